@@ -1,0 +1,1 @@
+"""Radial profiles and the two-dimensional axisymmetric fields that they stand for."""

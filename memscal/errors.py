@@ -1,0 +1,81 @@
+"""The family of errors that memscal raises on purpose.
+
+Every one of them says what is wrong (file, HDF5 path, value, unit), why that is a
+problem, and what to do about it.  The command line turns each kind into the exit code
+in its ``exit_code`` attribute; a library user catches :class:`MemscalError`.
+"""
+
+from __future__ import annotations
+
+__all__ = [
+    "ConvergenceError",
+    "DomainError",
+    "FitError",
+    "FormatError",
+    "InputError",
+    "MemscalError",
+    "OutputError",
+    "SchemaVersionError",
+    "UnitError",
+    "UnsafeFileError",
+]
+
+
+class MemscalError(Exception):
+    """Base of every error that memscal raises on purpose.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong: the file, the path inside it, the value, the unit.
+    why : str, optional
+        Why this stops the work.
+    cure : str, optional
+        What the user can do.
+    """
+
+    exit_code = 3
+
+    def __init__(self, problem: str, *, why: str = "", cure: str = "") -> None:
+        self.problem = problem
+        self.why = why
+        self.cure = cure
+        super().__init__("\n".join(part for part in (problem, why, cure) if part))
+
+
+class InputError(MemscalError, ValueError):
+    """A value, an array or an option that cannot be worked with."""
+
+
+class DomainError(InputError):
+    """A request outside the range in which the mechanical model holds."""
+
+
+class UnitError(InputError):
+    """A unit that is missing, unknown, or of the wrong dimension."""
+
+
+class FormatError(InputError):
+    """A file that does not hold what its format requires."""
+
+
+class SchemaVersionError(FormatError):
+    """A file written under a newer major version of its schema."""
+
+
+class UnsafeFileError(FormatError):
+    """A file whose structure could read, run, hang or exhaust something: refused unread."""
+
+
+class FitError(MemscalError):
+    """Data that do not determine the parameters that are asked of them."""
+
+
+class ConvergenceError(MemscalError):
+    """A numerical solution that did not reach its stated accuracy."""
+
+
+class OutputError(MemscalError):
+    """An output that was not written; what was there before is untouched."""
+
+    exit_code = 4

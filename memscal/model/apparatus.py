@@ -1,0 +1,200 @@
+"""What a calibration finds: the data of an apparatus function, as stored in its artifact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+from memscal.model.provenance import Process
+from memscal.model.scan import StressSensor
+from memscal.model.stress import StressProfile
+from memscal.model.validation import FloatArray
+
+__all__ = [
+    "ApparatusData",
+    "ApparatusField",
+    "ApparatusRadial",
+    "ParameterSet",
+    "QualityCheck",
+    "Reconvolution",
+    "TransferFunction",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class ApparatusField:
+    """The apparatus function on a Cartesian grid, with unit integral over it.
+
+    ``x`` (n,) and ``y`` (m,) in m; ``g`` and ``g_errors`` (m, n) in 1/m^2.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    g: FloatArray
+    g_errors: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ApparatusRadial:
+    """The radial profile of the apparatus function.
+
+    ``r`` (n,) in m; ``g``, ``g_errors`` (k = 1) and ``g_gaussian`` (n,) in 1/m^2;
+    ``g_covariance`` (n, n) in 1/m^4.
+    """
+
+    r: FloatArray
+    g: FloatArray
+    g_errors: FloatArray
+    g_gaussian: FloatArray
+    g_covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class TransferFunction:
+    """Modulus of the apparatus function's 2-D Fourier transform along a radius.
+
+    ``k`` (n,) in rad/m; ``modulus``, ``modulus_errors`` and ``window`` (the
+    regularisation's, from 0 to 1) are dimensionless.  Beyond ``resolved_wavenumber``
+    (rad/m) the scan says nothing: what stands there is the regularisation's.
+    """
+
+    k: FloatArray
+    modulus: FloatArray
+    modulus_errors: FloatArray
+    window: FloatArray
+    resolved_wavenumber: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reconvolution:
+    """The scan beside what the calibration predicts for it; all in V against ``x`` in m.
+
+    ``u_zz_predicted`` uses the deconvolved G, ``u_zz_gaussian`` the Gaussian fitted in data
+    space; ``residual`` is measured minus predicted.
+    """
+
+    x: FloatArray
+    u_zz: FloatArray
+    u_zz_errors: FloatArray
+    u_zz_predicted: FloatArray
+    u_zz_gaussian: FloatArray
+    residual: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterSet:
+    """Estimated scalars with their joint covariance, in SI units.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Such as ``conversion_constant`` (V/Pa) or ``gaussian_sigma`` (m).
+    values : ndarray, shape (n,)
+        Their estimates.
+    covariance : ndarray, shape (n, n)
+        Their joint covariance, systematic contributions included.
+
+    Examples
+    --------
+    >>> p = ParameterSet(("gaussian_sigma",), np.array([5.6e-4]), np.array([[1e-12]]))
+    >>> p["gaussian_sigma"], p.uncertainty("gaussian_sigma")
+    (0.00056, 1e-06)
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        if self.values.shape != (n,) or self.covariance.shape != (n, n):
+            raise InputError(
+                f"{n} parameter names, {self.values.shape} values and a covariance of shape "
+                f"{self.covariance.shape} do not fit together."
+            )
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def uncertainty(self, name: str) -> float:
+        """Return the standard uncertainty (k = 1) of one parameter, in its SI unit."""
+        i = self.names.index(name)
+        return float(np.sqrt(self.covariance[i, i]))
+
+
+@dataclass(frozen=True)
+class QualityCheck:
+    """One check of a result: what was found, what is allowed, and what a failure means."""
+
+    name: str
+    value: float
+    limit: float
+    passed: bool
+    meaning: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ApparatusData:
+    """Everything that an apparatus-function artifact stores.
+
+    Parameters
+    ----------
+    field, radial, transfer, reconvolution
+        The apparatus function in its three views, and the scan it came from.
+    parameters : ParameterSet
+        ``conversion_constant`` (V/Pa), ``gaussian_sigma``, ``gaussian_sigma_deconvolved``,
+        ``centre`` (m), ``baseline`` (V), and any further ones.
+    checks : tuple of QualityCheck
+        Quality checks.
+    film, indenter, sensor, load
+        Carried over from the scan; the load in N.
+    reference : StressProfile
+        The base stress that was divided by.
+    process : Process
+        What was done, with what.
+    budget : mapping
+        Standard uncertainty of the conversion constant and of both Gaussian widths by
+        source: ``{"conversion_constant": {"noise": ..., "load": ...}, ...}``, SI units.
+    """
+
+    field: ApparatusField
+    radial: ApparatusRadial
+    transfer: TransferFunction
+    reconvolution: Reconvolution
+    parameters: ParameterSet
+    checks: tuple[QualityCheck, ...]
+    film: ElasticFilm
+    indenter: Indenter
+    sensor: StressSensor
+    load: float
+    reference: StressProfile
+    process: Process
+    budget: Mapping[str, Mapping[str, float]]
+
+    @property
+    def conversion_constant(self) -> float:
+        """Conversion constant A, in V/Pa."""
+        return self.parameters["conversion_constant"]
+
+    @property
+    def gaussian_sigma(self) -> float:
+        """Standard deviation of the Gaussian fitted in data space, in m."""
+        return self.parameters["gaussian_sigma"]
+
+    @property
+    def resolved_wavenumber(self) -> float:
+        """Wavenumber up to which the scan determines G, in rad/m."""
+        return self.transfer.resolved_wavenumber
+
+    @property
+    def passed(self) -> bool:
+        """Whether every quality check passed."""
+        return all(check.passed for check in self.checks)

@@ -1,0 +1,70 @@
+"""The elastic film between the indenter and the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from memscal.model.validation import require_non_negative, require_positive, require_range
+
+__all__ = ["ElasticFilm"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticFilm:
+    r"""A linear elastic film bonded to a rigid base.
+
+    Parameters
+    ----------
+    young_modulus : float
+        Young's modulus :math:`E`, in Pa.
+    poisson_ratio : float
+        Poisson's ratio :math:`\nu`, from 0 up to and including 0.5 (incompressible).
+    thickness : float
+        Thickness :math:`h`, in m.
+    roughness_rms : float, optional
+        Root-mean-square roughness of the free surface, in m.
+    young_modulus_uncertainty, poisson_ratio_uncertainty, thickness_uncertainty : float, optional
+        Standard uncertainties (k = 1), in the unit of the quantity.  ``None`` means "not
+        stated"; a calibration then counts nothing for that source and says so.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or lies outside its physical range.
+
+    Examples
+    --------
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> round(film.shear_modulus)
+    733333
+    """
+
+    young_modulus: float
+    poisson_ratio: float
+    thickness: float
+    roughness_rms: float | None = None
+    young_modulus_uncertainty: float | None = None
+    poisson_ratio_uncertainty: float | None = None
+    thickness_uncertainty: float | None = None
+    roughness_rms_uncertainty: float | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("film young_modulus", self.young_modulus, "Pa")
+        require_range("film poisson_ratio", self.poisson_ratio, 0.0, 0.5, "1")
+        require_positive("film thickness", self.thickness, "m")
+        for name in ("young_modulus", "poisson_ratio", "thickness", "roughness_rms"):
+            uncertainty = getattr(self, f"{name}_uncertainty")
+            if uncertainty is not None:
+                require_non_negative(f"standard uncertainty of film {name}", uncertainty)
+        if self.roughness_rms is not None:
+            require_non_negative("film roughness_rms", self.roughness_rms)
+
+    @property
+    def shear_modulus(self) -> float:
+        r"""Shear modulus :math:`G = E / 2(1 + \nu)`, in Pa."""
+        return self.young_modulus / (2 * (1 + self.poisson_ratio))
+
+    @property
+    def contact_modulus(self) -> float:
+        r"""Plane-strain modulus :math:`E^* = E / (1 - \nu^2)` of a rigid contact, in Pa."""
+        return self.young_modulus / (1 - self.poisson_ratio**2)

@@ -1,0 +1,48 @@
+"""Where data came from, and what was done to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+__all__ = ["Process", "SourceFile"]
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file that was read: its base name and the SHA-256 of its bytes.
+
+    The folder is left out on purpose: it says nothing elsewhere and may be private.
+    """
+
+    file_name: str
+    sha256: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Process:
+    """What produced a result: program, options, environment, inputs, messages.
+
+    Parameters
+    ----------
+    program, version, date : str
+        Name and version of the program; date in ISO 8601 with its offset.
+    configuration : mapping
+        Every option with its value, the seed included; JSON-serialisable.
+    environment : mapping
+        Versions of Python and of the numerical libraries; JSON-serialisable.
+    messages : tuple of str
+        What the user was told while it ran.
+    input_scan, input_reference : SourceFile, optional
+        The files that were read.
+    """
+
+    program: str
+    version: str
+    date: str
+    configuration: Mapping[str, Any] = field(default_factory=dict)
+    environment: Mapping[str, Any] = field(default_factory=dict)
+    messages: tuple[str, ...] = ()
+    input_scan: SourceFile | None = None
+    input_reference: SourceFile | None = None

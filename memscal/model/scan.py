@@ -1,0 +1,145 @@
+"""A scan: the sensor's voltage for many positions of the indenter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+from memscal.model.provenance import SourceFile
+from memscal.model.stress import StressProfile
+from memscal.model.validation import FloatArray, finite_vector, frozen_array, require_non_negative
+
+__all__ = ["Scan", "StressSensor"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressSensor:
+    """The sensor and the channel whose voltage was recorded."""
+
+    name: str = ""
+    model: str = ""
+    channel: str = "zz"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scan:
+    """Sensor voltage against the position of the indenter, with what it was measured on.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Positions along the scan, in m; need not be sorted, centred or evenly spaced.
+    u_zz : ndarray, shape (n,), (repeat, n), or (m, n) where ``y`` is given
+        Normal channel's voltage, in V; NaN marks a missing point.
+    load : float
+        Nominal load of the indenter, in N.
+    indenter, film, sensor
+        What was pressed, on what, measured by what.
+    y : ndarray, shape (m,), optional
+        Second axis of a raster scan, in m.
+    u_zz_errors : ndarray, shape of ``u_zz``, optional
+        Standard uncertainty of each voltage (electronic noise), in V.
+    normal_load : ndarray, shape of ``u_zz``, optional
+        Load at each point, in N, where it was recorded.
+    channels : mapping of str to ndarray, shape of ``u_zz``
+        Further channels (``u_xz``, ``u_yz``), in V.
+    load_uncertainty : float, optional
+        Standard uncertainty of the load common to all points, in N.
+    title, start_time, end_time, notes : str
+        Free text; times in ISO 8601.
+    reference : StressProfile, optional
+        A base stress that travels with the scan.
+    synthetic : mapping, optional
+        The known truth of a simulated scan, SI units; present only in synthetic data.
+    source : SourceFile, optional
+        The file it was read from.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a position is not finite, or a load is not positive.
+
+    Examples
+    --------
+    >>> from memscal.model.indenter import Rod
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> scan = Scan(x=[-1e-3, 0, 1e-3], u_zz=[1e-3, 3e-3, 1e-3], load=1.0,
+    ...             indenter=Rod(radius=0.25e-3), film=film)
+    >>> scan.kind
+    'line'
+    """
+
+    x: FloatArray
+    u_zz: FloatArray
+    load: float
+    indenter: Indenter
+    film: ElasticFilm
+    sensor: StressSensor = field(default_factory=StressSensor)
+    y: FloatArray | None = None
+    u_zz_errors: FloatArray | None = None
+    normal_load: FloatArray | None = None
+    channels: Mapping[str, FloatArray] = field(default_factory=dict)
+    load_uncertainty: float | None = None
+    title: str = ""
+    start_time: str = ""
+    end_time: str = ""
+    notes: str = ""
+    reference: StressProfile | None = None
+    synthetic: Mapping[str, float | str] | None = None
+    source: SourceFile | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "x", finite_vector("x of the scan", self.x))
+        if self.y is not None:
+            object.__setattr__(self, "y", finite_vector("y of the scan", self.y))
+        object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
+        self._check_signal_shape()
+        for name in ("u_zz_errors", "normal_load"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, self._like_signal(name, getattr(self, name)))
+        channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
+        object.__setattr__(self, "channels", channels)
+        self._check_values()
+
+    @property
+    def kind(self) -> str:
+        """``"line"``, ``"repeats"`` or ``"raster"``, by the axes of ``u_zz``."""
+        if self.y is not None:
+            return "raster"
+        return "line" if self.u_zz.ndim == 1 else "repeats"
+
+    def _check_signal_shape(self) -> None:
+        n = self.x.size
+        if self.y is not None:
+            good = self.u_zz.shape == (self.y.size, n)
+            wanted = f"({self.y.size}, {n}), from y and x"
+        else:
+            good = self.u_zz.ndim in (1, 2) and self.u_zz.shape[-1:] == (n,) and self.u_zz.size > 0
+            wanted = f"({n},) or (repeat, {n})"
+        if not good:
+            raise InputError(f"u_zz has shape {self.u_zz.shape}, but it should be {wanted}.")
+
+    def _like_signal(self, name: str, values: FloatArray) -> FloatArray:
+        array = frozen_array(values)
+        if array.shape != self.u_zz.shape:
+            raise InputError(f"{name} has shape {array.shape}, but u_zz has {self.u_zz.shape}.")
+        return array
+
+    def _check_values(self) -> None:
+        if np.any(np.isinf(self.u_zz)):
+            raise InputError("u_zz holds an infinite voltage.", cure="Mark missing points with NaN.")
+        if not (np.isfinite(self.load) and self.load > 0):
+            raise InputError(
+                f"The load of the scan is {self.load:g} N, but it must be above zero.",
+                why="A calibration divides the voltage by the stress that this load produces.",
+                cure="Give the indenter's load (/entry/indenter/load).",
+            )
+        if self.load_uncertainty is not None:
+            require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        if self.u_zz_errors is not None and np.any(self.u_zz_errors < 0):
+            raise InputError("u_zz_errors holds a negative standard uncertainty.")

@@ -1,0 +1,99 @@
+"""A radial stress profile at the base of the film: the reference of a calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+from memscal.model.provenance import SourceFile
+from memscal.model.validation import (
+    FloatArray,
+    finite_vector,
+    require_increasing,
+    require_positive,
+)
+
+__all__ = ["StressProfile"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StressProfile:
+    r"""Stress at the base of the film as a function of radius, for one load.
+
+    Parameters
+    ----------
+    r : ndarray, shape (n,)
+        Distance from the axis of the indenter, in m; increasing, from 0 or above.
+    sigma_zz : ndarray, shape (n,)
+        Normal stress at the base, in Pa, positive in compression.
+    load : float
+        The normal load :math:`P` that produces it, in N.
+    sigma_rz : ndarray, shape (n,), optional
+        Radial shear stress at the base, in Pa, positive outward.
+    depth, contact_radius, stick_radius : float, optional
+        Indentation depth and radii, in m.
+    friction_coefficient : float, optional
+        Amontons' coefficient; ``inf`` for full stick.
+    loading : str
+        ``"incremental"``, ``"total"``, or ``""`` where it makes no difference or is unknown.
+    film, indenter : optional
+        What was pressed on what.
+    solver, discretisation : str
+        The program or method, and its mesh or quadrature.
+    convergence : float, optional
+        Estimated relative error of ``sigma_zz``, of its maximum.
+    source : SourceFile, optional
+        The file it was read from.
+
+    Raises
+    ------
+    InputError
+        If the axis does not increase or the shapes disagree.
+
+    Examples
+    --------
+    >>> profile = StressProfile(r=[0.0, 1e-3], sigma_zz=[2.0e5, 1.0e5], load=1.0)
+    >>> profile.sigma_zz.max()
+    np.float64(200000.0)
+    """
+
+    r: FloatArray
+    sigma_zz: FloatArray
+    load: float
+    sigma_rz: FloatArray | None = None
+    depth: float | None = None
+    contact_radius: float | None = None
+    stick_radius: float | None = None
+    friction_coefficient: float | None = None
+    loading: str = ""
+    film: ElasticFilm | None = None
+    indenter: Indenter | None = None
+    solver: str = ""
+    discretisation: str = ""
+    convergence: float | None = None
+    source: SourceFile | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("load of the stress profile", self.load, "N")
+        for name in ("r", "sigma_zz", "sigma_rz"):
+            values = getattr(self, name)
+            if values is not None:
+                object.__setattr__(self, name, finite_vector(f"{name} of the stress profile", values))
+        require_increasing("r of the stress profile", self.r)
+        if self.r[0] < 0:
+            raise InputError("r of the stress profile is negative.", cure="Give radii, not positions.")
+        for name in ("sigma_zz", "sigma_rz"):
+            values = getattr(self, name)
+            if values is not None and values.shape != self.r.shape:
+                raise InputError(
+                    f"{name} of the stress profile has {values.size} values for {self.r.size} radii."
+                )
+
+    @property
+    def force(self) -> float:
+        r"""Force :math:`2\pi\int\sigma_{zz}\,r\,dr` that the table itself carries, in N."""
+        return float(2 * np.pi * np.trapezoid(self.sigma_zz * self.r, self.r))

@@ -1,0 +1,70 @@
+"""The few checks that the dataclasses share."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from memscal.errors import InputError
+
+__all__ = [
+    "FloatArray",
+    "finite_vector",
+    "frozen_array",
+    "require_increasing",
+    "require_non_negative",
+    "require_positive",
+    "require_range",
+]
+
+FloatArray = NDArray[np.float64]
+
+
+def require_positive(what: str, value: float, unit: str = "") -> None:
+    """Refuse a value that is not a finite number above zero."""
+    if not (math.isfinite(value) and value > 0):
+        raise InputError(
+            f"{what} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero.",
+            cure="Check the value and its unit.",
+        )
+
+
+def require_non_negative(what: str, value: float) -> None:
+    """Refuse a value that is not a finite number of at least zero."""
+    if not (math.isfinite(value) and value >= 0):
+        raise InputError(f"{what} is {value:g}, but it must be finite and not negative.")
+
+
+def require_range(what: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Refuse a value outside the closed range from ``low`` to ``high``."""
+    if not (math.isfinite(value) and low <= value <= high):
+        raise InputError(
+            f"{what} is {value:g} {unit}".rstrip() + f", but it must lie from {low:g} to {high:g}.",
+            cure="Check the value and its unit.",
+        )
+
+
+def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> FloatArray:
+    """Return a read-only copy, so that a frozen dataclass stays frozen."""
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+def finite_vector(what: str, values: ArrayLike) -> FloatArray:
+    """Return a read-only 1-D copy; refuse another shape or a value that is not finite."""
+    array = frozen_array(values)
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(f"{what} has shape {array.shape}, but a 1-D array with values is needed.")
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"{what} holds a value that is not finite.")
+    return array
+
+
+def require_increasing(what: str, values: FloatArray) -> None:
+    """Refuse an axis that does not strictly increase."""
+    if np.any(np.diff(values) <= 0):
+        raise InputError(f"{what} must increase strictly.", cure="Sort it; merge equal positions.")
