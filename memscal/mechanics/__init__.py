@@ -1,0 +1,1 @@
+"""Linear elasticity of a bonded film: what an indenter on top does at the base."""

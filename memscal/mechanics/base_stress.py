@@ -1,0 +1,99 @@
+r"""Stress at the base of the film under a given surface traction.
+
+.. math::
+
+    \sigma_{zz}(r) &= \int_0^\infty (T\hat p - N\hat q)\,J_0(kr)\,k\,dk, \\
+    \sigma_{rz}(r) &= \int_0^\infty (S\hat p + R\hat q)\,J_1(kr)\,k\,dk,
+
+with the transfer functions of :mod:`memscal.mechanics.film_response`.  They fall like
+:math:`e^{-kh}`, so that a finite range of wavenumbers carries everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import j0, j1
+
+from memscal.mechanics import film_response as film
+from memscal.mechanics.quadrature import gauss_panels
+from memscal.mechanics.traction import InterfaceTraction
+from memscal.model.film import ElasticFilm
+from memscal.model.validation import FloatArray
+
+__all__ = ["base_normal_stress", "base_shear_stress", "decay_radius"]
+
+# k h exp(-k h) is below 1e-16 here.
+_LARGEST_KH = 42.0
+# Phase, in rad, that one panel of the k-quadrature may span.
+_PHASE = 14.0
+# Radii treated together: bounds the memory and lets near radii use fewer wavenumbers.
+_CHUNK = 256
+
+
+def base_normal_stress(
+    elastic_film: ElasticFilm, traction: InterfaceTraction, r: FloatArray
+) -> FloatArray:
+    """Return the normal stress at the base at the radii ``r`` (m), in Pa, compression positive.
+
+    Accurate to about 1e-13 of its maximum; zero beyond :func:`decay_radius`.
+    """
+    nu = elastic_film.poisson_ratio
+
+    def spectrum(k: FloatArray) -> FloatArray:
+        x = k * elastic_film.thickness
+        pressed = film.base_normal_from_pressure(x, nu) * traction.pressure_transform(k)
+        return pressed - film.base_normal_from_shear(x, nu) * traction.shear_transform(k)
+
+    return _hankel_synthesis(elastic_film, traction, r, spectrum, j0)
+
+
+def base_shear_stress(
+    elastic_film: ElasticFilm, traction: InterfaceTraction, r: FloatArray
+) -> FloatArray:
+    r"""Return the shear stress :math:`\sigma_{rz}` at the base at ``r`` (m), in Pa.
+
+    Positive where the film drags the base outward.
+    """
+    nu = elastic_film.poisson_ratio
+
+    def spectrum(k: FloatArray) -> FloatArray:
+        x = k * elastic_film.thickness
+        pressed = film.base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
+        return pressed + film.base_shear_from_shear(x, nu) * traction.shear_transform(k)
+
+    return _hankel_synthesis(elastic_film, traction, r, spectrum, j1)
+
+
+def decay_radius(elastic_film: ElasticFilm, contact_radius: float) -> float:
+    r"""Radius (m) beyond which the stress at the base is below 1e-13 of its maximum.
+
+    The stress decays as :math:`e^{-\eta r/h}`, where :math:`i\eta` is the zero of the transfer
+    functions' denominator nearest to the real axis: :math:`\eta` falls from 1.19 at
+    :math:`\nu = 0` to 0.739 at :math:`\nu = 1/2`.
+    """
+    return contact_radius + 45 * elastic_film.thickness
+
+
+def _hankel_synthesis(
+    elastic_film: ElasticFilm,
+    traction: InterfaceTraction,
+    r: FloatArray,
+    spectrum: Callable[[FloatArray], FloatArray],
+    bessel: Callable[[FloatArray], FloatArray],
+) -> FloatArray:
+    """Sum ``spectrum(k) bessel(k r) k dk`` at all radii, chunk by chunk of similar radii."""
+    h = elastic_film.thickness
+    flat = np.ravel(r)
+    inside = np.flatnonzero(flat <= decay_radius(elastic_film, traction.radius))
+    order = inside[np.argsort(flat[inside], kind="stable")]
+    stress = np.zeros_like(flat)
+    for start in range(0, order.size, _CHUNK):
+        chunk = order[start : start + _CHUNK]
+        # The integrand turns at the rate r (Bessel function) + radius (transform of the traction);
+        # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
+        rate = flat[chunk[-1]] + traction.radius
+        k, weights = gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / rate))
+        stress[chunk] = bessel(np.outer(flat[chunk], k)) @ (weights * k * spectrum(k))
+    return stress.reshape(np.shape(r))

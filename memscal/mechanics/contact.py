@@ -1,0 +1,171 @@
+"""A solved contact: what stands between indenter and film, and what reaches the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.errors import InputError
+from memscal.mechanics.base_stress import base_normal_stress, base_shear_stress
+from memscal.mechanics.traction import InterfaceTraction
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+from memscal.model.stress import StressProfile
+from memscal.model.validation import FloatArray
+
+__all__ = ["Contact"]
+
+# A cubic spline through a stress sampled this many times per film thickness is good to 1e-6 of
+# its maximum: the film lets nothing through that varies faster than exp(-kh).
+_SAMPLES_PER_THICKNESS = 50
+# The profile ends where the stress stays below this fraction of its maximum ...
+_PROFILE_FLOOR = 1e-9
+# ... which is within this many film thicknesses outside the contact, for any Poisson's ratio.
+_PROFILE_REACH = 32
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contact:
+    r"""A rigid indenter pressed on a bonded film, solved; from :func:`memscal.indent`.
+
+    Parameters
+    ----------
+    film, indenter
+        What was pressed on what.
+    load : float
+        Normal load :math:`P`, in N.
+    depth : float
+        Indentation depth :math:`\delta`, in m.
+    contact_radius, stick_radius : float
+        Radius of the contact and of the part of it that sticks, in m.
+    friction : float
+        Amontons' coefficient; ``inf`` for a contact that sticks all over.
+    loading : str
+        ``"incremental"`` or ``"total"``; ``""`` where it makes no difference (any rod).
+    backend : str
+        ``"hankel"``: linear elasticity by Hankel transforms.
+    convergence : float
+        Largest change of the base stress under refinement, relative to its maximum.
+    discretisation : str
+        What was refined, in words.
+    traction : InterfaceTraction
+        Pressure and shear at the interface.
+
+    Notes
+    -----
+    Stresses are in Pa at radii in m.  Normal stress is positive in compression.  Shear is the
+    component :math:`\sigma_{rz}` with z from the base to the surface: positive where the
+    indenter drags the film outward (interface), and where the film drags the base outward.
+
+    Examples
+    --------
+    >>> from memscal.mechanics.indent import indent
+    >>> from memscal.model.indenter import Rod
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> contact = indent(film, Rod(radius=0.25e-3), load=1.0)
+    >>> print((contact.base_stress([0.0, 1e-3, 4e-3]) * 1e-3).round(1))  # kPa
+    [181.8  92.9   0.1]
+    """
+
+    film: ElasticFilm
+    indenter: Indenter
+    load: float
+    depth: float
+    contact_radius: float
+    stick_radius: float
+    friction: float
+    loading: str
+    backend: str
+    convergence: float
+    discretisation: str
+    traction: InterfaceTraction
+
+    def base_stress(self, r: ArrayLike) -> FloatArray:
+        r"""Return the normal stress :math:`\sigma_{zz}` at the base, compression positive.
+
+        Parameters
+        ----------
+        r : array_like
+            Radii from 0 upward, in m, of any shape.
+
+        Returns
+        -------
+        ndarray, shape of ``r``
+            The stress in Pa.  Set to zero where it has decayed below 1e-13 of its maximum.
+
+        Raises
+        ------
+        InputError
+            If a radius is negative or not finite.
+        """
+        return base_normal_stress(self.film, self.traction, _radii(r))
+
+    def base_shear(self, r: ArrayLike) -> FloatArray:
+        r"""Return the shear stress :math:`\sigma_{rz}` at the base, positive outward.
+
+        As :meth:`base_stress`; it is the traction of the film on its base.
+        """
+        return base_shear_stress(self.film, self.traction, _radii(r))
+
+    def interface_pressure(self, r: ArrayLike) -> FloatArray:
+        """Return the pressure between indenter and film in Pa; zero outside the contact.
+
+        Under a rod it grows without bound towards the edge; the edge itself counts as outside.
+        """
+        return self.traction.pressure(_radii(r))
+
+    def interface_shear(self, r: ArrayLike) -> FloatArray:
+        """Return the radial traction on the film in Pa, positive outward; zero outside."""
+        return self.traction.shear(_radii(r))
+
+    def profile(self, r: ArrayLike | None = None) -> StressProfile:
+        """Return the stress at the base as a table, such as a calibration divides by.
+
+        Parameters
+        ----------
+        r : array_like, shape (n,), optional
+            Increasing radii in m.  By default 50 per film thickness, out to where the stress
+            stays below 1e-9 of its maximum: a cubic spline through them is accurate to 1e-6.
+        """
+        radii = self._default_radii() if r is None else _radii(r)
+        sigma_zz = self.base_stress(radii)
+        if r is None:
+            floor = _PROFILE_FLOOR * np.max(np.abs(sigma_zz))
+            last = np.flatnonzero(np.abs(sigma_zz) >= floor)[-1] + 2
+            radii, sigma_zz = radii[:last], sigma_zz[:last]
+        return StressProfile(
+            r=radii,
+            sigma_zz=sigma_zz,
+            sigma_rz=self.base_shear(radii),
+            load=self.load,
+            depth=self.depth,
+            contact_radius=self.contact_radius,
+            stick_radius=self.stick_radius,
+            friction_coefficient=self.friction,
+            loading=self.loading,
+            film=self.film,
+            indenter=self.indenter,
+            solver=f"memscal, {self.backend} backend",
+            discretisation=self.discretisation,
+            convergence=self.convergence,
+        )
+
+    def _default_radii(self) -> FloatArray:
+        reach = self.contact_radius / self.film.thickness + _PROFILE_REACH
+        count = int(np.ceil(reach * _SAMPLES_PER_THICKNESS)) + 1
+        return np.arange(count) * (self.film.thickness / _SAMPLES_PER_THICKNESS)
+
+
+def _radii(r: ArrayLike) -> FloatArray:
+    """Return radii as an array; refuse what is no radius."""
+    radii = np.asarray(r, dtype=np.float64)
+    if not np.all(np.isfinite(radii)):
+        raise InputError("A radius is not finite.", cure="Leave missing positions out.")
+    if np.any(radii < 0):
+        raise InputError(
+            f"A radius is {radii.min():g} m, but radii are not negative.",
+            cure="Give distances from the indenter's axis, such as abs(x - centre).",
+        )
+    return radii
