@@ -48,6 +48,10 @@ class FieldGrid(Protocol):
         """Return the field of a spectrum, with the origin where it belongs on the grid."""
         ...
 
+    def transfer(self, field: FloatArray) -> FloatArray:
+        """Fourier transform about the origin of a field that :meth:`inverse` returned."""
+        ...
+
     def to_image(self, field: FloatArray) -> FloatArray:
         """Return the whole plane as an image with the axis at its central pixel."""
         ...
@@ -104,6 +108,10 @@ class EvenGrid:
     def inverse(self, spectrum: FloatArray) -> FloatArray:
         """Return the even field of a real even spectrum."""
         return np.asarray(scipy.fft.idctn(spectrum, type=1) / self.cell_area)
+
+    def transfer(self, field: FloatArray) -> FloatArray:
+        """Fourier transform about the origin, where an even field's axis already is."""
+        return self.forward(field)
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to the whole plane: odd size, axis at the central pixel."""
@@ -167,6 +175,10 @@ class Lattice:
         """
         shape = (self.y.size, self.x.size)
         return np.asarray(scipy.fft.fftshift(scipy.fft.irfft2(spectrum, s=shape)) / self.cell_area)
+
+    def transfer(self, field: FloatArray) -> FloatArray:
+        """Fourier transform about the central point."""
+        return self.forward(scipy.fft.ifftshift(field))
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Return the field itself: it already covers the plane."""

@@ -1,0 +1,87 @@
+r"""The paper's white-noise method: a seeded draw, and its exact expectation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import scipy.fft
+
+from memscal.deconvolution.problem import (
+    NOISE_RATIO,
+    Division,
+    DivisionProblem,
+    filtered_division,
+)
+
+__all__ = ["WhiteNoise", "WhiteNoiseDraw"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WhiteNoise:
+    r"""Expectation of the paper's method over all draws of its noise.
+
+    White noise added to both fields leaves the numerator's mean as it is and turns the
+    denominator's reciprocal, for circular complex noise of variance :math:`s^2`, into
+    :math:`E[1/(z + n)] = (1 - \exp(-|z|^2/s^2))/z`: a smooth spectral window.
+
+    Parameters
+    ----------
+    amplitude : float
+        Noise amplitude, in units of the paper's: a tenth of the weakest relevant component.
+    """
+
+    amplitude: float = 1.0
+    name: ClassVar[str] = "white-noise"
+    assumes: ClassVar[str] = (
+        "G is negligible beyond the wavenumber where the voltage sinks into its noise."
+    )
+    fails: ClassVar[str] = (
+        "A G with fine detail (sharp edges, a narrow ring) is smoothed to the resolved band."
+    )
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide with the expected window."""
+        z = np.abs(problem.grid.forward(problem.reference))
+        s = self.amplitude * NOISE_RATIO * problem.weakest_reference
+        return filtered_division(problem, -np.expm1(-((z / s) ** 2)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class WhiteNoiseDraw:
+    """One seeded draw of the paper's method, as published.
+
+    White noise is added to both fields before the transform.  The quotient of two
+    components lost in noise has no finite variance: single draws carry rare, large ripples.
+
+    Parameters
+    ----------
+    amplitude : float
+        Noise amplitude, in units of the paper's.
+    seed : int
+        Seed of the noise.
+    """
+
+    amplitude: float = 1.0
+    seed: int = 0
+    name: ClassVar[str] = "white-noise-draw"
+    assumes: ClassVar[str] = WhiteNoise.assumes
+    fails: ClassVar[str] = "Draws are heavy-tailed: some carry ripples that others do not."
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide one draw; the window is that of its expectation."""
+        grid = problem.grid
+        rng = np.random.default_rng(self.seed)
+        numerator = grid.to_image(problem.voltage)
+        denominator = grid.to_image(problem.reference)
+        # Noise of spectral amplitude s has, per pixel, s / (cell area * sqrt(pixels)).
+        per_pixel = self.amplitude * NOISE_RATIO / (grid.cell_area * np.sqrt(numerator.size))
+        noisy_u = numerator + rng.normal(0, per_pixel * problem.weakest_voltage, numerator.shape)
+        noisy_s = denominator + rng.normal(
+            0, per_pixel * problem.weakest_reference, denominator.shape
+        )
+        quotient = scipy.fft.rfft2(noisy_u) / scipy.fft.rfft2(noisy_s)
+        image = scipy.fft.fftshift(scipy.fft.irfft2(quotient, s=numerator.shape)) / grid.cell_area
+        expected = WhiteNoise(amplitude=self.amplitude).divide(problem)
+        return Division(grid.from_image(image), expected.window)

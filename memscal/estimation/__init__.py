@@ -1,0 +1,1 @@
+"""From a scan to a radial profile with its uncertainty, in data space."""

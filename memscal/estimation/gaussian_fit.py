@@ -1,0 +1,244 @@
+r"""The Gaussian apparatus function that fits the scan best, in data space.
+
+The paper's approximation, fitted where the noise is known: its convolution with the
+reference stress against the scan, together with conversion constant, centre, baseline and
+linear drift, by weighted least squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import FitError
+from memscal.estimation.forward import ForwardModel, Geometry, gaussian_transfer
+from memscal.model.validation import FloatArray
+
+__all__ = ["GaussianFit", "fit_gaussian"]
+
+#: Widths from which the search starts, in units of the film's smoothing length.
+_STARTING_WIDTHS = (0.1, 0.3, 0.8)
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianFit:
+    """Best Gaussian in data space, and the model linearised about it.
+
+    Parameters
+    ----------
+    conversion_constant : float
+        A, in V/Pa.
+    sigma : float
+        Standard deviation of the Gaussian, in m.
+    centre : ndarray, shape (2,)
+        Centre (x0, y0) of the sensor, in m.
+    drift : ndarray, shape (2,) or (3,)
+        Baseline, and its change over half the scan's range along x (and y), in V.
+    geometry : Geometry
+        Distances from the centre.
+    jacobian : ndarray, shape (n, p)
+        Derivatives of the voltages by A, sigma, centre and drift, in this order.
+    predicted : ndarray, shape (n,)
+        Voltages of the fit, in V.
+    """
+
+    conversion_constant: float
+    sigma: float
+    centre: FloatArray
+    drift: FloatArray
+    geometry: Geometry
+    jacobian: FloatArray
+    predicted: FloatArray
+
+    def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
+        """Covariance of the parameters for a noise (V) and relative weights."""
+        information = (self.jacobian * weights[:, None]).T @ self.jacobian
+        scale = np.sqrt(np.diag(information))
+        inverse = np.linalg.inv(information / np.outer(scale, scale))
+        return np.asarray(noise**2 * inverse / np.outer(scale, scale))
+
+
+def fit_gaussian(
+    model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
+) -> GaussianFit:
+    """Fit a Gaussian apparatus function to the scan.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Points and reference.
+    weights : ndarray, shape (n,)
+        Relative weights: the inverse noise variance up to a common factor.
+    start : GaussianFit, optional
+        An earlier fit to start from; without one the search is global and robust.
+
+    Raises
+    ------
+    FitError
+        If the scan does not determine the parameters.
+    """
+    if start is None:
+        return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
+    theta = np.concatenate(
+        [[start.conversion_constant, start.sigma], start.centre[: _plane(model)], start.drift]
+    )
+    return _solve(model, weights, theta, loss="linear")
+
+
+def _plane(model: ForwardModel) -> int:
+    return 2 if model.points.planar else 1
+
+
+def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: str) -> GaussianFit:
+    from scipy.optimize import least_squares
+
+    root = np.sqrt(weights)
+    last: dict[bytes, GaussianFit] = {}
+
+    def evaluate(scaled: FloatArray) -> GaussianFit:
+        # Residuals and Jacobian are asked for at the same point, one after the other.
+        key = scaled.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = _linearise(model, scaled * scale)
+        return last[key]
+
+    scale = _typical(model, start)
+    noise = _robust_scale(root * (model.points.u - _linearise(model, start).predicted))
+    result = least_squares(
+        lambda t: root * (evaluate(t).predicted - model.points.u) / noise,
+        start / scale,
+        jac=lambda t: root[:, None] * evaluate(t).jacobian * scale / noise,
+        loss=loss,
+        f_scale=3.0,
+        xtol=1e-10,
+        ftol=1e-12,
+        gtol=1e-10,
+        max_nfev=100,
+    )
+    fit = _linearise(model, result.x * scale)
+    if not result.success or not 0 < fit.conversion_constant < np.inf:
+        raise _undetermined(model, fit)
+    return _positive_width(fit)
+
+
+def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
+    """Typical size of each parameter, so that the solver sees numbers near one."""
+    width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
+    amplitude = np.ptp(model.points.u)
+    plane = _plane(model)
+    drift = np.full(theta.size - 2 - plane, amplitude)
+    return np.concatenate([[abs(theta[0]), width], np.full(plane, width), drift])
+
+
+def _linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
+    plane = _plane(model)
+    amplitude, sigma = float(theta[0]), float(theta[1])
+    centre = np.zeros(2)
+    centre[:plane] = theta[2 : 2 + plane]
+    drift = theta[2 + plane :]
+    geometry = model.geometry(centre)
+    kernel = gaussian_transfer(model.k, sigma)
+    columns = np.stack([kernel, -sigma * model.k**2 * kernel], axis=1)
+    shape, widening = model.signal(geometry, columns).T
+    shift = model.centre_derivative(geometry, amplitude * kernel)
+    baseline = model.drift_columns
+    jacobian = np.column_stack([shape, amplitude * widening, shift, baseline])
+    predicted = amplitude * shape + baseline @ drift
+    return GaussianFit(amplitude, sigma, centre, drift, geometry, jacobian, predicted)
+
+
+def _positive_width(fit: GaussianFit) -> GaussianFit:
+    """The model is even in the width: choose its positive branch."""
+    if fit.sigma >= 0:
+        return fit
+    jacobian = fit.jacobian.copy()
+    jacobian[:, 1] *= -1
+    return GaussianFit(
+        fit.conversion_constant,
+        -fit.sigma,
+        fit.centre,
+        fit.drift,
+        fit.geometry,
+        jacobian,
+        fit.predicted,
+    )
+
+
+def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
+    """Best of a grid of centres and widths, by the sum of absolute residuals.
+
+    A single outlier can be the largest voltage of a scan: positions are tried, not read off.
+    """
+    points = model.points
+    centres = _trial_centres(model)
+    radii = np.linspace(0.0, 2 * np.ptp(points.x) + 2 * np.ptp(points.y), 400)
+    baseline = model.drift_columns
+    root = np.sqrt(weights)
+    best, best_cost = np.zeros(0), np.inf
+    for sigma in _smoothing_length(model) * np.array(_STARTING_WIDTHS):
+        profile = RadialTable(radii, model, float(sigma))
+        for centre in centres:
+            shape = profile.at(np.hypot(points.x - centre[0], points.y - centre[1])) * points.load
+            design = np.column_stack([shape, baseline]) * root[:, None]
+            coefficients = np.linalg.lstsq(design, root * points.u, rcond=None)[0]
+            cost = float(np.abs(root * points.u - design @ coefficients).sum())
+            if coefficients[0] > 0 and cost < best_cost:
+                drift = coefficients[1:]
+                place = centre[: _plane(model)]
+                best = np.concatenate([[coefficients[0], sigma], place, drift])
+                best_cost = cost
+    if not best.size:
+        raise _undetermined(model, None)
+    return best
+
+
+class RadialTable:
+    """A per-newton profile of a Gaussian kernel on a table of radii, for quick trials."""
+
+    def __init__(self, radii: FloatArray, model: ForwardModel, sigma: float) -> None:
+        kernel = gaussian_transfer(model.k, sigma) * model.reference.values
+        self.radii = radii
+        self.values = model.reference.wavenumbers.synthesise(kernel, radii)
+
+    def at(self, radius: FloatArray) -> FloatArray:
+        """Interpolate linearly."""
+        return np.interp(radius, self.radii, self.values)
+
+
+def _trial_centres(model: ForwardModel) -> FloatArray:
+    """At most 40 candidates per axis: the positions themselves, less the outer tenth."""
+    points = model.points
+
+    def inner(positions: FloatArray) -> FloatArray:
+        unique = np.unique(positions)
+        margin = unique.size // 10
+        kept = unique[margin : unique.size - margin]
+        return kept[:: int(np.ceil(kept.size / (12 if points.planar else 40)))]
+
+    if not points.planar:
+        return np.stack([inner(points.x), np.zeros_like(inner(points.x))], axis=1)
+    mesh = np.meshgrid(inner(points.x), inner(points.y))
+    return np.stack([axis.ravel() for axis in mesh], axis=1)
+
+
+def _smoothing_length(model: ForwardModel) -> float:
+    r"""Length over which the film blurs: :math:`1/k` where the reference has fallen to half."""
+    values = model.reference.values / model.reference.values[0]
+    return float(1 / model.k[int(np.argmax(values < 0.5))])
+
+
+def _robust_scale(residual: FloatArray) -> float:
+    """Median absolute deviation as a standard deviation, never zero."""
+    scale = 1.4826 * float(np.median(np.abs(residual)))
+    return max(scale, 1e-12 * float(np.abs(residual).max()), np.finfo(float).tiny)
+
+
+def _undetermined(model: ForwardModel, fit: GaussianFit | None) -> FitError:
+    found = "" if fit is None else f" (it stopped at A = {fit.conversion_constant:.3g} V/Pa)"
+    return FitError(
+        f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{found}.",
+        why="The voltage does not rise and fall with the distance from one centre.",
+        cure="Look at the scan; check its channel, its positions and that it crosses the sensor.",
+    )

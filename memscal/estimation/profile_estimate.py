@@ -1,0 +1,172 @@
+"""From the points of a scan to its radial profile: centre, baseline, noise and outliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.estimation.departure import (
+    DepartureBasis,
+    WeighedFit,
+    departure_basis,
+    weigh_departures,
+)
+from memscal.estimation.forward import ForwardModel, gaussian_transfer
+from memscal.estimation.gaussian_fit import GaussianFit, fit_gaussian
+from memscal.estimation.points import ScanPoints
+from memscal.model.validation import FloatArray
+
+__all__ = ["ProfileEstimate", "estimate_profile"]
+
+#: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
+OUTLIER_THRESHOLD = 3.5
+_WEIGHING_ROUNDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileEstimate:
+    """What the scan says, with its uncertainty, before any division.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Points and reference.
+    gaussian : GaussianFit
+        The best Gaussian in data space.
+    basis, weighed : DepartureBasis, WeighedFit
+        Kernels about it and their posterior.
+    weights : ndarray, shape (n,)
+        Relative weight of each point, the outliers' below one included.
+    outlier_weight : ndarray, shape (n,)
+        One for ordinary points; less for outliers.
+    """
+
+    model: ForwardModel
+    gaussian: GaussianFit
+    basis: DepartureBasis
+    weighed: WeighedFit
+    weights: FloatArray
+    outlier_weight: FloatArray
+
+    @property
+    def points(self) -> ScanPoints:
+        """The measured points."""
+        return self.model.points
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard uncertainty of each voltage, shape (n,), in V; outliers' noise is not raised."""
+        base = np.ones_like(self.points.u) if self.points.u_errors is None else self.points.u_errors
+        return base * self.noise_scale
+
+    @property
+    def noise_scale(self) -> float:
+        """Noise of a point (V); or, with stated uncertainties, the factor they must grow by.
+
+        Stated uncertainties are believed until the residuals exceed them (Birge's ratio).
+        """
+        found = self.weighed.noise
+        return found if self.points.u_errors is None else max(found, 1.0)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of all corrections, at the noise that is believed."""
+        return self.weighed.covariance * (self.noise_scale / self.weighed.noise) ** 2
+
+    @property
+    def gaussian_covariance(self) -> FloatArray:
+        """Covariance of the Gaussian fit's own parameters, by the Jacobian's order."""
+        return self.gaussian.covariance(self.weights, self.noise_scale)
+
+    @property
+    def kernel(self) -> FloatArray:
+        """Transform of A G at the quadrature nodes, in V/Pa."""
+        gaussian = gaussian_transfer(self.model.k, self.gaussian.sigma)
+        return self.gaussian.conversion_constant * gaussian + (
+            self.basis.kernels @ self.weighed.mean
+        )
+
+    @property
+    def spectrum(self) -> RadialSpectrum:
+        """Transform of the voltage's radial profile per newton, in V m^2 / N."""
+        reference = self.model.reference
+        return RadialSpectrum(reference.wavenumbers, self.kernel * reference.values)
+
+    @property
+    def conversion_constant(self) -> float:
+        """Integral of A G over the plane: A without any division, in V/Pa."""
+        return float(self.gaussian.conversion_constant + self.basis.integrals @ self.weighed.mean)
+
+    @property
+    def centre(self) -> FloatArray:
+        """Centre of the sensor (x0, y0), in m, with the departures allowed for."""
+        plane = 2 if self.points.planar else 1
+        corrected = self.gaussian.centre.copy()
+        corrected[:plane] += self.weighed.mean[2 : 2 + plane]
+        return corrected
+
+    @property
+    def drift(self) -> FloatArray:
+        """Baseline and its change over half the range along x (and y), in V."""
+        first = 4 if self.points.planar else 3
+        return np.asarray(self.gaussian.drift + self.weighed.mean[first : self.basis.flat])
+
+    @property
+    def background(self) -> FloatArray:
+        """Baseline and drift at each point, shape (n,), in V."""
+        return np.asarray(self.model.drift_columns @ self.drift)
+
+    @property
+    def predicted(self) -> FloatArray:
+        """Voltage at each point, shape (n,), in V."""
+        return self.points.u - self.weighed.residual
+
+
+def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEstimate:
+    """Estimate the radial profile of a scan, its centre, baseline, noise and outliers.
+
+    Parameters
+    ----------
+    points : ScanPoints
+        The measured points.
+    reference : RadialSpectrum
+        Transform of the base stress per newton.
+
+    Returns
+    -------
+    ProfileEstimate
+        The best Gaussian and the weighed departures from it.
+
+    Raises
+    ------
+    FitError
+        If the scan does not determine the parameters.
+    """
+    model = ForwardModel(points, reference)
+    stated = np.ones_like(points.u) if points.u_errors is None else points.u_errors**-2.0
+    fit = fit_gaussian(model, stated)
+    residual = points.u - fit.predicted
+    outlier = _outlier_weight(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
+    for _ in range(_WEIGHING_ROUNDS):
+        weights = stated * outlier
+        fit = fit_gaussian(model, weights, start=fit)
+        basis = departure_basis(model, fit)
+        weighed = weigh_departures(model, fit, basis, weights)
+        found = _outlier_weight(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
+        if np.allclose(found, outlier, atol=0.02):
+            break
+        outlier = found
+    return ProfileEstimate(model, fit, basis, weighed, weights, outlier)
+
+
+def _outlier_weight(standardised: FloatArray, threshold: float) -> FloatArray:
+    """Weights that leave ordinary points at one and fall fast beyond the threshold.
+
+    The influence w z of a point falls as 1/z^3 beyond the threshold, so a gross outlier
+    moves nothing, yet no point is ever dropped.
+    """
+    scale = 1.4826 * np.median(np.abs(standardised))
+    z = np.abs(standardised) / max(scale, np.finfo(float).tiny)
+    return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))
