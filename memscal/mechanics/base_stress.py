@@ -22,14 +22,19 @@ from memscal.mechanics.traction import InterfaceTraction
 from memscal.model.film import ElasticFilm
 from memscal.model.validation import FloatArray
 
-__all__ = ["base_normal_stress", "base_shear_stress", "decay_radius"]
+__all__ = [
+    "base_normal_spectrum",
+    "base_normal_stress",
+    "base_shear_stress",
+    "decay_radius",
+]
 
-# k h exp(-k h) is below 1e-16 here.
-_LARGEST_KH = 42.0
+# k h exp(-k h) is below 1e-15 here.
+_LARGEST_KH = 38.0
 # Phase, in rad, that one panel of the k-quadrature may span.
 _PHASE = 14.0
 # Radii treated together: bounds the memory and lets near radii use fewer wavenumbers.
-_CHUNK = 256
+_CHUNK = 128
 
 
 def base_normal_stress(
@@ -39,14 +44,18 @@ def base_normal_stress(
 
     Accurate to about 1e-13 of its maximum; zero beyond :func:`decay_radius`.
     """
-    nu = elastic_film.poisson_ratio
+    return _hankel_synthesis(
+        elastic_film, traction, r, lambda k: base_normal_spectrum(elastic_film, traction, k), j0
+    )
 
-    def spectrum(k: FloatArray) -> FloatArray:
-        x = k * elastic_film.thickness
-        pressed = film.base_normal_from_pressure(x, nu) * traction.pressure_transform(k)
-        return pressed - film.base_normal_from_shear(x, nu) * traction.shear_transform(k)
 
-    return _hankel_synthesis(elastic_film, traction, r, spectrum, j0)
+def base_normal_spectrum(
+    elastic_film: ElasticFilm, traction: InterfaceTraction, k: FloatArray
+) -> FloatArray:
+    r"""Return :math:`\int\sigma_{zz}\,J_0(kr)\,r\,dr` of the base at ``k`` (rad/m), in N."""
+    x, nu = k * elastic_film.thickness, elastic_film.poisson_ratio
+    pressed = film.base_normal_from_pressure(x, nu) * traction.pressure_transform(k)
+    return pressed - film.base_normal_from_shear(x, nu) * traction.shear_transform(k)
 
 
 def base_shear_stress(

@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.mechanics.base_stress import base_normal_stress, base_shear_stress
+from memscal.mechanics.base_stress import (
+    base_normal_spectrum,
+    base_normal_stress,
+    base_shear_stress,
+)
 from memscal.mechanics.traction import InterfaceTraction
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
@@ -17,13 +21,16 @@ from memscal.model.validation import FloatArray
 
 __all__ = ["Contact"]
 
-# A cubic spline through a stress sampled this many times per film thickness is good to 1e-6 of
-# its maximum: the film lets nothing through that varies faster than exp(-kh).
-_SAMPLES_PER_THICKNESS = 50
-# The profile ends where the stress stays below this fraction of its maximum ...
+# Default radii of a profile, in film thicknesses.  The film passes nothing that varies faster
+# than exp(-kh): with these steps, near the contact and far from it, a cubic spline is good to
+# 1e-6 of the maximum.
+_NEAR_STEP = 0.02
+_FAR_STEP = 0.05
+_NEAR_REACH = 6.0
+_FAR_REACH = 26.0
+# The profile ends where the stress stays below this fraction of its maximum, which happens
+# within the far reach for any Poisson's ratio.
 _PROFILE_FLOOR = 1e-9
-# ... which is within this many film thicknesses outside the contact, for any Poisson's ratio.
-_PROFILE_REACH = 32
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,8 +72,8 @@ class Contact:
     >>> from memscal.model.indenter import Rod
     >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     >>> contact = indent(film, Rod(radius=0.25e-3), load=1.0)
-    >>> print((contact.base_stress([0.0, 1e-3, 4e-3]) * 1e-3).round(1))  # kPa
-    [181.8  92.9   0.1]
+    >>> [round(float(s)) for s in contact.base_stress([0.0, 1e-3, 4e-3])]
+    [181805, 92873, 102]
     """
 
     film: ElasticFilm
@@ -102,6 +109,15 @@ class Contact:
         """
         return base_normal_stress(self.film, self.traction, _radii(r))
 
+    def base_spectrum(self, k: ArrayLike) -> FloatArray:
+        r"""Return the two-dimensional Fourier transform of the base stress, in N.
+
+        At ``k`` in rad/m, of any shape:
+        :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, which is the load at k = 0.
+        """
+        wavenumbers = np.asarray(k, dtype=np.float64)
+        return 2 * np.pi * base_normal_spectrum(self.film, self.traction, wavenumbers)
+
     def base_shear(self, r: ArrayLike) -> FloatArray:
         r"""Return the shear stress :math:`\sigma_{rz}` at the base, positive outward.
 
@@ -126,8 +142,9 @@ class Contact:
         Parameters
         ----------
         r : array_like, shape (n,), optional
-            Increasing radii in m.  By default 50 per film thickness, out to where the stress
-            stays below 1e-9 of its maximum: a cubic spline through them is accurate to 1e-6.
+            Increasing radii in m.  By default 50 per film thickness near the contact and 20
+            far from it, out to where the stress stays below 1e-9 of its maximum: a cubic
+            spline through them is accurate to 1e-6 of the maximum.
         """
         radii = self._default_radii() if r is None else _radii(r)
         sigma_zz = self.base_stress(radii)
@@ -153,9 +170,10 @@ class Contact:
         )
 
     def _default_radii(self) -> FloatArray:
-        reach = self.contact_radius / self.film.thickness + _PROFILE_REACH
-        count = int(np.ceil(reach * _SAMPLES_PER_THICKNESS)) + 1
-        return np.arange(count) * (self.film.thickness / _SAMPLES_PER_THICKNESS)
+        edge = self.contact_radius / self.film.thickness
+        near = np.arange(0.0, edge + _NEAR_REACH, _NEAR_STEP)
+        far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
+        return np.concatenate([near, far]) * self.film.thickness
 
 
 def _radii(r: ArrayLike) -> FloatArray:
