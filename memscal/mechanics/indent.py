@@ -124,10 +124,10 @@ def indent(
         raise InputError(f"The loads or depths have shape {given.shape}; give a flat list.")
     for value in given.flat:
         require_positive("load" if depth is None else "depth", value, "N" if depth is None else "m")
-    loads = given if depth is None else given * stiffness
+    loads, depths = (given, given / stiffness) if depth is None else (given * stiffness, given)
     contacts = [
-        _rod_contact(film, indenter, solution, float(one), float(one / stiffness), friction)
-        for one in loads.flat
+        _rod_contact(film, indenter, solution, float(one_load), float(one_depth), friction)
+        for one_load, one_depth in zip(loads.flat, depths.flat, strict=True)
     ]
     return contacts[0] if given.ndim == 0 else contacts
 

@@ -32,12 +32,13 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import spherical_jn
+from numpy.typing import NDArray
 
-from memscal.errors import ConvergenceError
+from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response
 from memscal.mechanics.base_stress import base_normal_stress
 from memscal.mechanics.quadrature import gauss_panels
+from memscal.mechanics.spherical_bessel import spherical_bessel
 from memscal.model.film import ElasticFilm
 from memscal.model.validation import FloatArray
 
@@ -49,6 +50,8 @@ _MOST_TERMS = 128
 _SETTLED = 1e-9
 # ... and a solution that changes by more than this in the last doubling is not given away.
 _TOLERABLE = 1e-5
+# A wider rod would need more terms; it is also far from anything that is a probe of the film.
+_WIDEST = 100.0
 # x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
 _LARGEST_KH = 22.0
 
@@ -97,16 +100,17 @@ class RodTraction:
     def _transform(self, terms: FloatArray, first: int, k: FloatArray) -> FloatArray:
         if terms.size == 0:
             return np.zeros_like(k)
-        return self.load / (2 * np.pi) * (terms @ _bessel_rows(first, terms.size, k * self.radius))
+        orders = spherical_bessel(2 * terms.size, k * self.radius)[first::2]
+        return self.load / (2 * np.pi) * (terms @ orders)
 
     def _mean_scale(self) -> float:
         return self.load / (2 * np.pi * self.radius**2)
 
-    def _inside(self, r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _inside(self, r: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         ratio = np.asarray(r, dtype=np.float64) / self.radius
         under = ratio < 1
         m = np.sqrt(np.where(under, (1 - ratio) * (1 + ratio), 1.0))
-        return ratio, m, under
+        return ratio, np.asarray(m, dtype=np.float64), under
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +154,10 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
 
     Raises
     ------
+    DomainError
+        If the rod is more than a hundred times as wide as the film is thick.
     ConvergenceError
-        If the stress at the base has not settled to 1e-5 with the largest number of terms,
-        which happens for a rod many times wider than the film is thick.
+        If the stress at the base has not settled to 1e-5 with the largest number of terms.
 
     Examples
     --------
@@ -162,6 +167,12 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
     >>> round(solution.stiffness_factor, 4)
     1.3695
     """
+    if radius_ratio > _WIDEST:
+        raise DomainError(
+            f"The rod's radius is {radius_ratio:g} times the film's thickness, but this solution "
+            f"goes to {_WIDEST:g} times.",
+            cure="Check the radius and the thickness, and their units.",
+        )
     terms = _FEWEST_TERMS
     while True:
         coarse = _solve(radius_ratio, poisson_ratio, sticking, terms, order=12)
@@ -172,10 +183,10 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
             break
     if change > _TOLERABLE:
         raise ConvergenceError(
-            f"The stress under a rod {radius_ratio:g} times as wide as the film is thick changes "
-            f"by {change:.1g} of its maximum in the last refinement.",
+            f"Under a rod whose radius is {radius_ratio:g} times the film's thickness, the base "
+            f"stress changes by {change:.1g} of its maximum in the last refinement.",
             why=f"The model promises {_TOLERABLE:g}.",
-            cure="Use a narrower rod or a thicker film.",
+            cure="Use a narrower rod, a thicker film, or a rod that slides freely (friction 0).",
         )
     stiffness, pressure_terms, shear_terms = fine
     return RodSolution(stiffness, pressure_terms, shear_terms, change)
@@ -201,12 +212,12 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     longest = min(1.5 * ratio, 6.0)
     xi, weights = gauss_panels(_LARGEST_KH * ratio, longest, order)
     x = xi / ratio
-    even = _bessel_rows(0, terms, xi)
+    orders = spherical_bessel(2 * terms, xi)
+    even, odd = orders[::2], orders[1::2]
     matrix = np.diag(_half_space_diagonal(0, terms))
     matrix += (even * (weights * film_response.normal_correction(x, nu))) @ even.T
     if not sticking:
         return matrix
-    odd = _bessel_rows(1, terms, xi)
     radial = np.diag(_half_space_diagonal(1, terms))
     radial += (odd * (weights * film_response.radial_correction(x, nu))) @ odd.T
     coupling = film_response.half_space_coupling(nu) * _half_space_coupling_matrix(terms)
@@ -238,12 +249,6 @@ def _largest_change(fine: _Terms, coarse: _Terms, ratio: float, nu: float) -> fl
     ]
     by_stress = np.max(np.abs(stress[0] - stress[1])) / np.max(np.abs(stress[0]))
     return float(max(by_stress, abs(fine[0] / coarse[0] - 1)))
-
-
-def _bessel_rows(first: int, count: int, xi: FloatArray) -> FloatArray:
-    """Return the spherical Bessel functions of orders first, first + 2, ... as rows."""
-    orders = first + 2 * np.arange(count)
-    return np.asarray(spherical_jn(orders[:, None], xi), dtype=np.float64)
 
 
 def _term_scale(count: int) -> FloatArray:

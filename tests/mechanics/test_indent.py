@@ -1,0 +1,189 @@
+"""Pressing a rod on a film: loads, depths, base stress, and requests that are refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from memscal.errors import DomainError, InputError
+from memscal.mechanics.contact import Contact
+from memscal.mechanics.indent import indent
+from memscal.mechanics.quadrature import gauss_panels
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod, Sphere
+
+FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+ROD = Rod(radius=0.25e-3)
+CASES = [(nu, friction) for nu in (0.0, 0.3, 0.5) for friction in (0.0, math.inf)]
+
+
+def press(nu: float, friction: float, radius: float = 0.25e-3) -> Contact:
+    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
+    return indent(film, Rod(radius=radius), load=0.5, friction=friction)
+
+
+@pytest.mark.parametrize("radius", [0.25e-3, 4e-3])
+@pytest.mark.parametrize(("nu", "friction"), CASES)
+def test_the_base_carries_the_load(nu: float, friction: float, radius: float) -> None:
+    contact = press(nu, friction, radius)
+    r, weights = gauss_panels(radius + 40 * 2e-3, 1e-3)
+    force = 2 * np.pi * np.sum(weights * r * contact.base_stress(r))
+    assert force == pytest.approx(0.5, rel=1e-9)
+    assert 2 * np.pi * contact.traction.pressure_transform(np.zeros(1))[0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("nu", "friction"), CASES)
+def test_the_interface_carries_the_load(nu: float, friction: float) -> None:
+    contact = press(nu, friction)
+    theta, weights = gauss_panels(np.pi / 2, 0.02)
+    r = ROD.radius * np.sin(theta)
+    ring = weights * r * ROD.radius * np.cos(theta)
+    force = 2 * np.pi * np.sum(ring * contact.interface_pressure(r))
+    assert force == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize(("nu", "friction"), CASES)
+def test_the_base_stress_has_converged(nu: float, friction: float) -> None:
+    assert press(nu, friction).convergence < 1e-5
+
+
+def test_the_rod_of_the_paper_sinks_as_deep_as_the_linear_model_says() -> None:
+    contact = indent(FILM, ROD, load=1.0)
+    assert contact.depth == pytest.approx(0.587e-3, rel=1e-3)
+    assert contact.load / contact.depth == pytest.approx(1704, rel=5e-4)
+
+
+def test_friction_changes_the_stress_under_the_paper_s_rod_by_a_thousandth() -> None:
+    r = np.linspace(0.0, 8e-3, 400)
+    sliding = indent(FILM, ROD, load=1.0).base_stress(r)
+    sticking = indent(FILM, ROD, load=1.0, friction=math.inf).base_stress(r)
+    difference = np.max(np.abs(sticking - sliding)) / np.max(sliding)
+    assert 0.5e-3 < difference < 2e-3
+
+
+@pytest.mark.parametrize(("nu", "friction"), CASES)
+def test_the_film_drags_its_base_outward_around_the_axis(nu: float, friction: float) -> None:
+    shear = press(nu, friction).base_shear([0.0, 0.5e-3, 1e-3, 2e-3])
+    assert shear[0] == 0
+    assert np.all(shear[1:] > 0)
+
+
+def test_load_and_depth_are_two_sides_of_one_solution() -> None:
+    by_load = indent(FILM, ROD, load=0.7)
+    by_depth = indent(FILM, ROD, depth=by_load.depth)
+    assert by_depth.load == pytest.approx(0.7, rel=1e-14)
+    r = np.array([0.0, 1e-3])
+    np.testing.assert_allclose(by_depth.base_stress(r), by_load.base_stress(r), rtol=1e-13)
+
+
+def test_a_list_of_loads_gives_proportional_contacts() -> None:
+    one, three = indent(FILM, ROD, load=[0.25, 0.75])
+    assert three.depth == pytest.approx(3 * one.depth, rel=1e-14)
+    assert [c.load for c in indent(FILM, ROD, load=np.array([0.25, 0.75]))] == [0.25, 0.75]
+    assert [c.depth for c in indent(FILM, ROD, depth=(1e-5, 2e-5))] == [1e-5, 2e-5]
+
+
+def test_a_contact_says_how_it_was_solved() -> None:
+    sliding, sticking = indent(FILM, ROD, load=1.0), indent(FILM, ROD, load=1.0, friction=math.inf)
+    assert (sliding.stick_radius, sticking.stick_radius) == (0.0, ROD.radius)
+    assert sliding.contact_radius == ROD.radius
+    assert "spherical Bessel functions" in sliding.discretisation
+
+
+@pytest.mark.parametrize("friction", [0.0, math.inf])
+def test_there_is_no_traction_outside_the_rod_and_no_nan_anywhere(friction: float) -> None:
+    contact = indent(FILM, ROD, load=1.0, friction=friction)
+    r = np.array([[0.0, 0.1e-3], [ROD.radius, 1.0]])
+    for field in (
+        contact.interface_pressure(r),
+        contact.interface_shear(r),
+        contact.base_stress(r),
+        contact.base_shear(r),
+    ):
+        assert field.shape == r.shape
+        assert np.all(np.isfinite(field))
+        assert field[1, 1] == 0
+    assert np.all(contact.interface_pressure(r[1]) == 0)
+
+
+@pytest.mark.parametrize("r", [[-1e-3], [np.nan], [np.inf]])
+def test_what_is_no_radius_is_refused(r: list[float]) -> None:
+    with pytest.raises(InputError, match="radius"):
+        indent(FILM, ROD, load=1.0).base_stress(r)
+
+
+def test_base_stress_does_not_depend_on_the_other_radii_asked_for() -> None:
+    contact = indent(FILM, ROD, load=1.0)
+    r = np.linspace(0.0, 30e-3, 300)
+    together = contact.base_stress(r[::-1])[::-1]
+    alone = [contact.base_stress(one) for one in r[::25]]
+    np.testing.assert_allclose(together[::25], alone, atol=1e-12 * together.max())
+
+
+@pytest.mark.parametrize("radius", [0.1e-3, 0.25e-3, 4e-3])
+@pytest.mark.parametrize(("nu", "friction"), CASES)
+def test_a_spline_through_the_profile_is_the_stress(
+    nu: float, friction: float, radius: float
+) -> None:
+    contact = press(nu, friction, radius)
+    profile = contact.profile()
+    between = (profile.r[1:] + profile.r[:-1]) / 2
+    spline = CubicSpline(profile.r, profile.sigma_zz)
+    highest = np.max(profile.sigma_zz)
+    assert np.max(np.abs(spline(between) - contact.base_stress(between))) < 1e-6 * highest
+    beyond = profile.r[-1] + np.linspace(0.0, 0.05, 50)
+    assert np.max(np.abs(contact.base_stress(beyond))) < 1.1e-9 * highest
+
+
+def test_the_profile_of_a_sticking_rod_carries_its_conditions() -> None:
+    profile = indent(FILM, ROD, load=1.0, friction=math.inf).profile([0.0, 1e-3])
+    assert (profile.load, profile.contact_radius) == (1.0, ROD.radius)
+    assert math.isinf(profile.friction_coefficient or 0)
+    assert profile.loading == ""
+    assert profile.film == FILM
+    assert profile.sigma_rz is not None
+    assert profile.sigma_rz[1] > 0
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("name", ["load", "depth"])
+def test_loads_and_depths_that_are_not_positive_are_refused(name: str, value: float) -> None:
+    asked = (value, None) if name == "load" else (None, value)
+    with pytest.raises(InputError, match=f"{name} is .* above zero"):
+        indent(FILM, ROD, load=asked[0], depth=asked[1])
+
+
+def test_load_and_depth_together_or_neither_are_refused() -> None:
+    with pytest.raises(InputError, match="either a load or a depth, not both"):
+        indent(FILM, ROD, load=1.0, depth=1e-4)
+    with pytest.raises(InputError, match="either a load or a depth"):
+        indent(FILM, ROD)
+
+
+def test_a_rod_pushed_through_the_film_is_refused() -> None:
+    with pytest.raises(DomainError, match="sink"):
+        indent(FILM, ROD, depth=2e-3)
+    with pytest.raises(DomainError, match="sink"):
+        indent(FILM, ROD, load=10.0)
+
+
+def test_friction_between_none_and_full_is_refused_with_what_is_supported() -> None:
+    with pytest.raises(DomainError, match=r"0 \(slides freely\) and inf \(sticks\)"):
+        indent(FILM, ROD, load=1.0, friction=0.4)
+    for nonsense in (-0.1, math.nan):
+        with pytest.raises(InputError, match="friction"):
+            indent(FILM, ROD, load=1.0, friction=nonsense)
+
+
+def test_what_this_version_does_not_solve_is_refused_in_plain_words() -> None:
+    with pytest.raises(DomainError, match="flat rod only"):
+        indent(FILM, Sphere(radius=0.1288), load=1.0)
+    with pytest.raises(DomainError, match="not in this version"):
+        indent(FILM, ROD, load=1.0, backend="fem")
+    with pytest.raises(InputError, match="not known"):
+        indent(FILM, ROD, load=1.0, backend="magic")
+    with pytest.raises(InputError, match="loading"):
+        indent(FILM, ROD, load=1.0, loading="sudden")

@@ -1,0 +1,126 @@
+"""The rod problem against closed forms, tables and an independent integral equation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import j0, j1
+
+from memscal.errors import ConvergenceError, DomainError
+from memscal.mechanics import film_response, rod
+from memscal.mechanics.quadrature import gauss_panels
+from memscal.mechanics.rod import solve_rod
+
+# Hayes, Keer, Herrmann and Mockros, J. Biomech. 5 (1972) 541, flat punch, nu = 0.5.
+HAYES = {0.2: 1.281, 0.4: 1.683, 0.6: 2.211, 0.8: 2.855, 1.0: 3.609, 1.5: 5.970, 2.0: 9.069}
+
+
+@pytest.mark.parametrize(("ratio", "kappa"), HAYES.items())
+def test_stiffness_agrees_with_the_table_of_hayes_within_its_own_error(
+    ratio: float, kappa: float
+) -> None:
+    assert solve_rod(ratio, 0.5, sticking=False).stiffness_factor == pytest.approx(kappa, rel=0.01)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+@pytest.mark.parametrize("ratio", [0.125, 1.0, 2.0])
+def test_frictionless_rod_solves_the_fredholm_equation(ratio: float, nu: float) -> None:
+    # phi(t) + int K(t,s) phi(s) ds = 1 on (0, a), by Nystrom's method; kappa is phi's mean.
+    t, t_weights = gauss_panels(1.0, 0.25)
+    k, k_weights = gauss_panels(25.0 * ratio, 0.5)
+    cosines = np.cos(np.outer(t, k))
+    layer = k_weights * film_response.normal_correction(k / ratio, nu)
+    kernel = 2 / np.pi * (cosines * layer) @ cosines.T
+    phi = np.linalg.solve(np.eye(t.size) + kernel * t_weights, np.ones(t.size))
+    solution = solve_rod(ratio, nu, sticking=False)
+    assert solution.stiffness_factor == pytest.approx(t_weights @ phi, rel=1e-10)
+    transform = cosines.T @ (t_weights * phi) / (t_weights @ phi)
+    found = 2 * np.pi * solution.traction(1.0, 1.0).pressure_transform(k)
+    np.testing.assert_allclose(found, transform, atol=1e-10)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.2, 0.5])
+def test_a_very_thick_film_is_a_half_space_to_a_frictionless_rod(nu: float) -> None:
+    # Boussinesq: P = 2 E* a delta; the film's correction is of the order a/h.
+    assert solve_rod(1e-8, nu, sticking=False).stiffness_factor == pytest.approx(1, abs=1e-7)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.2, 0.4, 0.49])
+def test_a_very_thick_film_is_a_half_space_to_a_sticking_rod(nu: float) -> None:
+    # Mossakovskii, Spence: P = 4 G a delta ln(3 - 4 nu)/(1 - 2 nu).
+    exact = (1 - nu) * np.log(3 - 4 * nu) / (1 - 2 * nu)
+    assert solve_rod(1e-8, nu, sticking=True).stiffness_factor == pytest.approx(exact, rel=3e-6)
+
+
+@pytest.mark.parametrize(("sticking", "factor"), [(False, 3 / 64), (True, 3 / 16)])
+def test_a_thin_incompressible_film_is_lubricated_flow(sticking: bool, factor: float) -> None:
+    # Reynolds: kappa -> factor pi (a/h)^3, the rod seeming wider by about one thickness;
+    # the fourth root removes that edge when extrapolated in h/a.
+    ratios = np.array([10.0, 20.0])
+    kappa = [solve_rod(ratio, 0.5, sticking=sticking).stiffness_factor for ratio in ratios]
+    root = (np.array(kappa) / (factor * np.pi * ratios**3)) ** 0.25
+    assert 2 * root[1] - root[0] == pytest.approx(1, abs=3e-3)
+
+
+def test_a_thin_compressible_film_is_compressed_uniaxially() -> None:
+    # P -> pi a^2 M delta/h with M = 2G (1-nu)/(1-2nu), again with an edge of the order h.
+    nu, ratios = 0.3, np.array([10.0, 20.0])
+    kappa = np.array([solve_rod(ratio, nu, sticking=False).stiffness_factor for ratio in ratios])
+    limit = np.pi * (1 - nu) ** 2 / (2 * (1 - 2 * nu)) * ratios
+    root = np.sqrt(kappa / limit)
+    assert 2 * root[1] - root[0] == pytest.approx(1, abs=3e-3)
+
+
+@pytest.mark.parametrize("sticking", [False, True])
+def test_an_incompressible_film_converges_exponentially(sticking: bool) -> None:
+    assert solve_rod(0.125, 0.5, sticking=sticking).convergence < 1e-11
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
+def test_a_sticking_compressible_film_has_settled_to_its_stated_convergence(nu: float) -> None:
+    solution = solve_rod(0.5, nu, sticking=True)
+    assert solution.convergence < 1e-5
+    stiffness, *_ = rod._solve(0.5, nu, True, terms=256, order=16)
+    assert abs(solution.stiffness_factor / stiffness - 1) < solution.convergence
+
+
+@pytest.mark.parametrize(("nu", "sticking"), [(0.5, False), (0.5, True), (0.3, True)])
+def test_transforms_belong_to_the_tractions(nu: float, sticking: bool) -> None:
+    traction = solve_rod(0.5, nu, sticking=sticking).traction(2.0, 3.0)
+    theta, weights = gauss_panels(np.pi / 2, 0.02)  # r = a sin(theta) resolves the edge
+    r = 2.0 * np.sin(theta)
+    weights = weights * r * 2.0 * np.cos(theta)
+    for k in np.array([[0.0], [0.3], [1.1], [2.9]]):
+        pressure = np.sum(weights * traction.pressure(r) * j0(k * r))
+        shear = np.sum(weights * traction.shear(r) * j1(k * r))
+        scale = 3.0 / (2 * np.pi)
+        assert pressure == pytest.approx(traction.pressure_transform(k)[0], abs=1e-7 * scale)
+        assert shear == pytest.approx(traction.shear_transform(k)[0], abs=1e-7 * scale)
+
+
+def test_sticking_stiffens_the_film_and_sliding_needs_no_shear() -> None:
+    sliding = solve_rod(0.5, 0.5, sticking=False)
+    sticking = solve_rod(0.5, 0.5, sticking=True)
+    assert sticking.stiffness_factor > sliding.stiffness_factor
+    assert sliding.shear_terms.size == 0
+
+
+def test_shear_holds_back_what_the_pressure_would_move() -> None:
+    r = np.array([0.2, 0.5, 0.8])
+    # A thin incompressible film is squeezed outward, so that the rod drags it inward ...
+    assert np.all(solve_rod(1.0, 0.5, sticking=True).traction(1.0, 1.0).shear(r) < 0)
+    # ... a thick compressible one moves inward under a pressure, and is dragged outward.
+    assert np.all(solve_rod(0.01, 0.0, sticking=True).traction(1.0, 1.0).shear(r) > 0)
+
+
+def test_a_solution_that_has_not_settled_is_not_given_away(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rod, "_MOST_TERMS", 16)
+    with pytest.raises(ConvergenceError, match="in the last refinement"):
+        solve_rod(37.5, 0.5, sticking=False)
+
+
+def test_a_rod_too_wide_for_this_solution_is_refused() -> None:
+    with pytest.raises(DomainError, match="101 times the film's thickness"):
+        solve_rod(101.0, 0.5, sticking=False)
