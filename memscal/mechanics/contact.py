@@ -112,10 +112,10 @@ class Contact:
     def base_spectrum(self, k: ArrayLike) -> FloatArray:
         r"""Return the two-dimensional Fourier transform of the base stress, in N.
 
-        At ``k`` in rad/m, of any shape:
+        At ``k`` in rad/m, of any shape and sign:
         :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, which is the load at k = 0.
         """
-        wavenumbers = np.asarray(k, dtype=np.float64)
+        wavenumbers = np.abs(np.asarray(k, dtype=np.float64))
         return 2 * np.pi * base_normal_spectrum(self.film, self.traction, wavenumbers)
 
     def base_shear(self, r: ArrayLike) -> FloatArray:

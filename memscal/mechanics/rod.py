@@ -54,6 +54,8 @@ _TOLERABLE = 1e-5
 _WIDEST = 100.0
 # x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
 _LARGEST_KH = 22.0
+# Wavenumbers transformed together, which bounds the memory.
+_CHUNK = 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +101,14 @@ class RodTraction:
 
     def _transform(self, terms: FloatArray, first: int, k: FloatArray) -> FloatArray:
         if terms.size == 0:
-            return np.zeros_like(k)
-        orders = spherical_bessel(2 * terms.size, k * self.radius)[first::2]
-        return self.load / (2 * np.pi) * (terms @ orders)
+            return np.zeros(np.shape(k))
+        flat = np.ravel(k) * self.radius
+        sums = [
+            terms @ spherical_bessel(2 * terms.size, flat[start : start + _CHUNK])[first::2]
+            for start in range(0, flat.size, _CHUNK)
+        ]
+        values = self.load / (2 * np.pi) * np.concatenate(sums) if sums else flat
+        return values.reshape(np.shape(k))
 
     def _mean_scale(self) -> float:
         return self.load / (2 * np.pi * self.radius**2)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.special import j0
 
 from memscal.errors import DomainError, InputError
 from memscal.mechanics.contact import Contact
@@ -33,6 +34,28 @@ def test_the_base_carries_the_load(nu: float, friction: float, radius: float) ->
     force = 2 * np.pi * np.sum(weights * r * contact.base_stress(r))
     assert force == pytest.approx(0.5, rel=1e-9)
     assert 2 * np.pi * contact.traction.pressure_transform(np.zeros(1))[0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("friction", [0.0, math.inf])
+def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction: float) -> None:
+    contact = indent(FILM, ROD, load=0.5, friction=friction)
+    k = np.array([[0.0, 300.0, 700.0], [1500.0, 3000.0, 1e6]])
+    r, weights = gauss_panels(80e-3, 0.5e-3)
+    summed = 2 * np.pi * j0(k[..., None] * r) @ (weights * r * contact.base_stress(r))
+    spectrum = contact.base_spectrum(k)
+    np.testing.assert_allclose(spectrum[:, :2], summed[:, :2], atol=1e-11)
+    assert spectrum[0, 0] == pytest.approx(0.5, rel=1e-14)
+    assert abs(spectrum[1, 2]) < 1e-100
+    np.testing.assert_array_equal(contact.base_spectrum(-k), spectrum)
+
+
+def test_a_large_array_of_wavenumbers_is_treated_in_parts() -> None:
+    contact = indent(FILM, ROD, load=0.5)
+    k = np.linspace(0.0, 2e4, 20001)
+    np.testing.assert_allclose(
+        contact.base_spectrum(k)[::4000], contact.base_spectrum(k[::4000]), atol=1e-15
+    )
+    assert contact.base_spectrum([]).shape == (0,)
 
 
 @pytest.mark.parametrize(("nu", "friction"), CASES)
