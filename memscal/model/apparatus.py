@@ -98,6 +98,8 @@ class ParameterSet:
         Their estimates.
     covariance : ndarray, shape (n, n)
         Their joint covariance, systematic contributions included.
+    units : tuple of str, optional
+        Their SI units; needed only for names that the file format does not know.
 
     Examples
     --------
@@ -109,9 +111,12 @@ class ParameterSet:
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
+    units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.names)
+        if self.units and len(self.units) != n:
+            raise InputError(f"{n} parameter names, but {len(self.units)} units.")
         if self.values.shape != (n,) or self.covariance.shape != (n, n):
             raise InputError(
                 f"{n} parameter names, {self.values.shape} values and a covariance of shape "

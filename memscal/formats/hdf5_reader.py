@@ -1,0 +1,299 @@
+"""The one safe HDF5 reader: for files that come from anywhere, in any state.
+
+The file is read once into memory and hashed; HDF5 sees those bytes and never the disk.
+Only known paths are opened, along hard links; nothing is listed or visited.  Every dataset
+is checked (:mod:`memscal.formats.hdf5_limits`) before it is read, and whatever the library
+raises on damaged bytes becomes a :class:`~memscal.errors.FormatError`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import stat
+from collections.abc import Iterator
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.formats.hdf5_limits import (
+    MAX_TEXT_BYTES,
+    check_layout,
+    check_type,
+    claimed_bytes,
+    refuse,
+)
+from memscal.formats.schema import MAX_FILE_BYTES
+from memscal.formats.text import printable
+from memscal.model.provenance import SourceFile
+
+__all__ = ["SafeFile", "open_hdf5", "read_bytes"]
+
+_MAX_TOTAL_BYTES = 512 * 2**20
+_MAX_ATTRIBUTE_BYTES = 2**16
+_MAX_ATTRIBUTE_ITEMS = 64
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> bytes:
+    """Read a regular file of bounded size, once, without ever waiting for another program.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it cannot be read.
+    UnsafeFileError
+        If it is not a regular file, or too large.
+    """
+    shown = os.fspath(path)
+    flags = os.O_RDONLY
+    for name in ("O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY", "O_BINARY"):
+        flags |= getattr(os, name, 0)
+    try:
+        descriptor = os.open(shown, flags)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"{shown} cannot be read: {reason}.", cure="Check the name and the permissions."
+        ) from error
+    with os.fdopen(descriptor, "rb", buffering=0) as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise UnsafeFileError(
+                f"{shown} is not a regular file.",
+                why="A folder, pipe or device could keep a program waiting for ever.",
+                cure="Give the name of a file.",
+            )
+        if status.st_size > limit:
+            raise _too_large(shown, status.st_size, limit)
+        return _read_whole(file, shown, limit)
+
+
+def _read_whole(file: Any, shown: str, limit: int) -> bytes:
+    """Read to the end; a file that grows meanwhile still meets the limit."""
+    parts, size = [], 0
+    try:
+        while part := file.read(min(2**24, limit + 1 - size)):
+            parts.append(part)
+            size += len(part)
+            if size > limit:
+                raise _too_large(shown, size, limit)
+    except OSError as error:
+        raise InputError(f"{shown} cannot be read: {error.strerror}.") from error
+    return b"".join(parts)
+
+
+def _too_large(shown: str, size: int, limit: int) -> UnsafeFileError:
+    return UnsafeFileError(
+        f"{shown} has {size:,} bytes, but at most {limit:,} are read.",
+        why="A scan or an apparatus function is far smaller.",
+        cure="Check that it is the right file; leave out data that memscal does not need.",
+    )
+
+
+@contextlib.contextmanager
+def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
+    """Open an HDF5 file safely, for the time of a ``with`` block.
+
+    Raises
+    ------
+    FormatError
+        If it is not an HDF5 file, is damaged, or holds something that is not read.
+    """
+    from memscal.formats.hdf5_library import h5py
+
+    data = read_bytes(path)
+    name = os.path.basename(os.fspath(path))
+    if not data.startswith(_SIGNATURE):
+        raise FormatError(
+            f"{name} is not an HDF5 file.",
+            why="It does not begin with HDF5's signature.",
+            cure="Convert a table with `memscal import`.",
+        )
+    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    with _damage_named(f"{name} cannot be opened as HDF5"):
+        file = h5py.File(BytesIO(data), "r")
+    try:
+        yield SafeFile(file, name, source)
+    finally:
+        with contextlib.suppress(Exception):
+            file.close()
+
+
+@contextlib.contextmanager
+def _damage_named(problem: str) -> Iterator[None]:
+    """Turn whatever HDF5 raises on damaged bytes into one kind of error."""
+    try:
+        yield
+    except MemscalError:
+        raise
+    except MemoryError as error:
+        raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
+    except Exception as error:
+        raise FormatError(
+            f"{problem}.",
+            why=f"The file is damaged or incomplete ({printable(str(error), 200)}).",
+            cure="Get the file again from where it came from.",
+        ) from error
+
+
+class SafeFile:
+    """An open file whose content is reached by known paths only.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The file, opened from memory.
+    name : str
+        Its base name, for messages.
+    source : SourceFile
+        Name and SHA-256 of its bytes.
+    """
+
+    def __init__(self, file: Any, name: str, source: SourceFile) -> None:
+        self.name = name
+        self.source = source
+        self._root = file.id
+        self._budget = _MAX_TOTAL_BYTES
+        self._arrays: dict[str, np.ndarray[Any, Any]] = {}
+        self._texts: dict[str, str] = {}
+
+    def where(self, path: str) -> str:
+        """Return file and path as messages name them."""
+        return f"{self.name}: {path}"
+
+    def has(self, path: str) -> bool:
+        """Return whether a path exists; a link that is not a hard link is refused."""
+        with _damage_named(f"{self.where(path)} cannot be opened"):
+            return self._open(path) is not None
+
+    def is_group(self, path: str) -> bool:
+        """Return whether a path exists and is a group."""
+        from memscal.formats.hdf5_library import h5py
+
+        with _damage_named(f"{self.where(path)} cannot be opened"):
+            return isinstance(self._open(path), h5py.h5g.GroupID)
+
+    def array(self, path: str) -> np.ndarray[Any, Any]:
+        """Return the numbers at a path: 64-bit floats, or 64-bit integers where stored so."""
+        if path not in self._arrays:
+            with _damage_named(f"{self.where(path)} cannot be read"):
+                self._arrays[path] = self._read_array(path)
+        return self._arrays[path]
+
+    def text(self, path: str) -> str:
+        """Return the text at a path, without characters that do not print."""
+        if path not in self._texts:
+            with _damage_named(f"{self.where(path)} cannot be read"):
+                self._texts[path] = self._read_text(path)
+        return self._texts[path]
+
+    def is_text(self, path: str) -> bool:
+        """Return whether a path holds a string and not a number."""
+        from memscal.formats.hdf5_library import h5py
+
+        with _damage_named(f"{self.where(path)} cannot be read"):
+            return bool(self._dataset(path).get_type().get_class() == h5py.h5t.STRING)
+
+    def attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
+        """Return an attribute: text, a number, a few texts, or ``None`` where there is none."""
+        with _damage_named(f"{self.where(path)}@{name} cannot be read"):
+            return self._read_attribute(path, name)
+
+    def _open(self, path: str) -> Any:
+        """Follow a path along hard links; ``None`` where it ends."""
+        from memscal.formats.hdf5_library import h5py
+
+        item: Any = self._root
+        opened = h5py.h5o.open(item, b"/")
+        for name in path.strip("/").split("/") if path != "/" else ():
+            if not isinstance(opened, h5py.h5g.GroupID):
+                return None
+            key = name.encode("ascii")
+            if not opened.links.exists(key):
+                return None
+            if opened.links.get_info(key).type != h5py.h5l.TYPE_HARD:
+                raise UnsafeFileError(
+                    f"{self.where(path)} is reached through a soft, external or other link.",
+                    why="A link can lead to another file, to a pipe, or round in a circle.",
+                    cure="Copy the linked data into the file.",
+                )
+            opened = h5py.h5o.open(opened, key)
+        return opened
+
+    def _dataset(self, path: str) -> Any:
+        from memscal.formats.hdf5_library import h5py
+
+        found = self._open(path)
+        if found is None:
+            raise FormatError(f"{self.where(path)} is missing.")
+        if not isinstance(found, h5py.h5d.DatasetID):
+            raise FormatError(f"{self.where(path)} is not a dataset.")
+        return found
+
+    def _spend(self, path: str, size: int) -> None:
+        self._budget -= size
+        if self._budget < 0:
+            raise refuse(
+                self.where(path),
+                "brings the data of this file over the limit",
+                f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file.",
+            )
+
+    def _read_array(self, path: str) -> np.ndarray[Any, Any]:
+        from memscal.formats.hdf5_library import h5py
+
+        dataset = self._dataset(path)
+        check_layout(self.where(path), dataset, text=False)
+        self._spend(path, claimed_bytes(dataset))
+        whole = dataset.get_type().get_class() == h5py.h5t.INTEGER
+        values = np.empty(dataset.shape, dtype=np.int64 if whole else np.float64)
+        dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
+        values.setflags(write=False)
+        return values
+
+    def _read_text(self, path: str) -> str:
+        dataset = self._dataset(path)
+        check_layout(self.where(path), dataset, text=True)
+        self._spend(path, claimed_bytes(dataset))
+        from memscal.formats.hdf5_library import h5py
+
+        return printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
+
+    def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
+        from memscal.formats.hdf5_library import h5py
+
+        item = self._open(path)
+        if item is None:
+            raise FormatError(f"{self.where(path)} is missing.")
+        key = name.encode("ascii")
+        if not h5py.h5a.exists(item, key):
+            return None
+        attribute = h5py.h5a.open(item, key)
+        where = f"{self.where(path)}@{name}"
+        if attribute.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+            raise refuse(where, "has a null dataspace", "It holds no value.")
+        number = int(np.prod(attribute.shape, dtype=object))
+        size = number * attribute.get_type().get_size()
+        if len(attribute.shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
+            raise refuse(where, f"has {number} values", "An attribute is one value or a few names.")
+        text = attribute.get_type().get_class() == h5py.h5t.STRING
+        check_type(where, attribute.get_type(), text=text)
+        self._spend(path, size)
+        value = h5py.AttributeManager(_Owner(item))[name]
+        if not text:
+            return np.asarray(value).reshape(-1)[0].item() if number else None
+        if len(attribute.shape) == 0:
+            return printable(value, _MAX_ATTRIBUTE_BYTES)
+        return tuple(printable(part, _MAX_ATTRIBUTE_BYTES) for part in value)
+
+
+class _Owner:
+    """What h5py's attribute access needs of an object: its identifier."""
+
+    def __init__(self, identifier: Any) -> None:
+        self.id = identifier
+

@@ -1,0 +1,143 @@
+"""The one HDF5 writer: a tree becomes bytes in memory, and the bytes a file in one step."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.formats.atomic import atomic_write_bytes, ensure_writable
+from memscal.formats.digest import content_digest, contents_of, tree_items
+from memscal.formats.json_text import to_json
+from memscal.formats.schema import (
+    DIGEST_ATTRIBUTE,
+    SCHEMA_ATTRIBUTE,
+    SCHEMA_VERSION,
+    VERSION_ATTRIBUTE,
+)
+from memscal.formats.text import printable
+from memscal.formats.tree import Attribute, Group, Number, note, walk
+
+__all__ = ["ensure_writable", "file_tree", "tree_to_bytes", "write_tree"]
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_CONTENTS = "Every path that was written, with its attributes; memscal_content_sha256 covers them."
+# Below this a chunked and compressed dataset is larger than a plain one.
+_COMPRESS_ABOVE = 4096
+
+
+def file_tree(schema: str, entry: Group) -> Group:
+    """Return the root of a file around its entry: schema, contents list and digest."""
+    root = Group(
+        "NXroot",
+        {"entry": entry},
+        {"default": "entry", SCHEMA_ATTRIBUTE: schema, VERSION_ATTRIBUTE: SCHEMA_VERSION},
+    )
+    listed = _with_contents(root, "")
+    # The list names itself, so it is made once with a place for itself and once in full.
+    listed = _with_contents(root, to_json("contents", contents_of(listed)))
+    digest = content_digest(tree_items(listed))
+    return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
+
+
+def write_tree(
+    root: Group,
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    inputs: Iterable[str | os.PathLike[str]] = (),
+) -> None:
+    """Write a tree as one HDF5 file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the file exists (and ``overwrite`` is false), is an input, or cannot be written.
+    """
+    ensure_writable(path, overwrite=overwrite, inputs=inputs)
+    atomic_write_bytes(path, tree_to_bytes(root), overwrite=overwrite, inputs=inputs)
+
+
+def tree_to_bytes(root: Group) -> bytes:
+    """Return the HDF5 file of a tree; the same tree always gives the same bytes."""
+    from memscal.formats.hdf5_library import h5py
+
+    memory = BytesIO()
+    with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
+        for path, node in walk(root):
+            if path != "/" and not _NAME.fullmatch(path.rpartition("/")[2]):
+                raise InputError(
+                    f"{path} cannot be written: its name is not lower-case ASCII.",
+                    cure="Use the letters a to z, digits and underscores.",
+                )
+            if isinstance(node, Group):
+                group = file if path == "/" else file.create_group(path)
+                for name, value in node.all_attributes.items():
+                    _write_attribute(group, name, value)
+            elif isinstance(node, Number):
+                _write_number(file, path, node)
+            else:
+                _write_text(file, path, node)
+        _attach_scales(file, root)
+    return memory.getvalue()
+
+
+def _with_contents(root: Group, text: str) -> Group:
+    entry = root.children["entry"]
+    assert isinstance(entry, Group)
+    listing = note(text, media_type="application/json", description=_CONTENTS)
+    entry = replace(entry, children={**entry.children, "contents": listing})
+    return replace(root, children={**root.children, "entry": entry})
+
+
+def _write_number(file: Any, path: str, node: Number) -> None:
+    storage: dict[str, Any] = {}
+    if node.values.nbytes > _COMPRESS_ABOVE:
+        storage = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True}
+    dataset = file.create_dataset(path, data=node.values, track_times=False, **storage)
+    for name, value in {"units": node.units, **node.attributes}.items():
+        _write_attribute(dataset, name, value)
+
+
+def _write_text(file: Any, path: str, text: str) -> None:
+    encoded, dtype = _fixed_text(text)
+    file.create_dataset(path, data=np.array(encoded, dtype=dtype), track_times=False)
+
+
+def _write_attribute(item: Any, name: str, value: Attribute) -> None:
+    if isinstance(value, int):
+        item.attrs.create(name, value, dtype=np.int64)
+    elif isinstance(value, tuple):
+        item.attrs.create(name, np.array([text.encode("ascii") for text in value]))
+    else:
+        encoded, dtype = _fixed_text(value)
+        item.attrs.create(name, np.array(encoded, dtype=dtype), dtype=dtype)
+
+
+def _fixed_text(text: str) -> tuple[bytes, Any]:
+    """Encode text for a fixed-length string: no heap, so the same text gives the same bytes."""
+    from memscal.formats.hdf5_library import h5py
+
+    encoded = printable(text, len(text)).encode("utf-8", "replace")
+    charset = "ascii" if encoded.isascii() else "utf-8"
+    return encoded, h5py.string_dtype(charset, max(1, len(encoded)))
+
+
+def _attach_scales(file: Any, root: Group) -> None:
+    """Make every axis an HDF5 dimension scale and attach it to the arrays that run along it."""
+    arrays = [(p, n) for p, n in walk(root) if isinstance(n, Number) and n.axes]
+    for path, node in arrays:
+        folder, _, name = path.rpartition("/")
+        if node.axes == (name,):
+            file[path].make_scale(name)
+    for path, node in arrays:
+        folder, _, name = path.rpartition("/")
+        if node.axes != (name,):
+            for i, axis in enumerate(node.axes):
+                file[path].dims[i].attach_scale(file[f"{folder}/{axis}"])

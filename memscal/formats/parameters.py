@@ -1,0 +1,146 @@
+"""The estimated parameters of an artifact: values, covariance, and what the uncertainty is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from memscal.errors import FormatError, InputError
+from memscal.formats.fields import any_scalar, json_value, require_array, units_of
+from memscal.formats.hdf5_reader import SafeFile
+from memscal.formats.json_text import to_json
+from memscal.formats.tree import Group, Node, Number, index_axis, si
+from memscal.formats.units import dimension_of, from_si, to_si
+from memscal.model.apparatus import ParameterSet
+
+__all__ = [
+    "budget_group",
+    "parameter_dimension",
+    "parameter_group",
+    "read_budget",
+    "read_parameters",
+]
+
+# Names whose dimension is known, by their beginning; the longest that fits counts.
+_DIMENSIONS = {
+    "conversion_constant": "voltage per stress",
+    "gaussian_sigma": "length",
+    "centre": "length",
+    "baseline": "voltage",
+    "baseline_slope": "voltage per length",
+    "drift": "voltage",
+    "noise": "voltage",
+    "load": "force",
+}
+_COVARIANCE = (
+    "Covariance of the numbers: each parameter in the unit of its own dataset, in the order of names."
+)
+
+
+def parameter_dimension(name: str, unit: str = "", *, default: str | None = None) -> str:
+    """Return the dimension of a parameter: by its SI unit where that is given, else by its name.
+
+    Raises
+    ------
+    InputError
+        If neither says it.
+
+    Examples
+    --------
+    >>> parameter_dimension("gaussian_sigma_deconvolved")
+    'length'
+    """
+    if unit:
+        return dimension_of(unit, f"parameter {name}")
+    known = [start for start in _DIMENSIONS if name == start or name.startswith(start + "_")]
+    if known:
+        return _DIMENSIONS[max(known, key=len)]
+    if default is not None:
+        return default
+    raise InputError(
+        f"The parameter {name} has no unit.",
+        why="Every number in a file carries its unit.",
+        cure="Give its SI unit in ParameterSet(units=...).",
+    )
+
+
+def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
+    """Return the parameters as an NXcollection."""
+    dimensions = _dimensions(parameters)
+    children: dict[str, Node] = {"names": to_json("parameter names", list(parameters.names))}
+    for name, value, dimension in zip(
+        parameters.names, parameters.values, dimensions, strict=True
+    ):
+        children[name] = si(float(value), dimension)
+        children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
+    axes = ("parameter", "parameter_prime")
+    for axis in axes:
+        children[axis] = index_axis(axis, len(parameters.names))
+    scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions])
+    numbers = parameters.covariance * scale[:, None] * scale[None, :]
+    children["covariance"] = Number(numbers, "1", axes, {"description": _COVARIANCE})
+    if budget:
+        children["budget"] = budget_group(budget, dict(zip(parameters.names, dimensions, strict=True)))
+    return Group("NXcollection", children)
+
+
+def read_parameters(file: SafeFile, path: str) -> ParameterSet:
+    """Read the parameters, in SI units."""
+    names = tuple(str(name) for name in json_value(file, f"{path}/names", list, []))
+    if not names or len(set(names)) != len(names):
+        raise FormatError(
+            f"{file.where(path)}/names is missing or names a parameter twice.",
+            why="It says which parameters there are, and the order of their covariance.",
+        )
+    pairs = [any_scalar(file, f"{path}/{name}") for name in names]
+    units = [units_of(file, f"{path}/{name}") or "1" for name in names]
+    scale = np.array(
+        [
+            float(to_si(1.0, unit, dimension_of(unit, f"{path}/{name}"), file.where(path)))
+            for name, unit in zip(names, units, strict=True)
+        ]
+    )
+    covariance = require_array(file, f"{path}/covariance", "dimensionless", ndim=2)
+    if covariance.shape != (len(names), len(names)):
+        raise FormatError(
+            f"{file.where(path)}/covariance has shape {covariance.shape} for {len(names)} names."
+        )
+    return ParameterSet(
+        names=names,
+        values=np.array([value for value, _ in pairs]),
+        covariance=covariance * scale[:, None] * scale[None, :],
+        units=tuple(unit for _, unit in pairs),
+    )
+
+
+def budget_group(
+    budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]
+) -> Group:
+    """Return the uncertainty budget: one group per quantity, one number per source."""
+    children: dict[str, Node] = {"names": to_json("budget", list(budget))}
+    for quantity, sources in budget.items():
+        dimension = dimensions.get(quantity) or parameter_dimension(quantity)
+        group: dict[str, Node] = {"names": to_json(f"budget of {quantity}", list(sources))}
+        for source, value in sources.items():
+            group[source] = si(float(value), dimension)
+        children[quantity] = Group("NXcollection", group)
+    return Group("NXcollection", children)
+
+
+def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
+    """Read the uncertainty budget, in SI units; empty where there is none."""
+    if not file.has(path):
+        return {}
+    return {
+        str(quantity): {
+            str(source): any_scalar(file, f"{path}/{quantity}/{source}")[0]
+            for source in json_value(file, f"{path}/{quantity}/names", list, [])
+        }
+        for quantity in json_value(file, f"{path}/names", list, [])
+    }
+
+
+def _dimensions(parameters: ParameterSet) -> list[str]:
+    units = parameters.units or ("",) * len(parameters.names)
+    return [parameter_dimension(n, u) for n, u in zip(parameters.names, units, strict=True)]

@@ -1,0 +1,211 @@
+"""memscal-scan: the sensor's voltage against the indenter's position, as HDF5."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from memscal.errors import FormatError
+from memscal.formats.fields import (
+    any_scalar,
+    json_value,
+    optional_array,
+    optional_scalar,
+    optional_text,
+    require_array,
+    require_scalar,
+    require_schema,
+)
+from memscal.formats.hdf5_reader import SafeFile, open_hdf5
+from memscal.formats.hdf5_writer import file_tree, write_tree
+from memscal.formats.json_text import to_json
+from memscal.formats.parameters import parameter_dimension
+from memscal.formats.parts import (
+    indenter_group,
+    instrument_group,
+    profile_groups,
+    read_film,
+    read_indenter,
+    read_profile,
+    read_sensor,
+    sample_group,
+)
+from memscal.formats.schema import SCAN_SCHEMA
+from memscal.formats.tree import Group, Node, index_axis, note, si
+from memscal.model.scan import Scan
+
+__all__ = ["read_scan", "write_scan"]
+
+_CHANNELS = ("u_xz", "u_yz")
+_DATA = "/entry/data"
+_AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
+_SYNTHETIC = (
+    "The data of this file are synthetic: calculated from the known truth below, not measured."
+)
+
+
+def read_scan(path: str | os.PathLike[str]) -> Scan:
+    """Read a scan from a memscal-scan file.
+
+    Parameters
+    ----------
+    path : path
+        The file; units in it are converted to SI.
+
+    Returns
+    -------
+    Scan
+        With ``source`` naming the file and its SHA-256.
+
+    Raises
+    ------
+    FormatError, UnitError, UnsafeFileError, SchemaVersionError
+        If the file does not hold a scan that this version can read; the message names the
+        file and the HDF5 path.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from memscal.model.film import ElasticFilm
+    >>> from memscal.model.indenter import Rod
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> scan = Scan(x=[-1e-3, 0, 1e-3], u_zz=[1e-3, 3e-3, 1e-3], load=1.0,
+    ...             indenter=Rod(radius=0.25e-3), film=film)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_scan(scan, f"{folder}/scan.h5")
+    ...     read_scan(f"{folder}/scan.h5").u_zz
+    array([0.001, 0.003, 0.001])
+    """
+    with open_hdf5(path) as file:
+        return scan_from(file)
+
+
+def scan_from(file: SafeFile) -> Scan:
+    """Read the scan of an open memscal-scan file."""
+    require_schema(file, SCAN_SCHEMA)
+    load = require_scalar(file, "/entry/indenter/load", "force")
+    film = read_film(file, "/entry/sample/film")
+    indenter = read_indenter(file, "/entry/indenter")
+    _check_axes(file)
+    channels = {
+        name: require_array(file, f"{_DATA}/{name}", "voltage")
+        for name in _CHANNELS
+        if file.has(f"{_DATA}/{name}")
+    }
+    reference = None
+    if file.has("/entry/reference"):
+        parts = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
+        reference = read_profile(file, *parts, load=load, film=film, indenter=indenter)
+    return Scan(
+        x=require_array(file, f"{_DATA}/x", "length", ndim=1),
+        y=optional_array(file, f"{_DATA}/y", "length", ndim=1),
+        u_zz=require_array(file, f"{_DATA}/u_zz", "voltage"),
+        u_zz_errors=optional_array(file, f"{_DATA}/u_zz_errors", "voltage"),
+        normal_load=optional_array(file, f"{_DATA}/normal_load", "force"),
+        channels=channels,
+        load=load,
+        load_uncertainty=optional_scalar(file, "/entry/indenter/load_errors", "force"),
+        indenter=indenter,
+        film=film,
+        sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
+        title=optional_text(file, "/entry/title"),
+        start_time=optional_text(file, "/entry/start_time"),
+        end_time=optional_text(file, "/entry/end_time"),
+        notes=optional_text(file, "/entry/notes/data"),
+        reference=reference,
+        synthetic=_read_synthetic(file),
+        source=file.source,
+    )
+
+
+def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a scan as a memscal-scan file, whole or not at all.
+
+    Parameters
+    ----------
+    scan : Scan
+        The scan; its ``source`` is not written.
+    path : path
+        The file.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the file exists or cannot be written.
+    """
+    write_tree(file_tree(SCAN_SCHEMA, _entry(scan)), path, overwrite=overwrite)
+
+
+def _entry(scan: Scan) -> Group:
+    texts = {"title": scan.title, "start_time": scan.start_time, "end_time": scan.end_time}
+    children: dict[str, Node] = {name: text for name, text in texts.items() if text}
+    children["data"] = _data_group(scan)
+    children["indenter"] = indenter_group(scan.indenter, scan.load, scan.load_uncertainty)
+    children["sample"] = sample_group(scan.film)
+    children["instrument"] = instrument_group(scan.sensor)
+    if scan.notes:
+        children["notes"] = note(scan.notes)
+    if scan.reference is not None:
+        data, parameters, process = profile_groups(scan.reference)
+        children["reference"] = data
+        children["reference_parameters"] = parameters
+        children["reference_process"] = process
+    if scan.synthetic is not None:
+        children["synthetic"] = _synthetic_group(scan.synthetic)
+    return Group("NXentry", children, {"default": "data"})
+
+
+def _data_group(scan: Scan) -> Group:
+    axes = _AXES[scan.kind]
+    data: dict[str, Node] = {}
+    if scan.y is not None:
+        data["y"] = si(scan.y, "length", ("y",))
+    if scan.kind == "repeats":
+        data["repeat"] = index_axis("repeat", scan.u_zz.shape[0])
+    data["x"] = si(scan.x, "length", ("x",))
+    data["u_zz"] = si(scan.u_zz, "voltage", axes)
+    if scan.u_zz_errors is not None:
+        data["u_zz_errors"] = si(scan.u_zz_errors, "voltage", axes)
+    if scan.normal_load is not None:
+        data["normal_load"] = si(scan.normal_load, "force", axes)
+    for name, values in scan.channels.items():
+        data[name] = si(values, "voltage", axes)
+    return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
+
+
+def _check_axes(file: SafeFile) -> None:
+    """A square raster with its axes the other way round would pass every test of shape."""
+    axes = file.attribute(_DATA, "axes")
+    if isinstance(axes, str):
+        axes = tuple(axes.replace(":", " ").replace(",", " ").split())
+    if axes is not None and axes not in _AXES.values():
+        raise FormatError(
+            f"{file.where(_DATA)}@axes is {axes}.",
+            why="A scan is stored along [x], [repeat, x] or [y, x].",
+            cure="Transpose the data, or correct the attribute.",
+        )
+
+
+def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
+    children: dict[str, Node] = {"description": _SYNTHETIC}
+    for name, value in truth.items():
+        if isinstance(value, str):
+            children[name] = value
+        else:
+            children[name] = si(value, parameter_dimension(name, default="dimensionless"))
+    children["names"] = to_json("names of the synthetic truth", list(truth))
+    return Group("NXcollection", children)
+
+
+def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
+    path = "/entry/synthetic"
+    if not file.is_group(path):
+        return None
+    truth: dict[str, Any] = {}
+    for name in json_value(file, f"{path}/names", list, []):
+        item = f"{path}/{name}"
+        truth[str(name)] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
+    return truth

@@ -1,0 +1,29 @@
+"""Names, versions and limits that the file formats share."""
+
+from __future__ import annotations
+
+__all__ = [
+    "ARTIFACT_SCHEMA",
+    "CONTENTS_PATH",
+    "DIGEST_ATTRIBUTE",
+    "MAX_FILE_BYTES",
+    "REFERENCE_SCHEMA",
+    "SCAN_SCHEMA",
+    "SCHEMA_ATTRIBUTE",
+    "SCHEMA_VERSION",
+    "VERSION_ATTRIBUTE",
+]
+
+SCAN_SCHEMA = "memscal-scan"
+REFERENCE_SCHEMA = "memscal-reference"
+ARTIFACT_SCHEMA = "memscal-artifact"
+SCHEMA_VERSION = "1.0.0"
+
+SCHEMA_ATTRIBUTE = "memscal_schema"
+VERSION_ATTRIBUTE = "memscal_schema_version"
+DIGEST_ATTRIBUTE = "memscal_content_sha256"
+
+# The list of what was written: a reader can follow it without ever listing a group.
+CONTENTS_PATH = "/entry/contents/data"
+
+MAX_FILE_BYTES = 256 * 2**20

@@ -1,0 +1,228 @@
+"""Units, converted here and nowhere else: SI inside Python, any right unit in files.
+
+The canonical strings are looked up in a table of powers of ten, which keeps the conversion
+correctly rounded (0.25 mm is read as exactly ``0.25e-3``).  Anything else is left to pint,
+which is imported only then.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.errors import UnitError
+from memscal.model.validation import FloatArray
+
+__all__ = ["FILE_UNITS", "SI_UNITS", "dimension_of", "from_si", "to_si"]
+
+# Dimension -> SI unit inside Python.
+SI_UNITS = {
+    "length": "m",
+    "voltage": "V",
+    "force": "N",
+    "stress": "Pa",
+    "voltage per stress": "V/Pa",
+    "per area": "1/m^2",
+    "per area squared": "1/m^4",
+    "wavenumber": "rad/m",
+    "voltage per length": "V/m",
+    "dimensionless": "1",
+}
+
+# Dimension -> unit that our writers use.
+FILE_UNITS = {
+    "length": "mm",
+    "voltage": "mV",
+    "force": "N",
+    "stress": "Pa",
+    "voltage per stress": "mV/Pa",
+    "per area": "1/mm^2",
+    "per area squared": "1/mm^4",
+    "wavenumber": "rad/mm",
+    "voltage per length": "mV/mm",
+    "dimensionless": "1",
+}
+
+# Canonical unit -> (dimension, power of ten that takes it to SI).
+_CANONICAL = {
+    "m": ("length", 0),
+    "cm": ("length", -2),
+    "mm": ("length", -3),
+    "um": ("length", -6),
+    "µm": ("length", -6),  # micro sign
+    "μm": ("length", -6),  # Greek mu
+    "nm": ("length", -9),
+    "V": ("voltage", 0),
+    "mV": ("voltage", -3),
+    "uV": ("voltage", -6),
+    "µV": ("voltage", -6),
+    "μV": ("voltage", -6),
+    "kN": ("force", 3),
+    "N": ("force", 0),
+    "mN": ("force", -3),
+    "uN": ("force", -6),
+    "Pa": ("stress", 0),
+    "kPa": ("stress", 3),
+    "MPa": ("stress", 6),
+    "GPa": ("stress", 9),
+    "V/Pa": ("voltage per stress", 0),
+    "mV/Pa": ("voltage per stress", -3),
+    "V/MPa": ("voltage per stress", -6),
+    "mV/kPa": ("voltage per stress", -6),
+    "mV/MPa": ("voltage per stress", -9),
+    "1/m^2": ("per area", 0),
+    "1/mm^2": ("per area", 6),
+    "1/m^4": ("per area squared", 0),
+    "1/mm^4": ("per area squared", 12),
+    "rad/m": ("wavenumber", 0),
+    "rad/mm": ("wavenumber", 3),
+    "1/m": ("wavenumber", 0),
+    "1/mm": ("wavenumber", 3),
+    "V/m": ("voltage per length", 0),
+    "mV/mm": ("voltage per length", 0),
+    "1": ("dimensionless", 0),
+    "": ("dimensionless", 0),
+}
+
+# What pint may be asked: names, products and small powers.  Arithmetic such as 9**9**9 is a
+# way to hang a program from inside a file.
+_WORD = r"(?:[A-Za-zµμ°%][A-Za-z0-9_µμ°%]*|1)"
+_FACTOR = rf"{_WORD}(?:\s*(?:\*\*|\^)\s*\(?-?[0-9](?:\.5)?\)?)?"
+_UNIT = re.compile(rf"\s*\(?{_FACTOR}(?:\s*[*/·.]\s*\(?{_FACTOR}\)?|\s+{_FACTOR})*\)?\s*")
+_MAX_LENGTH = 64
+
+
+def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> FloatArray:
+    """Convert values from a file's unit to SI.
+
+    Parameters
+    ----------
+    values : array_like
+        Numbers in ``unit``.
+    unit : str or None
+        The unit; ``None`` means that none is stated, which only a dimensionless quantity may.
+    dimension : str
+        A key of :data:`SI_UNITS`.
+    where : str
+        File and HDF5 path (or column), for the message.
+
+    Returns
+    -------
+    ndarray
+        The numbers in ``SI_UNITS[dimension]``.
+
+    Raises
+    ------
+    UnitError
+        If the unit is missing, unknown, or of another dimension.
+
+    Examples
+    --------
+    >>> to_si([0.25, 561.0], "um", "length", "scan.h5: /entry/data/x")
+    array([2.50e-07, 5.61e-04])
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    if unit is None:
+        if dimension == "dimensionless":
+            return numbers
+        raise UnitError(
+            f"{where} has no unit.",
+            why=f"It is a {dimension}, and a bare number could be in any unit.",
+            cure=f'Add an attribute units, such as "{FILE_UNITS[dimension]}".',
+        )
+    canonical = _CANONICAL.get(unit.strip())
+    if canonical is not None:
+        if canonical[0] != dimension:
+            raise _wrong_dimension(where, unit, dimension)
+        return _scaled(numbers, canonical[1])
+    return np.asarray(numbers * _pint_factor(unit, dimension, where))
+
+
+def from_si(values: ArrayLike, dimension: str) -> tuple[FloatArray, str]:
+    """Convert SI values to the unit that our files use; return them with that unit.
+
+    Examples
+    --------
+    >>> from_si([561e-6], "length")
+    (array([0.561]), 'mm')
+    """
+    unit = FILE_UNITS[dimension]
+    return _scaled(np.asarray(values, dtype=np.float64), -_CANONICAL[unit][1]), unit
+
+
+def dimension_of(unit: str, where: str) -> str:
+    """Return the dimension of a unit whose quantity is not known beforehand.
+
+    Raises
+    ------
+    UnitError
+        If the unit is none of those that memscal works with.
+    """
+    canonical = _CANONICAL.get(unit.strip())
+    if canonical is not None:
+        return canonical[0]
+    for dimension in SI_UNITS:
+        try:
+            _pint_factor(unit, dimension, where)
+        except UnitError:
+            continue
+        return dimension
+    raise UnitError(
+        f'{where} has the unit "{_shown(unit)}", which memscal does not work with.',
+        cure="Use one of: " + ", ".join(u for u in _CANONICAL if u.isascii() and u) + ".",
+    )
+
+
+def _scaled(numbers: FloatArray, power: int) -> FloatArray:
+    """Multiply by a power of ten; dividing by 10^n rounds once, multiplying by 10^-n twice."""
+    if power >= 0:
+        return np.asarray(numbers * 10.0**power)
+    return np.asarray(numbers / 10.0**-power)
+
+
+def _pint_factor(unit: str, dimension: str, where: str) -> float:
+    if len(unit) > _MAX_LENGTH or not _UNIT.fullmatch(unit):
+        raise UnitError(
+            f'{where} has the unit "{_shown(unit)}", which is not a unit that can be read.',
+            cure=f'Write it like "{FILE_UNITS[dimension]}".',
+        )
+    import pint
+
+    registry = _registry()
+    try:
+        quantity = registry.Quantity(1.0, registry.parse_units(unit))
+        return float(quantity.to(_PINT_SI.get(dimension, SI_UNITS[dimension])).magnitude)
+    except pint.DimensionalityError as error:
+        raise _wrong_dimension(where, unit, dimension) from error
+    except Exception as error:  # pint raises what its parser happens to meet
+        raise UnitError(
+            f'{where} has the unit "{_shown(unit)}", which is unknown.',
+            why=f"It is a {dimension}.",
+            cure=f'Write it like "{FILE_UNITS[dimension]}".',
+        ) from error
+
+
+_PINT_SI = {"dimensionless": "dimensionless"}
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _wrong_dimension(where: str, unit: str, dimension: str) -> UnitError:
+    return UnitError(
+        f'{where} has the unit "{_shown(unit)}", but it must be a {dimension}.',
+        why="A number in a unit of another kind cannot be converted.",
+        cure=f'Give it in "{FILE_UNITS[dimension]}" or another unit of {dimension}.',
+    )
+
+
+def _shown(unit: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in unit[:_MAX_LENGTH])

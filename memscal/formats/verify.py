@@ -1,0 +1,52 @@
+"""Whether a file still holds what was written into it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from memscal.errors import FormatError
+from memscal.formats.digest import DigestItem, content_digest
+from memscal.formats.fields import json_value
+from memscal.formats.hdf5_reader import SafeFile
+from memscal.formats.schema import CONTENTS_PATH, DIGEST_ATTRIBUTE
+
+__all__ = ["altered"]
+
+_PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
+_MAX_ITEMS = 10_000
+
+
+def altered(file: SafeFile) -> str:
+    """Return how a file differs from what was written, or ``""`` where it does not.
+
+    A file without a digest counts as altered: every file of ours has one.
+    """
+    stated = file.attribute("/", DIGEST_ATTRIBUTE)
+    if stated is None:
+        return f"its root attribute {DIGEST_ATTRIBUTE} is missing."
+    contents = json_value(file, CONTENTS_PATH, dict, None)
+    if contents is None:
+        return f"the list of its contents ({CONTENTS_PATH}) is missing."
+    missing = [path for path in contents if not (_PATH.fullmatch(path) and file.has(path))]
+    if missing:
+        return f"{missing[0]} is missing."
+    if len(contents) > _MAX_ITEMS:
+        return f"it lists {len(contents):,} items."
+    if content_digest(_items(file, contents)) != stated:
+        return "its content does not fit its digest."
+    return ""
+
+
+def _items(file: SafeFile, contents: dict[str, Any]) -> Iterator[DigestItem]:
+    for path, names in sorted(contents.items()):
+        if not isinstance(names, list):
+            raise FormatError(f"{file.where(CONTENTS_PATH)} does not list attributes for {path}.")
+        attributes = {str(name): file.attribute(path, str(name)) for name in names}
+        if file.is_group(path):
+            yield path, None, attributes
+        elif file.is_text(path):
+            yield path, file.text(path), attributes
+        else:
+            yield path, file.array(path), attributes

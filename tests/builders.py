@@ -1,0 +1,171 @@
+"""Small self-consistent objects that many tests need."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from memscal.model.apparatus import (
+    ApparatusData,
+    ApparatusField,
+    ApparatusRadial,
+    ParameterSet,
+    QualityCheck,
+    Reconvolution,
+    TransferFunction,
+)
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod
+from memscal.model.provenance import Process, SourceFile
+from memscal.model.scan import Scan, StressSensor
+from memscal.model.stress import StressProfile
+
+SIGMA = 561e-6
+CONVERSION = 3.0e-8
+
+
+def make_film(**changes: Any) -> ElasticFilm:
+    """The paper's film."""
+    film = ElasticFilm(
+        young_modulus=2.2e6,
+        poisson_ratio=0.5,
+        thickness=2e-3,
+        roughness_rms=1.82e-6,
+        young_modulus_uncertainty=0.1e6,
+        thickness_uncertainty=20e-6,
+    )
+    return replace(film, **changes)
+
+
+def make_profile(**changes: Any) -> StressProfile:
+    """A Gaussian stress that carries 1 N."""
+    r = np.linspace(0.0, 10e-3, 101)
+    width = 1.0e-3
+    sigma = np.exp(-(r**2) / (2 * width**2)) / (2 * np.pi * width**2)
+    profile = StressProfile(
+        r=r,
+        sigma_zz=sigma,
+        sigma_rz=sigma * r / width * 0.1,
+        load=1.0,
+        depth=0.587e-3,
+        contact_radius=0.25e-3,
+        stick_radius=0.0,
+        friction_coefficient=0.0,
+        loading="incremental",
+        film=make_film(),
+        indenter=Rod(radius=0.25e-3),
+        solver="closed form",
+        discretisation="none",
+        convergence=1e-9,
+    )
+    return replace(profile, **changes)
+
+
+def make_scan(kind: str = "line", **changes: Any) -> Scan:
+    """A Gaussian response, as a line, as repeats or as a raster, with a missing point."""
+    x = np.linspace(-8e-3, 8e-3, 33)
+    y = np.linspace(-4e-3, 4e-3, 9)
+    u = 3e-3 * np.exp(-(x**2) / (2 * 1.2e-3**2))
+    if kind == "repeats":
+        u = np.stack([u, 1.01 * u, 0.99 * u])
+    elif kind == "raster":
+        u = u * np.exp(-(y[:, None] ** 2) / (2 * 1.2e-3**2))
+    u = u.copy()
+    u[..., 5] = np.nan
+    scan = Scan(
+        x=x,
+        y=y if kind == "raster" else None,
+        u_zz=u,
+        u_zz_errors=np.full(u.shape, 1e-5),
+        normal_load=np.full(u.shape, 1.01),
+        channels={"u_xz": 0.1 * u},
+        load=1.0,
+        load_uncertainty=0.01,
+        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6),
+        film=make_film(),
+        sensor=StressSensor(name="S1", model="MEMS", channel="zz"),
+        title="A scan",
+        start_time="2024-01-02T03:04:05+00:00",
+        end_time="2024-01-02T04:04:05+00:00",
+        notes="Two lines\nof notes, with an é.",
+        reference=make_profile(),
+        synthetic={"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "shape": "gaussian"},
+    )
+    return replace(scan, **changes)
+
+
+def make_artifact(**changes: Any) -> ApparatusData:
+    """A Gaussian apparatus function of 561 um in all its views."""
+    x = np.linspace(-4e-3, 4e-3, 33)
+    y = np.linspace(-3e-3, 3e-3, 25)
+    step = (x[1] - x[0]) * (y[1] - y[0])
+    g = np.exp(-(x[None, :] ** 2 + y[:, None] ** 2) / (2 * SIGMA**2))
+    g /= g.sum() * step
+    r = np.linspace(0.0, 4e-3, 41)
+    radial = np.exp(-(r**2) / (2 * SIGMA**2)) / (2 * np.pi * SIGMA**2)
+    errors = 0.01 * radial.max() * np.ones_like(r)
+    k = np.linspace(0.0, 6e3, 31)
+    modulus = np.exp(-(k**2) * SIGMA**2 / 2)
+    scan = make_scan()
+    voltage = np.nan_to_num(scan.u_zz)
+    data = ApparatusData(
+        field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g),
+        radial=ApparatusRadial(
+            r=r,
+            g=radial,
+            g_errors=errors,
+            g_gaussian=radial,
+            g_covariance=np.diag(errors**2),
+        ),
+        transfer=TransferFunction(
+            k=k,
+            modulus=modulus,
+            modulus_errors=0.01 * modulus,
+            window=np.where(k < 3.7e3, 1.0, 0.1),
+            resolved_wavenumber=3.7e3,
+        ),
+        reconvolution=Reconvolution(
+            x=scan.x,
+            u_zz=scan.u_zz,
+            u_zz_errors=np.full(scan.x.shape, 1e-5),
+            u_zz_predicted=voltage,
+            u_zz_gaussian=1.001 * voltage,
+            residual=scan.u_zz - voltage,
+        ),
+        parameters=ParameterSet(
+            names=(
+                "conversion_constant",
+                "gaussian_sigma",
+                "gaussian_sigma_deconvolved",
+                "centre",
+                "baseline",
+            ),
+            values=np.array([CONVERSION, SIGMA, 1.01 * SIGMA, 1e-5, 2e-6]),
+            covariance=np.diag([1e-20, 1e-12, 4e-12, 1e-12, 1e-14]),
+        ),
+        checks=(
+            QualityCheck("reconvolution", 0.004, 0.02, True, "The scan is met."),
+            QualityCheck("symmetry", 0.05, 0.03, False, "Left and right differ."),
+        ),
+        film=make_film(),
+        indenter=Rod(radius=0.25e-3),
+        sensor=StressSensor(name="S1", model="MEMS"),
+        load=1.0,
+        reference=make_profile(),
+        process=Process(
+            program="memscal",
+            version="0.1.0",
+            date="2024-01-02T03:04:05+00:00",
+            configuration={"method": "white-noise", "seed": None, "noise": 0.1},
+            environment={"python": "3.11"},
+            messages=("Two points were down-weighted.",),
+            input_scan=SourceFile("scan.h5", "0" * 64),
+        ),
+        budget={
+            "conversion_constant": {"noise": 1e-10, "load": 3e-10},
+            "gaussian_sigma": {"noise": 1e-6},
+        },
+    )
+    return replace(data, **changes)
