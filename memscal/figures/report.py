@@ -1,0 +1,247 @@
+"""A calibration as one HTML page that opens anywhere: no other file, no network, no script."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+
+import numpy as np
+
+from memscal.figures.calibration import calibration_figure, values_text
+from memscal.figures.quantities import MM, PER_MM, measured_text, quantity, shown_quantity
+from memscal.figures.render import render_figure
+from memscal.figures.report_style import PAGE, STYLE
+from memscal.model.apparatus import ApparatusData
+from memscal.model.notation import format_measured
+from memscal.model.provenance import SourceFile
+
+__all__ = ["html_report"]
+
+_RATIO_SCALE = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
+
+
+def html_report(data: ApparatusData) -> str:
+    """Return a calibration as a self-contained HTML page, for reading and for printing.
+
+    Values with uncertainty and unit, quality checks with what a failure means, the
+    uncertainty budget, the figure of :func:`~memscal.figures.calibration.calibration_figure`,
+    and the provenance.  The same data give the same text.
+
+    Parameters
+    ----------
+    data : ApparatusData
+        The result of a calibration, or what was read from an artifact.
+
+    Returns
+    -------
+    str
+        The page, in UTF-8's characters; everything that came from a file is escaped.
+    """
+    sensor = " ".join(part for part in (data.sensor.name, data.sensor.model) if part)
+    title = f"Apparatus function of {sensor or 'the sensor'}, channel {data.sensor.channel}"
+    body = "\n".join(
+        (
+            f"<h1>{escape(title)}</h1>",
+            _verdict(data),
+            _section("Values", _values_table(data)),
+            _section("Quality checks", _checks_table(data)),
+            _section("Figure", _figure(data)),
+            _section("Uncertainty budget", _budget_table(data)),
+            _section("What was measured on", _setting_table(data)),
+            _section("Provenance", _provenance(data)),
+        )
+    )
+    return PAGE.substitute(title=escape(title), style=STYLE, body=body)
+
+
+def _section(heading: str, content: str) -> str:
+    return f"<section>\n<h2>{escape(heading)}</h2>\n{content}\n</section>"
+
+
+def _verdict(data: ApparatusData) -> str:
+    kind = "verdict" if data.passed else "verdict failed"
+    return f'<p class="{kind}" role="note">{escape(_verdict_text(data))}</p>'
+
+
+def _verdict_text(data: ApparatusData) -> str:
+    if not data.checks:
+        return "No quality check was made."
+    failed = [check.name.replace("_", " ") for check in data.checks if not check.passed]
+    if not failed:
+        return f"All {len(data.checks)} quality checks passed."
+    count = f"{len(failed)} of {len(data.checks)} quality checks failed"
+    return f"{count}: {', '.join(failed)}. Read what each failure means before use."
+
+
+def _values_table(data: ApparatusData) -> str:
+    rows = []
+    for name in data.parameters.names:
+        shown, text = shown_quantity(data.parameters, name), measured_text(data.parameters, name)
+        value, spread = data.parameters[name], data.parameters.uncertainty(name)
+        # A share of a position or an offset would mean nothing: its zero is arbitrary.
+        share = f"{100 * spread / abs(value):.2g} %" if name in _RATIO_SCALE and value else "–"
+        rows.append((shown.words, shown.symbol, text, share))
+    resolved = data.resolved_wavenumber / PER_MM
+    rows.append(("resolved up to the wavenumber", "k", f"{resolved:.3g} rad/mm", "–"))
+    caption = "Estimates with their standard uncertainties (k = 1)"
+    return _table(caption, ("quantity", "symbol", "value", "relative uncertainty"), rows)
+
+
+def _checks_table(data: ApparatusData) -> str:
+    rows = [
+        (
+            check.name.replace("_", " "),
+            f"{check.value:.3g}",
+            f"{check.limit:.3g}",
+            "passed" if check.passed else "FAILED",
+            check.meaning,
+        )
+        for check in data.checks
+    ]
+    failed = {i for i, check in enumerate(data.checks) if not check.passed}
+    head = ("check", "value", "limit", "result", "what a failure means")
+    return _table("Each check, its value and its limit", head, rows, marked=failed)
+
+
+def _budget_table(data: ApparatusData) -> str:
+    """Return sources of uncertainty in rows, estimated quantities in columns."""
+    columns = list(data.budget)
+    sources = list(dict.fromkeys(source for name in columns for source in data.budget[name]))
+    if not sources:
+        return "<p>No budget by source was stored.</p>"
+    head = ["source", *(f"{quantity(name).words} ({quantity(name).unit})" for name in columns)]
+    rows = [
+        (source.replace("_", " "), *(_share(data, name, source) for name in columns))
+        for source in sources
+    ]
+    total = [_root_sum_square(data.budget[name].values()) for name in columns]
+    combined = (_in_unit(name, each) for name, each in zip(columns, total, strict=True))
+    rows.append(("root sum of squares", *combined))
+    caption = "Standard uncertainty by source, and its share of the variance"
+    return _table(caption, head, rows, marked={len(rows) - 1}, mark="total")
+
+
+def _share(data: ApparatusData, name: str, source: str) -> str:
+    if source not in data.budget[name]:
+        return "–"
+    part, total = data.budget[name][source], _root_sum_square(data.budget[name].values())
+    percent = f" ({100 * (part / total) ** 2:.0f} %)" if total > 0 else ""
+    return _in_unit(name, part) + percent
+
+
+def _in_unit(name: str, value: float) -> str:
+    return f"{value / quantity(name).scale:.2g}"
+
+
+def _root_sum_square(parts: Iterable[float]) -> float:
+    return float(np.sqrt(sum(part**2 for part in parts)))
+
+
+def _setting_table(data: ApparatusData) -> str:
+    film, indenter, reference = data.film, data.indenter, data.reference
+    rows = [
+        ("sensor", " ".join(filter(None, (data.sensor.name, data.sensor.model)))),
+        ("channel", data.sensor.channel),
+        ("load", f"{data.load:.4g} N"),
+        (
+            f"{indenter.shape}, radius",
+            format_measured(indenter.radius / MM, _scaled(indenter.radius_uncertainty, MM), "mm"),
+        ),
+        (
+            "film, Young's modulus",
+            format_measured(
+                film.young_modulus / 1e6, _scaled(film.young_modulus_uncertainty, 1e6), "MPa"
+            ),
+        ),
+        (
+            "film, Poisson's ratio",
+            format_measured(film.poisson_ratio, film.poisson_ratio_uncertainty),
+        ),
+        (
+            "film, thickness",
+            format_measured(film.thickness / MM, _scaled(film.thickness_uncertainty, MM), "mm"),
+        ),
+        ("reference, solver", reference.solver or "not stated"),
+        ("reference, discretisation", reference.discretisation or "not stated"),
+        (
+            "reference, estimated relative error",
+            "not stated" if reference.convergence is None else f"{reference.convergence:.1g}",
+        ),
+    ]
+    return _table("Sensor, indenter, film and reference", ("item", "value"), rows)
+
+
+def _scaled(uncertainty: float | None, scale: float) -> float | None:
+    return None if uncertainty is None else uncertainty / scale
+
+
+def _provenance(data: ApparatusData) -> str:
+    process = data.process
+    rows = [
+        ("program", f"{process.program} {process.version}"),
+        ("date", process.date),
+        *_source_rows("scan", process.input_scan),
+        *_source_rows("reference", process.input_reference),
+    ]
+    parts = [_table("What was run on what", ("item", "value"), rows)]
+    for caption, mapping in (("Options", process.configuration), ("Versions", process.environment)):
+        if mapping:
+            rows = [(str(key), _plain(value)) for key, value in mapping.items()]
+            parts.append(_table(caption, ("name", "value"), rows))
+    parts.append("<h3>Messages</h3>")
+    if process.messages:
+        items = "\n".join(f"<li>{escape(message)}</li>" for message in process.messages)
+        parts.append(f"<ul>\n{items}\n</ul>")
+    else:
+        parts.append("<p>None.</p>")
+    return "\n".join(parts)
+
+
+def _source_rows(what: str, source: SourceFile | None) -> list[tuple[str, str]]:
+    if source is None:
+        return []
+    return [(f"input {what}", source.file_name), (f"its SHA-256 ({what})", source.sha256)]
+
+
+def _plain(value: object) -> str:
+    return "not given" if value is None else str(value)
+
+
+def _figure(data: ApparatusData) -> str:
+    svg = base64.b64encode(render_figure(calibration_figure(data), "svg")).decode("ascii")
+    alt = (
+        f"Six panels: the scan with both reconvolutions, linear and logarithmic; residuals; "
+        f"the apparatus function with its band, linear and logarithmic; the transfer function "
+        f"resolved up to {data.resolved_wavenumber / PER_MM:.3g} rad/mm. "
+        f"{values_text(data)}. {_verdict_text(data)}"
+    )
+    caption = (
+        "a, c: scan, reconvolutions with the deconvolved G and with the Gaussian, and the "
+        "reference. b: residuals in standard uncertainties. d, e: G with its band (k = 2) and "
+        "the Gaussian. f: transfer function; hatched, what the scan does not resolve."
+    )
+    return (
+        f'<figure>\n<img alt="{escape(alt)}" src="data:image/svg+xml;base64,{svg}">\n'
+        f"<figcaption>{escape(caption)}</figcaption>\n</figure>"
+    )
+
+
+def _table(
+    caption: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    marked: Iterable[int] = (),
+    mark: str = "failed",
+) -> str:
+    """Return a table whose first column heads its rows; every cell is escaped here."""
+    lines = ["<table>", f"<caption>{escape(caption)}</caption>", "<thead><tr>"]
+    lines += [f'<th scope="col">{escape(cell)}</th>' for cell in head]
+    lines.append("</tr></thead>\n<tbody>")
+    for i, (first, *rest) in enumerate(rows):
+        opening = f'<tr class="{mark}">' if i in set(marked) else "<tr>"
+        cells = "".join(f"<td>{escape(cell)}</td>" for cell in rest)
+        lines.append(f'{opening}<th scope="row">{escape(first)}</th>{cells}</tr>')
+    lines.append("</tbody>\n</table>")
+    return "\n".join(lines)

@@ -1,0 +1,136 @@
+"""One look for all figures: type, colours, and what never changes with the user's set-up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+__all__ = [
+    "COLOURS",
+    "FIGURE_WIDTH",
+    "SCATTER_THRESHOLD",
+    "drawable",
+    "house_style",
+    "legend_above",
+    "marker_size",
+    "new_figure",
+    "panel_letter",
+]
+
+FIGURE_WIDTH = 7.2
+"""Width in inches of a figure across two columns of a journal."""
+
+COLOURS = {
+    "measured": "#000000",
+    "deconvolved": "#0072B2",
+    "gaussian": "#D55E00",
+    "reference": "#009E73",
+    "window": "#7B3F8C",
+    "muted": "#6B6B6B",
+    "failed": "#A11D00",
+}
+"""Okabe and Ito's colours, told apart by colour-blind readers; line styles do it in grey."""
+
+SCATTER_THRESHOLD = 400
+"""Above this many points error bars become a fog: dots are drawn instead."""
+
+_STYLE: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],  # ships with matplotlib: the same on every machine
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-5, 6),  # a factor above the axis would lie under the legend
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.fontsize": 7.0,
+    "legend.frameon": False,
+    "legend.handlelength": 2.0,
+    "legend.columnspacing": 1.0,
+    "legend.labelspacing": 0.3,
+    "legend.borderaxespad": 0.2,
+    "lines.linewidth": 1.2,
+    "hatch.linewidth": 0.4,
+    "savefig.dpi": 200,
+    "svg.hashsalt": "memscal",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Hold matplotlib's settings at the house's, and give back the user's afterwards.
+
+    The user's own matplotlibrc is set aside, so that a figure looks the same everywhere.
+    Settings are read both when a figure is built and when it is rendered: both need this.
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        settings: Any = mpl.rcParams
+        settings.update(_STYLE)
+        yield
+
+
+def drawable(text: str) -> str:
+    """Return the text with a mark for each character that the house's font cannot draw."""
+    font = get_font(findfont("DejaVu Sans"))
+    return "".join(c if font.get_char_index(ord(c)) else "\ufffd" for c in text)
+
+
+def new_figure(height: float) -> Figure:
+    """Return an empty figure of the house's width, with a canvas and no window."""
+    layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, wspace=0.04, hspace=0.02)
+    figure = Figure(figsize=(FIGURE_WIDTH, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def panel_letter(axes: Axes, letter: str) -> None:
+    """Put the panel's letter at the upper left, outside the frame and clear of all data."""
+    label = axes.annotate(
+        letter,
+        (0.0, 1.0),
+        (-30, 4),
+        xycoords="axes fraction",
+        textcoords="offset points",
+    )
+    label.set_fontweight("bold")
+    label.set_fontsize(10)
+    label.set_in_layout(False)
+
+
+def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:
+    """Put the legend above the frame, where it cannot lie over data; the scan comes first."""
+    entries = sorted(
+        zip(*axes.get_legend_handles_labels(), strict=True),
+        key=lambda entry: not entry[1].startswith("scan"),
+    )
+    axes.legend(
+        *zip(*entries, strict=True),
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        borderpad=0.2,
+        markerscale=3.0 if points > SCATTER_THRESHOLD else 1.0,
+    )
+
+
+def marker_size(points: int) -> float:
+    """Return a marker size in points that keeps 33 points visible and 400 apart."""
+    return float(min(4.0, max(1.5, 4.0 * (40.0 / max(points, 1)) ** 0.5)))

@@ -1,0 +1,223 @@
+"""The paper's claim of insensitivity, drawn: results against the amplitude of the noise."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from memscal.figures.quantities import MM, MV
+from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
+from memscal.model.validation import FloatArray
+
+__all__ = ["SweepLike", "sweep_figure"]
+
+_INNER = (0.16, 0.84)  # of the draws: what one standard deviation holds of a normal law
+_SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge
+
+
+class SweepLike(Protocol):
+    """What a sweep over the amplitude of the regularising noise holds, in SI units.
+
+    ``amplitude`` (n,) is relative to the one that the rule chooses.  The three results (n,)
+    come from the exact expectation; those named ``seed_...`` (n, s) from s seeded draws.
+    """
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """Noise amplitude relative to the rule's choice."""
+
+    @property
+    def conversion_constant(self) -> FloatArray:
+        """Conversion constant A, in V/Pa."""
+
+    @property
+    def gaussian_sigma_deconvolved(self) -> FloatArray:
+        """Width of the Gaussian fitted to the deconvolved G, in m."""
+
+    @property
+    def relative_rms(self) -> FloatArray:
+        """Misfit of the reconvolution, of the scan's maximum."""
+
+    @property
+    def seed_conversion_constant(self) -> FloatArray:
+        """Conversion constant of each draw, in V/Pa."""
+
+    @property
+    def seed_gaussian_sigma(self) -> FloatArray:
+        """Width of the Gaussian of each draw, in m."""
+
+    @property
+    def seed_relative_rms(self) -> FloatArray:
+        """Misfit of each draw's reconvolution."""
+
+
+def sweep_figure(sweep: SweepLike) -> Figure:
+    r"""Draw how A, sigma and the reconvolution change with the noise that regularises them.
+
+    A line joins the results of the exact expectation.  Dots are seeded draws, with their
+    median and the range that holds the middle 68 % of them.  Single draws are heavy-tailed:
+    those beyond the axis are drawn at its edge as triangles, and counted.
+
+    Parameters
+    ----------
+    sweep : SweepLike
+        Results over noise amplitude and over seeds; there may be no seeds (n, 0).
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Save it with :func:`memscal.figures.save.save_figure`.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> a, none = np.array([0.1, 1.0, 10.0]), np.empty((3, 0))
+    >>> sweep = SimpleNamespace(
+    ...     amplitude=a, conversion_constant=3e-8 + 0 * a, gaussian_sigma_deconvolved=5e-4 * a,
+    ...     relative_rms=0.01 * a, seed_conversion_constant=none, seed_gaussian_sigma=none,
+    ...     seed_relative_rms=none)
+    >>> [axes.get_ylabel() for axes in sweep_figure(sweep).axes][1:]
+    ['$\\sigma$ of deconvolved $G$ (mm)', 'reconvolution, rms misfit (%)']
+    """
+    power = _power_of_ten(sweep.conversion_constant / MV)
+    rows = (
+        (
+            f"$A$ ($10^{{{power}}}$ mV/Pa)" if power else "$A$ (mV/Pa)",
+            sweep.conversion_constant,
+            sweep.seed_conversion_constant,
+            MV * 10.0**power,
+        ),
+        (
+            r"$\sigma$ of deconvolved $G$ (mm)",
+            sweep.gaussian_sigma_deconvolved,
+            sweep.seed_gaussian_sigma,
+            MM,
+        ),
+        ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
+    )
+    with house_style():
+        figure = new_figure(6.6)
+        panels = figure.subplots(3, 1, sharex=True)
+        for letter, axes, (label, exact, draws, scale) in zip("abc", panels, rows, strict=True):
+            _draw_row(axes, sweep.amplitude, exact / scale, draws / scale)
+            axes.set_ylabel(label)
+            panel_letter(axes, letter)
+        for axes in panels[:2]:
+            _relative_axis(axes, sweep.amplitude)
+        axes = panels[2]
+        axes.set_xlabel("noise amplitude, relative to the one chosen by rule (1)")
+        axes.set_xlim(0.85 * np.min(sweep.amplitude), 1.18 * np.max(sweep.amplitude))
+        axes.xaxis.set_major_formatter(lambda amplitude, _: f"{amplitude:g}")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+    return figure
+
+
+def _power_of_ten(values: FloatArray) -> int:
+    """Return the power of ten to name in a label in place of a row of zeros."""
+    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+    power = int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
+    return 0 if -2 <= power <= 3 else power
+
+
+def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: FloatArray) -> None:
+    axes.set_xscale("log")
+    axes.axvline(1.0, color="0.5", lw=0.8, ls=":", label="_rule's choice")
+    draws = np.where(np.isfinite(draws), draws, np.nan)
+    low, high = _limits(exact, draws)
+    if np.any(np.isfinite(draws)):
+        _draw_seeds(axes, amplitude, draws, (low, high))
+    axes.plot(
+        amplitude,
+        exact,
+        "-o",
+        color=COLOURS["deconvolved"],
+        ms=4,
+        label="exact expectation",
+        zorder=4,
+    )
+    axes.set_ylim(low, high)
+
+
+def _draw_seeds(
+    axes: Axes, amplitude: FloatArray, draws: FloatArray, limits: tuple[float, float]
+) -> None:
+    colour = COLOURS["gaussian"]
+    across = np.broadcast_to(amplitude[:, None], draws.shape)
+    drawn = np.any(np.isfinite(draws), axis=1)
+    lower, median, upper = np.nanquantile(draws[drawn], (_INNER[0], 0.5, _INNER[1]), axis=1)
+    axes.fill_between(
+        amplitude[drawn], lower, upper, color=colour, alpha=0.2, lw=0, label="middle 68 % of draws"
+    )
+    axes.plot(
+        across.ravel(), draws.ravel(), ".", color=colour, ms=4, alpha=0.6, mew=0, label="one draw"
+    )
+    axes.plot(amplitude[drawn], median, "--", color=colour, label="median of draws")
+    outside = 0
+    for sign, edge, marker in ((1, limits[1], "^"), (-1, limits[0], "v")):
+        beyond = sign * draws > sign * edge
+        outside += int(np.sum(beyond))
+        places = amplitude[np.any(beyond, axis=1)]
+        level = np.full(places.size, 0.96 if sign > 0 else 0.04)
+        axes.plot(
+            places,
+            level,
+            marker,
+            color=colour,
+            ms=4,
+            transform=axes.get_xaxis_transform(),
+            label="_beyond the axis",
+        )
+    if outside:
+        note = f"{outside} of {int(np.sum(np.isfinite(draws)))} draws beyond the axis"
+        axes.set_title(note, loc="right", fontsize=7, color=COLOURS["muted"], pad=2)
+
+
+def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
+    """Return axis limits from the exact results and the bulk of the draws."""
+    shown = exact[np.isfinite(exact)]
+    for row in draws:
+        finite = row[np.isfinite(row)]
+        if finite.size:
+            # A bulk that reaches far beyond the exact results is a tail as well.
+            shown = np.concatenate([shown, np.quantile(finite, _SHOWN)])
+    if not shown.size:
+        return 0.0, 1.0
+    centre = float(np.median(exact[np.isfinite(exact)])) if np.any(np.isfinite(exact)) else 0.0
+    reach = _reach(exact, draws, centre)
+    low = max(float(np.min(shown)), centre - reach)
+    high = min(float(np.max(shown)), centre + reach)
+    margin = 0.12 * (high - low) or 0.05 * abs(centre) or 1.0
+    bottom = low - margin
+    return (max(bottom, 0.0) if low >= 0 else bottom), high + margin
+
+
+def _reach(exact: FloatArray, draws: FloatArray, centre: float) -> float:
+    """Return how far from the centre the axis may reach: some times the typical spread."""
+    steps = np.abs(exact[np.isfinite(exact)] - centre)
+    spread = np.abs(draws[np.isfinite(draws)] - centre)
+    typical = float(np.quantile(spread, 0.68)) if spread.size else 0.0
+    return max(1.2 * float(np.max(steps, initial=0.0)), 4.0 * typical, 1e-3 * abs(centre))
+
+
+def _relative_axis(axes: Axes, amplitude: FloatArray) -> None:
+    """Add a right-hand axis: the change from the result at the rule's amplitude, in percent."""
+    (line,) = (each for each in axes.lines if each.get_label() == "exact expectation")
+    base = float(np.asarray(line.get_ydata())[np.argmin(np.abs(np.log(amplitude)))])
+    if not (np.isfinite(base) and base != 0):
+        return
+
+    def percent(value: ArrayLike) -> FloatArray:
+        return 100 * (np.asarray(value, dtype=float) / base - 1)
+
+    def at_percent(percent: ArrayLike) -> FloatArray:
+        return base * (1 + np.asarray(percent, dtype=float) / 100)
+
+    right = axes.secondary_yaxis("right", functions=(percent, at_percent))
+    right.set_ylabel("change (%)")

@@ -1,0 +1,102 @@
+"""How a measured value is written: with its uncertainty, rounded by it, and with its unit."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal, localcontext
+
+from memscal.errors import InputError
+
+__all__ = ["format_measured"]
+
+# Outside these powers of ten a factor reads better than a row of zeros.
+_PLAIN_EXPONENTS = range(-3, 5)
+_NEGLIGIBLE = 1e-12
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def format_measured(
+    value: float, uncertainty: float | None, unit: str = "", *, concise: bool = False
+) -> str:
+    """Write a value with its standard uncertainty and unit, for people to read.
+
+    The uncertainty keeps two significant digits and the value is rounded to the same place,
+    as the GUM (JCGM 100:2008, 7.2) advises.  Very large and very small numbers share one
+    power of ten.
+
+    Parameters
+    ----------
+    value : float
+        The value, in ``unit``.
+    uncertainty : float or None
+        Its standard uncertainty (k = 1), in ``unit``.  ``None``, zero or a number that is
+        not finite means that none is stated, and the text says so.
+    unit : str
+        Unit as it should read; ``""`` or ``"1"`` for a dimensionless quantity.
+    concise : bool
+        Write ``0.5612(34) mm`` in place of ``(0.5612 ± 0.0034) mm``.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        If the uncertainty is negative.
+
+    Examples
+    --------
+    >>> format_measured(0.56123, 0.00342, "mm")
+    '(0.5612 ± 0.0034) mm'
+    >>> format_measured(0.56123, 0.00342, "mm", concise=True)
+    '0.5612(34) mm'
+    >>> format_measured(3.0123e-5, 1.2e-7, "mV/Pa")
+    '(3.012 ± 0.012)×10⁻⁵ mV/Pa'
+    >>> format_measured(0.56123, None, "mm")
+    '0.5612 mm (no uncertainty stated)'
+    """
+    tail = "" if unit in ("", "1") else f" {unit}"
+    if not math.isfinite(value):
+        return "not determined"
+    if uncertainty is not None and uncertainty < 0:
+        raise InputError(f"A standard uncertainty of {uncertainty:g}{tail} is negative.")
+    if uncertainty is None or not math.isfinite(uncertainty):
+        return f"{value:.4g}{tail} (no uncertainty stated)"
+    if uncertainty <= _NEGLIGIBLE * abs(value):
+        return f"{value:.6g}{tail} (no uncertainty stated)"
+    number, spread, exponent = _rounded(value, uncertainty)
+    factor = "" if exponent == 0 else "×10" + str(exponent).translate(_SUPERSCRIPTS)
+    if concise:
+        digits = spread.replace(".", "").lstrip("0") if float(spread) < 1 else spread
+        return f"{number}({digits}){factor}{tail}"
+    if factor or tail:
+        return f"({number} ± {spread}){factor}{tail}"
+    return f"{number} ± {spread}"
+
+
+def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
+    """Return value and uncertainty as digits, and the power of ten that they share.
+
+    Decimal arithmetic, because a binary 0.0145 would round differently from what is read.
+    """
+    with localcontext() as context:
+        context.prec = 800  # the widest span of two doubles
+        number, spread = Decimal(repr(float(value))), Decimal(repr(float(uncertainty)))
+        spread = _two_digits(spread)
+        place = Decimal(1).scaleb(spread.adjusted() - 1)
+        number = number.quantize(place)
+        exponent = max(number.adjusted() if number else spread.adjusted(), spread.adjusted())
+        if exponent in _PLAIN_EXPONENTS:
+            exponent = 0
+        number, spread = number.scaleb(-exponent), spread.scaleb(-exponent)
+        if not number:
+            number = abs(number)  # never "-0.00"
+        return f"{number:f}", f"{spread:f}", exponent
+
+
+def _two_digits(spread: Decimal) -> Decimal:
+    """Round to two significant digits; 0.0996 gives 0.10, not 0.100."""
+    for _ in range(2):
+        spread = spread.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
+    return spread

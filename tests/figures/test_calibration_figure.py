@@ -1,0 +1,273 @@
+"""The calibration figure: what its panels hold, and what they may not."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from matplotlib.patches import Rectangle
+
+from memscal.figures.calibration import calibration_figure, failed_checks_text
+from memscal.model.scan import StressSensor
+
+
+def panels(figure):
+    return {axes.get_label(): axes for axes in figure.axes if axes.get_label()}
+
+
+def line(axes, label):
+    exact = [each for each in axes.lines if each.get_label() == label]
+    (found,) = exact or [each for each in axes.lines if each.get_label().startswith(label)]
+    return np.asarray(found.get_xdata(), float), np.asarray(found.get_ydata(), float)
+
+
+def band(axes):
+    (found,) = [each for each in axes.collections if isinstance(each, PolyCollection)]
+    return found.get_paths()[0].vertices
+
+
+def texts(figure):
+    return "\n".join(text.get_text() for text in figure.texts)
+
+
+def test_every_axis_names_its_quantity_and_unit(drawn):
+    axes = panels(drawn())
+    units = {
+        "scan": (None, "mV"),
+        "residuals": (None, "$u$"),
+        "scan_log": ("mm", "mV"),
+        "radial": (None, "1/mm$^2$"),
+        "radial_log": ("mm", "1/mm$^2$"),
+        "transfer": ("rad/mm", "(1)"),
+    }
+    for name, (along, up) in units.items():
+        assert up in axes[name].get_ylabel()
+        if along:
+            assert f"({along})" in axes[name].get_xlabel()
+    (right,) = axes["scan"].child_axes
+    assert "kPa" in right.get_ylabel()
+
+
+@pytest.mark.parametrize("points", [33, 200])
+def test_the_scan_panel_holds_the_points_and_both_reconvolutions(make_apparatus, drawn, points):
+    data = make_apparatus(points=points)
+    axes = panels(drawn(points=points))["scan"]
+    scan = data.reconvolution
+    (bars,) = axes.containers
+    np.testing.assert_allclose(bars.lines[0].get_xdata(), scan.x * 1e3)
+    np.testing.assert_allclose(bars.lines[0].get_ydata(), scan.u_zz * 1e3)
+    segments = bars.lines[2][0].get_segments()
+    lengths = [segment[1, 1] - segment[0, 1] for segment in segments]
+    np.testing.assert_allclose(lengths, 2e3 * scan.u_zz_errors)
+    np.testing.assert_allclose(line(axes, "reconvolved, G")[1], scan.u_zz_predicted * 1e3)
+    np.testing.assert_allclose(line(axes, "reconvolved, Gaussian")[1], scan.u_zz_gaussian * 1e3)
+
+
+def test_points_out_of_order_are_joined_in_order(make_apparatus):
+    data = make_apparatus(points=33)
+    order = np.random.default_rng(3).permutation(33)
+    scan = data.reconvolution
+    for name in ("x", "u_zz", "u_zz_errors", "u_zz_predicted", "u_zz_gaussian", "residual"):
+        object.__setattr__(scan, name, getattr(scan, name)[order])
+    x, _ = line(panels(calibration_figure(data))["scan"], "reconvolved, G")
+    assert np.all(np.diff(x) > 0)
+
+
+def test_the_reference_reads_in_kilopascals_on_the_right_hand_axis(make_apparatus, drawn):
+    data = make_apparatus()
+    axes = panels(drawn())["scan"]
+    (right,) = axes.child_axes
+    x, height = line(axes, "reference")
+    to_stress = right._functions[0]  # what the drawn ticks are computed with
+    assert to_stress(np.max(height)) == pytest.approx(np.max(data.reference.sigma_zz) / 1e3)
+    assert to_stress(data.parameters["baseline"] * 1e3) == pytest.approx(0.0)
+    assert x[np.argmax(height)] == pytest.approx(data.parameters["centre"] * 1e3)
+
+
+def test_the_black_patch_is_as_wide_as_the_rod_and_stands_at_the_centre(drawn):
+    axes = panels(drawn())["scan"]
+    (patch,) = [each for each in axes.patches if isinstance(each, Rectangle)]
+    assert patch.get_width() == pytest.approx(0.5)
+    assert patch.get_x() + 0.25 == pytest.approx(0.14)
+
+
+@pytest.mark.parametrize("kind", ["line", "radii", "flat"])
+def test_logarithmic_panels_hold_no_value_that_is_not_positive(drawn, kind):
+    axes = panels(drawn(kind, 33, noise=0.05, ripple=0.3, error=0.4))
+    for name in ("scan_log", "radial_log"):
+        assert axes[name].get_yscale() == "log"
+        for each in axes[name].lines:
+            heights = np.asarray(each.get_ydata(), float)
+            assert not np.any(heights <= 0), each.get_label()
+    for bars in axes["scan_log"].containers:
+        segments = [segment for segment in bars.lines[2][0].get_segments() if len(segment)]
+        assert np.all(np.concatenate(segments)[:, 1] > 0)
+    assert np.min(band(axes["radial_log"])[:, 1]) > 0
+
+
+def test_each_point_is_a_measurement_or_an_upper_limit_on_the_logarithmic_axis(
+    make_apparatus, drawn
+):
+    data = make_apparatus(noise=0.03)
+    axes = panels(drawn(noise=0.03))["scan_log"]
+    scan = data.reconvolution
+    signal = (scan.u_zz - data.parameters["baseline"]) * 1e3
+    errors = scan.u_zz_errors * 1e3
+    measured = np.asarray(axes.containers[0].lines[0].get_ydata(), float)
+    _, limits = line(axes, "less than 2u")
+    np.testing.assert_array_equal(np.isfinite(measured), signal > 2 * errors)
+    np.testing.assert_array_equal(np.isfinite(limits), ~(signal > 2 * errors))
+    low = np.isfinite(limits)
+    np.testing.assert_allclose(limits[low], np.maximum(signal[low], 0) + 2 * errors[low])
+
+
+def test_residuals_are_in_units_of_the_standard_uncertainty(make_apparatus, drawn):
+    data = make_apparatus()
+    axes = panels(drawn())["residuals"]
+    scan = data.reconvolution
+    _, z = line(axes, "G: rms")
+    np.testing.assert_allclose(z, scan.residual / scan.u_zz_errors)
+    (label,) = [each.get_label() for each in axes.lines if each.get_label().startswith("G: rms")]
+    assert float(label.split()[-1]) == pytest.approx(np.sqrt(np.mean(z**2)), abs=0.006)
+
+
+def test_an_outlier_is_drawn_at_the_edge_and_does_not_stretch_the_axis(make_apparatus):
+    data = make_apparatus()
+    data.reconvolution.residual[10] = 60 * data.reconvolution.u_zz_errors[10]
+    axes = panels(calibration_figure(data))["residuals"]
+    low, high = axes.get_ylim()
+    assert high < 10
+    x = data.reconvolution.x[10] * 1e3
+    edge = [each for each in axes.lines if each.get_marker() == "^"]
+    shown = [(each.get_xdata(), each.get_ydata()) for each in edge]
+    assert any(x in np.asarray(xs) and np.all(low < ys) and np.all(ys < high) for xs, ys in shown)
+
+
+def test_without_uncertainties_the_residuals_say_what_they_are_divided_by(make_apparatus):
+    data = make_apparatus()
+    data.reconvolution.u_zz_errors[:] = 0.0
+    axes = panels(calibration_figure(data))["residuals"]
+    assert "own rms" in axes.get_ylabel()
+    _, z = line(axes, "G: rms")
+    assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0)
+
+
+def test_the_band_of_g_is_two_standard_uncertainties_either_way(make_apparatus, drawn):
+    data = make_apparatus()
+    axes = panels(drawn())["radial"]
+    corners = band(axes)
+    g, spread = data.radial.g / 1e6, data.radial.g_errors / 1e6
+    for each in (g + 2 * spread, g - 2 * spread):
+        wanted = np.column_stack([data.radial.r * 1e3, each])
+        distance = np.abs(corners[:, None] - wanted[None]).max(axis=2).min(axis=0)
+        assert np.max(distance) < 1e-12
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert any("k = 2" in label for label in labels)
+
+
+def test_g_and_its_gaussian_differ_in_more_than_colour(make_apparatus, drawn):
+    data = make_apparatus()
+    axes = panels(drawn())["radial"]
+    np.testing.assert_allclose(line(axes, "deconvolved G")[1], data.radial.g / 1e6)
+    np.testing.assert_allclose(line(axes, "Gaussian fit")[1], data.radial.g_gaussian / 1e6)
+    styles = {each.get_label(): each.get_linestyle() for each in axes.lines}
+    assert styles["deconvolved G"] != styles["Gaussian fit"]
+
+
+def test_the_transfer_function_is_hatched_beyond_the_resolved_wavenumber(make_apparatus, drawn):
+    data = make_apparatus()
+    axes = panels(drawn())["transfer"]
+    (hatched,) = [each for each in axes.patches if each.get_hatch()]
+    box = hatched.get_path().vertices
+    assert hatched.get_x() == pytest.approx(3.7), box
+    assert hatched.get_x() + hatched.get_width() == pytest.approx(axes.get_xlim()[1])
+    np.testing.assert_allclose(line(axes, "window")[1], data.transfer.window)
+    np.testing.assert_allclose(line(axes, "modulus")[1], data.transfer.modulus)
+
+
+def test_values_and_failed_checks_stand_in_words_above_the_panels(drawn):
+    said = texts(drawn(failed=2))
+    assert "A = (3.000 ± 0.013)×10⁻⁵ mV/Pa" in said
+    assert "σ = (0.5610 ± 0.0034) mm" in said
+    assert "Failed check, reconvolution: 1.7 against a limit of 1." in said
+    assert "Failed check, symmetry" in said
+    assert "tail share" not in said
+
+
+def test_a_calibration_without_failures_says_so(make_apparatus, drawn):
+    assert "All 5 quality checks passed." in texts(drawn())
+    assert failed_checks_text(make_apparatus().checks) == []
+
+
+def test_no_text_above_the_panels_leaves_the_page(drawn):
+    words = "a failure that takes many words to explain " * 4
+    figure = drawn(failed=5, meaning=words.strip() + ".")
+    renderer = figure.canvas.get_renderer()
+    boxes = [text.get_window_extent(renderer) for text in figure.texts]
+    panel_top = max(axes.get_tightbbox(renderer).y1 for axes in panels(figure).values())
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.width for box in boxes)
+    assert all(panel_top <= box.y0 and box.y1 <= figure.bbox.height for box in boxes)
+
+
+@pytest.mark.parametrize("kind", ["line", "radii"])
+def test_legends_lie_outside_the_panels_and_inside_the_page(drawn, kind):
+    figure = drawn(kind, 33)
+    renderer = figure.canvas.get_renderer()
+    for name, axes in panels(figure).items():
+        if axes.get_legend() is not None:
+            box = axes.get_legend().get_window_extent(renderer)
+            assert box.y0 >= axes.bbox.y1 - 1, name
+            assert box.x1 <= figure.bbox.width, name
+
+
+def test_a_raster_is_drawn_against_the_distance_from_its_centre(drawn):
+    axes = panels(drawn("radii", 25))
+    assert "distance" in axes["scan_log"].get_xlabel()
+    x, height = line(axes["scan"], "reference")
+    assert x[np.argmax(height)] == 0.0
+    xs, _ = line(axes["scan"], "reconvolved, G")
+    assert np.all(np.diff(xs) >= 0)
+
+
+def test_voltages_that_share_a_position_are_not_joined_by_a_line(drawn):
+    axes = panels(drawn("flat", 25))["scan"]
+    (found,) = [each for each in axes.lines if each.get_label() == "reconvolved, G"]
+    assert found.get_linestyle() == "None"
+    assert np.asarray(found.get_xdata()).size == 625
+
+
+def test_repeats_of_a_position_share_one_reconvolution(make_apparatus):
+    data = make_apparatus(points=33)
+    scan = data.reconvolution
+    for name in ("x", "u_zz", "u_zz_errors", "u_zz_predicted", "u_zz_gaussian", "residual"):
+        object.__setattr__(scan, name, np.tile(getattr(scan, name), 3))
+    axes = panels(calibration_figure(data))["scan"]
+    x, _ = line(axes, "reconvolved, G")
+    assert x.size == 33
+    assert next(each for each in axes.lines if each.get_label() == "reconvolved, G").get_linestyle()
+
+
+@pytest.mark.parametrize(
+    "name", ["$x_{$ \\frac", "<b>&amp;</b>", "传感器 \x07", "a" * 400, "", "line\nbreak"]
+)
+def test_a_sensor_of_any_name_is_drawn_as_plain_text(drawn, name):
+    figure = drawn(sensor=StressSensor(name=name))
+    figure.draw_without_rendering()
+    assert figure.texts[0].get_text().startswith("Apparatus function of ")
+
+
+def test_a_conversion_constant_below_zero_leaves_out_the_stress_axis(make_apparatus):
+    data = make_apparatus()
+    data.parameters.values[0] *= -1
+    axes = panels(calibration_figure(data))["scan"]
+    assert not axes.child_axes
+    assert not [each for each in axes.lines if each.get_label().startswith("reference")]
+
+
+def test_the_settings_of_matplotlib_are_given_back(make_apparatus):
+    with mpl.rc_context({"font.size": 23.0, "axes.facecolor": "black"}):
+        before = dict(mpl.rcParams)
+        figure = calibration_figure(make_apparatus())
+        assert dict(mpl.rcParams) == before
+    assert panels(figure)["scan"].get_facecolor() == (1.0, 1.0, 1.0, 1.0)

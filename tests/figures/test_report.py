@@ -1,0 +1,166 @@
+"""The HTML report: parsed by another program, self-contained, and safe with hostile names."""
+
+from __future__ import annotations
+
+import base64
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from memscal.figures.report import html_report
+from memscal.model.apparatus import ParameterSet
+from memscal.model.scan import StressSensor
+
+_VOID = {"meta", "img", "br", "link", "hr"}
+_HOSTILE = "<script>alert('x')</script>\"&$title ${body} --><img src=x onerror=1>"
+
+
+class Page(HTMLParser):
+    """What a reader of the page finds: elements with their attributes, text, balance."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.rows: list[list[str]] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in _VOID:
+            self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+        if self.open and self.open[-1] != "style":
+            self.words.append(data)
+
+    def find(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@pytest.fixture(name="page", scope="module")
+def page_fixture(make_apparatus):
+    return Page(html_report(make_apparatus(failed=2)))
+
+
+def test_every_element_is_closed_and_the_page_names_its_language_and_title(page):
+    assert page.open == []
+    assert page.find("html") == [{"lang": "en"}]
+    assert len(page.find("title")) == len(page.find("h1")) == 1
+    assert {"charset": "utf-8"} in page.find("meta")
+
+
+def test_nothing_is_fetched_and_nothing_is_run(page):
+    assert not page.find("script") + page.find("link") + page.find("iframe") + page.find("a")
+    for _, attributes in page.elements:
+        assert not any(name.startswith("on") for name in attributes)
+        assert (attributes.get("src") or "data:").startswith("data:")
+    policy = [each for each in page.find("meta") if "http-equiv" in each]
+    assert policy[0]["http-equiv"] == "Content-Security-Policy"
+
+
+def test_the_figure_is_an_svg_with_a_text_in_its_place(page):
+    (image,) = page.find("img")
+    kind, _, payload = image["src"].partition(",")
+    assert kind == "data:image/svg+xml;base64"
+    assert b"<svg" in base64.b64decode(payload, validate=True)[:1000]
+    assert "3.7 rad/mm" in image["alt"]
+    assert "2 of 5 quality checks failed" in image["alt"]
+
+
+def test_every_check_has_a_row_with_value_limit_result_and_meaning(page):
+    rows = {row[0]: row[1:] for row in page.rows if row}
+    meaning = "The scan is not explained to within its noise."
+    assert rows["reconvolution"] == ["1.7", "1", "FAILED", meaning]
+    assert rows["symmetry"] == ["1.7", "1", "FAILED", meaning]
+    for name in ("tail share", "resolved band", "gaussian misfit"):
+        assert rows[name] == ["0.41", "1", "passed", meaning]
+    assert any("2 of 5 quality checks failed: reconvolution, symmetry." in w for w in page.words)
+
+
+def test_values_stand_with_uncertainty_and_unit(page):
+    rows = {row[0]: row[1:] for row in page.rows if row}
+    assert rows["conversion constant"][1] == "(3.000 ± 0.013)×10⁻⁵ mV/Pa"
+    assert rows["Gaussian width, fitted to the scan"][1] == "(0.5610 ± 0.0034) mm"
+    assert rows["centre of the scan"][1] == "(0.1400 ± 0.0042) mm"
+    assert rows["baseline"][1] == "(0.0400 ± 0.0011) mV"
+    assert rows["resolved up to the wavenumber"][1] == "3.7 rad/mm"
+
+
+def test_the_budget_adds_up_in_squares(page):
+    start = next(i for i, row in enumerate(page.rows) if row[0] == "source")
+    rows = {row[0]: row[1:] for row in page.rows[start : start + 5]}
+    shares = [int(rows[name][0].split("(")[1].split()[0]) for name in ("noise", "load")]
+    assert shares == [49, 22]  # 9, 6 and 7 squared are 81, 36 and 49 of 166
+    assert float(rows["root sum of squares"][0]) == pytest.approx(1.3e-7)
+
+
+def test_inputs_options_versions_and_messages_are_told(page):
+    rows = {row[0]: row[1:] for row in page.rows if row}
+    assert rows["input scan"] == ["scan.h5"]
+    assert rows["its SHA-256 (scan)"] == ["ab" * 32]
+    assert rows["method"] == ["white-noise"]
+    assert rows["seed"] == ["not given"]
+    assert rows["numpy"] == ["2.0"]
+    assert rows["program"] == ["memscal 0.1.0"]
+    assert "1 outlier was down-weighted at x = 2.25 mm." in page.words
+
+
+def test_every_table_has_a_caption_and_headers_with_a_scope(page):
+    assert len(page.find("table")) == len(page.find("caption")) >= 5
+    assert all(each.get("scope") in ("col", "row") for each in page.find("th"))
+
+
+def test_hostile_strings_are_text_and_nothing_else(make_apparatus):
+    data = make_apparatus(
+        sensor=StressSensor(name=_HOSTILE, model=_HOSTILE, channel=_HOSTILE),
+        meaning=_HOSTILE,
+        failed=1,
+        messages=(_HOSTILE,),
+    )
+    object.__setattr__(data.process, "configuration", {_HOSTILE: _HOSTILE})
+    page = Page(html_report(data))
+    assert page.open == []
+    assert not page.find("script")
+    assert len(page.find("img")) == 1
+    assert page.words.count(_HOSTILE) >= 4
+    assert any(row[:2] == [_HOSTILE, _HOSTILE] for row in page.rows)
+
+
+def test_the_same_data_give_the_same_page(make_apparatus):
+    assert html_report(make_apparatus()) == html_report(make_apparatus())
+
+
+def test_a_calibration_without_checks_does_not_claim_that_they_passed(make_apparatus):
+    data = make_apparatus()
+    object.__setattr__(data, "checks", ())
+    text = html_report(data)
+    assert "No quality check was made." in text
+    assert "checks passed" not in text
+
+
+def test_a_further_parameter_is_shown_with_the_unit_that_it_states(make_apparatus):
+    data = make_apparatus()
+    known = data.parameters
+    covariance = np.zeros((6, 6))
+    covariance[:5, :5] = known.covariance
+    covariance[5, 5] = 1e-6
+    units = ("V/Pa", "m", "m", "m", "V", "V/m")
+    more = ParameterSet(
+        (*known.names, "baseline_slope"), np.append(known.values, 0.02), covariance, units
+    )
+    object.__setattr__(data, "parameters", more)
+    rows = {row[0]: row[1:] for row in Page(html_report(data)).rows}
+    assert rows["baseline slope"][1] == "(0.0200 ± 0.0010) mV/mm"

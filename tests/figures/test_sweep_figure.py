@@ -1,0 +1,113 @@
+"""The sweep figure: every draw is accounted for, and heavy tails do not rule the axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from memscal.figures.render import render_figure
+from memscal.figures.sweep import sweep_figure
+from memscal.model.validation import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    amplitude: FloatArray
+    conversion_constant: FloatArray
+    gaussian_sigma_deconvolved: FloatArray
+    relative_rms: FloatArray
+    seed_conversion_constant: FloatArray
+    seed_gaussian_sigma: FloatArray
+    seed_relative_rms: FloatArray
+
+
+def make_sweep(seeds: int = 12, tail: float = 1.0) -> Sweep:
+    rng = np.random.default_rng(5)
+    amplitude = np.logspace(-1, 1, 9)
+    constant = 3e-8 * (1 - 0.002 * amplitude)
+    sigma = 0.55e-3 * (1 + 0.01 * np.log(amplitude))
+    misfit = 0.005 * (1 + 0.05 * amplitude)
+
+    def draws(values):
+        spread = 1 + 0.01 * rng.normal(size=(9, seeds))
+        if seeds:
+            spread[-1, 0] = tail
+        return values[:, None] * spread
+
+    return Sweep(amplitude, constant, sigma, misfit, draws(constant), draws(sigma), draws(misfit))
+
+
+def line(axes, label):
+    (found,) = [each for each in axes.lines if each.get_label() == label]
+    return np.asarray(found.get_xdata(), float), np.asarray(found.get_ydata(), float)
+
+
+def test_each_panel_holds_the_exact_results_in_its_unit():
+    sweep = make_sweep()
+    a, sigma, misfit = sweep_figure(sweep).axes
+    np.testing.assert_allclose(line(a, "exact expectation")[1], sweep.conversion_constant / 1e-8)
+    np.testing.assert_allclose(
+        line(sigma, "exact expectation")[1], sweep.gaussian_sigma_deconvolved * 1e3
+    )
+    np.testing.assert_allclose(line(misfit, "exact expectation")[1], sweep.relative_rms * 100)
+    assert a.get_ylabel() == "$A$ ($10^{-5}$ mV/Pa)"
+    assert "(mm)" in sigma.get_ylabel()
+    assert "(%)" in misfit.get_ylabel()
+    assert "amplitude" in misfit.get_xlabel()
+    assert misfit.get_xscale() == "log"
+
+
+def test_the_median_of_the_draws_is_drawn_and_every_draw_is_a_dot():
+    sweep = make_sweep()
+    sigma = sweep_figure(sweep).axes[1]
+    _, median = line(sigma, "median of draws")
+    np.testing.assert_allclose(median, np.median(sweep.seed_gaussian_sigma, axis=1) * 1e3)
+    _, dots = line(sigma, "one draw")
+    np.testing.assert_allclose(np.sort(dots), np.sort(sweep.seed_gaussian_sigma.ravel() * 1e3))
+
+
+@pytest.mark.parametrize("tail", [1e6, -1e6])
+def test_a_wild_draw_goes_to_the_edge_is_counted_and_leaves_the_axis_alone(tail):
+    calm, wild = sweep_figure(make_sweep()).axes[0], sweep_figure(make_sweep(tail=tail)).axes[0]
+    assert np.ptp(wild.get_ylim()) < 3 * np.ptp(calm.get_ylim())
+    note = wild.get_title(loc="right")
+    assert note.endswith("of 108 draws beyond the axis")
+    assert int(note.split()[0]) >= 1
+    marker = "^" if tail > 0 else "v"
+    (edge,) = [each for each in wild.lines if each.get_marker() == marker]
+    assert 10.0 in np.asarray(edge.get_xdata())
+
+
+def test_the_exact_results_always_lie_inside_the_axes():
+    sweep = make_sweep(tail=50.0)
+    for axes in sweep_figure(sweep).axes:
+        low, high = axes.get_ylim()
+        _, exact = line(axes, "exact expectation")
+        assert np.all((exact > low) & (exact < high))
+
+
+def test_the_right_hand_axis_is_zero_percent_at_the_rules_amplitude():
+    sweep = make_sweep()
+    axes = sweep_figure(sweep).axes[1]
+    (right,) = axes.child_axes
+    to_percent = right._functions[0]  # what the drawn ticks are computed with
+    at_rule = sweep.gaussian_sigma_deconvolved[4] * 1e3
+    assert to_percent(at_rule) == pytest.approx(0.0, abs=1e-12)
+    assert to_percent(1.05 * at_rule) == pytest.approx(5.0)
+
+
+def test_draws_that_failed_are_left_out_and_no_seeds_are_no_error():
+    sweep = make_sweep()
+    sweep.seed_conversion_constant[2, :] = np.nan
+    x, median = line(sweep_figure(sweep).axes[0], "median of draws")
+    assert x.size == 8
+    assert np.all(np.isfinite(median))
+    none = sweep_figure(make_sweep(seeds=0)).axes[0]
+    assert [each.get_label() for each in none.lines if each.get_label() == "one draw"] == []
+
+
+def test_two_sweep_figures_are_the_same_bytes():
+    first, second = (render_figure(sweep_figure(make_sweep()), "svg") for _ in range(2))
+    assert first == second
