@@ -1,0 +1,7 @@
+"""The version of the program; the files' schemas have versions of their own."""
+
+from __future__ import annotations
+
+__all__ = ["__version__"]
+
+__version__ = "0.1.0"

@@ -1,0 +1,99 @@
+"""Every check of the project, each in a fresh environment: ``nox --list`` names them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import nox
+
+nox.needs_version = ">=2025.2.9"
+nox.options.sessions = ["lint", "typecheck", "tests"]
+
+ROOT = Path(__file__).parent
+GROUPS = nox.project.load_toml("pyproject.toml")
+
+NOTHING_FROM_OUTSIDE = {"PYTHONPATH": "", "PYTHONNOUSERSITE": "1"}
+"""Environment in which only what the session installed can be imported."""
+
+
+def group(name: str) -> list[str]:
+    """Requirements of one of the dependency groups in pyproject.toml."""
+    return list(nox.project.dependency_groups(GROUPS, name))
+
+
+@contextmanager
+def outside_the_checkout(session: nox.Session, *, requirements: list[str]) -> Iterator[Path]:
+    """Install the built wheel and step into a copy of the tests that has no sources beside it."""
+    with TemporaryDirectory(prefix="memscal-") as folder:
+        wheels, copy = Path(folder, "wheel"), Path(folder, "outside")
+        pip = ("python", "-m", "pip", "wheel", "--quiet", "--no-deps")
+        session.run(*pip, "--wheel-dir", os.fspath(wheels), os.fspath(ROOT))
+        (wheel,) = wheels.glob("memscal-*.whl")
+        session.install(os.fspath(wheel), *requirements)
+
+        for name in ("tests", "notebooks", "calibration_data"):
+            clutter = shutil.ignore_patterns("__pycache__", ".*")
+            if (ROOT / name).is_dir():
+                shutil.copytree(ROOT / name, copy / name, ignore=clutter)
+        for name in ("pyproject.toml", "README.md"):
+            shutil.copy(ROOT / name, copy)
+        with session.chdir(copy):
+            yield copy
+
+
+def run_pytest(session: nox.Session, *arguments: str) -> None:
+    """Run pytest on whatever the session installed, and on nothing else."""
+    session.run("pytest", "-p", "no:cacheprovider", *arguments, env=NOTHING_FROM_OUTSIDE)
+
+
+@nox.session
+def tests(session: nox.Session) -> None:
+    """Test the built wheel: unit tests, doctests, notebooks and benchmarks in one run."""
+    with outside_the_checkout(session, requirements=group("test")) as copy:
+        everything = ["tests", "--pyargs", "memscal", "--nbmake"]
+        everything += sorted(os.fspath(book) for book in copy.glob("notebooks/*.ipynb"))
+        run_pytest(session, *(session.posargs or everything))
+
+
+@nox.session
+def accuracy(session: nox.Session) -> None:
+    """Run the statistical studies in full, over every seed."""
+    with outside_the_checkout(session, requirements=group("test")):
+        session.env["MEMSCAL_FULL_STUDY"] = "1"
+        run_pytest(session, "tests/accuracy", "-m", "accuracy", *session.posargs)
+
+
+@nox.session
+def notebooks(session: nox.Session) -> None:
+    """Execute the notebooks against the built wheel."""
+    with outside_the_checkout(session, requirements=group("test")):
+        run_pytest(session, "--nbmake", "notebooks", *session.posargs)
+
+
+@nox.session
+def coverage(session: nox.Session) -> None:
+    """Show which lines of the built wheel no test reaches."""
+    with outside_the_checkout(session, requirements=[*group("test"), "pytest-cov"]):
+        run_pytest(session, "tests", "--cov", "--cov-report=term-missing", "--benchmark-disable")
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Check style, formatting, spelling, and the set-up of the repository itself."""
+    session.install(*group("lint"))
+    session.run("ruff", "check", ".")
+    session.run("ruff", "format", "--check", ".")
+    session.run("codespell")
+    session.run("repo-review", ".")
+
+
+@nox.session
+def typecheck(session: nox.Session) -> None:
+    """Check the types of the package, strictly."""
+    session.install(*group("typecheck"), ".")
+    session.run("mypy")
