@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from memscal.figures.apparatus_panels import draw_radial, draw_radial_log, draw_transfer
 from memscal.figures.quantities import KPA, MM, measured_text
-from memscal.figures.scan_panels import draw_residuals, draw_scan, draw_scan_log
+from memscal.figures.residual_panel import draw_residuals
+from memscal.figures.scan_panels import draw_scan, draw_scan_log
 from memscal.figures.style import COLOURS, drawable, house_style, new_figure, panel_letter
 from memscal.model.apparatus import ApparatusData, QualityCheck
 
@@ -18,6 +19,7 @@ _PANELS_HEIGHT = 8.2
 _LINE_HEIGHT = 0.155
 _LINE_WIDTH = 122
 _MAX_FAILED_LINES = 12
+_MARGIN = 0.012  # left and right of the lines of text, of the width
 
 
 def calibration_figure(data: ApparatusData) -> Figure:
@@ -135,7 +137,12 @@ def _write_lines(figure: Figure, lines: list[tuple[str, str, str]]) -> None:
         y = 1.0 - (0.08 + _LINE_HEIGHT * i) / height
         # A sensor's name may hold a dollar sign: it is text, not mathematics.
         text = figure.text(
-            0.012, y, drawable(line), color=colour, weight=weight, va="top", parse_math=False
+            _MARGIN, y, drawable(line), color=colour, weight=weight, va="top", parse_math=False
         )
-        text.set_fontsize(9.0 if i == 0 else 7.5)
+        size = 9.0 if i == 0 else 7.5
+        text.set_fontsize(size)
         text.set_in_layout(False)
+        # Lines are broken by their number of characters; one of wide letters is set smaller.
+        available = (1 - 2 * _MARGIN) * figure.bbox.width
+        width = text.get_window_extent().width
+        text.set_fontsize(size * min(1.0, available / max(width, 1.0)))

@@ -1,4 +1,4 @@
-"""The panels that show the scan: measured voltage, reconvolutions, reference, residuals."""
+"""The panels that show the scan: measured voltage, reconvolutions, reference."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from memscal.figures.style import COLOURS, SCATTER_THRESHOLD, legend_above, mark
 from memscal.model.apparatus import ApparatusData
 from memscal.model.validation import FloatArray
 
-__all__ = ["draw_residuals", "draw_scan", "draw_scan_log"]
+__all__ = ["draw_scan", "draw_scan_log", "limit_to_scan"]
 
 _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a limit
 
@@ -25,10 +25,10 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
     """
     scan = data.reconvolution
     _draw_measured(axes, scan.x, scan.u_zz, _finite_errors(scan.u_zz_errors))
-    _draw_predictions(axes, data, baseline=0.0)
-    _draw_reference(axes, data, baseline=_baseline(data))
+    _draw_predictions(axes, data)
+    _draw_reference(axes, data)
     _draw_indenter(axes, data)
-    _limit_to_scan(axes, scan.x)
+    limit_to_scan(axes, scan.x)
     axes.set_ylabel("voltage $U_{zz}$ (mV)")
     _stress_axis(axes, data, baseline=_baseline(data))
     legend_above(axes, points=scan.x.size)
@@ -40,8 +40,8 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     A point below twice its standard uncertainty is not a measurement of a magnitude: its
     upper limit, max(U, 0) + 2u, is drawn instead, as an open triangle pointing down.
     """
-    scan, baseline = data.reconvolution, _baseline(data)
-    signal, errors = scan.u_zz - baseline, _finite_errors(scan.u_zz_errors)
+    scan = data.reconvolution
+    signal, errors = scan.u_zz - _background(data, scan.x), _finite_errors(scan.u_zz_errors)
     clear = (signal > _EXPANDED * errors) & (signal > 0)
     limit = np.where(clear, np.nan, np.maximum(signal, 0.0) + _EXPANDED * errors)
     limit[~(limit > 0)] = np.nan
@@ -52,54 +52,21 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
         limits.set(color=COLOURS["muted"], markersize=0.8 * marker_size(scan.x.size))
         limits.set(label="less than 2u: upper limit, U + 2u")
         limits.set_rasterized(scan.x.size > SCATTER_THRESHOLD)
-    _draw_predictions(axes, data, baseline=baseline, positive=True)
-    _draw_reference(axes, data, baseline=0.0, positive=True)
+    _draw_predictions(axes, data, net=True)
+    _draw_reference(axes, data, net=True)
     axes.set_yscale("log")
     heights = np.concatenate([signal[clear], limit[np.isfinite(limit)]])
     if heights.size:
         top = max(float(np.max(heights)), _reference_peak(data))
         axes.set_ylim(0.5 * float(np.min(heights)) / MV, 2.0 * top / MV)
     _draw_indenter(axes, data)
-    _limit_to_scan(axes, scan.x)
+    limit_to_scan(axes, scan.x)
     along = "distance from the centre $r$" if _by_distance(data) else "position $x$"
     axes.set_xlabel(f"{along} (mm)")
     axes.set_ylabel("$U_{zz}$ less baseline (mV)")
     _stress_axis(axes, data, baseline=0.0)
     if np.any(np.isfinite(limit)):
         axes.legend(handles=[limits], loc="lower left", bbox_to_anchor=(0, 1), borderpad=0.2)
-
-
-def draw_residuals(axes: Axes, data: ApparatusData) -> None:
-    """Draw measured minus predicted in units of each point's standard uncertainty.
-
-    Points beyond the axis are drawn at its edge as triangles, never dropped.
-    """
-    scan = data.reconvolution
-    errors, scale = _residual_scale(data)
-    with_g, with_gaussian = (
-        scan.residual / errors,
-        (scan.u_zz - scan.u_zz_gaussian) / errors,
-    )
-    limit = _residual_limit(with_g, with_gaussian)
-    axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
-    axes.axhline(0.0, color="0.4", lw=0.6)
-    many = scan.x.size > SCATTER_THRESHOLD
-    size = 1.2 if many else marker_size(scan.x.size)
-    for z, name, marker, face in (
-        (with_gaussian, "gaussian", "s", "none"),
-        (with_g, "deconvolved", "o", COLOURS["deconvolved"]),
-    ):
-        label = f"{'Gaussian' if name == 'gaussian' else 'G'}: rms {_rms(z):.2f}"
-        (points,) = axes.plot(
-            scan.x / MM, z, ls="none", marker=marker, ms=size, mew=0.3 if many else 0.7
-        )
-        points.set(color=COLOURS[name], markerfacecolor=face, label=label)
-        points.set_rasterized(many)
-        _mark_beyond(axes, scan.x, z, limit, COLOURS[name])
-    axes.set_ylim(-limit, limit)
-    axes.set_ylabel(f"residual / {scale}")
-    _limit_to_scan(axes, scan.x)
-    legend_above(axes, points=scan.x.size)
 
 
 def _draw_measured(
@@ -131,16 +98,16 @@ def _draw_measured(
     )
 
 
-def _draw_predictions(
-    axes: Axes, data: ApparatusData, *, baseline: float, positive: bool = False
-) -> None:
+def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> None:
+    """Draw both reconvolutions; ``net``: less baseline and drift, and only where positive."""
     scan = data.reconvolution
+    background = _background(data, scan.x) if net else np.zeros(scan.x.shape)
     for u, name, label, style in (
         (scan.u_zz_predicted, "deconvolved", "reconvolved, G", "-"),
         (scan.u_zz_gaussian, "gaussian", "reconvolved, Gaussian", "--"),
     ):
-        x, curve = _as_curve(scan.x, u - baseline)
-        if positive:
+        x, curve = _as_curve(scan.x, u - background)
+        if net:
             curve = np.where(curve > 0, curve, np.nan)
         line_like = x.size < scan.x.size or _single_valued(scan.x)
         (line,) = axes.plot(x / MM, curve / MV, style, color=COLOURS[name], label=label, zorder=3)
@@ -166,18 +133,21 @@ def _single_valued(x: FloatArray) -> bool:
     return bool(np.unique(x).size == x.size)
 
 
-def _draw_reference(
-    axes: Axes, data: ApparatusData, *, baseline: float, positive: bool = False
-) -> None:
-    """Draw baseline + A sigma_zz for the scan's load, mirrored about the centre."""
+def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> None:
+    """Draw baseline + A sigma_zz for the scan's load, mirrored about the centre.
+
+    ``net``: less baseline and drift, and only where positive.
+    """
     reference, constant = data.reference, data.conversion_constant
     if not (np.isfinite(constant) and constant > 0):
         return
     voltage = constant * reference.sigma_zz * (data.load / reference.load)
-    if positive:
+    if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
     x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
-    curve = baseline + np.concatenate([voltage[::-1], voltage])
+    curve = np.concatenate([voltage[::-1], voltage])
+    if not net:
+        curve = curve + _background(data, x)
     axes.plot(
         x / MM,
         curve / MV,
@@ -252,49 +222,26 @@ def _baseline(data: ApparatusData) -> float:
     return data.parameters["baseline"] if known else 0.0
 
 
+def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
+    """Return baseline and drift at positions x, in V.
+
+    ``drift`` is the change of the baseline from the middle of the scan to its end.  Points
+    given by their distance from a raster's centre no longer tell where on it they were.
+    """
+    level = np.full(x.shape, _baseline(data))
+    along = data.reconvolution.x
+    if "drift" in data.parameters and np.ptp(along) > 0 and not _by_distance(data):
+        middle, half = (np.max(along) + np.min(along)) / 2, np.ptp(along) / 2
+        level += data.parameters["drift"] * (x - middle) / half
+    return level
+
+
 def _finite_errors(errors: FloatArray) -> FloatArray:
     return np.where(np.isfinite(errors), errors, 0.0)
 
 
-def _residual_scale(data: ApparatusData) -> tuple[FloatArray, str]:
-    """Return what residuals are divided by: the stated uncertainty, or else their own rms."""
-    errors = data.reconvolution.u_zz_errors
-    if np.all(np.isfinite(errors) & (errors > 0)):
-        return errors, "$u$"
-    rms = _rms(data.reconvolution.residual)
-    return np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
-
-
-def _rms(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
-
-
-def _residual_limit(*residuals: FloatArray) -> float:
-    """Return an axis limit that one outlier cannot stretch."""
-    sizes = np.abs(np.concatenate(residuals))
-    sizes = sizes[np.isfinite(sizes)]
-    if not sizes.size:
-        return 3.5
-    return float(max(3.5, min(1.1 * np.max(sizes), 2.0 * np.quantile(sizes, 0.9))))
-
-
-def _mark_beyond(axes: Axes, x: FloatArray, z: FloatArray, limit: float, colour: str) -> None:
-    for side, marker in ((1, "^"), (-1, "v")):
-        beyond = side * z > limit
-        if np.any(beyond):
-            edge = np.full(int(np.sum(beyond)), 0.93 * side * limit)
-            axes.plot(
-                x[beyond] / MM,
-                edge,
-                marker,
-                color=colour,
-                ms=4,
-                label="_beyond the axis",
-            )
-
-
-def _limit_to_scan(axes: Axes, x: FloatArray) -> None:
+def limit_to_scan(axes: Axes, x: FloatArray) -> None:
+    """Show the positions (m) of the scan, whatever the reference reaches."""
     low, high = float(np.min(x)), float(np.max(x))
     margin = 0.03 * (high - low) or MM
     axes.set_xlim((low - margin) / MM, (high + margin) / MM)

@@ -9,6 +9,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
 from memscal.figures.calibration import calibration_figure, failed_checks_text
+from memscal.model.apparatus import ParameterSet
 from memscal.model.scan import StressSensor
 
 
@@ -122,6 +123,21 @@ def test_each_point_is_a_measurement_or_an_upper_limit_on_the_logarithmic_axis(
     np.testing.assert_allclose(limits[low], np.maximum(signal[low], 0) + 2 * errors[low])
 
 
+def test_a_drift_is_taken_off_before_the_logarithm(make_apparatus, drawn):
+    data = make_apparatus()
+    scan, known = data.reconvolution, data.parameters
+    tilt = 5e-4 * scan.x / 8e-3  # V: a tenth of the maximum at the scan's end
+    for name in ("u_zz", "u_zz_predicted", "u_zz_gaussian"):
+        object.__setattr__(scan, name, getattr(scan, name) + tilt)
+    more = ParameterSet(
+        (*known.names, "drift"), np.append(known.values, 5e-4), np.diag(np.full(6, 1e-12))
+    )
+    object.__setattr__(data, "parameters", more)
+    tilted, level = panels(calibration_figure(data))["scan_log"], panels(drawn())["scan_log"]
+    for label in ("reconvolved, G", "less than 2u"):
+        np.testing.assert_allclose(line(tilted, label)[1], line(level, label)[1], rtol=1e-6)
+
+
 def test_residuals_are_in_units_of_the_standard_uncertainty(make_apparatus, drawn):
     data = make_apparatus()
     axes = panels(drawn())["residuals"]
@@ -200,8 +216,9 @@ def test_a_calibration_without_failures_says_so(make_apparatus, drawn):
     assert failed_checks_text(make_apparatus().checks) == []
 
 
-def test_no_text_above_the_panels_leaves_the_page(drawn):
-    words = "a failure that takes many words to explain " * 4
+@pytest.mark.parametrize("sentence", ["many words explain a failure ", "WWWWW WWWWW ", "i" * 99])
+def test_no_text_above_the_panels_leaves_the_page(drawn, sentence):
+    words = sentence * 4
     figure = drawn(failed=5, meaning=words.strip() + ".")
     renderer = figure.canvas.get_renderer()
     boxes = [text.get_window_extent(renderer) for text in figure.texts]
