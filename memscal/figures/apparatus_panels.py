@@ -18,7 +18,7 @@ _LOG_DECADES = 4.0
 
 def draw_radial(axes: Axes, data: ApparatusData) -> None:
     """Draw G(r) with its expanded uncertainty (k = 2) and the Gaussian, linear."""
-    radial = data.radial
+    radial = data.radial_profile
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_band(axes, radial, floor=-np.inf)
     _draw_profiles(axes, radial.r, radial.g, radial.g_gaussian)
@@ -38,7 +38,7 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
 
 def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     """Draw G(r) on a logarithmic axis; where G is not positive, only the band is drawn."""
-    radial = data.radial
+    radial = data.radial_profile
     axes.set_yscale("log")
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
     inside = radial.r <= _shown_radius(radial)

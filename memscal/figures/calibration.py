@@ -143,6 +143,6 @@ def _write_lines(figure: Figure, lines: list[tuple[str, str, str]]) -> None:
         text.set_fontsize(size)
         text.set_in_layout(False)
         # Lines are broken by their number of characters; one of wide letters is set smaller.
-        available = (1 - 2 * _MARGIN) * figure.bbox.width
+        available = (1 - 3 * _MARGIN) * figure.bbox.width
         width = text.get_window_extent().width
         text.set_fontsize(size * min(1.0, available / max(width, 1.0)))

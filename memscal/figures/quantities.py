@@ -49,7 +49,9 @@ _KNOWN = {
     "centre": ("centre of the scan", "x₀", "m"),
     "centre_y": ("centre of the scan along y", "y₀", "m"),
     "baseline": ("baseline", "U₀", "V"),
-    "drift": ("drift of the baseline over half the scan", "U₁", "V"),
+    "drift": ("drift of the baseline across the scan", "ΔU", "V"),
+    "drift_y": ("drift of the baseline along y", "ΔU", "V"),
+    "conversion_constant_gaussian": ("conversion constant with the Gaussian", "A", "V/Pa"),
 }
 
 # The unit that is shown for an SI unit, and how many of the latter it is.

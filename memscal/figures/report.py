@@ -18,7 +18,12 @@ from memscal.model.provenance import SourceFile
 
 __all__ = ["html_report"]
 
-_RATIO_SCALE = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
+_RATIO_SCALE = (
+    "conversion_constant",
+    "conversion_constant_gaussian",
+    "gaussian_sigma",
+    "gaussian_sigma_deconvolved",
+)
 
 
 def html_report(data: ApparatusData) -> str:
@@ -100,7 +105,7 @@ def _checks_table(data: ApparatusData) -> str:
         for check in data.checks
     ]
     failed = {i for i, check in enumerate(data.checks) if not check.passed}
-    head = ("check", "value", "limit", "result", "what a failure means")
+    head = ("check", "value", "limit", "result", "meaning")
     return _table("Each check, its value and its limit", head, rows, marked=failed)
 
 

@@ -225,14 +225,14 @@ def _baseline(data: ApparatusData) -> float:
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
     """Return baseline and drift at positions x, in V.
 
-    ``drift`` is the change of the baseline from the middle of the scan to its end.  Points
+    ``drift`` is the change of the baseline from one end of the scan to the other.  Points
     given by their distance from a raster's centre no longer tell where on it they were.
     """
     level = np.full(x.shape, _baseline(data))
     along = data.reconvolution.x
     if "drift" in data.parameters and np.ptp(along) > 0 and not _by_distance(data):
-        middle, half = (np.max(along) + np.min(along)) / 2, np.ptp(along) / 2
-        level += data.parameters["drift"] * (x - middle) / half
+        middle = (np.max(along) + np.min(along)) / 2
+        level += data.parameters["drift"] * (x - middle) / np.ptp(along)
     return level
 
 

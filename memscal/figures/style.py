@@ -66,6 +66,7 @@ _STYLE: dict[str, Any] = {
     "legend.borderaxespad": 0.2,
     "lines.linewidth": 1.2,
     "hatch.linewidth": 0.4,
+    "text.hinting": "none",  # letters as wide on paper as on a screen: lines keep their ends
     "savefig.dpi": 200,
     "svg.hashsalt": "memscal",
     "svg.fonttype": "path",

@@ -143,7 +143,7 @@ def build(
     rod = Rod(radius=0.25e-3)
     return ApparatusData(
         field=ApparatusField(x=grid, y=grid, g=g, g_errors=np.full(g.shape, error * g.max())),
-        radial=radial_profile(error, ripple),
+        radial_profile=radial_profile(error, ripple),
         transfer=transfer_function(3.7e3),
         reconvolution=reconvolution(kind, points, noise, seed),
         parameters=ParameterSet(

@@ -130,7 +130,7 @@ def test_a_drift_is_taken_off_before_the_logarithm(make_apparatus, drawn):
     for name in ("u_zz", "u_zz_predicted", "u_zz_gaussian"):
         object.__setattr__(scan, name, getattr(scan, name) + tilt)
     more = ParameterSet(
-        (*known.names, "drift"), np.append(known.values, 5e-4), np.diag(np.full(6, 1e-12))
+        (*known.names, "drift"), np.append(known.values, 1e-3), np.diag(np.full(6, 1e-12))
     )
     object.__setattr__(data, "parameters", more)
     tilted, level = panels(calibration_figure(data))["scan_log"], panels(drawn())["scan_log"]
@@ -173,9 +173,9 @@ def test_the_band_of_g_is_two_standard_uncertainties_either_way(make_apparatus, 
     data = make_apparatus()
     axes = panels(drawn())["radial"]
     corners = band(axes)
-    g, spread = data.radial.g / 1e6, data.radial.g_errors / 1e6
+    g, spread = data.radial_profile.g / 1e6, data.radial_profile.g_errors / 1e6
     for each in (g + 2 * spread, g - 2 * spread):
-        wanted = np.column_stack([data.radial.r * 1e3, each])
+        wanted = np.column_stack([data.radial_profile.r * 1e3, each])
         distance = np.abs(corners[:, None] - wanted[None]).max(axis=2).min(axis=0)
         assert np.max(distance) < 1e-12
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
@@ -185,8 +185,8 @@ def test_the_band_of_g_is_two_standard_uncertainties_either_way(make_apparatus, 
 def test_g_and_its_gaussian_differ_in_more_than_colour(make_apparatus, drawn):
     data = make_apparatus()
     axes = panels(drawn())["radial"]
-    np.testing.assert_allclose(line(axes, "deconvolved G")[1], data.radial.g / 1e6)
-    np.testing.assert_allclose(line(axes, "Gaussian fit")[1], data.radial.g_gaussian / 1e6)
+    np.testing.assert_allclose(line(axes, "deconvolved G")[1], data.radial_profile.g / 1e6)
+    np.testing.assert_allclose(line(axes, "Gaussian fit")[1], data.radial_profile.g_gaussian / 1e6)
     styles = {each.get_label(): each.get_linestyle() for each in axes.lines}
     assert styles["deconvolved G"] != styles["Gaussian fit"]
 
