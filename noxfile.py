@@ -1,3 +1,7 @@
+#!/usr/bin/env python3
+# /// script
+# dependencies = ["nox>=2025.2.9"]
+# ///
 """Every check of the project, each in a fresh environment: ``nox --list`` names them."""
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ from tempfile import TemporaryDirectory
 import nox
 
 nox.needs_version = ">=2025.2.9"
-nox.options.sessions = ["lint", "typecheck", "tests"]
+nox.options.default_venv_backend = "virtualenv"
 
 ROOT = Path(__file__).parent
 GROUPS = nox.project.load_toml("pyproject.toml")
@@ -60,7 +64,7 @@ def tests(session: nox.Session) -> None:
         run_pytest(session, *(session.posargs or everything))
 
 
-@nox.session
+@nox.session(default=False)
 def accuracy(session: nox.Session) -> None:
     """Run the statistical studies in full, over every seed."""
     with outside_the_checkout(session, requirements=group("test")):
@@ -68,14 +72,14 @@ def accuracy(session: nox.Session) -> None:
         run_pytest(session, "tests/accuracy", "-m", "accuracy", *session.posargs)
 
 
-@nox.session
+@nox.session(default=False)
 def notebooks(session: nox.Session) -> None:
     """Execute the notebooks against the built wheel."""
     with outside_the_checkout(session, requirements=group("test")):
         run_pytest(session, "--nbmake", "notebooks", *session.posargs)
 
 
-@nox.session
+@nox.session(default=False)
 def coverage(session: nox.Session) -> None:
     """Show which lines of the built wheel no test reaches."""
     with outside_the_checkout(session, requirements=[*group("test"), "pytest-cov"]):
@@ -97,3 +101,7 @@ def typecheck(session: nox.Session) -> None:
     """Check the types of the package, strictly."""
     session.install(*group("typecheck"), ".")
     session.run("mypy")
+
+
+if __name__ == "__main__":
+    nox.main()

@@ -1,0 +1,51 @@
+"""What the README promises to a new user is what happens."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"^```console\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+EXAMPLES = re.findall(r"^```python\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that holds the shipped data and nothing else."""
+    shutil.copytree(ROOT / "calibration_data", tmp_path / "calibration_data")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_set_up_takes_exactly_two_commands() -> None:
+    assert [block.count("\n") for block in COMMANDS] == [1, 1]
+
+
+def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> None:
+    program, *arguments = shlex.split(COMMANDS[0])[-7:]
+    assert Path(program).name == "memscal"
+    installed = Path(sys.executable).with_name("memscal")
+    run = subprocess.run(
+        [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert (fresh_folder / "rod_scan_65.apparatus.h5").is_file()
+    assert (fresh_folder / "calibration.png").is_file()
+    assert run.stdout.strip()
+
+
+@pytest.mark.usefixtures("fresh_folder")
+def test_the_example_in_python_runs() -> None:
+    names: dict[str, object] = {}
+    for example in EXAMPLES:
+        exec(compile(example, "README.md", "exec"), names)
+    assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)  # type: ignore[attr-defined]
