@@ -112,7 +112,7 @@ def make_artifact(**changes: Any) -> ApparatusData:
     voltage = np.nan_to_num(scan.u_zz)
     data = ApparatusData(
         field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g),
-        radial=ApparatusRadial(
+        radial_profile=ApparatusRadial(
             r=r,
             g=radial,
             g_errors=errors,

@@ -34,7 +34,6 @@ from memscal.model.apparatus import (
     Reconvolution,
     TransferFunction,
 )
-
 from memscal.model.validation import FloatArray
 
 __all__ = ["read_artifact", "write_artifact"]
@@ -81,7 +80,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     parts = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
     return ApparatusData(
         field=_read_field(file, "/entry/apparatus_function"),
-        radial=_read_radial(file, "/entry/radial_profile"),
+        radial_profile=_read_radial(file, "/entry/radial_profile"),
         transfer=_read_transfer(file, "/entry/transfer_function"),
         reconvolution=_read_reconvolution(file, "/entry/reconvolution"),
         parameters=read_parameters(file, "/entry/parameters"),
@@ -127,7 +126,7 @@ def _entry(data: ApparatusData) -> Group:
     children: dict[str, Node] = {
         "title": _TITLE,
         "apparatus_function": _field_group(data.field),
-        "radial_profile": _radial_group(data.radial),
+        "radial_profile": _radial_group(data.radial_profile),
         "transfer_function": _transfer_group(data.transfer),
         "reconvolution": _reconvolution_group(data.reconvolution),
         "parameters": parameter_group(data.parameters, data.budget),

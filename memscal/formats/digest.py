@@ -1,8 +1,8 @@
-"""The content digest: does a file still hold what was written into it?
+"""The content digest, which shows whether a file still holds what was written into it.
 
 Beside the data every file of ours lists what it holds (``/entry/contents``): each path with
-the names of its attributes.  The digest goes over this list in its order, one line of JSON per group or
-dataset: path, type, shape, attributes, and the SHA-256 of the values as little-endian
+the names of its attributes.  The digest goes over the paths in alphabetical order, one line
+of JSON for each: path, type, shape, attributes, and the SHA-256 of the values as little-endian
 64-bit numbers or UTF-8 text.  A reader can follow the list by known paths, without listing a
 group; what other programs add beside it is not ours and is not covered.  The digest shows
 accidents and careless edits; it is not a signature.

@@ -63,7 +63,9 @@ def units_of(file: SafeFile, path: str) -> str | None:
     return None if units is None else str(units)
 
 
-def require_array(file: SafeFile, path: str, dimension: str, *, ndim: int | None = None) -> FloatArray:
+def require_array(
+    file: SafeFile, path: str, dimension: str, *, ndim: int | None = None
+) -> FloatArray:
     """Return the array at a path in SI units."""
     if not file.has(path):
         raise FormatError(
@@ -128,5 +130,3 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     if not isinstance(value, kind):
         raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
     return value
-
-

@@ -296,4 +296,3 @@ class _Owner:
 
     def __init__(self, identifier: Any) -> None:
         self.id = identifier
-

@@ -1,4 +1,4 @@
-"""The estimated parameters of an artifact: values, covariance, and what the uncertainty is made of."""
+"""The estimated parameters of an artifact: values, covariance, and the uncertainty budget."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _DIMENSIONS = {
     "load": "force",
 }
 _COVARIANCE = (
-    "Covariance of the numbers: each parameter in the unit of its own dataset, in the order of names."
+    "Covariance of the numbers, in the order of names: each parameter in the unit of its dataset."
 )
 
 
@@ -69,9 +69,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     """Return the parameters as an NXcollection."""
     dimensions = _dimensions(parameters)
     children: dict[str, Node] = {"names": to_json("parameter names", list(parameters.names))}
-    for name, value, dimension in zip(
-        parameters.names, parameters.values, dimensions, strict=True
-    ):
+    for name, value, dimension in zip(parameters.names, parameters.values, dimensions, strict=True):
         children[name] = si(float(value), dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
     axes = ("parameter", "parameter_prime")
@@ -81,7 +79,9 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     numbers = parameters.covariance * scale[:, None] * scale[None, :]
     children["covariance"] = Number(numbers, "1", axes, {"description": _COVARIANCE})
     if budget:
-        children["budget"] = budget_group(budget, dict(zip(parameters.names, dimensions, strict=True)))
+        children["budget"] = budget_group(
+            budget, dict(zip(parameters.names, dimensions, strict=True))
+        )
     return Group("NXcollection", children)
 
 
@@ -114,9 +114,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
     )
 
 
-def budget_group(
-    budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]
-) -> Group:
+def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
     """Return the uncertainty budget: one group per quantity, one number per source."""
     children: dict[str, Node] = {"names": to_json("budget", list(budget))}
     for quantity, sources in budget.items():

@@ -17,7 +17,7 @@ Attribute = str | int | tuple[str, ...]
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A scalar or array in the unit of the file; ``axes`` names one axis of its group per dimension."""
+    """A scalar or array in the unit of the file; ``axes`` names its axes, found in its group."""
 
     values: NDArray[np.float64] | NDArray[np.int64]
     units: str

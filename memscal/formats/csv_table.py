@@ -1,0 +1,189 @@
+"""Tables of numbers as text: delimiter, decimal mark and header are found, and reported."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import FormatError, InputError
+from memscal.formats.hdf5_reader import read_bytes
+from memscal.formats.text import printable
+from memscal.model.provenance import SourceFile
+from memscal.model.validation import FloatArray
+
+__all__ = ["Table", "read_table"]
+
+_MAX_COLUMNS = 1000
+_DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+_MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
+_MAX_NAME = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table as it stands in a file: the cells of its columns, by name and by number."""
+
+    source: SourceFile
+    names: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    first_line: int
+    decimal: str
+    notes: tuple[str, ...]
+
+    def column(self, wanted: str | int) -> FloatArray:
+        """Return a column as numbers, NaN where a cell is empty.
+
+        Parameters
+        ----------
+        wanted : str or int
+            The name in the header, or the number counted from 1.
+
+        Raises
+        ------
+        InputError
+            If there is no such column.
+        FormatError
+            If a cell is not a number.
+        """
+        i = self._index(wanted)
+        values = np.empty(len(self.rows))
+        for k, row in enumerate(self.rows):
+            values[k] = self._number(row[i] if i < len(row) else "", k, wanted)
+        return values
+
+    def where(self, wanted: str | int) -> str:
+        """Return file and column as messages name them."""
+        return f"{self.source.file_name}: column {wanted!r}"
+
+    def _index(self, wanted: str | int) -> int:
+        if isinstance(wanted, str) and wanted in self.names:
+            if self.names.count(wanted) > 1:
+                raise InputError(
+                    f"{self.source.file_name} has several columns named {wanted!r}.",
+                    cure="Give the number of the column, counted from 1.",
+                )
+            return self.names.index(wanted)
+        number = int(wanted) if isinstance(wanted, int) or wanted.isdecimal() else 0
+        if not 1 <= number <= len(self.names):
+            raise InputError(
+                f"{self.source.file_name} has no column {wanted!r}.",
+                why="Its columns are: " + ", ".join(self.names) + ".",
+                cure="Give one of these names, or a number counted from 1.",
+            )
+        return number - 1
+
+    def _number(self, cell: str, k: int, wanted: str | int) -> float:
+        if cell.lower() in _MISSING:
+            return float("nan")
+        text = cell.replace(self.decimal, ".") if self.decimal != "." else cell
+        try:
+            return float(text.replace("D", "E").replace("d", "e"))
+        except ValueError as error:
+            raise FormatError(
+                f"{self.where(wanted)}, data row {k + 1}: "
+                f"{printable(cell, _MAX_NAME)!r} is not a number.",
+                cure="Correct or remove this row, or state the decimal mark.",
+            ) from error
+
+
+def read_table(
+    path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None
+) -> Table:
+    """Read a delimited text file.
+
+    Lines that begin with ``#`` or ``%`` are comments; the first line with a cell that is
+    no number is the header, and without one the columns have numbers only.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    delimiter, decimal : str, optional
+        What separates the columns, and the decimal mark; found from the file by default.
+
+    Raises
+    ------
+    FormatError
+        If there is no table in it.
+    """
+    data = read_bytes(path)
+    name = os.path.basename(os.fspath(path))
+    notes = []
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+        notes.append("The table is not UTF-8; it was read as Latin-1.")
+    if "\0" in text:
+        raise FormatError(f"{name} is not a text file.", cure="Give a table as CSV.")
+    lines = [s for s in text.splitlines() if s.strip() and s.lstrip()[0] not in "#%"]
+    if not lines:
+        raise FormatError(f"{name} holds no table.", cure="Give a table with one row per reading.")
+    delimiter = delimiter or _find_delimiter(lines)
+    rows = _split(name, lines, delimiter)
+    headed = not all(_NUMBER.fullmatch(c) or c.lower() in _MISSING for c in rows[0])
+    width = max(len(row) for row in rows)
+    header = rows[0] if headed else tuple(str(i + 1) for i in range(width))
+    body = tuple(rows[1:] if headed else rows)
+    if not body:
+        raise FormatError(f"{name} has a header, but no rows.", cure="Give a table with rows.")
+    decimal = decimal or _find_decimal(body, delimiter)
+    mark = "comma" if decimal == "," else "point"
+    notes.append(
+        f"Read {len(body)} rows of {width} columns separated by a "
+        f"{_DELIMITERS.get(delimiter, repr(delimiter))}, with a decimal {mark}."
+    )
+    return Table(
+        source=SourceFile(name, hashlib.sha256(data).hexdigest()),
+        names=tuple(printable(cell, _MAX_NAME) for cell in header),
+        rows=body,
+        first_line=int(headed) + 1,
+        decimal=decimal,
+        notes=tuple(notes),
+    )
+
+
+def _find_delimiter(lines: list[str]) -> str:
+    """Take the delimiter that cuts the most lines into equally many pieces."""
+    sample = lines[:50]
+    best, score = " ", 0.0
+    for delimiter in _DELIMITERS:
+        widths = [len(_cells(line, delimiter)) for line in sample]
+        common = max(set(widths), key=widths.count)
+        if common > 1 and widths.count(common) > score:
+            best, score = delimiter, widths.count(common)
+    return best
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    return line.split() if delimiter == " " else line.split(delimiter)
+
+
+def _split(name: str, lines: list[str], delimiter: str) -> list[tuple[str, ...]]:
+    rows: Iterable[list[str]]
+    try:
+        if delimiter == " ":
+            rows = [line.split() for line in lines]
+        else:
+            rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True))
+    except (csv.Error, TypeError) as error:
+        raise FormatError(f"{name} cannot be cut into columns: {error}.") from error
+    cut = [tuple(cell.strip() for cell in row) for row in rows]
+    if max(len(row) for row in cut) > _MAX_COLUMNS:
+        raise FormatError(f"{name} has more than {_MAX_COLUMNS} columns.")
+    return cut
+
+
+def _find_decimal(rows: tuple[tuple[str, ...], ...], delimiter: str) -> str:
+    """A comma is the decimal mark only where cells hold one comma each and no point."""
+    if delimiter == ",":
+        return "."
+    cells = [c for row in rows[:200] for c in row if _NUMBER.fullmatch(c)]
+    return "," if any("," in c for c in cells) and not any("." in c for c in cells) else "."

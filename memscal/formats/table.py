@@ -1,0 +1,186 @@
+"""Import of tables: scans as they leave an experiment, profiles as they leave a FEM program."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import InputError, UnitError
+from memscal.formats.csv_table import Table, read_table
+from memscal.formats.placement import place_readings
+from memscal.formats.reference_table import ImportedProfile, read_reference_table
+from memscal.formats.units import to_si
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+from memscal.model.scan import Scan, StressSensor
+from memscal.model.validation import FloatArray
+
+__all__ = ["ImportedProfile", "ImportedScan", "read_reference_table", "read_scan_table"]
+
+Column = str | int
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedScan:
+    """A scan that was read from a table, and what was done on the way."""
+
+    scan: Scan
+    notes: tuple[str, ...]
+
+
+def read_scan_table(
+    path: str | os.PathLike[str],
+    *,
+    x: Column,
+    u: Column,
+    x_unit: str,
+    u_unit: str,
+    film: ElasticFilm,
+    indenter: Indenter,
+    load: float | None = None,
+    y: Column | None = None,
+    repeat: Column | None = None,
+    u_xz: Column | None = None,
+    u_yz: Column | None = None,
+    load_column: Column | None = None,
+    load_unit: str = "N",
+    load_uncertainty: float | None = None,
+    u_scale: float | None = None,
+    grid_tolerance: float = 0.1,
+    repeats: str = "keep",
+    sensor: StressSensor | None = None,
+    title: str = "",
+    delimiter: str | None = None,
+    decimal: str | None = None,
+) -> ImportedScan:
+    """Read a scan from a table with one row per reading.
+
+    A line scan without repeats keeps its positions as they are.  Repeats of a line are
+    brought to common places, and a raster (``y`` given) to an evenly spaced grid; places
+    without a reading become NaN.
+
+    Parameters
+    ----------
+    path : path
+        A delimited text file.
+    x, u : str or int
+        Columns of position and voltage: a name, or a number counted from 1.
+    x_unit, u_unit : str
+        Their units; ``x_unit`` holds for ``y`` too.
+    film, indenter
+        What was pressed on what: a table does not say it.
+    load : float, optional
+        Nominal load in N; by default the median of ``load_column``.
+    y : str or int, optional
+        Column of the second position, for a raster.
+    repeat : str or int, optional
+        Column that numbers the repeats; without it equal positions are counted in file order.
+    u_xz, u_yz, load_column : str or int, optional
+        Columns of further channels (in ``u_unit``) and of the load at each point.
+    load_unit : str
+        Unit of ``load_column``.
+    load_uncertainty : float, optional
+        Standard uncertainty of the load, in N.
+    u_scale : float, optional
+        Volts per unit of the ``u`` columns, for a sensor whose output is not a voltage;
+        ``u_unit`` is then only its name, and the notes of the scan record the choice.
+    grid_tolerance : float
+        Largest distance of a reading from its place, as a fraction of the grid's step.
+    repeats : {"keep", "average"}
+        What to do with repeats.  A raster can only average: the mean of each place, with a
+        standard uncertainty from the spread pooled over all places.
+    sensor, title
+        Carried into the scan.
+    delimiter, decimal : str, optional
+        Column separator and decimal mark; found from the file by default.
+
+    Returns
+    -------
+    ImportedScan
+        The scan, and what was done: also recorded in ``scan.notes``.
+
+    Raises
+    ------
+    InputError
+        If a column is missing, or the positions do not fit a grid within the tolerance.
+    UnitError
+        If ``u_unit`` is not a voltage and no ``u_scale`` is given.
+    """
+    if repeats not in ("keep", "average"):
+        raise InputError(f'repeats is "{repeats}".', cure='Give "keep" or "average".')
+    if not (np.isfinite(grid_tolerance) and 0 < grid_tolerance < 0.5):
+        raise InputError(
+            f"The grid tolerance is {grid_tolerance:g} of the step, but it must lie between 0 and "
+            "0.5.",
+            why="Beyond half a step a reading has no nearest place.",
+        )
+    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    notes = [
+        f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
+        *table.notes,
+    ]
+    columns = {"u_zz": _voltage(table, u, u_unit, u_scale)}
+    for name, column in (("u_xz", u_xz), ("u_yz", u_yz)):
+        if column is not None:
+            columns[name] = _voltage(table, column, u_unit, u_scale)
+    if u_scale is not None:
+        notes.append(
+            f"The readings are in {u_unit}, not in volts: {u_scale:g} V was taken for one "
+            f"{u_unit}, and every voltage and conversion constant carries this choice."
+        )
+    if load_column is not None:
+        where = table.where(load_column)
+        columns["normal_load"] = to_si(table.column(load_column), load_unit, "force", where)
+        if load is None:
+            load = float(np.nanmedian(columns["normal_load"]))
+            notes.append(f"The nominal load is the median of the column: {load:g} N.")
+    if load is None:
+        raise InputError(
+            "The load of the scan is not given.", cure="Give the load in N, or its column."
+        )
+    placed = place_readings(
+        columns,
+        xs=to_si(table.column(x), x_unit, "length", table.where(x)),
+        ys=None if y is None else to_si(table.column(y), x_unit, "length", table.where(y)),
+        numbers=None if repeat is None else table.column(repeat),
+        tolerance=grid_tolerance,
+        average=repeats == "average",
+        notes=notes,
+    )
+    fields = dict(placed.fields)
+    scan = Scan(
+        x=placed.x,
+        y=placed.y,
+        u_zz=fields.pop("u_zz"),
+        u_zz_errors=placed.errors,
+        normal_load=fields.pop("normal_load", None),
+        channels=fields,
+        load=load,
+        load_uncertainty=load_uncertainty,
+        film=film,
+        indenter=indenter,
+        sensor=sensor or StressSensor(),
+        title=title,
+        notes="\n".join(notes),
+        source=table.source,
+    )
+    return ImportedScan(scan, tuple(notes))
+
+
+def _voltage(table: Table, column: Column, unit: str, scale: float | None) -> FloatArray:
+    values = table.column(column)
+    if scale is not None:
+        if not (np.isfinite(scale) and scale != 0):
+            raise InputError(f"The scale of the readings is {scale:g} V per {unit}.")
+        return values * scale
+    try:
+        return to_si(values, unit, "voltage", table.where(column))
+    except UnitError as error:
+        raise UnitError(
+            error.problem,
+            why="Conversion constants are in volts per pascal.",
+            cure="Give a unit of voltage; for another kind of sensor give the volts that one unit "
+            "stands for (u_scale; --u-scale).",
+        ) from error
