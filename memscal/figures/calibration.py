@@ -103,7 +103,9 @@ def failed_checks_text(checks: tuple[QualityCheck, ...]) -> list[str]:
 def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     """Return the lines above the panels, each with colour and weight."""
     ink = COLOURS["measured"]
-    sensor = " ".join(part for part in (data.sensor.name, data.sensor.model) if part) or "sensor"
+    sensor = (
+        " ".join(part for part in (data.sensor.name, data.sensor.model) if part) or "the sensor"
+    )
     sensor = textwrap.shorten(sensor, 60, placeholder=" …") + f", channel {data.sensor.channel}"
     title = textwrap.shorten(f"Apparatus function of {sensor}", 95, placeholder=" …")
     film = data.film

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 import numpy as np
@@ -43,8 +43,7 @@ def html_report(data: ApparatusData) -> str:
     str
         The page, in UTF-8's characters; everything that came from a file is escaped.
     """
-    sensor = " ".join(part for part in (data.sensor.name, data.sensor.model) if part)
-    title = f"Apparatus function of {sensor or 'the sensor'}, channel {data.sensor.channel}"
+    title = f"Apparatus function of {_sensor(data) or 'the sensor'}, channel {data.sensor.channel}"
     body = "\n".join(
         (
             f"<h1>{escape(title)}</h1>",
@@ -58,6 +57,10 @@ def html_report(data: ApparatusData) -> str:
         )
     )
     return PAGE.substitute(title=escape(title), style=STYLE, body=body)
+
+
+def _sensor(data: ApparatusData) -> str:
+    return " ".join(part for part in (data.sensor.name, data.sensor.model) if part)
 
 
 def _section(heading: str, content: str) -> str:
@@ -146,7 +149,7 @@ def _root_sum_square(parts: Iterable[float]) -> float:
 def _setting_table(data: ApparatusData) -> str:
     film, indenter, reference = data.film, data.indenter, data.reference
     rows = [
-        ("sensor", " ".join(filter(None, (data.sensor.name, data.sensor.model)))),
+        ("sensor", _sensor(data) or "not stated"),
         ("channel", data.sensor.channel),
         ("load", f"{data.load:.4g} N"),
         (
@@ -210,6 +213,9 @@ def _source_rows(what: str, source: SourceFile | None) -> list[tuple[str, str]]:
 
 
 def _plain(value: object) -> str:
+    """Return an option's value for reading: groups as "name: value", not as Python."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key}: {_plain(each)}" for key, each in value.items()) or "none"
     return "not given" if value is None else str(value)
 
 

@@ -18,9 +18,10 @@ h3 { font-size: 1rem; }
 table { border-collapse: collapse; width: 100%; margin: 1rem 0; font-size: .92rem; }
 caption { text-align: left; color: #555; padding-bottom: .3rem; }
 th, td { text-align: left; vertical-align: top; padding: .3rem .7rem .3rem 0;
-  border-bottom: 1px solid #ddd; overflow-wrap: anywhere; }
+  border-bottom: 1px solid #ddd; overflow-wrap: break-word; }
+td:last-child { overflow-wrap: anywhere; }
 th[scope=row] { font-weight: 500; min-width: 9rem; }
-thead th { border-bottom: 2px solid #777; overflow-wrap: normal; }
+thead th { border-bottom: 2px solid #777; }
 td { font-variant-numeric: tabular-nums; }
 tr.failed th, tr.failed td { color: #a11d00; font-weight: 600; }
 tr.total th, tr.total td { font-weight: 600; border-top: 1px solid #777; }

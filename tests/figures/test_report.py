@@ -164,3 +164,12 @@ def test_a_further_parameter_is_shown_with_the_unit_that_it_states(make_apparatu
     object.__setattr__(data, "parameters", more)
     rows = {row[0]: row[1:] for row in Page(html_report(data)).rows}
     assert rows["baseline slope"][1] == "(0.0200 ± 0.0010) mV/mm"
+
+
+def test_grouped_options_read_as_words(make_apparatus):
+    data = make_apparatus()
+    options = {"grid": {"spacing": "0.09 mm", "seed": None}, "options": {}}
+    object.__setattr__(data.process, "configuration", options)
+    rows = {row[0]: row[1:] for row in Page(html_report(data)).rows}
+    assert rows["grid"] == ["spacing: 0.09 mm; seed: not given"]
+    assert rows["options"] == ["none"]
