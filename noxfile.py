@@ -59,7 +59,7 @@ def run_pytest(session: nox.Session, *arguments: str) -> None:
 def tests(session: nox.Session) -> None:
     """Test the built wheel: unit tests, doctests, notebooks and benchmarks in one run."""
     with outside_the_checkout(session, requirements=group("test")) as copy:
-        everything = ["tests", "--pyargs", "memscal", "--nbmake"]
+        everything = [os.fspath(copy / "tests"), "--pyargs", "memscal", "--nbmake"]
         everything += sorted(os.fspath(book) for book in copy.glob("notebooks/*.ipynb"))
         run_pytest(session, *(session.posargs or everything))
 

@@ -16,10 +16,10 @@ MODULES = {
     for path in sorted(PACKAGE.rglob("*.py"))
 }
 
-FLOW = (
-    "version errors model axisymmetry mechanics deconvolution estimation apparatus calibration "
-    "simulation figures cli"
-).split()
+FLOW = [
+    "version", "errors", "model", "axisymmetry", "mechanics", "deconvolution", "estimation",
+    "apparatus", "calibration", "simulation", "figures", "cli",
+]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 
 USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli"}
@@ -99,3 +99,9 @@ def test_slow_libraries_are_imported_only_when_needed(module: tuple[str, str]) -
 
 def test_a_module_is_short_enough_to_hold_in_the_head(module: tuple[str, str]) -> None:
     assert len(module[1].splitlines()) <= LONGEST
+
+
+def test_no_public_name_is_hidden_by_a_module_of_that_name() -> None:
+    # Importing memscal.indent, were there such a module, would replace the function memscal.indent.
+    at_the_top = {room(name) for name in MODULES}
+    assert at_the_top.isdisjoint(memscal.__all__)

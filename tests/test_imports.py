@@ -49,9 +49,3 @@ def test_asking_for_help_loads_click_alone(arguments: str) -> None:
 def test_calibrating_is_possible_without_the_libraries_of_other_jobs() -> None:
     loaded = libraries_after("import memscal; memscal.calibrate, memscal.read_scan")
     assert loaded.isdisjoint({"matplotlib", "meshio", "pint", "rich", "skfem", "skimage"})
-
-
-@pytest.mark.parametrize("name", ["calibrate", "simulate"])
-def test_a_function_is_not_hidden_by_the_module_of_its_name(name: str) -> None:
-    code = f"import memscal.{name}, memscal; assert callable(memscal.{name})"
-    assert "memscal" in libraries_after(code)
