@@ -52,6 +52,10 @@ class FieldGrid(Protocol):
         """Fourier transform about the origin of a field that :meth:`inverse` returned."""
         ...
 
+    def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
+        """Convolve a field that :meth:`inverse` returned with a lifted field."""
+        ...
+
     def to_image(self, field: FloatArray) -> FloatArray:
         """Return the whole plane as an image with the axis at its central pixel."""
         ...
@@ -79,22 +83,23 @@ class EvenGrid:
     @property
     def axis(self) -> FloatArray:
         """Half axis from 0, shape (count,), in m."""
-        return self.spacing * np.arange(self.count)
+        return self.spacing * np.arange(self.count, dtype=np.float64)
 
     @property
     def wavenumber_axis(self) -> FloatArray:
         """Wavenumbers along one axis, shape (count,), in rad/m."""
-        return np.pi / ((self.count - 1) * self.spacing) * np.arange(self.count)
+        return np.pi * np.arange(self.count, dtype=np.float64) / ((self.count - 1) * self.spacing)
 
     @cached_property
     def radius(self) -> FloatArray:
         """Distance of each point from the axis, shape (count, count), in m."""
-        return np.hypot.outer(self.axis, self.axis)
+        return np.asarray(np.hypot.outer(self.axis, self.axis), dtype=np.float64)
 
     @cached_property
     def wavenumber(self) -> FloatArray:
         """Modulus of each wave vector, shape (count, count), in rad/m."""
-        return np.hypot.outer(self.wavenumber_axis, self.wavenumber_axis)
+        axis = self.wavenumber_axis
+        return np.asarray(np.hypot.outer(axis, axis), dtype=np.float64)
 
     @property
     def cell_area(self) -> float:
@@ -112,6 +117,16 @@ class EvenGrid:
     def transfer(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the origin, where an even field's axis already is."""
         return self.forward(field)
+
+    def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
+        """Convolve two even fields."""
+        return self.inverse(self.forward(kernel) * self.forward(field))
+
+    def integrate(self, field: FloatArray) -> float:
+        """Integral of an even field over the whole plane that the quarter stands for."""
+        sides = np.full(field.shape[0], 2.0)
+        sides[0] = 1.0
+        return float(sides @ field @ sides * self.cell_area)
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to the whole plane: odd size, axis at the central pixel."""
@@ -180,6 +195,40 @@ class Lattice:
         """Fourier transform about the central point."""
         return self.forward(scipy.fft.ifftshift(field))
 
+    def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
+        """Convolve a kernel centred on the central point with a field of the lattice."""
+        spectrum = self.transfer(kernel) * self.forward(field)
+        return np.asarray(scipy.fft.irfft2(spectrum, s=field.shape) / self.cell_area)
+
+    def refined(self, kernel: FloatArray, factor: int) -> tuple[Lattice, FloatArray]:
+        """Interpolate a centred kernel to a finer lattice about 0, by its Fourier series.
+
+        Parameters
+        ----------
+        kernel : ndarray, shape (m, n), both odd
+            A field that :meth:`inverse` returned.
+        factor : int
+            An odd number: how many new points come for one old.
+
+        Returns
+        -------
+        Lattice, ndarray
+            The finer lattice, with 0 at its central point, and the kernel on it.
+        """
+        m, n = kernel.shape
+        dy, dx = self.spacing
+        spectrum = scipy.fft.rfft2(scipy.fft.ifftshift(kernel))
+        padded = np.zeros((m * factor, n * factor // 2 + 1), dtype=complex)
+        half = m // 2 + 1
+        padded[:half, : n // 2 + 1] = spectrum[:half]
+        padded[half - m :, : n // 2 + 1] = spectrum[half:]
+        fine = scipy.fft.irfft2(padded, s=(m * factor, n * factor)) * factor**2
+
+        def axis(count: int, step: float) -> FloatArray:
+            return (np.arange(count) - count // 2) * step / factor
+
+        return Lattice(axis(n * factor, dx), axis(m * factor, dy)), scipy.fft.fftshift(fine)
+
     def to_image(self, field: FloatArray) -> FloatArray:
         """Return the field itself: it already covers the plane."""
         return field
@@ -198,10 +247,9 @@ def lift(profile: Callable[[FloatArray], FloatArray], grid: FieldGrid, step: flo
     reach = float(np.max(grid.radius))
     table = np.linspace(0.0, reach, int(np.ceil(reach / step)) + 4)
     spline = radial_spline(table, profile(table))
-    return np.asarray(spline(grid.radius))  # type: ignore[operator]  # as in hankel_transform
+    return spline(grid.radius)
 
 
 def cut(field: FloatArray, grid: EvenGrid, r: FloatArray) -> FloatArray:
     """Cut an even field along its axis: the inverse of :func:`lift`, at radii ``r`` (m)."""
-    spline = radial_spline(grid.axis, field[0])
-    return np.asarray(spline(r))  # type: ignore[operator]  # as in hankel_transform
+    return radial_spline(grid.axis, field[0])(r)

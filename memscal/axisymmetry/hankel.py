@@ -12,29 +12,27 @@ so that :math:`\hat f(0)` is the integral of the field, and convolution is multi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import j0
 
+from memscal.axisymmetry.quadrature import gauss_panels
 from memscal.errors import InputError
 from memscal.model.validation import FloatArray
 
 __all__ = [
     "RadialSpectrum",
     "Wavenumbers",
-    "convolve_radial",
-    "gauss_legendre",
     "hankel_transform",
     "radial_spline",
 ]
 
-
-def gauss_legendre(start: float, stop: float, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights of Gauss-Legendre quadrature from ``start`` to ``stop``."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    half = (stop - start) / 2
-    return start + half * (nodes + 1), half * weights
+# Panels of many nodes are nearly as good as one Gauss rule for all (pi nodes an oscillation),
+# and their nodes are computed once.
+_ORDER = 64
+_PHASE = 90.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +52,8 @@ class Wavenumbers:
 
     @classmethod
     def covering(cls, k_max: float, r_max: float) -> Wavenumbers:
-        """Return nodes up to ``k_max`` (rad/m) that resolve radii up to ``r_max`` (m).
-
-        Gauss-Legendre quadrature needs a little over pi nodes per oscillation of the
-        integrand; the 24 extra ones make smooth spectra exact to rounding.
-        """
-        count = int(np.ceil(0.6 * k_max * r_max)) + 24
-        k, dk = gauss_legendre(0.0, k_max, count)
+        """Return nodes up to ``k_max`` (rad/m) that resolve radii up to ``r_max`` (m)."""
+        k, dk = gauss_panels(k_max, _PHASE / r_max, _ORDER)
         return cls(k, k * dk / (2 * np.pi))
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray) -> FloatArray:
@@ -88,7 +81,7 @@ class RadialSpectrum:
         return self.wavenumbers.synthesise(self.values, r)
 
 
-def radial_spline(r: FloatArray, f: FloatArray) -> object:
+def radial_spline(r: FloatArray, f: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Return an even cubic spline through a radial table.
 
     The table is mirrored, so that the spline has no kink on the axis.
@@ -102,7 +95,8 @@ def radial_spline(r: FloatArray, f: FloatArray) -> object:
     inner = slice(1, 4) if r[0] == 0 else slice(0, 3)
     mirrored_r = np.concatenate([-r[inner][::-1], r])
     mirrored_f = np.concatenate([f[inner][::-1], f])
-    return CubicSpline(mirrored_r, mirrored_f)
+    spline = CubicSpline(mirrored_r, mirrored_f)
+    return lambda radius: np.asarray(spline(radius))
 
 
 def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
@@ -136,43 +130,7 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
     True
     """
     spline = radial_spline(r, f)
-    cells = int(np.ceil(np.max(k) * r[-1] * 0.6)) + min(r.size, 512)
-    nodes, weights = gauss_legendre(0.0, float(r[-1]), cells)
-    values = spline(nodes)  # type: ignore[operator]  # scipy ships no types for CubicSpline
-    return np.asarray(2 * np.pi * j0(np.multiply.outer(k, nodes)) @ (weights * nodes * values))
-
-
-def convolve_radial(
-    r: FloatArray, f: FloatArray, g: FloatArray, r_out: FloatArray | None = None
-) -> FloatArray:
-    """Two-dimensional convolution of two radial functions on one table of radii.
-
-    Parameters
-    ----------
-    r : ndarray, shape (n,)
-        Increasing radii, in m; both functions must have decayed at ``r[-1]``.
-    f, g : ndarray, shape (n,)
-        Their values.
-    r_out : ndarray, optional
-        Radii of the result, in m; ``r`` where absent.
-
-    Returns
-    -------
-    ndarray
-        The convolution, in the unit of ``f`` times that of ``g`` times m^2.
-
-    Examples
-    --------
-    Gaussians of standard deviations 3 and 4 give one of 5:
-
-    >>> r = np.linspace(0, 40, 600)
-    >>> unit = lambda s: np.exp(-(r**2) / (2 * s**2)) / (2 * np.pi * s**2)
-    >>> bool(np.allclose(convolve_radial(r, unit(3.0), unit(4.0)), unit(5.0), atol=1e-7))
-    True
-    """
-    # A cubic spline holds nothing finer than its typical step, whatever the finest one is.
-    k_max = np.pi / float(np.median(np.diff(r)))
-    reach = float(r[-1] if r_out is None else max(r[-1], np.max(r_out)))
-    wavenumbers = Wavenumbers.covering(k_max, 2 * reach)
-    product = hankel_transform(r, f, wavenumbers.k) * hankel_transform(r, g, wavenumbers.k)
-    return wavenumbers.synthesise(product, r if r_out is None else r_out)
+    reach = float(r[-1])
+    nodes, weights = gauss_panels(reach, min(_PHASE / float(np.max(k)), reach / 4), _ORDER)
+    measure = 2 * np.pi * weights * nodes
+    return np.asarray(j0(np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))

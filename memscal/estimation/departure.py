@@ -31,6 +31,9 @@ __all__ = ["DepartureBasis", "WeighedFit", "departure_basis", "weigh_departures"
 _RINGS = 14
 _SUPPORT_IN_WIDTHS = 3.0
 _BLUR = 0.5
+#: A width below the sampling is not seen: rings are never narrower than this many steps.
+_SMALLEST_WIDTH_IN_STEPS = 0.5
+_NEGLIGIBLE = 1e-4
 _STRENGTHS = np.concatenate([[0.0], np.logspace(-2, 7, 37)])
 
 
@@ -62,12 +65,15 @@ class WeighedFit:
         Noise of a point of weight one: in V, or a factor on the stated uncertainties.
     gaussian_probability : float
         Posterior probability that there is no departure, from a prior of one half.
+    gain : ndarray, shape (p, n)
+        Derivative of ``mean`` by the voltages.
     residual : ndarray, shape (n,)
         Voltages that are not explained, in V.
     """
 
     mean: FloatArray
     covariance: FloatArray
+    gain: FloatArray
     noise: float
     gaussian_probability: float
     residual: FloatArray
@@ -90,12 +96,12 @@ def departure_basis(model: ForwardModel, fit: GaussianFit) -> DepartureBasis:
     return DepartureBasis(np.hstack([own, rings]), integrals, own.shape[1])
 
 
-#: A width below the sampling is not seen: rings are never narrower than this many steps.
-_SMALLEST_WIDTH_IN_STEPS = 0.5
-
-
 def weigh_departures(
-    model: ForwardModel, fit: GaussianFit, basis: DepartureBasis, weights: FloatArray
+    model: ForwardModel,
+    fit: GaussianFit,
+    basis: DepartureBasis,
+    weights: FloatArray,
+    effective_count: float,
 ) -> WeighedFit:
     """Weigh departures from a Gaussian fit by evidence.
 
@@ -105,6 +111,8 @@ def weigh_departures(
         The forward model, the best Gaussian, and the kernels about it.
     weights : ndarray, shape (n,)
         Relative weights of the points.
+    effective_count : float
+        How many points the data are worth, outliers down-weighted.
 
     Returns
     -------
@@ -118,20 +126,26 @@ def weigh_departures(
     scale[basis.flat :] = scale[basis.flat :].max()
     design = design / scale
     data = root * (model.points.u - fit.predicted)
-    probability, variance = _evidence(design, data, basis.flat, float(weights.sum()))
-    mean, second = np.zeros(scale.size), np.zeros((scale.size, scale.size))
+    probability, variance = _evidence(design, data, basis.flat, effective_count)
+    gain = np.zeros(design.T.shape)
+    second = np.zeros((scale.size, scale.size))
     for strength, p, v in zip(_STRENGTHS, probability, variance, strict=True):
-        if p < 1e-4:
-            continue
-        centre, inverse = _posterior(design, data, basis.flat, strength)
-        mean += p * centre
-        second += p * (v * inverse + np.outer(centre, centre))
-    used = probability[probability >= 1e-4].sum()
-    mean, second = mean / used, second / used
+        if p > 0:
+            inverse = _posterior_inverse(design, basis.flat, strength)
+            own_gain = inverse @ design.T
+            centre = own_gain @ data
+            gain += p * own_gain
+            second += p * (v * inverse + np.outer(centre, centre))
+    mean = gain @ data
     covariance = (second - np.outer(mean, mean)) / np.outer(scale, scale)
-    residual = np.divide(data - design @ mean, root)
-    noise = float(np.sqrt(probability @ variance))
-    return WeighedFit(mean / scale, covariance, noise, float(probability[0]), residual)
+    return WeighedFit(
+        mean=mean / scale,
+        covariance=covariance,
+        gain=gain * root / scale[:, None],
+        noise=float(np.sqrt(probability @ variance)),
+        gaussian_probability=float(probability[0]),
+        residual=np.divide(data - design @ mean, root),
+    )
 
 
 def _evidence(
@@ -156,20 +170,17 @@ def _evidence(
     prior = np.full(_STRENGTHS.size, 0.5 / (_STRENGTHS.size - 1))
     prior[0] = 0.5
     posterior = prior * np.exp(log_evidence - log_evidence.max())
+    posterior[posterior < _NEGLIGIBLE * posterior.sum()] = 0.0
     return posterior / posterior.sum(), variance
 
 
-def _posterior(
-    design: FloatArray, data: FloatArray, flat: int, strength: float
-) -> tuple[FloatArray, FloatArray]:
-    """Mean and covariance (per unit noise variance) of all columns at one strength."""
+def _posterior_inverse(design: FloatArray, flat: int, strength: float) -> FloatArray:
+    """Posterior covariance of all columns at one strength, per unit noise variance."""
     count = flat if strength == 0 else design.shape[1]
     used = design[:, :count]
     precision = used.T @ used
     if strength > 0:
         precision[range(flat, count), range(flat, count)] += 1 / strength
-    inverse = np.linalg.inv(precision)
-    mean, covariance = np.zeros(design.shape[1]), np.zeros((design.shape[1],) * 2)
-    mean[:count] = inverse @ (used.T @ data)
-    covariance[:count, :count] = inverse
-    return mean, covariance
+    covariance = np.zeros((design.shape[1],) * 2)
+    covariance[:count, :count] = np.linalg.inv(precision)
+    return covariance

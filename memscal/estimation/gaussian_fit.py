@@ -8,6 +8,7 @@ linear drift, by weighted least squares.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from memscal.estimation.forward import ForwardModel, Geometry, gaussian_transfer
 from memscal.model.validation import FloatArray
 
 __all__ = ["GaussianFit", "fit_gaussian"]
+
+_Loss = Literal["linear", "soft_l1"]
 
 #: Widths from which the search starts, in units of the film's smoothing length.
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
@@ -58,6 +61,10 @@ class GaussianFit:
         inverse = np.linalg.inv(information / np.outer(scale, scale))
         return np.asarray(noise**2 * inverse / np.outer(scale, scale))
 
+    def gain(self, weights: FloatArray) -> FloatArray:
+        """Derivative of the parameters by the voltages, shape (p, n)."""
+        return np.asarray(self.covariance(weights, 1.0) @ (self.jacobian * weights[:, None]).T)
+
 
 def fit_gaussian(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
@@ -90,7 +97,7 @@ def _plane(model: ForwardModel) -> int:
     return 2 if model.points.planar else 1
 
 
-def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: str) -> GaussianFit:
+def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _Loss) -> GaussianFit:
     from scipy.optimize import least_squares
 
     root = np.sqrt(weights)
@@ -106,10 +113,17 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: st
 
     scale = _typical(model, start)
     noise = _robust_scale(root * (model.points.u - _linearise(model, start).predicted))
+
+    def residual(scaled: FloatArray) -> FloatArray:
+        return np.asarray(root * (evaluate(scaled).predicted - model.points.u) / noise)
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return np.asarray(root[:, None] * evaluate(scaled).jacobian * scale / noise)
+
     result = least_squares(
-        lambda t: root * (evaluate(t).predicted - model.points.u) / noise,
+        residual,
         start / scale,
-        jac=lambda t: root[:, None] * evaluate(t).jacobian * scale / noise,
+        jac=slope,
         loss=loss,
         f_scale=3.0,
         xtol=1e-10,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.model.scan import Scan
@@ -43,7 +44,7 @@ class ScanPoints:
     u: FloatArray
     load: FloatArray
     u_errors: FloatArray | None
-    repeat: FloatArray
+    repeat: NDArray[np.intp]
     planar: bool
     missing: int
 
@@ -67,7 +68,7 @@ def measured_points(scan: Scan) -> ScanPoints:
     u = scan.u_zz
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
     x, y, repeat = _positions(scan)
-    keep = np.isfinite(u) & np.isfinite(load)
+    keep: NDArray[np.bool_] = np.isfinite(u) & np.isfinite(load)
     errors = scan.u_zz_errors
     if errors is not None:
         keep &= np.isfinite(errors)
@@ -91,17 +92,17 @@ def measured_points(scan: Scan) -> ScanPoints:
     return points
 
 
-def _positions(scan: Scan) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _positions(scan: Scan) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
     shape = scan.u_zz.shape
     x = np.broadcast_to(scan.x, shape)
     if scan.y is not None:
-        return x, np.broadcast_to(scan.y[:, None], shape), np.zeros(shape)
-    rows = np.arange(shape[0]) if scan.kind == "repeats" else np.zeros(1)
-    repeat = np.broadcast_to(rows[:, None] if scan.kind == "repeats" else rows, shape)
+        return x, np.broadcast_to(scan.y[:, None], shape), np.zeros(shape, dtype=np.intp)
+    rows = np.arange(shape[0] if scan.kind == "repeats" else 1, dtype=np.intp)
+    repeat = np.repeat(rows, scan.x.size).reshape(shape)
     return x, np.zeros(shape), repeat
 
 
-def _stated_errors(errors: FloatArray | None, keep: FloatArray) -> FloatArray | None:
+def _stated_errors(errors: FloatArray | None, keep: NDArray[np.bool_]) -> FloatArray | None:
     if errors is None:
         return None
     if np.any(errors[keep] <= 0):
@@ -110,7 +111,7 @@ def _stated_errors(errors: FloatArray | None, keep: FloatArray) -> FloatArray | 
             why="A point without noise would outweigh every other point.",
             cure="Give the electronic noise, or leave u_zz_errors out to have it estimated.",
         )
-    return errors[keep]
+    return np.asarray(errors[keep])
 
 
 def _require_usable(points: ScanPoints) -> None:

@@ -81,6 +81,11 @@ class ProfileEstimate:
         return self.gaussian.covariance(self.weights, self.noise_scale)
 
     @property
+    def gaussian_gain(self) -> FloatArray:
+        """Derivative of the Gaussian fit's parameters by the voltages."""
+        return self.gaussian.gain(self.weights)
+
+    @property
     def kernel(self) -> FloatArray:
         """Transform of A G at the quadrature nodes, in V/Pa."""
         gaussian = gaussian_transfer(self.model.k, self.gaussian.sigma)
@@ -123,6 +128,11 @@ class ProfileEstimate:
         """Voltage at each point, shape (n,), in V."""
         return self.points.u - self.weighed.residual
 
+    @property
+    def largest_signal(self) -> float:
+        """Largest voltage above the background, in V."""
+        return float(np.abs(self.predicted - self.background).max())
+
 
 def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEstimate:
     """Estimate the radial profile of a scan, its centre, baseline, noise and outliers.
@@ -153,7 +163,7 @@ def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEs
         weights = stated * outlier
         fit = fit_gaussian(model, weights, start=fit)
         basis = departure_basis(model, fit)
-        weighed = weigh_departures(model, fit, basis, weights)
+        weighed = weigh_departures(model, fit, basis, weights, float(outlier.sum()))
         found = _outlier_weight(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
         if np.allclose(found, outlier, atol=0.02):
             break

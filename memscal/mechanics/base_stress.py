@@ -16,8 +16,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import j0, j1
 
+from memscal.axisymmetry.quadrature import gauss_panels
 from memscal.mechanics import film_response as film
-from memscal.mechanics.quadrature import gauss_panels
 from memscal.mechanics.traction import InterfaceTraction
 from memscal.model.film import ElasticFilm
 from memscal.model.validation import FloatArray

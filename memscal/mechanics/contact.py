@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -146,15 +147,19 @@ class Contact:
             far from it, out to where the stress stays below 1e-9 of its maximum: a cubic
             spline through them is accurate to 1e-6 of the maximum.
         """
-        radii = self._default_radii() if r is None else _radii(r)
-        sigma_zz = self.base_stress(radii)
-        if r is None:
-            floor = _PROFILE_FLOOR * np.max(np.abs(sigma_zz))
-            last = np.flatnonzero(np.abs(sigma_zz) >= floor)[-1] + 2
-            radii, sigma_zz = radii[:last], sigma_zz[:last]
+        return self._default_profile if r is None else self._tabulated(_radii(r))
+
+    @cached_property
+    def _default_profile(self) -> StressProfile:
+        radii = self._default_radii()
+        sigma_zz = np.abs(self.base_stress(radii))
+        last = np.flatnonzero(sigma_zz >= _PROFILE_FLOOR * sigma_zz.max())[-1] + 2
+        return self._tabulated(radii[:last])
+
+    def _tabulated(self, radii: FloatArray) -> StressProfile:
         return StressProfile(
             r=radii,
-            sigma_zz=sigma_zz,
+            sigma_zz=self.base_stress(radii),
             sigma_rz=self.base_shear(radii),
             load=self.load,
             depth=self.depth,

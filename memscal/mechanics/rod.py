@@ -34,10 +34,10 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from memscal.axisymmetry.quadrature import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response
 from memscal.mechanics.base_stress import base_normal_stress
-from memscal.mechanics.quadrature import gauss_panels
 from memscal.mechanics.spherical_bessel import spherical_bessel
 from memscal.model.film import ElasticFilm
 from memscal.model.validation import FloatArray

@@ -12,7 +12,7 @@ from scipy.special import j0
 from memscal.errors import DomainError, InputError
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
-from memscal.mechanics.quadrature import gauss_panels
+from memscal.axisymmetry.quadrature import gauss_panels
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 

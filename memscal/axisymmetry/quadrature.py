@@ -21,7 +21,7 @@ def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatAr
         End of the range.
     longest : float
         Longest panel allowed.  With 16 nodes a panel integrates one or two oscillations
-        (up to 16 rad of phase) to rounding.
+        (up to 16 rad of phase) to rounding; with 64, up to 100 rad.
     order : int
         Nodes in each panel.
 

@@ -1,0 +1,82 @@
+"""memscal: calibration of stress sensors under an elastic film, and what they measure.
+
+The public names are loaded when they are first used, so that importing memscal costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from memscal.version import __version__
+
+if TYPE_CHECKING:
+    from memscal.apparatus import ApparatusFunction, load_apparatus
+    from memscal.calibration.procedure import Calibration, calibrate
+    from memscal.errors import MemscalError
+    from memscal.formats.reference import read_reference, write_reference
+    from memscal.formats.scan import read_scan, write_scan
+    from memscal.mechanics.contact import Contact
+    from memscal.mechanics.indent import indent
+    from memscal.model.film import ElasticFilm
+    from memscal.model.indenter import Rod, Sphere
+    from memscal.model.scan import Scan, StressSensor
+    from memscal.model.stress import StressProfile
+    from memscal.simulation import GaussianMixture, simulate
+
+_HOMES = {
+    "ApparatusFunction": "memscal.apparatus",
+    "Calibration": "memscal.calibration.procedure",
+    "Contact": "memscal.mechanics.contact",
+    "ElasticFilm": "memscal.model.film",
+    "GaussianMixture": "memscal.simulation",
+    "MemscalError": "memscal.errors",
+    "Rod": "memscal.model.indenter",
+    "Scan": "memscal.model.scan",
+    "Sphere": "memscal.model.indenter",
+    "StressProfile": "memscal.model.stress",
+    "StressSensor": "memscal.model.scan",
+    "calibrate": "memscal.calibration.procedure",
+    "indent": "memscal.mechanics.indent",
+    "load_apparatus": "memscal.apparatus",
+    "read_reference": "memscal.formats.reference",
+    "read_scan": "memscal.formats.scan",
+    "simulate": "memscal.simulation",
+    "write_reference": "memscal.formats.reference",
+    "write_scan": "memscal.formats.scan",
+}
+
+__all__ = [
+    "ApparatusFunction",
+    "Calibration",
+    "Contact",
+    "ElasticFilm",
+    "GaussianMixture",
+    "MemscalError",
+    "Rod",
+    "Scan",
+    "Sphere",
+    "StressProfile",
+    "StressSensor",
+    "__version__",
+    "calibrate",
+    "indent",
+    "load_apparatus",
+    "read_reference",
+    "read_scan",
+    "simulate",
+    "write_reference",
+    "write_scan",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'memscal' has no attribute '{name}'")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

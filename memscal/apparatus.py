@@ -1,0 +1,167 @@
+"""The apparatus function in use: predict voltages, convolve stresses, read stresses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline
+from memscal.errors import InputError
+from memscal.model.apparatus import ApparatusData
+from memscal.model.validation import FloatArray, finite_vector, require_increasing
+
+__all__ = ["ApparatusFunction", "load_apparatus"]
+
+#: A base stress reaches no farther than this, in m; a larger radius is in another unit.
+_LARGEST_RADIUS = 1.0
+#: What may be left of a stress at the end of its table.
+_DECAYED = 0.01
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ApparatusFunction(ApparatusData):
+    r"""A calibrated sensor: :math:`U_{zz} = A\,G \otimes \sigma_{zz}`.
+
+    Made by :func:`memscal.calibrate` or :func:`memscal.load_apparatus`; its data are described
+    in :class:`memscal.model.apparatus.ApparatusData`.  All quantities are in SI units.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> apparatus = memscal.calibrate(memscal.simulate(noise=0.002, seed=3)).apparatus
+    >>> contact = memscal.indent(apparatus.film, apparatus.indenter, load=0.5)
+    >>> r = np.linspace(0, 20e-3, 801)
+    >>> volts = apparatus.predict(r, contact.base_stress(r))
+    >>> bool(apparatus.stress(volts)[0] < contact.base_stress(0.0))
+    True
+    """
+
+    def radial(self, r: ArrayLike) -> FloatArray:
+        """Return G at radii ``r`` (m, any shape), in 1/m^2; zero beyond its support."""
+        return self._at(self.radial_profile.g, r)
+
+    def radial_uncertainty(self, r: ArrayLike) -> FloatArray:
+        """Return the standard uncertainty (k = 1) of :meth:`radial`, in 1/m^2."""
+        return self._at(self.radial_profile.g_errors, r)
+
+    def convolve(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+        r"""Return :math:`G \otimes \sigma_{zz}`: a stress field as the sensor blurs it.
+
+        Parameters
+        ----------
+        r : array_like, shape (n,)
+            Increasing radii of the base stress, in m, from the axis to where it has decayed.
+        sigma_zz : array_like, shape (n,)
+            Normal stress at the base, in Pa.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            The blurred stress at the same radii, in Pa.
+
+        Raises
+        ------
+        InputError
+            If the table is not in metres, is coarser than G, begins off the axis, or ends
+            before the stress has decayed.
+        """
+        radii, stress = self._checked(r, sigma_zz)
+        profile = self.radial_profile
+        # G passes nothing beyond the last wavenumber of its own grid.
+        reach = float(radii[-1] + profile.r[-1])
+        wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
+        kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
+        blurred = kernel * hankel_transform(radii, stress, wavenumbers.k)
+        return wavenumbers.synthesise(blurred, radii)
+
+    def predict(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+        r"""Return the voltage :math:`A\,G \otimes \sigma_{zz}` of a base stress, in V.
+
+        Parameters and errors are those of :meth:`convolve`.
+        """
+        return self.conversion_constant * self.convolve(r, sigma_zz)
+
+    def stress(self, u_zz: ArrayLike) -> FloatArray:
+        """Return the measured stress S_zz = U_zz / A, in Pa, for voltages in V of any shape.
+
+        The paper's definition: the stress as the sensor blurs it, to be compared with
+        :meth:`convolve`.  Baselines must have been subtracted.
+        """
+        return np.asarray(u_zz, dtype=np.float64) / self.conversion_constant
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the apparatus function to an artifact file.
+
+        Raises
+        ------
+        OutputError
+            If the file exists and ``overwrite`` is false, or cannot be written.
+        """
+        from memscal.formats.artifact import write_artifact
+
+        write_artifact(self, path, overwrite=overwrite)
+
+    def _at(self, values: FloatArray, r: ArrayLike) -> FloatArray:
+        radii = np.abs(np.asarray(r, dtype=np.float64))
+        support = self.radial_profile.r
+        spline = radial_spline(support, values)
+        inside = radii <= support[-1]
+        return np.where(inside, spline(np.minimum(radii, support[-1])), 0.0)
+
+    def _checked(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        radii, stress = finite_vector("r", r), finite_vector("sigma_zz", sigma_zz)
+        if radii.shape != stress.shape:
+            raise InputError(f"There are {stress.size} stresses for {radii.size} radii.")
+        require_increasing("r", radii)
+        if radii[-1] > _LARGEST_RADIUS:
+            raise InputError(
+                f"r reaches {radii[-1]:g} m.", cure="Give radii in metres, not millimetres."
+            )
+        step = float(np.diff(radii).max())
+        if radii[0] > step or radii[0] < 0:
+            raise InputError(
+                f"r begins at {radii[0]:g} m.",
+                cure="Give the stress from the axis (r = 0) outward.",
+            )
+        # The steps that matter are those where there is stress to be convolved.
+        peak = float(np.abs(stress).max())
+        strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak
+        coarse = float(np.diff(radii)[strong].max(initial=0.0))
+        if coarse > self.gaussian_sigma:
+            raise InputError(
+                f"The stress is given every {coarse * 1e3:.3g} mm, coarser than the apparatus "
+                f"function is wide ({self.gaussian_sigma * 1e3:.3g} mm).",
+                cure="Give the stress on a finer grid.",
+            )
+        if abs(stress[-1]) > _DECAYED * peak:
+            raise InputError(
+                f"{abs(stress[-1]) / peak:.1%} of the largest stress is left at the end of the "
+                f"table, r = {radii[-1] * 1e3:.4g} mm.",
+                why="A convolution needs the stress out to where it has decayed.",
+                cure="Extend the table.",
+            )
+        return radii, stress
+
+
+def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
+    """Read an apparatus function from its artifact.
+
+    Parameters
+    ----------
+    path : path-like
+        A file written by ``memscal calibrate`` or :meth:`ApparatusFunction.save`.
+
+    Raises
+    ------
+    FormatError
+        If the file is no artifact, is damaged, or was changed after it was written.
+    SchemaVersionError
+        If it was written under a newer major version of the format.
+    """
+    from memscal.formats.artifact import read_artifact
+
+    data = read_artifact(path)
+    return ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})

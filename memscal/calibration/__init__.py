@@ -1,0 +1,1 @@
+"""The steps of a calibration between the estimated profile and the artifact."""

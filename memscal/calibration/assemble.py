@@ -1,0 +1,116 @@
+"""Putting a calibration's results together as an apparatus function."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import scipy
+
+from memscal.apparatus import ApparatusFunction
+from memscal.calibration.normalise import unit_gaussian
+from memscal.calibration.solution import Solution
+from memscal.calibration.uncertainty import Results
+from memscal.formats.timestamp import timestamp
+from memscal.mechanics.contact import Contact
+from memscal.model.apparatus import (
+    ApparatusField,
+    ApparatusRadial,
+    QualityCheck,
+    Reconvolution,
+    TransferFunction,
+)
+from memscal.model.provenance import Process
+from memscal.model.validation import FloatArray
+from memscal.version import __version__
+
+__all__ = ["assemble"]
+
+
+def assemble(
+    solution: Solution,
+    results: Results,
+    checks: tuple[QualityCheck, ...],
+    messages: tuple[str, ...],
+    configuration: Mapping[str, Any],
+) -> ApparatusFunction:
+    """Return the apparatus function with everything that its artifact stores."""
+    scan, stress = solution.scan, solution.stress
+    reference = stress.profile() if isinstance(stress, Contact) else stress
+    return ApparatusFunction(
+        field=_field(solution, results),
+        radial_profile=_radial(solution, results),
+        transfer=_transfer(solution, results),
+        reconvolution=_reconvolution(solution),
+        parameters=results.parameters,
+        checks=checks,
+        film=scan.film,
+        indenter=scan.indenter,
+        sensor=scan.sensor,
+        load=scan.load,
+        reference=reference,
+        process=Process(
+            program="memscal",
+            version=__version__,
+            date=timestamp(),
+            configuration={
+                **configuration,
+                "grid": dict(solution.choice.reasons),
+                "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
+            },
+            environment={
+                "python": platform.python_version(),
+                "numpy": np.__version__,
+                "scipy": scipy.__version__,
+            },
+            messages=messages,
+            input_scan=scan.source,
+            input_reference=reference.source,
+        ),
+        budget=results.budget,
+    )
+
+
+def _field(solution: Solution, results: Results) -> ApparatusField:
+    view = solution.quotient.kernel.view
+    errors = np.sqrt(np.diag(results.radial_covariance))
+    radius = np.hypot.outer(view.y, view.x)
+    return ApparatusField(view.x, view.y, view.plane, np.interp(radius, view.r, errors))
+
+
+def _radial(solution: Solution, results: Results) -> ApparatusRadial:
+    view = solution.quotient.kernel.view
+    covariance = results.radial_covariance
+    gaussian = unit_gaussian(view.r, solution.estimate.gaussian.sigma)
+    return ApparatusRadial(view.r, view.radial, np.sqrt(np.diag(covariance)), gaussian, covariance)
+
+
+def _transfer(solution: Solution, results: Results) -> TransferFunction:
+    fields, division = solution.fields, solution.quotient.division
+    a = solution.quotient.kernel.conversion_constant
+    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(division.field)) / a)
+    window = fields.along_axis(division.window)[1]
+    return TransferFunction(k, modulus, results.transfer_errors, window, solution.band.resolved)
+
+
+def _reconvolution(solution: Solution) -> Reconvolution:
+    estimate = solution.estimate
+    points = estimate.points
+    # A raster is shown against the distance from the centre: a line has a side, a plane has not.
+    place = np.hypot(*(np.stack([points.x, points.y]) - estimate.centre[:, None]))
+    place = place if points.planar else points.x
+    order = np.argsort(place, kind="stable")
+
+    def sorted_(values: FloatArray) -> FloatArray:
+        return np.asarray(values[order])
+
+    return Reconvolution(
+        x=sorted_(place),
+        u_zz=sorted_(points.u),
+        u_zz_errors=sorted_(estimate.noise),
+        u_zz_predicted=sorted_(solution.quotient.predicted),
+        u_zz_gaussian=sorted_(estimate.gaussian.predicted),
+        residual=sorted_(points.u - solution.quotient.predicted),
+    )

@@ -1,0 +1,234 @@
+"""The two fields of the paper's Eq. (1): lifted from profiles, or measured as a raster."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.fft
+
+from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice, cut, lift
+from memscal.deconvolution.problem import NOISE_RATIO, DivisionProblem
+from memscal.errors import InputError
+from memscal.estimation.band import Band
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.model.validation import FloatArray
+
+__all__ = ["Fields", "GridChoice", "KernelView", "choose_grid", "prepare_fields"]
+
+_POINTS_PER_WIDTH = 6.0
+_RASTER_REFINEMENT = 5
+_RASTER_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class GridChoice:
+    """Spacing, half width of the support of G, and half extent of the fields, in m."""
+
+    spacing: float
+    support: float
+    extent: float
+
+    @property
+    def reasons(self) -> Mapping[str, str]:
+        """Why each was chosen, for the record."""
+        return {
+            "spacing": f"{self.spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
+            "width, and the last wavenumber is at least twice the one where the window has closed",
+            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre",
+            "extent": f"{self.extent * 1e3:.4g} mm: the whole length of the scan, about twice the "
+            "support, so that nothing wraps around into it",
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class KernelView:
+    """A kernel on its support: the plane, a radial cut, and its integral there.
+
+    ``x``, ``y`` in m; ``plane`` (y, x); ``r`` in m with ``radial``; ``integral`` over the plane.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    plane: FloatArray
+    r: FloatArray
+    radial: FloatArray
+    integral: float
+
+
+class Fields(Protocol):
+    """Both fields on one grid, with the ways back from the grid."""
+
+    @property
+    def grid(self) -> FieldGrid:
+        """The grid."""
+        ...
+
+    @property
+    def voltage(self) -> FloatArray:
+        """Voltage per newton on the grid, in V/N."""
+        ...
+
+    @property
+    def reference(self) -> FloatArray:
+        """Base stress per newton on the grid, in 1/m^2."""
+        ...
+
+    def at_points(self, field: FloatArray) -> FloatArray:
+        """Values of a field at the measured points."""
+        ...
+
+    def view(self, kernel: FloatArray) -> KernelView:
+        """A kernel on its support."""
+        ...
+
+    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Wavenumbers along one axis and a spectral quantity there."""
+        ...
+
+
+def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
+    """Choose the grid from the scan: every length from a length of the data.
+
+    Parameters
+    ----------
+    estimate : ProfileEstimate
+        The scan's profile.
+    band : Band
+        Its relevant band, which says where the window closes.
+    """
+    points = estimate.points
+    distance = np.hypot(points.x - estimate.centre[0], points.y - estimate.centre[1])
+    support = float(distance.max())
+    if points.planar:
+        # A square of this half width lies within the raster's longer side.
+        support = float(np.abs(points.x - estimate.centre[0]).max())
+    reference = np.abs(estimate.model.reference.values)
+    closed = reference < 0.1 * NOISE_RATIO * band.weakest_reference
+    last = float(band.k[int(np.argmax(closed))] if closed.any() else band.k[-1])
+    width = max(estimate.gaussian.sigma, 0.5 * points.step)
+    spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
+    spacing = support / np.ceil(support / spacing)
+    extent = max(float(np.ptp(points.x)), float(np.ptp(points.y)), 1.25 * support)
+    return GridChoice(spacing=float(spacing), support=support, extent=extent)
+
+
+def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
+    """Lift a line scan's profile, or place a raster as it was measured."""
+    if estimate.points.planar:
+        return _RasterFields.place(estimate, choice)
+    return _LineFields.lift(estimate, choice)
+
+
+def division_problem(fields: Fields, band: Band) -> DivisionProblem:
+    """Return what a regulariser is given."""
+    return DivisionProblem(
+        fields.grid, fields.voltage, fields.reference, band.weakest_voltage, band.weakest_reference
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _LineFields:
+    """Both profiles, lifted to a quarter plane."""
+
+    grid: EvenGrid
+    voltage: FloatArray
+    reference: FloatArray
+    support: int
+    radius: FloatArray
+
+    @classmethod
+    def lift(cls, estimate: ProfileEstimate, choice: GridChoice) -> _LineFields:
+        cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
+        grid = EvenGrid(cells + 1, choice.spacing)
+        step = choice.spacing / 2
+        voltage = lift(estimate.spectrum.at, grid, step)
+        reference = lift(estimate.model.reference.at, grid, step)
+        points = estimate.points
+        radius = np.abs(points.x - estimate.centre[0])
+        return cls(grid, voltage, reference, round(choice.support / choice.spacing), radius)
+
+    def at_points(self, field: FloatArray) -> FloatArray:
+        return cut(field, self.grid, self.radius)
+
+    def view(self, kernel: FloatArray) -> KernelView:
+        inside = slice(0, self.support + 1)
+        quarter = kernel[inside, inside]
+        axis = self.grid.axis[inside]
+        mirrored = np.concatenate([-axis[:0:-1], axis])
+        plane = self.grid.to_image(quarter)
+        integral = self.grid.integrate(quarter)
+        return KernelView(mirrored, mirrored, plane, axis, quarter[0], integral)
+
+    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return self.grid.wavenumber_axis, spectral[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _RasterFields:
+    """A measured raster on its own lattice, continued by the fitted profile around it."""
+
+    grid: Lattice
+    voltage: FloatArray
+    reference: FloatArray
+    support: float
+    index: tuple[FloatArray, FloatArray]
+
+    @classmethod
+    def place(cls, estimate: ProfileEstimate, choice: GridChoice) -> _RasterFields:
+        points = estimate.points
+        x, columns = _even_axis("x", points.x, choice.extent)
+        y, rows = _even_axis("y", points.y, choice.extent)
+        grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
+        step = choice.spacing / 2
+        voltage = lift(estimate.spectrum.at, grid, step)
+        # A point that is missing keeps the profile; an outlier keeps most of it.
+        departure = estimate.weighed.residual / points.load * estimate.outlier_weight
+        voltage[rows, columns] += departure
+        reference = lift(estimate.model.reference.at, grid, step)
+        return cls(grid, voltage, reference, choice.support, (rows, columns))
+
+    def at_points(self, field: FloatArray) -> FloatArray:
+        return np.asarray(field[self.index])
+
+    def view(self, kernel: FloatArray) -> KernelView:
+        fine, values = self.grid.refined(kernel, _RASTER_REFINEMENT)
+        inside_x, inside_y = np.abs(fine.x) <= self.support, np.abs(fine.y) <= self.support
+        plane = values[np.ix_(inside_y, inside_x)]
+        x, y = fine.x[inside_x], fine.y[inside_y]
+        r = x[x.size // 2 :]
+        radial = _azimuthal_mean(x, y, plane, r)
+        return KernelView(x, y, plane, r, radial, float(plane.sum() * fine.cell_area))
+
+    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return self.grid.wavenumber[0], spectral[0]
+
+
+def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatArray, FloatArray]:
+    """Continue a raster's axis on both sides, to an odd number of points; index the points."""
+    unique = np.unique(positions)
+    step = (unique[-1] - unique[0]) / (unique.size - 1)
+    index = (positions - unique[0]) / step
+    if np.any(np.abs(index - np.rint(index)) > _RASTER_TOLERANCE * unique.size):
+        raise InputError(
+            f"The raster's {name} positions are not evenly spaced.",
+            why="A raster is transformed as it is, on its own lattice.",
+            cure="Import it with positions snapped to a grid, or scan evenly.",
+        )
+    padding = int(np.ceil(max(2 * extent - (unique[-1] - unique[0]), 0.0) / (2 * step))) + 1
+    count = unique.size + 2 * padding + (unique.size + 1) % 2
+    axis = unique[0] + step * (np.arange(count) - padding)
+    return axis, np.rint(index).astype(int) + padding
+
+
+def _azimuthal_mean(x: FloatArray, y: FloatArray, plane: FloatArray, r: FloatArray) -> FloatArray:
+    """Mean over 64 directions; beyond the plane the last ring is continued."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    angle = 2 * np.pi * np.arange(64) / 64
+    sample = RegularGridInterpolator((y, x), plane, method="cubic", bounds_error=False)
+    at = np.stack([np.multiply.outer(r, np.sin(angle)), np.multiply.outer(r, np.cos(angle))], -1)
+    inside = np.clip(at, [y[0], x[0]], [y[-1], x[-1]])
+    return np.asarray(sample(inside).mean(axis=1))

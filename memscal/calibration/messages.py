@@ -1,0 +1,81 @@
+"""What a calibration tells its user."""
+
+from __future__ import annotations
+
+from memscal.calibration.solution import Solution
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.mechanics.contact import Contact
+from memscal.model.apparatus import QualityCheck
+from memscal.model.scan import Scan
+
+__all__ = ["calibration_messages"]
+
+
+def calibration_messages(solution: Solution, checks: tuple[QualityCheck, ...]) -> tuple[str, ...]:
+    """Return the messages that accompany a result, the gravest first."""
+    estimate, scan = solution.estimate, solution.scan
+    messages = [
+        f"Quality check {check.name} failed: {check.value:.3g} exceeds {check.limit:.3g}. "
+        f"{check.meaning}"
+        for check in checks
+        if not check.passed
+    ]
+    messages += _points(estimate)
+    messages += _reference(solution)
+    messages += _unstated(scan)
+    if scan.synthetic is not None:
+        messages.append("The scan is synthetic: its truth is stored in it.")
+    return tuple(messages)
+
+
+def _points(estimate: ProfileEstimate) -> list[str]:
+    points, messages = estimate.points, []
+    if points.missing:
+        messages.append(f"{points.missing} points of the scan are missing and were left out.")
+    for i in (estimate.outlier_weight < 0.5).nonzero()[0]:
+        place = f"x = {points.x[i] * 1e3:.4g} mm"
+        if points.planar:
+            place += f", y = {points.y[i] * 1e3:.4g} mm"
+        messages.append(
+            f"Outlier at {place}: {points.u[i] * 1e3:.4g} mV instead of "
+            f"{estimate.predicted[i] * 1e3:.4g} mV; its weight is "
+            f"{estimate.outlier_weight[i]:.2g}."
+        )
+    if points.u_errors is None:
+        messages.append(
+            f"u_zz_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV was estimated "
+            "from the scan's scatter, so that chi-square cannot tell noise from misfit of the same "
+            "size."
+        )
+    return messages
+
+
+def _reference(solution: Solution) -> list[str]:
+    stress, scan = solution.stress, solution.scan
+    if isinstance(stress, Contact):
+        depth = stress.depth / scan.film.thickness
+        model_form = (
+            "The reference is the frictionless rod on the linear elastic film, indented by "
+            f"{depth:.0%} of its thickness at {stress.load:.3g} N; the error of linear elasticity "
+            "there is not part of the uncertainties."
+        )
+        return [model_form]
+    if stress.convergence is None:
+        return ["The reference states no convergence: its own error is not counted."]
+    return []
+
+
+def _unstated(scan: Scan) -> list[str]:
+    film = scan.film
+    missing = {
+        "film thickness": film.thickness_uncertainty,
+        "Poisson's ratio": film.poisson_ratio_uncertainty,
+        "rod radius": scan.indenter.radius_uncertainty,
+        "load": scan.load_uncertainty,
+    }
+    names = [name for name, value in missing.items() if value is None]
+    if not names:
+        return []
+    pronoun = "them" if len(names) > 1 else "it"
+    listed = ", ".join(names)
+    return [f"No uncertainty is stated for {listed}: nothing is counted for {pronoun}."]

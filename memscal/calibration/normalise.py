@@ -1,0 +1,87 @@
+"""From the quotient of the fields to A and G, and the Gaussian fitted to G."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.calibration.fields import KernelView
+from memscal.errors import FitError
+from memscal.model.validation import FloatArray
+
+__all__ = ["NormalisedKernel", "fit_gaussian_to_kernel", "normalise"]
+
+
+@dataclass(frozen=True, eq=False)
+class NormalisedKernel:
+    """A and G, from the quotient of the fields.
+
+    Parameters
+    ----------
+    conversion_constant : float
+        Integral of A G over the support, in V/Pa.
+    view : KernelView
+        G on its support, of integral one, in 1/m^2.
+    gaussian_sigma : float
+        Standard deviation of the Gaussian of unit integral nearest to G, in m.
+    """
+
+    conversion_constant: float
+    view: KernelView
+    gaussian_sigma: float
+
+
+def normalise(view: KernelView, start: float) -> NormalisedKernel:
+    """Split A G so that G integrates to one: the paper's definition of A.
+
+    Parameters
+    ----------
+    view : KernelView
+        A G on its support, in V/Pa/m^2.
+    start : float
+        Width from which the fit of the Gaussian starts, in m.
+
+    Raises
+    ------
+    FitError
+        If A G does not add up to a positive number.
+    """
+    a = view.integral
+    if not a > 0:
+        raise FitError(
+            f"The quotient of the fields adds up to {a:.3g} V/Pa.",
+            why="A conversion constant is positive.",
+            cure="Look at the deconvolved field; choose another method or less regularisation.",
+        )
+    unit = KernelView(view.x, view.y, view.plane / a, view.r, view.radial / a, 1.0)
+    return NormalisedKernel(a, unit, fit_gaussian_to_kernel(unit.r, unit.radial, start))
+
+
+def fit_gaussian_to_kernel(r: FloatArray, g: FloatArray, start: float) -> float:
+    """Width of the Gaussian of unit integral nearest to G over the plane, in m.
+
+    Minimises the integral of the squared difference, with weight r: the paper's fit.
+    """
+    from scipy.optimize import least_squares
+
+    root = np.sqrt(r)
+
+    def misfit(scaled: FloatArray) -> FloatArray:
+        return root * (unit_gaussian(r, scaled[0] * start) - g) * start**2
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
+
+    found = least_squares(misfit, [1.0], jac=slope, xtol=1e-12, ftol=1e-14, gtol=1e-14)
+    return float(abs(found.x[0]) * start)
+
+
+def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
+    """Gaussian of unit integral over the plane, in 1/m^2."""
+    return np.asarray(np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2))
+
+
+def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
+    """Derivative of :func:`unit_gaussian` by its width, in 1/m^3."""
+    return np.asarray(unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma)

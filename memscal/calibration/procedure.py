@@ -1,0 +1,173 @@
+"""The main job: from a scan to an apparatus function, by the paper's method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, is_dataclass
+from os import PathLike
+from typing import Any
+
+from memscal.apparatus import ApparatusFunction
+from memscal.calibration.assemble import assemble
+from memscal.calibration.messages import calibration_messages
+from memscal.calibration.quality import quality_checks
+from memscal.calibration.solution import Solution, solve
+from memscal.calibration.sweep import Sweep, sweep_noise
+from memscal.calibration.uncertainty import Results, propagate
+from memscal.deconvolution.problem import Regulariser
+from memscal.deconvolution.registry import create_regulariser
+from memscal.errors import InputError
+from memscal.estimation.reference import (
+    reference_profile,
+    reference_sensitivities,
+    require_calibration_rod,
+)
+from memscal.mechanics.contact import Contact
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
+
+__all__ = ["Calibration", "calibrate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A finished calibration: its result, and every step that led to it.
+
+    Parameters
+    ----------
+    apparatus : ApparatusFunction
+        The result, ready to be saved and applied.
+    solution : Solution
+        The steps: estimate, band, fields, quotient.
+    """
+
+    apparatus: ApparatusFunction
+    solution: Solution
+
+    @property
+    def passed(self) -> bool:
+        """Whether every quality check passed."""
+        return self.apparatus.passed
+
+    def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> Sweep:
+        """Vary the white noise over two decades of amplitude, and over seeds.
+
+        Parameters
+        ----------
+        amplitudes : int
+            How many amplitudes, from a tenth to ten times the rule's.
+        draws : int
+            How many seeded draws at each.
+        seed : int
+            The first seed.
+
+        Returns
+        -------
+        Sweep
+            A, both widths and the reconvolution for each.
+        """
+        return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
+
+
+def calibrate(
+    scan: Scan,
+    *,
+    reference: StressProfile | Contact | str | PathLike[str] | None = None,
+    method: str | Regulariser = "white-noise",
+    seed: int = 0,
+    **options: Any,
+) -> Calibration:
+    r"""Find the apparatus function of a sensor from a rod scan.
+
+    Solves :math:`U_{zz} = A\,G \otimes \sigma_{zz}` (the paper's Eq. 1) for the conversion
+    constant A and the apparatus function G of unit integral.
+
+    Parameters
+    ----------
+    scan : Scan
+        Voltage against the rod's position.
+    reference : StressProfile, Contact or path, optional
+        Stress at the base of the film.  Without it, the one that travels with the scan; without
+        that, the rod is solved on the film.
+    method : str or Regulariser, default "white-noise"
+        How the fields are divided; see :func:`memscal.deconvolution.registry.regulariser_names`.
+    seed : int, default 0
+        Seed of methods that draw random numbers.
+    **options
+        Parameters of the method, such as ``amplitude``.
+
+    Returns
+    -------
+    Calibration
+        With ``.apparatus``; its quality checks may have failed: see ``.passed``.
+
+    Raises
+    ------
+    InputError
+        If the scan or the reference cannot be used.
+    FitError
+        If the scan does not determine the parameters.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> calibration = memscal.calibrate(memscal.simulate(noise=0.005, seed=1))
+    >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
+    True
+    """
+    require_calibration_rod(scan)
+    stress = reference_profile(scan, _read(reference))
+    regulariser = _regulariser(method, seed, options)
+    solution = solve(scan, stress, regulariser)
+    results = _uncertainties(solution)
+    checks = quality_checks(solution, results.parameters)
+    messages = calibration_messages(solution, checks)
+    configuration = {"method": regulariser.name, "seed": seed, **_settings(regulariser)}
+    apparatus = assemble(solution, results, checks, messages, configuration)
+    return Calibration(apparatus, solution)
+
+
+def _read(
+    reference: StressProfile | Contact | str | PathLike[str] | None,
+) -> StressProfile | Contact | None:
+    if isinstance(reference, str | PathLike):
+        from memscal.formats.reference import read_reference
+
+        return read_reference(reference)
+    return reference
+
+
+def _regulariser(method: str | Regulariser, seed: int, options: Mapping[str, Any]) -> Regulariser:
+    if isinstance(method, str):
+        return create_regulariser(method, seed=seed, **options)
+    if options:
+        raise InputError(
+            f"Options {', '.join(options)} were given beside a regulariser that is set up already.",
+            cure="Set them on the regulariser, or give the method by name.",
+        )
+    return method
+
+
+def _settings(regulariser: Regulariser) -> Mapping[str, Any]:
+    """Parameters of a regulariser, for the record."""
+    own: Any = regulariser
+    known = is_dataclass(own) and not isinstance(own, type)
+    return {"options": asdict(own) if known else {}}
+
+
+def _uncertainties(solution: Solution) -> Results:
+    scan, estimate = solution.scan, solution.estimate
+    relative = {"reference_force": abs(estimate.model.reference.integral - 1.0)}
+    if scan.load_uncertainty is not None:
+        relative["load"] = scan.load_uncertainty / scan.load
+    if solution.stress.convergence is not None:
+        relative["reference_convergence"] = solution.stress.convergence
+    wavenumbers = solution.fields.along_axis(solution.quotient.division.window)[0]
+    return propagate(
+        estimate,
+        solution.quotient.kernel,
+        solution.window_at_nodes,
+        wavenumbers,
+        reference_sensitivities(scan, estimate.model.reference),
+        relative,
+    )

@@ -1,0 +1,158 @@
+"""The calibration's chain of steps, up to A and G, without their uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import j1
+
+from memscal.calibration.fields import (
+    Fields,
+    GridChoice,
+    choose_grid,
+    division_problem,
+    prepare_fields,
+)
+from memscal.calibration.normalise import NormalisedKernel, normalise
+from memscal.deconvolution.problem import Division, Regulariser
+from memscal.estimation.band import Band, find_band
+from memscal.estimation.points import measured_points
+from memscal.estimation.profile_estimate import ProfileEstimate, estimate_profile
+from memscal.estimation.reference import reference_spectrum
+from memscal.mechanics.contact import Contact
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
+from memscal.model.validation import FloatArray
+
+__all__ = ["Misfit", "Quotient", "Solution", "divide", "solve"]
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How well a prediction meets the scan.
+
+    ``relative_rms``: root-mean-square residual over the largest signal; ``chi2_reduced``:
+    chi-square against the noise per degree of freedom; ``degrees``: how many there are.
+    """
+
+    relative_rms: float
+    chi2_reduced: float
+    degrees: float
+
+
+@dataclass(frozen=True, eq=False)
+class Quotient:
+    """One division of the fields: the window, A and G, and what they predict for the scan.
+
+    ``predicted`` (n,) in V, at the measured points.
+    """
+
+    division: Division
+    kernel: NormalisedKernel
+    predicted: FloatArray
+    misfit: Misfit
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Every step of a calibration.
+
+    Parameters
+    ----------
+    scan : Scan
+        What was measured.
+    stress : StressProfile or Contact
+        The reference.
+    estimate : ProfileEstimate
+        Centre, baseline, noise, outliers and profile.
+    band : Band
+        Signal and noise of the voltage's transform.
+    choice : GridChoice
+        The grid and the reasons for it.
+    fields : Fields
+        The two fields.
+    regulariser : Regulariser
+        How they were divided.
+    quotient : Quotient
+        The outcome.
+    gaussian_misfit : Misfit
+        The Gaussian fitted in data space against the scan.
+    """
+
+    scan: Scan
+    stress: StressProfile | Contact
+    estimate: ProfileEstimate
+    band: Band
+    choice: GridChoice
+    fields: Fields
+    regulariser: Regulariser
+    quotient: Quotient
+    gaussian_misfit: Misfit
+
+    @property
+    def window_at_nodes(self) -> FloatArray:
+        """The regularisation's window at the quadrature nodes of the estimate."""
+        k, window = self.fields.along_axis(self.quotient.division.window)
+        return np.interp(self.estimate.model.k, k, window)
+
+    @property
+    def tail_share(self) -> float:
+        r"""Share of the voltage's integral beyond the scan's reach.
+
+        Within a radius R the integral is
+        :math:`R \int \hat U(k) J_1(kR)\,dk`, from the Hankel transform.
+        """
+        spectrum, reach = self.estimate.spectrum, self.choice.support
+        k = spectrum.wavenumbers.k
+        dk = 2 * np.pi * spectrum.wavenumbers.weights / k
+        inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
+        return abs(1 - inside / spectrum.integral)
+
+
+def solve(scan: Scan, stress: StressProfile | Contact, regulariser: Regulariser) -> Solution:
+    """Go through the paper's steps: profile, lift, transform, divide, normalise, reconvolve."""
+    points = measured_points(scan)
+    reference = reference_spectrum(stress, points, scan.film.thickness)
+    estimate = estimate_profile(points, reference)
+    band = find_band(estimate)
+    choice = choose_grid(estimate, band)
+    fields = prepare_fields(estimate, choice)
+    return Solution(
+        scan=scan,
+        stress=stress,
+        estimate=estimate,
+        band=band,
+        choice=choice,
+        fields=fields,
+        regulariser=regulariser,
+        quotient=divide(estimate, band, fields, regulariser),
+        gaussian_misfit=_misfit(estimate, estimate.gaussian.predicted),
+    )
+
+
+def divide(
+    estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
+) -> Quotient:
+    """Divide the fields, normalise the quotient, and convolve it back."""
+    division = regulariser.divide(division_problem(fields, band))
+    kernel = normalise(fields.view(division.field), estimate.gaussian.sigma)
+    back = fields.grid.convolve(division.field, fields.reference)
+    predicted = fields.at_points(back) * estimate.points.load + estimate.background
+    return Quotient(division, kernel, predicted, _misfit(estimate, predicted))
+
+
+def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
+    """Compare a prediction with the scan, outliers at their reduced weight."""
+    residual = estimate.points.u - predicted
+    weight = estimate.outlier_weight
+    stated = estimate.points.u_errors
+    noise = estimate.noise if stated is None else stated
+    degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]
+    return Misfit(
+        relative_rms=float(
+            np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal
+        ),
+        chi2_reduced=float(np.sum(weight * (residual / noise) ** 2) / degrees),
+        degrees=degrees,
+    )

@@ -1,0 +1,67 @@
+"""How much a calibration depends on the white noise: its amplitude and its seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.calibration.solution import Quotient, Solution, divide
+from memscal.deconvolution.problem import Regulariser
+from memscal.deconvolution.white_noise import WhiteNoise, WhiteNoiseDraw
+from memscal.errors import FitError
+from memscal.model.validation import FloatArray
+
+__all__ = ["Sweep", "sweep_noise"]
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Results against the noise amplitude.
+
+    Parameters
+    ----------
+    amplitude : ndarray, shape (n,)
+        Noise amplitude over the rule's choice.
+    conversion_constant : ndarray, shape (n,)
+        A of the expectation, in V/Pa.
+    gaussian_sigma_deconvolved : ndarray, shape (n,)
+        Width of the Gaussian fitted to G, in m.
+    relative_rms : ndarray, shape (n,)
+        Reconvolution residual over the largest signal.
+    seed_conversion_constant, seed_gaussian_sigma, seed_relative_rms : ndarray, shape (n, seeds)
+        The same for single draws; NaN for a draw whose quotient has no positive integral.
+    """
+
+    amplitude: FloatArray
+    conversion_constant: FloatArray
+    gaussian_sigma_deconvolved: FloatArray
+    relative_rms: FloatArray
+    seed_conversion_constant: FloatArray
+    seed_gaussian_sigma: FloatArray
+    seed_relative_rms: FloatArray
+
+
+def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -> Sweep:
+    """Repeat the division over two decades of noise amplitude and several seeds."""
+    amplitude = np.logspace(-1, 1, amplitudes)
+    expected = np.array([_outcome(solution, WhiteNoise(amplitude=a)) for a in amplitude])
+    drawn = np.array(
+        [
+            [
+                _outcome(solution, WhiteNoiseDraw(amplitude=a, seed=s))
+                for s in range(seed, seed + draws)
+            ]
+            for a in amplitude
+        ]
+    ).reshape(amplitudes, draws, 3)
+    return Sweep(amplitude, *expected.T, *np.moveaxis(drawn, -1, 0))
+
+
+def _outcome(solution: Solution, regulariser: Regulariser) -> tuple[float, float, float]:
+    try:
+        quotient: Quotient = divide(solution.estimate, solution.band, solution.fields, regulariser)
+    except FitError:
+        return np.nan, np.nan, np.nan
+    kernel = quotient.kernel
+    return kernel.conversion_constant, kernel.gaussian_sigma, quotient.misfit.relative_rms

@@ -1,0 +1,127 @@
+r"""Up to which wavenumber the scan determines the apparatus function.
+
+The measured points are rings: the transform of the voltage at :math:`k` is a sum
+:math:`\sum_i a_i u_i J_0(kR_i)` with ring areas :math:`a_i`, and its noise is the same sum in
+quadrature.  Points whose signal is lost in noise carry the profile's tail instead, and count
+as :math:`u_i^2/(u_i^2 + s_i^2)`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import j0
+
+from memscal.errors import FitError
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.model.validation import FloatArray
+
+__all__ = ["Band", "find_band"]
+
+#: A spectral component is relevant while it stands this many times above its noise...
+RELEVANT = 10.0
+#: ...and resolved while its relative standard uncertainty is below a third.
+RESOLVED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Signal and noise of the voltage's transform.
+
+    Parameters
+    ----------
+    k : ndarray, shape (n,)
+        Wavenumbers, in rad/m.
+    signal, noise : ndarray, shape (n,)
+        Modulus of the voltage's transform and its noise, in V m^2 / N.
+    relevant, resolved : float
+        Wavenumbers where the signal falls below ten and three times the noise, in rad/m.
+    weakest_voltage, weakest_reference : float
+        Moduli of both fields' transforms at ``relevant``.
+    """
+
+    k: FloatArray
+    signal: FloatArray
+    noise: FloatArray
+    relevant: float
+    resolved: float
+    weakest_voltage: float
+    weakest_reference: float
+
+
+def find_band(estimate: ProfileEstimate) -> Band:
+    """Find the relevant and the resolved band of a scan.
+
+    Raises
+    ------
+    FitError
+        If no component of the voltage stands ten times above its noise.
+    """
+    spectrum = estimate.spectrum
+    k, signal = spectrum.wavenumbers.k, np.abs(spectrum.values)
+    noise = _planar_noise(estimate) if estimate.points.planar else _ring_noise(estimate, k)
+    ratio = signal / noise
+    relevant, resolved = _falls_below(k, ratio, RELEVANT), _falls_below(k, ratio, RESOLVED)
+    if relevant <= k[0]:
+        raise FitError(
+            f"The voltage's total stands only {ratio[0]:.1f} times above its noise; at least "
+            f"{RELEVANT:g} times are needed.",
+            why="No spectral component of the scan can be divided with any confidence.",
+            cure="Raise the load, average repeats, or scan closer to the sensor.",
+        )
+    reference = np.abs(estimate.model.reference.values)
+    weakest_voltage = float(np.interp(relevant, k, signal))
+    weakest_reference = float(np.interp(relevant, k, reference))
+    return Band(k, signal, noise, relevant, resolved, weakest_voltage, weakest_reference)
+
+
+def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
+    """Return the first wavenumber where a ratio crosses a threshold, log-interpolated."""
+    below = np.flatnonzero(ratio < threshold)
+    if not below.size:
+        return float(k[-1])
+    i = int(below[0])
+    if i == 0:
+        return float(k[0])
+    upper, lower = np.log(ratio[i - 1]), np.log(max(ratio[i], np.finfo(float).tiny))
+    return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
+
+
+def _measured_share(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Radius, noise per newton, and share of the measurement in each point's value."""
+    points = estimate.points
+    radius = np.hypot(points.x - estimate.centre[0], points.y - estimate.centre[1])
+    signal = (estimate.predicted - estimate.background) / points.load
+    noise = estimate.noise / points.load
+    share = signal**2 / (signal**2 + noise**2) * estimate.outlier_weight
+    return radius, noise, share
+
+
+def _ring_noise(estimate: ProfileEstimate, k: FloatArray) -> FloatArray:
+    radius, noise, share = _measured_share(estimate)
+    area = _ring_areas(radius, tolerance=0.25 * estimate.points.step)
+    weighted = area * share * noise
+    return np.asarray(np.sqrt(j0(np.multiply.outer(k, radius)) ** 2 @ weighted**2))
+
+
+def _ring_areas(radius: FloatArray, tolerance: float) -> FloatArray:
+    """Area of the plane that each point stands for; points at equal radii share a ring."""
+    order = np.argsort(radius, kind="stable")
+    ordered = radius[order]
+    group = np.concatenate([[0], np.cumsum(np.diff(ordered) > tolerance)])
+    count = np.bincount(group)
+    mean = np.bincount(group, ordered) / count
+    edges = np.concatenate([[0.0], (mean[1:] + mean[:-1]) / 2, mean[-1:]])
+    area = np.empty_like(radius)
+    area[order] = (np.pi * np.diff(edges**2) / count)[group]
+    return area
+
+
+def _planar_noise(estimate: ProfileEstimate) -> FloatArray:
+    """Noise of one component of a raster's transform: the same at every wavenumber."""
+    _, noise, share = _measured_share(estimate)
+    points = estimate.points
+    cell = points.step * float(np.median(np.diff(np.unique(points.y))))
+    per_component = cell * np.sqrt(np.sum((share * noise) ** 2))
+    return np.full(estimate.model.k.size, per_component)

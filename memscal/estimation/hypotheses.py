@@ -1,0 +1,121 @@
+r"""Tests of what the model takes for granted: symmetry, linearity in load, a round sensor.
+
+Each adds a few columns to the fitted model and asks by how much the misfit falls.  With
+:math:`m` columns that should not be needed, the fall of chi-square follows the chi-square
+distribution of :math:`m` degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri
+
+from memscal.estimation.forward import gaussian_transfer
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.model.validation import FloatArray
+
+__all__ = [
+    "ExtraColumns",
+    "axisymmetry_test",
+    "chi_square_limit",
+    "linearity_test",
+    "symmetry_test",
+]
+
+#: Chance that a check fails although its assumption holds.
+FALSE_ALARM = 1e-3
+#: Loads must differ by this share of their mean before linearity can be tested.
+_LOAD_CONTRAST = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class ExtraColumns:
+    """Outcome of adding columns to the model.
+
+    ``fall`` of chi-square for ``count`` columns; ``coefficients`` and their standard
+    ``errors``; ``size``: largest voltage of the added part over the largest signal.
+    """
+
+    fall: float
+    count: int
+    coefficients: FloatArray
+    errors: FloatArray
+    size: float
+
+
+def chi_square_limit(degrees: float) -> float:
+    """Value that chi-square exceeds by chance once in a thousand."""
+    return float(chdtri(degrees, FALSE_ALARM))
+
+
+def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
+    """Compare the left and right halves of a line scan.
+
+    Is anything odd left over?  The columns are odd in the distance from the centre, at three
+    widths of the profile.
+    """
+    points = estimate.points
+    side = points.x - estimate.centre[0]
+    return _add(estimate, side[:, None] * _widened(estimate, (0.5, 1.0, 1.5)))
+
+
+def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
+    """Ask whether a raster is elliptic: columns that vary as cos 2a and sin 2a."""
+    points = estimate.points
+    dx, dy = points.x - estimate.centre[0], points.y - estimate.centre[1]
+    quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy], axis=1)
+    shapes = _widened(estimate, (0.5, 1.0))
+    columns = [quadrupole * shape[:, None] for shape in shapes.T]
+    return _add(estimate, np.concatenate(columns, axis=1))
+
+
+def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
+    r"""Test the paper's linearity in load: :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`.
+
+    Returns
+    -------
+    ExtraColumns or None
+        Its coefficient is eta; ``None`` where the loads do not differ enough.
+    """
+    load = estimate.points.load
+    mean = float(load.mean())
+    if np.ptp(load) < _LOAD_CONTRAST * mean:
+        return None
+    signal = estimate.predicted - estimate.background
+    return _add(estimate, (signal * (load - mean) / mean)[:, None])
+
+
+def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArray:
+    """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
+    model, fit = estimate.model, estimate.gaussian
+    width = max(fit.sigma, 0.5 * estimate.points.step)
+    kernels = [gaussian_transfer(model.k, factor * width) for factor in factors]
+    return model.signal(fit.geometry, np.stack(kernels, axis=1))
+
+
+def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
+    """Fit the columns together with the rest of the model to what the model left over.
+
+    The departures enter as explained: they are even, and absorb nothing odd or uneven.
+    """
+    root = np.sqrt(estimate.weights) / estimate.noise_scale
+    scale = np.abs(columns).max(axis=0)
+    columns = columns / scale
+    jacobian = estimate.gaussian.jacobian / np.linalg.norm(estimate.gaussian.jacobian, axis=0)
+    base = np.linalg.qr(jacobian * root[:, None])[0]
+    scaled = columns * root[:, None]
+    residual = estimate.weighed.residual * root
+    residual = residual - base @ (base.T @ residual)
+    free = scaled - base @ (base.T @ scaled)
+    information = np.linalg.pinv(free.T @ free, hermitian=True)
+    coefficients = information @ (free.T @ residual)
+    fall = float(residual @ free @ coefficients)
+    return ExtraColumns(
+        fall=fall,
+        count=columns.shape[1],
+        coefficients=coefficients / scale,
+        errors=np.sqrt(np.diag(information)) / scale,
+        size=float(np.abs(columns @ coefficients).max() / estimate.largest_signal),
+    )

@@ -1,0 +1,211 @@
+"""Synthetic rod scans through a known apparatus function, their truth stored with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
+from memscal.errors import InputError
+from memscal.mechanics.indent import indent
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod
+from memscal.model.scan import Scan, StressSensor
+from memscal.model.validation import FloatArray
+
+__all__ = ["GaussianMixture", "simulate"]
+
+#: The paper's film, with its uncertainties where it gives them and modest ones elsewhere.
+PAPER_FILM = ElasticFilm(
+    young_modulus=2.2e6,
+    poisson_ratio=0.5,
+    thickness=2e-3,
+    roughness_rms=1.82e-6,
+    young_modulus_uncertainty=0.1e6,
+    poisson_ratio_uncertainty=0.005,
+    thickness_uncertainty=0.02e-3,
+    roughness_rms_uncertainty=0.10e-6,
+)
+PAPER_ROD = Rod(radius=0.25e-3, radius_uncertainty=2.5e-6)
+
+
+@dataclass(frozen=True)
+class GaussianMixture:
+    """A radial apparatus function: a sum of Gaussians, of unit integral in all.
+
+    Parameters
+    ----------
+    weights : tuple of float
+        Share of each; they may be negative (a ring), and must add up to one.
+    sigmas : tuple of float
+        Standard deviation of each, in m.
+
+    Examples
+    --------
+    >>> GaussianMixture((0.75, 0.25), (0.5e-3, 1e-3)).transform(np.array([0.0]))
+    array([1.])
+    """
+
+    weights: tuple[float, ...] = (1.0,)
+    sigmas: tuple[float, ...] = (561e-6,)
+
+    def __post_init__(self) -> None:
+        if len(self.weights) != len(self.sigmas) or not self.weights:
+            raise InputError(
+                f"{len(self.weights)} weights do not fit {len(self.sigmas)} widths of Gaussians."
+            )
+        if abs(sum(self.weights) - 1) > 1e-9:
+            raise InputError(
+                f"The weights of the Gaussians add up to {sum(self.weights):g}, not to 1.",
+                why="An apparatus function has unit integral.",
+            )
+        if min(self.sigmas) <= 0:
+            raise InputError("A Gaussian of the apparatus function has no positive width.")
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
+        terms = zip(self.weights, self.sigmas, strict=True)
+        return np.asarray(sum(w * np.exp(-0.5 * (s * k) ** 2) for w, s in terms))
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """G at radii ``r`` (m), in 1/m^2."""
+        terms = zip(self.weights, self.sigmas, strict=True)
+        return np.asarray(
+            sum(w * np.exp(-0.5 * (r / s) ** 2) / (2 * np.pi * s**2) for w, s in terms)
+        )
+
+
+def simulate(
+    *,
+    film: ElasticFilm = PAPER_FILM,
+    rod: Rod = PAPER_ROD,
+    kernel: GaussianMixture | None = None,
+    conversion_constant: float = 1e-7,
+    load: float | Sequence[float] = 1.0,
+    half_range: float = 8e-3,
+    points: int = 65,
+    repeats: int = 1,
+    raster: bool = False,
+    noise: float = 0.005,
+    centre: tuple[float, float] = (0.14e-3, 0.0),
+    baseline: float = 0.01,
+    drift: float = 0.005,
+    load_uncertainty: float | None = 0.01,
+    state_noise: bool = True,
+    seed: int = 0,
+) -> Scan:
+    """Simulate a rod scan through a known apparatus function.
+
+    The base stress of the frictionless rod on the bonded film is convolved with G exactly, by
+    Hankel transforms; Gaussian noise, an offset and a linear drift are added.
+
+    Parameters
+    ----------
+    film, rod
+        What is pressed on what; the paper's where absent.
+    kernel : GaussianMixture, optional
+        The apparatus function; the paper's Gaussian of 561 um where absent.
+    conversion_constant : float
+        A, in V/Pa.
+    load : float or sequence of float
+        Load in N; several loads give one repeat of the scan for each.
+    half_range : float
+        Positions run from minus to plus this, in m.
+    points : int
+        Number of positions along each axis.
+    repeats : int
+        Repeats at each load.
+    raster : bool
+        Scan a square instead of a line.
+    noise, baseline, drift : float
+        Standard deviation of the noise, offset, and change of the offset across the scan, each
+        as a share of the largest signal at the (mean) load.
+    centre : tuple of float
+        Position of the sensor, in m.
+    load_uncertainty : float, optional
+        Relative standard uncertainty to be stated for the load.
+    state_noise : bool
+        Whether the scan states its noise (``u_zz_errors``).
+    seed : int
+        Seed of the noise.
+
+    Returns
+    -------
+    Scan
+        With its truth in ``synthetic``.
+
+    Examples
+    --------
+    >>> scan = simulate(points=33, seed=2)
+    >>> scan.u_zz.shape, scan.synthetic["gaussian_sigma"]
+    ((33,), 0.000561)
+    """
+    truth = GaussianMixture() if kernel is None else kernel
+    loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
+    if raster and loads.size * repeats > 1:
+        raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
+    if points < 2 or repeats < 1:
+        raise InputError("A scan needs two positions and one repeat at least.")
+    x = np.linspace(-half_range, half_range, points)
+    y = x if raster else np.zeros(1)
+    radius = np.hypot.outer(y - centre[1], x - centre[0])
+    per_newton = conversion_constant * _blurred(film, rod, truth, radius)
+    row_loads = np.repeat(loads, repeats)
+    signal = per_newton * row_loads[:, None] if not raster else per_newton * loads[0]
+    largest = float(per_newton.max() * loads.mean())
+    clean = signal + largest * (baseline + 0.5 * drift * x / half_range)
+    rng = np.random.default_rng(seed)
+    u = clean + rng.normal(0.0, noise * largest, clean.shape)
+    if not raster and row_loads.size == 1:
+        u = u[0]
+    varying = loads.size > 1
+    return Scan(
+        x=x,
+        y=x if raster else None,
+        u_zz=u,
+        u_zz_errors=np.full(u.shape, noise * largest) if state_noise and noise > 0 else None,
+        normal_load=np.broadcast_to(row_loads[:, None], u.shape) if varying else None,
+        load=float(loads.mean()),
+        load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
+        indenter=rod,
+        film=film,
+        sensor=StressSensor(name="simulated", model="synthetic", channel="zz"),
+        title="Synthetic rod scan",
+        notes="Synthetic data made by memscal simulate; nothing here was measured.",
+        synthetic=_truth(
+            truth,
+            {
+                "conversion_constant": conversion_constant,
+                "centre": centre[0],
+                "centre_y": centre[1],
+                "baseline": baseline * largest,
+                "drift": drift * largest,
+                "noise": noise * largest,
+                "seed": float(seed),
+            },
+        ),
+    )
+
+
+def _blurred(
+    film: ElasticFilm, rod: Rod, kernel: GaussianMixture, radius: FloatArray
+) -> FloatArray:
+    """G convolved with the base stress per newton, in 1/m^2, at the given radii."""
+    contact = indent(film, rod, load=1.0)
+    wavenumbers = Wavenumbers.covering(40 / film.thickness, float(radius.max()))
+    spectrum = contact.base_spectrum(wavenumbers.k) * kernel.transform(wavenumbers.k)
+    return RadialSpectrum(wavenumbers, spectrum).at(radius)
+
+
+def _truth(kernel: GaussianMixture, values: dict[str, float]) -> dict[str, float | str]:
+    truth: dict[str, float | str] = {
+        "kernel": "sum of Gaussians of unit integral",
+        "kernel_weights": ", ".join(f"{w:g}" for w in kernel.weights),
+        "kernel_sigmas_um": ", ".join(f"{s * 1e6:g}" for s in kernel.sigmas),
+        **values,
+    }
+    if len(kernel.sigmas) == 1:
+        truth["gaussian_sigma"] = kernel.sigmas[0]
+    return truth
