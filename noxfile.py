@@ -93,6 +93,7 @@ def lint(session: nox.Session) -> None:
     session.run("ruff", "check", ".")
     session.run("ruff", "format", "--check", ".")
     session.run("codespell")
+    session.run("rumdl", "check", ".")
     session.run("repo-review", ".")
 
 
