@@ -59,8 +59,8 @@ def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> 
         raise InputError(
             f"{shown} cannot be read: {reason}.", cure="Check the name and the permissions."
         ) from error
-    with os.fdopen(descriptor, "rb", buffering=0) as file:
-        status = os.fstat(file.fileno())
+    try:
+        status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
             raise UnsafeFileError(
                 f"{shown} is not a regular file.",
@@ -69,14 +69,16 @@ def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> 
             )
         if status.st_size > limit:
             raise _too_large(shown, status.st_size, limit)
-        return _read_whole(file, shown, limit)
+        return _read_whole(descriptor, shown, limit)
+    finally:
+        os.close(descriptor)
 
 
-def _read_whole(file: Any, shown: str, limit: int) -> bytes:
+def _read_whole(descriptor: int, shown: str, limit: int) -> bytes:
     """Read to the end; a file that grows meanwhile still meets the limit."""
     parts, size = [], 0
     try:
-        while part := file.read(min(2**24, limit + 1 - size)):
+        while part := os.read(descriptor, min(2**20, limit + 1 - size)):
             parts.append(part)
             size += len(part)
             if size > limit:

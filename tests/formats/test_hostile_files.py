@@ -1,0 +1,411 @@
+"""Files built to read, run, hang or exhaust something: each is refused, and says why."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from builders import make_artifact, make_scan
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.formats import hdf5_reader
+from memscal.formats.artifact import read_artifact, write_artifact
+from memscal.formats.scan import read_scan, write_scan
+
+SIGNAL = "/entry/data/u_zz"
+Edit = Callable[[Callable[[h5py.Group], Any]], Path]
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Edit:
+    """Return a function that replaces u_zz of a good scan by something else."""
+
+    def edit(make: Callable[[h5py.Group], Any]) -> Path:
+        path = tmp_path / "scan.h5"
+        write_scan(make_scan(), path, overwrite=True)
+        with h5py.File(path, "r+") as file:
+            del file[SIGNAL]
+            made = make(file["/entry/data"])
+            if isinstance(made, h5py.Dataset):
+                made.attrs["units"] = "mV"
+        return path
+
+    return edit
+
+
+def low_level(group: h5py.Group, dtype: Any, shape: tuple[int, ...], prepare: Any) -> Any:
+    """Create u_zz with a property list that h5py's own interface does not offer."""
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    prepare(plist)
+    space = h5py.h5s.create_simple(shape)
+    return h5py.Dataset(h5py.h5d.create(group.id, b"u_zz", dtype, space, plist))
+
+
+def assert_refused_cheaply(path: Path, *words: str) -> None:
+    """The refusal names file and path, and costs less memory than twenty times the file."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(UnsafeFileError) as caught:
+            read_scan(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert f"scan.h5: {SIGNAL}" in caught.value.problem
+    assert caught.value.why
+    assert caught.value.cure
+    for word in words:
+        assert word in str(caught.value)
+    assert peak < 20 * path.stat().st_size + 2**22
+
+
+def test_an_external_link_to_a_pipe_is_refused_without_waiting(edited: Edit, tmp_path: Path):
+    os.mkfifo(tmp_path / "pipe.h5")
+    path = edited(lambda g: g.__setitem__("u_zz", h5py.ExternalLink("pipe.h5", "/x")))
+    assert_refused_cheaply(path, "link")
+
+
+def test_a_soft_link_is_refused(edited: Edit):
+    path = edited(lambda g: g.__setitem__("u_zz", h5py.SoftLink("/entry/data/x")))
+    assert_refused_cheaply(path, "link")
+
+
+def test_a_soft_link_half_way_along_the_path_is_refused(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(), path)
+    with h5py.File(path, "r+") as file:
+        file.move("/entry/data", "/entry/hidden")
+        file["/entry/data"] = h5py.SoftLink("/entry/hidden")
+    with pytest.raises(UnsafeFileError, match="/entry/data"):
+        read_scan(path)
+
+
+def test_external_raw_storage_is_refused_and_the_other_file_stays_unread(
+    edited: Edit, tmp_path: Path
+):
+    secret = tmp_path / "secret.bin"
+    secret.write_bytes(np.full(33, 42.0).tobytes())
+    before = secret.stat().st_atime_ns
+    path = edited(
+        lambda g: g.create_dataset("u_zz", (33,), "f8", external=[(str(secret), 0, 264)])
+    )
+    assert_refused_cheaply(path, "external")
+    assert secret.stat().st_atime_ns == before
+
+
+def test_a_virtual_dataset_with_a_missing_source_is_refused(edited: Edit):
+    layout = h5py.VirtualLayout((33,), "f8")
+    layout[:] = h5py.VirtualSource("missing.h5", "/x", (33,))
+    assert_refused_cheaply(edited(lambda g: g.create_virtual_dataset("u_zz", layout)), "virtual")
+
+
+def test_a_small_file_that_claims_256_tebibytes_is_refused(edited: Edit):
+    path = edited(lambda g: g.create_dataset("u_zz", (2**45,), "f8", chunks=(1024,)))
+    assert path.stat().st_size < 2**17
+    assert_refused_cheaply(path, "claims 281,474,976,710,656 bytes")
+
+
+def test_a_shape_whose_product_overflows_64_bits_is_refused(edited: Edit):
+    path = edited(lambda g: g.create_dataset("u_zz", (2**40, 2**22), "f8", chunks=(1, 1024)))
+    assert_refused_cheaply(path, "claims")
+
+
+def test_a_filter_listed_twice_is_refused(edited: Edit):
+    def prepare(plist: Any) -> None:
+        plist.set_chunk((2**20,))
+        plist.set_deflate(9)
+        plist.set_deflate(9)
+
+    path = edited(lambda g: low_level(g, h5py.h5t.NATIVE_DOUBLE, (2**20,), prepare))
+    assert_refused_cheaply(path, "gzip more than once")
+
+
+@pytest.mark.parametrize("code", [h5py.h5z.FILTER_LZF, 32015])
+def test_a_filter_that_may_load_foreign_code_is_refused(edited: Edit, code: int):
+    def prepare(plist: Any) -> None:
+        plist.set_chunk((33,))
+        plist.set_filter(code, h5py.h5z.FLAG_OPTIONAL)
+
+    path = edited(lambda g: low_level(g, h5py.h5t.NATIVE_DOUBLE, (33,), prepare))
+    assert_refused_cheaply(path, f"filter {code}")
+
+
+def test_a_huge_chunk_around_one_number_is_refused(edited: Edit):
+    path = edited(lambda g: g.create_dataset("u_zz", (1,), "f8", maxshape=(None,), chunks=(2**26,)))
+    assert_refused_cheaply(path, "chunks of 536,870,912 bytes")
+
+
+def test_a_dataset_cut_into_millions_of_chunks_is_refused(edited: Edit):
+    path = edited(lambda g: g.create_dataset("u_zz", (2**23,), "f8", chunks=(1,)))
+    assert_refused_cheaply(path, "8,388,608 chunks")
+
+
+@pytest.mark.parametrize("chunks", [None, (11,)])
+def test_values_that_were_never_written_do_not_read_as_zeros(edited: Edit, chunks: Any):
+    path = edited(lambda g: g.create_dataset("u_zz", (33,), "f8", chunks=chunks))
+    assert_refused_cheaply(path, "never written")
+
+
+@pytest.mark.parametrize(
+    ("dtype", "value"),
+    [
+        (h5py.vlen_dtype(np.float64), np.zeros(3)),
+        (h5py.string_dtype(), "text"),
+        (np.dtype([("a", "f8"), ("b", "i4")]), (1.0, 2)),
+        (np.dtype("c16"), 1j),
+        (np.dtype("S8"), b"text"),
+        (np.dtype("V8"), b"12345678"),
+        (h5py.enum_dtype({"a": 1}), 1),
+    ],
+    ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"],
+)
+def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype: Any, value: Any):
+    def make(group: h5py.Group) -> Any:
+        dataset = group.create_dataset("u_zz", (33,), dtype)
+        dataset[0] = value
+        return dataset
+
+    assert_refused_cheaply(edited(make), "numbers")
+
+
+def test_a_bomb_of_references_to_one_long_vector_is_refused(edited: Edit):
+    def make(group: h5py.Group) -> Any:
+        dataset = group.create_dataset("u_zz", (2**16,), h5py.vlen_dtype(np.float64))
+        dataset[0] = np.zeros(2**10)
+        return dataset
+
+    assert_refused_cheaply(edited(make), "numbers")
+
+
+def test_object_references_are_refused(edited: Edit):
+    path = edited(lambda g: g.create_dataset("u_zz", data=[g.ref] * 3, dtype=h5py.ref_dtype))
+    assert_refused_cheaply(path, "references")
+
+
+def test_a_null_dataspace_is_refused(edited: Edit):
+    assert_refused_cheaply(
+        edited(lambda g: g.create_dataset("u_zz", data=h5py.Empty("f8"))), "null dataspace"
+    )
+
+
+def test_a_group_in_the_place_of_a_dataset_is_refused(edited: Edit):
+    with pytest.raises(FormatError, match=f"{SIGNAL} is not a dataset"):
+        read_scan(edited(lambda g: g.create_group("u_zz")))
+
+
+def test_one_large_dataset_linked_under_many_names_meets_the_limit_of_the_file(
+    edited: Edit, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(hdf5_reader, "_MAX_TOTAL_BYTES", 1500)
+
+    def make(group: h5py.Group) -> None:
+        group["u_zz"] = group["u_xz"]
+        group["u_yz"] = group["u_xz"]
+
+    with pytest.raises(UnsafeFileError, match="over the limit"):
+        read_scan(edited(make))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        h5py.Empty("f8"),
+        np.array([b"mm"] * 100),
+        np.array([[b"m", b"V"], [b"m", b"V"]]),
+        np.array([h5py.Reference()], dtype=h5py.ref_dtype),
+        b"m" * 60_000,
+    ],
+    ids=["null", "many", "table", "reference", "long"],
+)
+def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value: Any):
+    path = edited(lambda g: g.create_dataset("u_zz", data=np.zeros(33)))
+    with h5py.File(path, "r+") as file:
+        if isinstance(value, np.ndarray) and value.dtype == h5py.ref_dtype:
+            value = np.array([file.ref], dtype=h5py.ref_dtype)
+        del file[SIGNAL].attrs["units"]
+        file[SIGNAL].attrs.create("units", value)
+    with pytest.raises(InputError, match=SIGNAL):
+        read_scan(path)
+
+
+def test_text_from_a_file_cannot_steer_the_terminal(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(), path)
+    with h5py.File(path, "r+") as file:
+        del file["/entry/title"]
+        file["/entry/title"] = b"\x1b[2J\x07title \xff\xc3"
+    assert read_scan(path).title == "[2Jtitle ��"
+
+
+def test_text_of_variable_length_as_other_programs_write_it_is_read(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(), path)
+    with h5py.File(path, "r+") as file:
+        del file["/entry/indenter/shape"], file["/entry/data/x"].attrs["units"]
+        file["/entry/indenter/shape"] = "sphere"
+        file["/entry/data/x"].attrs["units"] = "um"
+        file["/entry/data"].attrs["axes"] = ["x"]
+    scan = read_scan(path)
+    assert scan.indenter.shape == "sphere"
+    assert scan.x[0] == pytest.approx(-8e-6)
+
+
+def test_a_text_dataset_longer_than_any_text_is_refused(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(), path)
+    with h5py.File(path, "r+") as file:
+        del file["/entry/title"]
+        file["/entry"].create_dataset("title", data=np.bytes_(b"a" * (2**22 + 1)))
+    with pytest.raises(UnsafeFileError, match="/entry/title"):
+        read_scan(path)
+
+
+def test_a_folder_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="not a regular file|cannot be read"):
+        read_scan(tmp_path)
+
+
+def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path: Path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(UnsafeFileError, match="not a regular file"):
+        read_scan(pipe)
+
+
+def test_a_device_is_refused():
+    with pytest.raises(UnsafeFileError, match="not a regular file"):
+        read_scan(os.devnull)
+
+
+def test_a_missing_file_and_a_name_that_is_none_are_input_errors(tmp_path: Path):
+    with pytest.raises(InputError, match=r"missing\.h5 cannot be read: No such file"):
+        read_scan(tmp_path / "missing.h5")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_scan("a\0b")
+
+
+def test_a_file_over_the_size_limit_is_refused_unread(tmp_path: Path):
+    path = tmp_path / "large.h5"
+    with path.open("wb") as file:
+        file.truncate(2**28 + 1)  # sparse: it takes no room on the disk
+    with pytest.raises(UnsafeFileError, match="268,435,457 bytes"):
+        read_scan(path)
+
+
+def test_a_text_file_is_not_taken_for_hdf5(tmp_path: Path):
+    path = tmp_path / "scan.csv"
+    path.write_text("x,u\n0,1\n")
+    with pytest.raises(FormatError, match=r"scan\.csv is not an HDF5 file"):
+        read_scan(path)
+
+
+def test_every_truncation_is_an_error_of_ours(tmp_path: Path):
+    whole, cut = tmp_path / "scan.h5", tmp_path / "cut.h5"
+    write_scan(make_scan(), whole)
+    data = whole.read_bytes()
+    for length in [*range(0, 2048, 64), *range(2048, len(data), 1999), len(data) - 1]:
+        cut.write_bytes(data[:length])
+        with pytest.raises(FormatError, match=r"cut\.h5"):
+            read_scan(cut)
+
+
+@pytest.fixture(scope="module")
+def artifact_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("artifact") / "a.h5"
+    write_artifact(make_artifact(), path)
+    return path.read_bytes()
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(draw=st.data())
+def test_an_artifact_with_a_flipped_bit_is_read_unchanged_or_refused(
+    artifact_bytes: bytes, tmp_path: Path, draw: st.DataObject
+):
+    damaged = bytearray(artifact_bytes)
+    # Half of the flips go to the first pages, where the structure is densest.
+    last = draw.draw(st.sampled_from([len(damaged) // 8, len(damaged) - 1]))
+    damaged[draw.draw(st.integers(8, last))] ^= 1 << draw.draw(st.integers(0, 7))
+    path = tmp_path / "flipped.h5"
+    path.write_bytes(damaged)
+    try:
+        found = read_artifact(path)
+    except MemscalError as error:
+        assert "flipped.h5" in str(error) or "contents" in str(error)
+    else:
+        expected = make_artifact()
+        np.testing.assert_allclose(found.field.g, expected.field.g, rtol=1e-15)
+        np.testing.assert_allclose(
+            found.parameters.values, expected.parameters.values, rtol=1e-15
+        )
+        assert found.checks == expected.checks
+
+
+def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(tmp_path: Path):
+    """A process of its own: a crash of the HDF5 library would end the tests."""
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(), path)
+    sweep = (
+        "import sys, pathlib\n"
+        "from memscal.errors import MemscalError\n"
+        "from memscal.formats.scan import read_scan\n"
+        "path = pathlib.Path(sys.argv[1])\n"
+        "good = path.read_bytes()\n"
+        "read = refused = 0\n"
+        "for i in range(8, len(good), 97):\n"
+        "    path.write_bytes(good[:i] + bytes([good[i] ^ 0xFF]) + good[i + 1:])\n"
+        "    try:\n"
+        "        read_scan(path)\n"
+        "        read += 1\n"
+        "    except MemscalError:\n"
+        "        refused += 1\n"
+        "print(read, refused)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", sweep, str(path)], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    read, refused = map(int, done.stdout.split())
+    assert read > 0
+    assert refused > 0
+
+
+def test_the_plugin_path_is_off_before_the_hdf5_library_starts(tmp_path: Path):
+    plugins = tmp_path / "plugins"
+    plugins.mkdir()
+    (plugins / "libforeign.so").write_bytes(b"never loaded")
+    watch = (
+        "import os, sys\n"
+        "class Watch:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'h5py':\n"
+        "            print(os.environ.get('HDF5_PLUGIN_PRELOAD'))\n"
+        "sys.meta_path.insert(0, Watch())\n"
+        "import memscal.formats.scan\n"
+        "assert 'h5py' not in sys.modules\n"
+        "import memscal.formats.hdf5_library\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "HDF5_PLUGIN_PRELOAD"}
+    environment["HDF5_PLUGIN_PATH"] = str(plugins)
+    done = subprocess.run(
+        [sys.executable, "-c", watch], capture_output=True, text=True, env=environment, check=True
+    )
+    assert done.stdout.strip() == "::"
+
+
+def test_reading_leaves_the_file_as_it_was(tmp_path: Path):
+    path, copy = tmp_path / "scan.h5", tmp_path / "copy.h5"
+    write_scan(make_scan(), path)
+    shutil.copy(path, copy)
+    path.chmod(0o444)
+    read_scan(path)
+    assert path.read_bytes() == copy.read_bytes()

@@ -1,0 +1,172 @@
+"""The files as other programs of the field see them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import netCDF4
+import numpy as np
+import pytest
+import silx.io.nxdata
+import xarray
+from builders import make_artifact, make_profile, make_scan
+from nexusformat.nexus.validate import validate_file
+
+from memscal.formats.artifact import write_artifact
+from memscal.formats.reference import write_reference
+from memscal.formats.scan import write_scan
+
+WRITERS: dict[str, Callable[[Path], None]] = {
+    "line": lambda path: write_scan(make_scan("line"), path),
+    "repeats": lambda path: write_scan(make_scan("repeats"), path),
+    "raster": lambda path: write_scan(make_scan("raster"), path),
+    "plain line": lambda path: write_scan(
+        make_scan(
+            u_zz_errors=None,
+            normal_load=None,
+            channels={},
+            reference=None,
+            synthetic=None,
+            title="",
+            start_time="",
+            end_time="",
+            notes="",
+        ),
+        path,
+    ),
+    "reference": lambda path: write_reference(make_profile(), path),
+    "artifact": lambda path: write_artifact(make_artifact(), path),
+}
+DEFAULTS = {"reference": "/entry/reference", "artifact": "/entry/apparatus_function"}
+
+
+@pytest.fixture(params=WRITERS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def path(kind: str, tmp_path: Path) -> Path:
+    file = tmp_path / f"{kind}.h5"
+    WRITERS[kind](file)
+    return file
+
+
+def items(path: Path) -> tuple[list[str], dict[str, Any]]:
+    """Return the paths of all groups, and of all datasets with shape and attributes."""
+    groups, datasets = ["/"], {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Group):
+            groups.append(f"/{name}")
+        else:
+            datasets[f"/{name}"] = (item.shape, item.dtype, dict(item.attrs))
+
+    with h5py.File(path) as file:
+        file.visititems(visit)
+    return groups, datasets
+
+
+def test_silx_finds_every_nxdata_valid_and_the_right_default(path: Path, kind: str):
+    found = 0
+    with h5py.File(path) as file:
+        for group in items(path)[0]:
+            if file[group].attrs["NX_class"] == b"NXdata":
+                assert silx.io.nxdata.NXdata(file[group]).issues == []
+                found += 1
+        default = silx.io.nxdata.get_default(file)
+        assert default is not None
+        assert default.group.name == DEFAULTS.get(kind, "/entry/data")
+    assert found == {"artifact": 5, "reference": 1, "plain line": 1}.get(kind, 2)
+
+
+def test_nexusformat_reports_no_error(path: Path):
+    warnings, errors = validate_file(str(path))
+    assert errors == 0
+    # The schema, version and digest of the root, and the channel of the sensor, are our own.
+    assert warnings <= 4
+
+
+def test_xarray_opens_every_group_without_a_warning(path: Path):
+    for group in items(path)[0]:
+        with xarray.open_dataset(path, engine="h5netcdf", group=group) as dataset:
+            dataset.load()
+            assert not [dim for dim in dataset.dims if str(dim).startswith("phony")]
+
+
+@pytest.mark.parametrize(
+    ("kind", "group", "name", "dims", "units"),
+    [
+        ("artifact", "apparatus_function", "g", ("y", "x"), "1/mm^2"),
+        ("artifact", "apparatus_function", "g_errors", ("y", "x"), "1/mm^2"),
+        ("artifact", "radial_profile", "g_covariance", ("r", "r_prime"), "1/mm^4"),
+        ("artifact", "transfer_function", "modulus", ("k",), "1"),
+        ("artifact", "transfer_function", "resolved_wavenumber", (), "rad/mm"),
+        ("artifact", "reconvolution", "u_zz_predicted", ("x",), "mV"),
+        ("artifact", "parameters", "conversion_constant", (), "mV/Pa"),
+        ("artifact", "parameters", "covariance", ("parameter", "parameter_prime"), "1"),
+        ("raster", "data", "u_zz", ("y", "x"), "mV"),
+        ("raster", "data", "normal_load", ("y", "x"), "N"),
+        ("repeats", "data", "u_zz", ("repeat", "x"), "mV"),
+        ("line", "data", "u_zz", ("x",), "mV"),
+        ("reference", "reference", "sigma_zz", ("r",), "Pa"),
+    ],
+    indirect=["kind"],
+)
+def test_xarray_gives_dimensions_in_order_with_units(
+    path: Path, group: str, name: str, dims: tuple[str, ...], units: str
+):
+    with xarray.open_dataset(path, engine="h5netcdf", group=f"/entry/{group}") as dataset:
+        assert dataset[name].dims == dims
+        assert dataset[name].attrs["units"] == units
+        for dim in dims:
+            assert dim in dataset.coords
+
+
+@pytest.mark.parametrize("kind", ["artifact"], indirect=True)
+def test_a_point_of_g_is_found_by_its_coordinates_in_mm(path: Path):
+    data = make_artifact().field
+    with xarray.open_dataset(path, engine="h5netcdf", group="/entry/apparatus_function") as found:
+        value = float(found["g"].sel(x=0.5, y=-1.0, method="nearest"))
+    j = int(np.argmin(np.abs(data.x - 0.5e-3)))
+    i = int(np.argmin(np.abs(data.y + 1.0e-3)))
+    assert value == pytest.approx(data.g[i, j] * 1e-6, rel=1e-14)
+
+
+def test_netcdf4_opens_every_group_and_reads_every_variable(path: Path):
+    groups, datasets = items(path)
+    read = 0
+    with netCDF4.Dataset(path) as file:
+        for group in groups:
+            opened = file if group == "/" else file[group]
+            for variable in opened.variables.values():
+                variable[...]
+                read += 1
+    assert read == len(datasets)
+
+
+def test_every_number_has_a_unit_and_every_array_a_scale_on_every_axis(path: Path):
+    for name, (shape, dtype, attributes) in items(path)[1].items():
+        if dtype.kind == "S":
+            continue
+        assert attributes["units"], name
+        with h5py.File(path) as file:
+            if attributes.get("CLASS") == b"DIMENSION_SCALE":
+                continue
+            for i, length in enumerate(shape):
+                assert [scale.shape for scale in file[name].dims[i].values()] == [(length,)], name
+
+
+def test_names_are_lower_case_and_links_are_hard(path: Path):
+    groups, datasets = items(path)
+    for name in [*groups, *datasets]:
+        assert name == name.lower()
+        assert name.isascii()
+    with h5py.File(path) as file:
+        for group in groups:
+            for child in file[group]:
+                assert isinstance(file[group].get(child, getlink=True), h5py.HardLink)
+        assert not any("long_name" in attributes for *_, attributes in datasets.values())
