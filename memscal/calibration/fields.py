@@ -37,7 +37,8 @@ class GridChoice:
         return {
             "spacing": f"{self.spacing * 1e3:.4g} mm: {_POINTS_PER_WIDTH:g} points per Gaussian "
             "width, and the last wavenumber is at least twice the one where the window has closed",
-            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre",
+            "support": f"{self.support * 1e3:.4g} mm: the largest distance from the centre; G is "
+            "tapered to zero over its outer half",
             "extent": f"{self.extent * 1e3:.4g} mm: the whole length of the scan, about twice the "
             "support, so that nothing wraps around into it",
         }
@@ -74,6 +75,11 @@ class Fields(Protocol):
     @property
     def reference(self) -> FloatArray:
         """Base stress per newton on the grid, in 1/m^2."""
+        ...
+
+    @property
+    def confinement(self) -> FloatArray:
+        """Taper on the grid that confines a kernel to its support."""
         ...
 
     def at_points(self, field: FloatArray) -> FloatArray:
@@ -129,6 +135,16 @@ def division_problem(fields: Fields, band: Band) -> DivisionProblem:
     )
 
 
+def _taper(radius: FloatArray, support: float) -> FloatArray:
+    """One up to half of the support, then falling as a cosine to zero at its edge.
+
+    A sharp edge would cut the ripples of G at full height: their integral, and with it A, would
+    depend on where it lies.
+    """
+    phase = np.clip(2 * radius / support - 1, 0.0, 1.0)
+    return np.asarray((1 + np.cos(np.pi * phase)) / 2)
+
+
 @dataclass(frozen=True, eq=False)
 class _LineFields:
     """Both profiles, lifted to a quarter plane."""
@@ -149,6 +165,10 @@ class _LineFields:
         points = estimate.points
         radius = np.abs(points.x - estimate.centre[0])
         return cls(grid, voltage, reference, round(choice.support / choice.spacing), radius)
+
+    @property
+    def confinement(self) -> FloatArray:
+        return _taper(self.grid.radius, self.support * self.grid.spacing)
 
     def at_points(self, field: FloatArray) -> FloatArray:
         return cut(field, self.grid, self.radius)
@@ -190,6 +210,13 @@ class _RasterFields:
         reference = lift(estimate.model.reference.at, grid, step)
         return cls(grid, voltage, reference, choice.support, (rows, columns))
 
+    @property
+    def confinement(self) -> FloatArray:
+        # A kernel's zero is the central point of the lattice, wherever the sensor is.
+        x = self.grid.x - self.grid.x[self.grid.x.size // 2]
+        y = self.grid.y - self.grid.y[self.grid.y.size // 2]
+        return _taper(np.hypot.outer(y, x), self.support)
+
     def at_points(self, field: FloatArray) -> FloatArray:
         return np.asarray(field[self.index])
 
@@ -224,11 +251,11 @@ def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatAr
 
 
 def _azimuthal_mean(x: FloatArray, y: FloatArray, plane: FloatArray, r: FloatArray) -> FloatArray:
-    """Mean over 64 directions; beyond the plane the last ring is continued."""
-    from scipy.interpolate import RegularGridInterpolator
+    """Mean over 64 directions, by cubic splines; beyond the plane its edge is continued."""
+    from scipy.ndimage import map_coordinates
 
     angle = 2 * np.pi * np.arange(64) / 64
-    sample = RegularGridInterpolator((y, x), plane, method="cubic", bounds_error=False)
-    at = np.stack([np.multiply.outer(r, np.sin(angle)), np.multiply.outer(r, np.cos(angle))], -1)
-    inside = np.clip(at, [y[0], x[0]], [y[-1], x[-1]])
-    return np.asarray(sample(inside).mean(axis=1))
+    rows = (np.multiply.outer(r, np.sin(angle)) - y[0]) / (y[1] - y[0])
+    columns = (np.multiply.outer(r, np.cos(angle)) - x[0]) / (x[1] - x[0])
+    samples = map_coordinates(plane, [rows, columns], order=3, mode="nearest")
+    return np.asarray(samples.mean(axis=1))

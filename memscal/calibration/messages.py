@@ -10,6 +10,9 @@ from memscal.model.scan import Scan
 
 __all__ = ["calibration_messages"]
 
+#: Methods that are a fixed window, whose uncertainties are therefore complete to first order.
+_WINDOWS = ("white-noise", "tikhonov")
+
 
 def calibration_messages(solution: Solution, checks: tuple[QualityCheck, ...]) -> tuple[str, ...]:
     """Return the messages that accompany a result, the gravest first."""
@@ -21,6 +24,7 @@ def calibration_messages(solution: Solution, checks: tuple[QualityCheck, ...]) -
         if not check.passed
     ]
     messages += _points(estimate)
+    messages += _method(solution)
     messages += _reference(solution)
     messages += _unstated(scan)
     if scan.synthetic is not None:
@@ -48,6 +52,17 @@ def _points(estimate: ProfileEstimate) -> list[str]:
             "size."
         )
     return messages
+
+
+def _method(solution: Solution) -> list[str]:
+    """Say of a method that is no fixed window on the spectrum what its uncertainty leaves out."""
+    regulariser = solution.regulariser
+    if regulariser.name in _WINDOWS:
+        return []
+    return [
+        f"Method {regulariser.name}: uncertainties are first-order through its effective window, "
+        f"without its own scatter. {regulariser.fails}"
+    ]
 
 
 def _reference(solution: Solution) -> list[str]:

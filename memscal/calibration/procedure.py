@@ -9,6 +9,7 @@ from typing import Any
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
+from memscal.calibration.field_noise import field_noise
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.quality import quality_checks
 from memscal.calibration.solution import Solution, solve
@@ -170,4 +171,5 @@ def _uncertainties(solution: Solution) -> Results:
         wavenumbers,
         reference_sensitivities(scan, estimate.model.reference),
         relative,
+        field_noise(solution, wavenumbers),
     )

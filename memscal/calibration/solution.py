@@ -135,7 +135,8 @@ def divide(
     estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
 ) -> Quotient:
     """Divide the fields, normalise the quotient, and convolve it back."""
-    division = regulariser.divide(division_problem(fields, band))
+    raw = regulariser.divide(division_problem(fields, band))
+    division = Division(raw.field * fields.confinement, raw.window)
     kernel = normalise(fields.view(division.field), estimate.gaussian.sigma)
     back = fields.grid.convolve(division.field, fields.reference)
     predicted = fields.at_points(back) * estimate.points.load + estimate.background

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0
 
+from memscal.calibration.field_noise import FieldNoise
 from memscal.calibration.normalise import NormalisedKernel, unit_gaussian_slope
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.apparatus import ParameterSet
@@ -71,6 +72,7 @@ def propagate(
     wavenumbers: FloatArray,
     changes: Mapping[str, FloatArray],
     relative: Mapping[str, float],
+    raster: FieldNoise | None = None,
 ) -> Results:
     """Propagate all stated uncertainties to the results.
 
@@ -88,6 +90,8 @@ def propagate(
         Change of the reference's transform by one standard uncertainty of each source.
     relative : mapping of str to float
         Relative standard uncertainty of each source that scales A alone (the load).
+    raster : FieldNoise, optional
+        What the noise of a measured field adds.
     """
     rows = _rows(estimate, kernel, window, wavenumbers)
     covariance = _joint_covariance(estimate)
@@ -99,6 +103,10 @@ def propagate(
         scalars[source] = rows.scalars @ shift
         radial.append(rows.radial @ shift)
         transfer.append(rows.transfer @ shift)
+    if raster is not None:
+        scalars["raster_noise"] = _raster_columns(rows.names, kernel, raster)
+        radial.append(raster.radial)
+        transfer.append(raster.transfer[:, None])
     scales_a = np.array([name.startswith("conversion_constant") for name in rows.names])
     for source, share in relative.items():
         scalars[source] = (np.where(scales_a, rows.values, 0.0) * share)[:, None]
@@ -178,6 +186,16 @@ def _scalar_rows(
         row[first : first + part.size] = part
     names, values = tuple(e[0] for e in entries), np.array([e[1] for e in entries])
     return rows, names, values
+
+
+def _raster_columns(
+    names: tuple[str, ...], kernel: NormalisedKernel, raster: FieldNoise
+) -> FloatArray:
+    """Columns of the scalars for the noise of a measured field: A first, then the width."""
+    columns = np.zeros((len(names), 1 + raster.radial.shape[1]))
+    columns[names.index("conversion_constant"), 0] = raster.conversion_constant
+    columns[names.index("gaussian_sigma_deconvolved"), 1:] = _width_row(kernel) @ raster.radial
+    return columns
 
 
 def _unit(count: int, index: int) -> FloatArray:

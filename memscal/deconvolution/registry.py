@@ -77,6 +77,7 @@ def _factory(name: str) -> Any:
     found = entry_points(group=ENTRY_POINT_GROUP, name=name)
     if not found:
         raise InputError(
-            f"There is no method named {name}.", cure=f"Choose from {', '.join(regulariser_names())}."
+            f"There is no method named {name}.",
+            cure=f"Choose from {', '.join(regulariser_names())}.",
         )
     return next(iter(found)).load()

@@ -120,6 +120,10 @@ class RichardsonLucy:
         images = _Images.of(problem)
         positive = np.maximum(images.image, 0.0)
         restored = richardson_lucy(
-            positive, images.point_spread, num_iter=self.iterations, clip=False, filter_epsilon=1e-12
+            positive,
+            images.point_spread,
+            num_iter=self.iterations,
+            clip=False,
+            filter_epsilon=1e-12,
         )
         return image_division(problem, restored * images.scale)

@@ -127,16 +127,17 @@ def weigh_departures(
     design = design / scale
     data = root * (model.points.u - fit.predicted)
     probability, variance = _evidence(design, data, basis.flat, effective_count)
-    gain = np.zeros(design.T.shape)
-    second = np.zeros((scale.size, scale.size))
+    information, projected = design.T @ design, design.T @ data
+    average = np.zeros_like(information)
+    second = np.zeros_like(information)
     for strength, p, v in zip(_STRENGTHS, probability, variance, strict=True):
         if p > 0:
-            inverse = _posterior_inverse(design, basis.flat, strength)
-            own_gain = inverse @ design.T
-            centre = own_gain @ data
-            gain += p * own_gain
+            inverse = _posterior_inverse(information, basis.flat, strength)
+            centre = inverse @ projected
+            average += p * inverse
             second += p * (v * inverse + np.outer(centre, centre))
-    mean = gain @ data
+    gain = average @ design.T
+    mean = average @ projected
     covariance = (second - np.outer(mean, mean)) / np.outer(scale, scale)
     return WeighedFit(
         mean=mean / scale,
@@ -156,15 +157,17 @@ def _evidence(
     The flat columns are projected out (restricted likelihood); in the singular basis of
     what is left every strength costs one sum.
     """
-    complement = np.linalg.qr(design[:, :flat], mode="complete")[0][:, flat:]
-    left, singular, _ = np.linalg.svd(complement.T @ design[:, flat:], full_matrices=True)
-    squared = np.zeros(complement.shape[1])
-    squared[: singular.size] = singular**2
-    power = (left.T @ (complement.T @ data)) ** 2
+    flat_part = np.linalg.qr(design[:, :flat])[0]
+    rings = design[:, flat:] - flat_part @ (flat_part.T @ design[:, flat:])
+    rest = data - flat_part @ (flat_part.T @ data)
+    left, singular, _ = np.linalg.svd(rings, full_matrices=False)
+    squared = singular**2
+    power = (left.T @ rest) ** 2
+    beyond = max(float(rest @ rest - power.sum()), 0.0)
     # Down-weighted points carry no full degree of freedom.
     freedom = effective_count - flat
     inflation = 1 + np.multiply.outer(_STRENGTHS, squared)
-    variance = (power / inflation).sum(axis=1) / freedom
+    variance = (beyond + (power / inflation).sum(axis=1)) / freedom
     variance = np.maximum(variance, np.finfo(float).tiny)
     log_evidence = -0.5 * (freedom * np.log(variance) + np.log(inflation).sum(axis=1))
     prior = np.full(_STRENGTHS.size, 0.5 / (_STRENGTHS.size - 1))
@@ -174,13 +177,12 @@ def _evidence(
     return posterior / posterior.sum(), variance
 
 
-def _posterior_inverse(design: FloatArray, flat: int, strength: float) -> FloatArray:
+def _posterior_inverse(information: FloatArray, flat: int, strength: float) -> FloatArray:
     """Posterior covariance of all columns at one strength, per unit noise variance."""
-    count = flat if strength == 0 else design.shape[1]
-    used = design[:, :count]
-    precision = used.T @ used
+    count = flat if strength == 0 else information.shape[0]
+    precision = information[:count, :count].copy()
     if strength > 0:
         precision[range(flat, count), range(flat, count)] += 1 / strength
-    covariance = np.zeros((design.shape[1],) * 2)
+    covariance = np.zeros_like(information)
     covariance[:count, :count] = np.linalg.inv(precision)
     return covariance

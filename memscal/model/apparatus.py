@@ -74,6 +74,8 @@ class TransferFunction:
 class Reconvolution:
     """The scan beside what the calibration predicts for it; all in V against ``x`` in m.
 
+    In a line scan ``x`` is the position; in a raster, the distance from the sensor's centre.
+
     ``u_zz_predicted`` uses the deconvolved G, ``u_zz_gaussian`` the Gaussian fitted in data
     space; ``residual`` is measured minus predicted.
     """
@@ -152,7 +154,7 @@ class ApparatusData:
 
     Parameters
     ----------
-    field, radial, transfer, reconvolution
+    field, radial_profile, transfer, reconvolution
         The apparatus function in its three views, and the scan it came from.
     parameters : ParameterSet
         ``conversion_constant`` (V/Pa), ``gaussian_sigma``, ``gaussian_sigma_deconvolved``,
@@ -171,7 +173,7 @@ class ApparatusData:
     """
 
     field: ApparatusField
-    radial: ApparatusRadial
+    radial_profile: ApparatusRadial
     transfer: TransferFunction
     reconvolution: Reconvolution
     parameters: ParameterSet
