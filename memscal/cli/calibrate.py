@@ -1,0 +1,303 @@
+"""``memscal calibrate``: a rod scan to an apparatus function."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.options import FILE, force_option, json_option
+from memscal.cli.output import emit_json, message, note, warn
+from memscal.cli.progress import working
+from memscal.cli.targets import FigurePath, beside, prove_writable
+
+if TYPE_CHECKING:
+    from memscal.calibration.procedure import Calibration
+    from memscal.calibration.sweep import Sweep
+    from memscal.deconvolution.problem import Regulariser
+    from memscal.model.scan import Scan
+    from memscal.model.stress import StressProfile
+
+__all__ = ["command"]
+
+EXAMPLES = """\b
+Examples:
+  memscal calibrate scan.h5
+  memscal calibrate scan.h5 -o sensor.apparatus.h5 --figure scan.png --report scan.html
+  memscal calibrate scan.h5 --reference fem.h5 --json
+  memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
+  memscal calibrate scan.h5 --sweep --sweep-figure sweep.pdf
+"""
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where the results go."""
+
+    artifact: Path
+    report: Path | None
+    figures: tuple[Path, ...]
+    sweep_figure: Path | None
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """All of them, the artifact first."""
+        others = (self.report, *self.figures, self.sweep_figure)
+        return (self.artifact, *(path for path in others if path is not None))
+
+
+def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    from memscal.deconvolution.registry import regulariser_names
+
+    return [name for name in regulariser_names() if name.startswith(incomplete)]
+
+
+@click.command("calibrate", epilog=EXAMPLES)
+@click.argument("scan", type=FILE)
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    metavar="OUT",
+    help="Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5.",
+)
+@click.option(
+    "--reference",
+    type=FILE,
+    metavar="FILE",
+    help="Stress at the base of the film (memscal-reference). By default the one in the scan, or "
+    "else the rod is solved on the film.",
+)
+@click.option(
+    "--method",
+    default="white-noise",
+    show_default=True,
+    metavar="NAME",
+    shell_complete=_complete_method,
+    help="How the fields are divided: white-noise (its exact expectation), white-noise-draw (one "
+    "seeded draw, as published), tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a "
+    "plug-in's.",
+)
+@click.option(
+    "--option",
+    "options",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
+    "the rule chooses). May be repeated.",
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of random numbers.  [default: 0]"
+)
+@json_option
+@click.option("--report", type=FILE, metavar="FILE.html", help="Write a report as one HTML page.")
+@click.option(
+    "--figure",
+    "figures",
+    type=FigurePath(),
+    multiple=True,
+    metavar="FILE.png|svg|pdf",
+    help="Draw scan, apparatus function and transfer function. May be repeated.",
+)
+@click.option(
+    "--sweep",
+    "sweeping",
+    is_flag=True,
+    help="Show how the results depend on the noise amplitude, over two decades and eight seeds.",
+)
+@click.option(
+    "--sweep-figure",
+    type=FigurePath(),
+    metavar="FILE.png|svg|pdf",
+    help="Draw the sweep; implies --sweep.",
+)
+@force_option
+@click.option(
+    "--dry-run",
+    is_flag=True,
+    help="Read and check every input, say what would be done, and write nothing.",
+)
+@debug_option
+def command(
+    scan: Path,
+    output: Path | None,
+    reference: Path | None,
+    method: str,
+    options: tuple[str, ...],
+    seed: int | None,
+    as_json: bool,
+    report: Path | None,
+    figures: tuple[Path, ...],
+    sweeping: bool,
+    sweep_figure: Path | None,
+    force: bool,
+    dry_run: bool,
+) -> int:
+    """Find a sensor's apparatus function from a rod scan.
+
+    Divides the scan's field by the stress that the rod makes at the base of the film, and writes
+    the conversion constant A (mV/Pa), the apparatus function G (1/mm^2, unit integral), both
+    Gaussian widths (mm), their standard uncertainties, and quality checks to an artifact.
+
+    A failed quality check is exit code 1: the artifact is written and says so.
+    """
+    outputs = Outputs(output or beside(scan, ".apparatus.h5"), report, figures, sweep_figure)
+    regulariser = _regulariser(method, options, seed)
+    data, profile = _read(scan, reference)
+    inputs = [path for path in (scan, reference) if path is not None]
+    prove_writable(outputs.paths, force=force, inputs=inputs)
+    if dry_run:
+        _rehearse(data, profile, regulariser, outputs, as_json)
+        return DONE
+
+    from memscal.calibration.procedure import calibrate
+
+    with working(f"Calibrating by {regulariser.name}"):
+        found = calibrate(data, reference=profile, method=regulariser, seed=seed or 0)
+    swept = None
+    if sweeping or sweep_figure:
+        with working("Sweeping the noise amplitude"):
+            swept = found.sweep(seed=seed or 0)
+    _write(found, swept, outputs, force)
+    return _tell(found, swept, outputs, as_json)
+
+
+def _regulariser(method: str, options: tuple[str, ...], seed: int | None) -> Regulariser:
+    """Set up the method; a wrong name or option is a matter of usage."""
+    from memscal.deconvolution.registry import create_regulariser
+    from memscal.errors import InputError
+
+    given = dict(_option(text) for text in options)
+    if "seed" in given:
+        raise click.UsageError("Give the seed as --seed, not as --option.")
+    try:
+        regulariser = create_regulariser(method, seed=seed or 0, **given)
+    except InputError as failure:
+        raise click.UsageError(f"{failure.problem} {failure.cure}".strip()) from failure
+    if seed is not None and not hasattr(regulariser, "seed"):
+        note(f"--seed changes nothing here: {regulariser.name} draws no random numbers.")
+    return regulariser
+
+
+def _option(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (equals and name.isidentifier()):
+        raise click.UsageError(f"--option {text!r} is not of the form NAME=VALUE.")
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value
+
+
+def _read(path: Path, reference: Path | None) -> tuple[Scan, StressProfile | None]:
+    """Read the inputs, and refuse an indenter that cannot calibrate."""
+    from memscal.estimation.reference import require_calibration_rod
+    from memscal.formats.scan import read_scan
+
+    scan = read_scan(path)
+    require_calibration_rod(scan)
+    if reference is None:
+        return scan, None
+    if scan.reference is not None:
+        note(f"The reference in {path.name} gives way to {reference.name}.")
+    return scan, _read_reference(reference)
+
+
+def _read_reference(path: Path) -> StressProfile:
+    from memscal.errors import InputError
+    from memscal.formats.reference import read_reference
+
+    if path.suffix.lower() in (".csv", ".txt", ".tsv", ".dat"):
+        raise InputError(
+            f"The reference {path} looks like a table, not like a memscal-reference file.",
+            why="A table does not say its units, nor the load it was calculated for.",
+            cure=f"Convert it first, such as: memscal import {path} --format reference --r r "
+            "--r-unit mm --sigma sigma_zz --sigma-unit Pa --load 1 "
+            f"-o {path.with_suffix('.h5')}",
+        )
+    return read_reference(path)
+
+
+def _rehearse(
+    scan: Scan,
+    profile: StressProfile | None,
+    regulariser: Regulariser,
+    outputs: Outputs,
+    as_json: bool,
+) -> None:
+    """Go as far as the calibration goes before it computes, and say what it would do."""
+    from memscal.cli.calibration_view import rehearsal_json, rehearsal_table
+    from memscal.cli.tables import emit_tables
+    from memscal.estimation.points import measured_points
+    from memscal.estimation.reference import reference_profile, reference_spectrum
+
+    points = measured_points(scan)
+    stress = reference_profile(scan, profile)
+    reference_spectrum(stress, points, scan.film.thickness)
+    if as_json:
+        emit_json(rehearsal_json(stress, regulariser.name, outputs.paths))
+    else:
+        emit_tables(rehearsal_table(scan, points, stress, regulariser.name, outputs.paths))
+    message("Nothing was written (--dry-run).")
+
+
+def _write(found: Calibration, swept: Sweep | None, outputs: Outputs, force: bool) -> None:
+    """Write every output; all are ready in memory before the first is written."""
+    from memscal.formats.atomic import atomic_write_bytes
+
+    with working("Drawing"):
+        ready = _rendered(found, swept, outputs)
+    found.apparatus.save(outputs.artifact, overwrite=force)
+    for path, data in ready.items():
+        atomic_write_bytes(path, data, overwrite=force)
+
+
+def _rendered(found: Calibration, swept: Sweep | None, outputs: Outputs) -> dict[Path, bytes]:
+    ready: dict[Path, bytes] = {}
+    if outputs.figures:
+        from memscal.figures.calibration import calibration_figure
+        from memscal.figures.render import figure_format, render_figure
+
+        figure = calibration_figure(found.apparatus)
+        for path in outputs.figures:
+            ready[path] = render_figure(figure, figure_format(path.suffix))
+    if outputs.report is not None:
+        from memscal.figures.report import html_report
+
+        ready[outputs.report] = html_report(found.apparatus).encode("utf-8")
+    if outputs.sweep_figure is not None and swept is not None:
+        from memscal.figures.render import figure_format, render_figure
+        from memscal.figures.sweep import sweep_figure
+
+        suffix = figure_format(outputs.sweep_figure.suffix)
+        ready[outputs.sweep_figure] = render_figure(sweep_figure(swept), suffix)
+    return ready
+
+
+def _tell(found: Calibration, swept: Sweep | None, outputs: Outputs, as_json: bool) -> int:
+    """Print the results and the messages; return the exit code."""
+    from memscal.cli.calibration_view import calibration_json, calibration_tables
+    from memscal.cli.sweep_view import sweep_json, sweep_table
+    from memscal.cli.tables import emit_tables
+
+    if as_json:
+        result = calibration_json(found, outputs.artifact)
+        emit_json(result if swept is None else {**result, "sweep": sweep_json(swept)})
+    else:
+        tables = calibration_tables(found)
+        emit_tables(*(tables if swept is None else [*tables, sweep_table(swept)]))
+    failed = [check.name for check in found.apparatus.checks if not check.passed]
+    for text in found.apparatus.process.messages:
+        (warn if text.startswith("Quality check") else note)(text)
+    for path in outputs.paths:
+        message(f"Written: {path}")
+    if not failed:
+        return DONE
+    named = ", ".join(name.replace("_", " ") for name in failed)
+    count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
+    warn(f"{count} failed ({named}). {outputs.artifact.name} was written and is marked so.")
+    return CHECK_FAILED

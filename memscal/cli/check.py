@@ -1,0 +1,49 @@
+"""``memscal check``: whether a file can be trusted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from memscal.cli.failures import DONE, REFUSED, debug_option
+from memscal.cli.options import FILE, json_option
+from memscal.cli.output import emit_json, error
+
+__all__ = ["command"]
+
+EXAMPLES = """\b
+Examples:
+  memscal check scan.apparatus.h5
+  memscal check scan.h5 --json
+"""
+
+
+@click.command("check", epilog=EXAMPLES)
+@click.argument("file", type=FILE)
+@json_option
+@debug_option
+def command(file: Path, as_json: bool) -> int:
+    """Check that a file is safe to read, follows its schema, and is as it was written.
+
+    Exit code 0: the file is in order. Exit code 3: it is not, and would be refused as an input.
+    Whether a calibration's own quality checks passed is shown by memscal inspect.
+    """
+    from memscal.formats.inspection import check
+
+    findings = check(file)
+    passed = all(finding.passed for finding in findings)
+    if as_json:
+        listed = [{"name": f.name, "passed": f.passed, "meaning": f.meaning} for f in findings]
+        head = {"schema_version": "1", "file": str(file), "passed": passed}
+        emit_json({**head, "findings": listed})
+    else:
+        from memscal.cli.tables import Table, emit_tables
+
+        rows = [(f.name, "passed" if f.passed else "FAILED", f.meaning) for f in findings]
+        failed = frozenset(i for i, f in enumerate(findings) if not f.passed)
+        emit_tables(Table(str(file), ("step", "result", "finding"), rows, failed))
+    if passed:
+        return DONE
+    error(f"{file} is not in order: see {findings[-1].name}.")
+    return REFUSED

@@ -1,0 +1,91 @@
+"""The group of commands: their names and one line on each, without importing any of them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import click
+
+from memscal.cli.failures import debug_option
+from memscal.version import __version__
+
+__all__ = ["COMMANDS", "SETTINGS", "memscal"]
+
+COMMANDS = {
+    "calibrate": ("calibrate", "Find a sensor's apparatus function from a rod scan."),
+    "reference": ("reference", "Solve the stress at the base of a film under an indenter."),
+    "simulate": ("simulate", "Make a synthetic scan from a known apparatus function."),
+    "import": ("import_", "Convert a table (CSV) to a scan or a reference."),
+    "inspect": ("inspect", "Show what a file holds."),
+    "check": ("check", "Check a file's safety, schema, digest and content."),
+    "completion": ("completion", "Print the shell's completion script."),
+}
+"""Command: its module in this package, and what it does."""
+
+SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+class LazyGroup(click.Group):
+    """Commands whose modules are imported when they are used."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's
+        """Return the names in the order of use."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import a command."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"memscal.cli.{COMMANDS[cmd_name][0]}")
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find a command; name the ones that a misspelt one may mean."""
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
+            from difflib import get_close_matches
+
+            close = get_close_matches(name, COMMANDS)
+            hint = f"Did you mean {' or '.join(close)}?" if close else ""
+            ctx.fail(f"There is no command {name!r}. {hint}".strip())
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands from what stands here, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, about) for name, (_, about) in COMMANDS.items()])
+
+
+EXAMPLES = """\b
+Examples:
+  memscal simulate -o scan.h5
+  memscal calibrate scan.h5 --figure scan.png
+  memscal inspect scan.apparatus.h5
+
+\b
+Exit codes:
+  0    done
+  1    done, but a quality check failed; the artifact is marked so
+  2    the command was not used as its help says
+  3    the input was refused
+  4    the output was not written; what was there before is untouched
+  70   a fault in memscal itself
+  130  interrupted
+"""
+
+
+@click.group(cls=LazyGroup, context_settings=SETTINGS, epilog=EXAMPLES)
+@click.version_option(__version__, "--version", message="memscal %(version)s")
+@debug_option
+def memscal() -> None:
+    """Calibrate stress sensors under an elastic film.
+
+    A sensor at the base of a film reports U = A G (x) sigma_zz: the normal stress there, blurred
+    by its apparatus function G and scaled by its conversion constant A. memscal finds both from a
+    scan with a thin rigid rod, with standard uncertainties and quality checks.
+
+    Lengths are in mm, depths in um, loads in N and moduli in MPa; every option says its unit.
+    """

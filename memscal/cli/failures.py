@@ -1,0 +1,110 @@
+"""From exceptions to exit codes and plain words: the user never meets a traceback unasked."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import click
+
+from memscal.cli.output import error, message, warn
+from memscal.errors import MemscalError
+
+__all__ = [
+    "CHECK_FAILED",
+    "DONE",
+    "INTERNAL",
+    "INTERRUPTED",
+    "REFUSED",
+    "USAGE",
+    "Session",
+    "debug_option",
+    "guarded",
+]
+
+DONE, CHECK_FAILED, USAGE, REFUSED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+@dataclass
+class Session:
+    """What one run of the program keeps: whether tracebacks are wanted."""
+
+    debug: bool = False
+
+
+def _set_debug(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        ctx.ensure_object(Session).debug = True
+
+
+def debug_option(command: _Command) -> _Command:
+    """Add ``--debug``, before or after the name of a command."""
+    option = click.option(
+        "--debug",
+        is_flag=True,
+        expose_value=False,
+        is_eager=True,
+        callback=_set_debug,
+        help="Show Python's traceback with an error.",
+    )
+    return option(command)
+
+
+def guarded(run: Callable[[Session], int]) -> int:
+    """Run a command; return its exit code, or that of its failure after saying what it was."""
+    session = Session()
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            return run(session)
+        except click.UsageError as failure:
+            failure.show()
+            return USAGE
+        except (click.Abort, KeyboardInterrupt) as failure:
+            _traceback(session)
+            if isinstance(failure.__cause__, EOFError):
+                return _internal(failure.__cause__)
+            message("Interrupted. Nothing was left half-written.")
+            return INTERRUPTED
+        except MemscalError as failure:
+            _traceback(session)
+            error(failure.problem, failure.why, failure.cure)
+            return failure.exit_code
+        except MemoryError:
+            _traceback(session)
+            error(
+                "The computer ran out of memory.",
+                cure="Close other programs, or give a scan with fewer points.",
+            )
+            return INTERNAL
+        except Exception as failure:  # noqa: BLE001 - the last resort, and it says so
+            _traceback(session)
+            return _internal(failure)
+
+
+def _internal(failure: BaseException) -> int:
+    said = " ".join(str(failure).split())
+    kind = type(failure).__name__
+    error(
+        f"memscal itself failed, and not because of anything you did: {kind}"
+        + (f" ({said})." if said else "."),
+        cure="Please report it, with what `memscal --debug` and the same arguments print.",
+    )
+    return INTERNAL
+
+
+def _traceback(session: Session) -> None:
+    if session.debug:
+        import traceback
+
+        click.echo(traceback.format_exc(), file=sys.stderr, nl=False)
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    """Show a Python warning as one plain line, without the line of code that raised it."""
+    warn(f"{category.__name__}: {message}")

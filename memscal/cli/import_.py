@@ -1,0 +1,237 @@
+"""``memscal import``: a table of numbers to a scan or a reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from memscal.cli.failures import DONE, debug_option
+from memscal.cli.options import (
+    FILE,
+    FILM,
+    Quantity,
+    film_from,
+    film_options,
+    force_option,
+    indenter_from,
+    json_option,
+    radius_options,
+)
+from memscal.cli.output import emit, emit_json, message
+from memscal.cli.targets import prove_writable
+
+if TYPE_CHECKING:
+    from memscal.formats.table import ImportedProfile, ImportedScan
+
+__all__ = ["command"]
+
+EXAMPLES = """\b
+Examples:
+  memscal import scan.csv -o scan.h5 --x position --x-unit mm --u voltage --u-unit mV
+      --load 1 --radius 0.25 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
+  memscal import raster.csv -o raster.h5 --x 1 --y 2 --x-unit um --u 5 --u-unit V
+      --repeats average --grid-tolerance 0.2 --load-column 4
+      --radius 0.5 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
+  memscal import fem.csv -o rod.h5 --format reference --r r --r-unit mm
+      --sigma S33 --sigma-unit MPa --sign -1 --load 1
+
+\b
+Columns are given by their names in the header, or by their numbers counted from 1.
+"""
+
+_SCAN_NAMES = [
+    *("x", "x_unit", "u", "u_unit", "u_scale", "y", "repeat", "u_xz", "u_yz"),
+    *("load_column", "load_unit", "load_uncertainty", "grid_tolerance", "repeats", "title"),
+]
+_SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
+_PROFILE_NAMES = ["r", "r_unit", "sigma", "sigma_unit", "shear", "solver"]
+_TABLE_NAMES = ["load", "delimiter", "decimal"]
+
+_ONLY = {
+    "scan": [*_SCAN_NAMES, *_SENSOR_NAMES.values()],
+    "reference": [*_PROFILE_NAMES, "sign"],
+}
+_NEEDED = {
+    "scan": ("x", "x_unit", "u", "u_unit"),
+    "reference": ("r", "r_unit", "sigma", "sigma_unit", "load"),
+}
+
+
+@click.command("import", epilog=EXAMPLES)
+@click.argument("table", type=FILE)
+@click.option(
+    "-o", "--output", type=FILE, required=True, metavar="OUT", help="Scan or reference to write."
+)
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["scan", "reference"]),
+    default="scan",
+    show_default=True,
+    help="What the table holds: measured points, or the base stress of a FEM calculation.",
+)
+@click.option("--x", metavar="COLUMN", help="Scan: column of the position.")
+@click.option("--x-unit", metavar="UNIT", help="Scan: unit of the positions, such as mm.")
+@click.option("--u", metavar="COLUMN", help="Scan: column of the normal channel's voltage.")
+@click.option("--u-unit", metavar="UNIT", help="Scan: unit of the voltages, such as mV.")
+@click.option("--y", metavar="COLUMN", help="Raster scan: column of the second position.")
+@click.option("--repeat", metavar="COLUMN", help="Scan: column that numbers the repeats.")
+@click.option("--u-xz", metavar="COLUMN", help="Scan: column of the channel xz.")
+@click.option("--u-yz", metavar="COLUMN", help="Scan: column of the channel yz.")
+@click.option("--load", type=Quantity("N"), help="Normal load, in N.")
+@click.option("--load-column", metavar="COLUMN", help="Scan: column of the load at each point.")
+@click.option(
+    "--load-unit", metavar="UNIT", help="Scan: unit of the column of loads.  [default: N]"
+)
+@click.option(
+    "--load-uncertainty",
+    type=Quantity("N", open_low=False),
+    help="Scan: standard uncertainty of the load, in N.",
+)
+@click.option(
+    "--u-scale",
+    type=float,
+    metavar="V",
+    help="Scan: volts per unit of the readings, for a sensor whose output is not a voltage.",
+)
+@click.option(
+    "--grid-tolerance",
+    type=float,
+    metavar="SHARE",
+    help="Scan: largest distance of a reading from its place, as a share of the grid's step.  "
+    "[default: 0.1]",
+)
+@click.option(
+    "--repeats",
+    type=click.Choice(["keep", "average"]),
+    help="Scan: what to do with repeated readings.  [default: keep]",
+)
+@click.option("--sensor-name", metavar="TEXT", help="Scan: name of the sensor.")
+@click.option("--sensor-model", metavar="TEXT", help="Scan: model of the sensor.")
+@click.option("--channel", metavar="TEXT", help="Scan: name of the channel.  [default: zz]")
+@click.option("--title", metavar="TEXT", help="Scan: title.")
+@click.option("--r", metavar="COLUMN", help="Reference: column of the radius.")
+@click.option("--r-unit", metavar="UNIT", help="Reference: unit of the radius, such as mm.")
+@click.option(
+    "--sigma", metavar="COLUMN", help="Reference: column of the normal stress at the base."
+)
+@click.option("--sigma-unit", metavar="UNIT", help="Reference: unit of the stresses, such as MPa.")
+@click.option("--shear", metavar="COLUMN", help="Reference: column of the radial shear stress.")
+@click.option(
+    "--sign",
+    type=click.Choice(["1", "-1"]),
+    help="Reference: -1 where compression is negative in the table.  [default: 1]",
+)
+@click.option("--solver", metavar="TEXT", help="Reference: the program that calculated it.")
+@click.option(
+    "--indenter",
+    type=click.Choice(["rod", "sphere"]),
+    default="rod",
+    show_default=True,
+    help="Shape of the indenter.",
+)
+@radius_options()
+@film_options()
+@click.option(
+    "--delimiter", metavar="CHAR", help="What separates columns; found from the table by default."
+)
+@click.option(
+    "--decimal",
+    type=click.Choice([".", ","]),
+    help="Decimal mark; found from the table by default.",
+)
+@json_option
+@force_option
+@debug_option
+def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **given: Any) -> int:
+    """Convert a TABLE (CSV) to a scan or to a reference.
+
+    A table says neither its units nor what was pressed on what: the options do. What was done to
+    the readings (places found, points missing, repeats averaged) is printed, and kept in the
+    scan's notes.
+    """
+    _check_usage(kind, given)
+    prove_writable([output], force=force, inputs=[table])
+    found = _scan(table, given) if kind == "scan" else _reference(table, given)
+    _write(found, output, force)
+    if as_json:
+        emit_json(
+            {
+                "schema_version": "1",
+                "output": str(output),
+                "format": kind,
+                "notes": list(found.notes),
+            }
+        )
+    else:
+        emit("\n".join(found.notes))
+    message(f"Written: {output}")
+    return DONE
+
+
+def _check_usage(kind: str, given: dict[str, Any]) -> None:
+    """Name every option that is missing, or that belongs to the other format, at once."""
+    missing = [name for name in _NEEDED[kind] if given[name] is None]
+    if missing:
+        raise click.UsageError(
+            f"A {kind} needs more: add {_named(missing)}. See the examples of "
+            "`memscal import --help`."
+        )
+    if kind == "scan" and given["load"] is None and given["load_column"] is None:
+        raise click.UsageError("The load is not given: add --load (in N) or --load-column.")
+    other = "reference" if kind == "scan" else "scan"
+    strange = [name for name in _ONLY[other] if given[name] is not None]
+    if strange:
+        raise click.UsageError(f"{_named(strange)} belong to --format {other}.")
+
+
+def _named(names: Sequence[str]) -> str:
+    return ", ".join("--" + name.replace("_", "-") for name in names)
+
+
+def _given(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Return the options that were given, so that the library's own defaults hold."""
+    return {name: values[name] for name in names if values[name] is not None}
+
+
+def _scan(path: Path, given: dict[str, Any]) -> ImportedScan:
+    film, indenter = film_from(given), indenter_from(given["indenter"], given)
+    from memscal.formats.table import read_scan_table
+    from memscal.model.scan import StressSensor
+
+    labels = {key: given[name] for key, name in _SENSOR_NAMES.items() if given[name] is not None}
+    return read_scan_table(
+        path,
+        **_given(given, [*_SCAN_NAMES, *_TABLE_NAMES]),
+        film=film,
+        indenter=indenter,
+        sensor=StressSensor(**labels),
+    )
+
+
+def _reference(path: Path, given: dict[str, Any]) -> ImportedProfile:
+    from memscal.formats.reference_table import read_reference_table
+
+    return read_reference_table(
+        path,
+        **_given(given, [*_PROFILE_NAMES, *_TABLE_NAMES]),
+        sign=int(given["sign"] or 1),
+        film=None if all(given[name] is None for name in FILM) else film_from(given),
+        indenter=None if given["radius"] is None else indenter_from(given["indenter"], given),
+    )
+
+
+def _write(found: ImportedScan | ImportedProfile, output: Path, force: bool) -> None:
+    from memscal.formats.table import ImportedScan
+
+    if isinstance(found, ImportedScan):
+        from memscal.formats.scan import write_scan
+
+        write_scan(found.scan, output, overwrite=force)
+    else:
+        from memscal.formats.reference import write_reference
+
+        write_reference(found.profile, output, overwrite=force)

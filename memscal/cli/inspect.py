@@ -1,0 +1,128 @@
+"""``memscal inspect``: what a file holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from memscal.cli.failures import DONE, debug_option
+from memscal.cli.options import FILE, json_option
+from memscal.cli.output import emit_json
+
+if TYPE_CHECKING:
+    from memscal.cli.tables import Table
+
+__all__ = ["command"]
+
+EXAMPLES = """\b
+Examples:
+  memscal inspect scan.apparatus.h5
+  memscal inspect scan.h5 --json
+"""
+
+
+@click.command("inspect", epilog=EXAMPLES)
+@click.argument("file", type=FILE)
+@json_option
+@debug_option
+def command(file: Path, as_json: bool) -> int:
+    """Show what a scan, a reference or an artifact holds.
+
+    Quantities with their standard uncertainties, arrays with shape and range, quality checks, and
+    where all of it came from. Numbers are in the units of the file.
+    """
+    from memscal.formats.inspection import describe
+
+    found = describe(file)
+    if as_json:
+        emit_json(found)
+    else:
+        from memscal.cli.tables import emit_tables
+
+        emit_tables(*_tables(found))
+    return DONE
+
+
+def _tables(found: Mapping[str, Any]) -> Iterator[Table]:
+    from memscal.cli.tables import Table
+    from memscal.model.notation import format_measured
+
+    rows = [
+        ("schema", f"{found['schema']} {found['schema_version']}"),
+        ("title", found["title"]),
+        ("sha256", found["sha256"]),
+    ]
+    yield Table(str(found["file"]), ("", ""), [row for row in rows if row[1]])
+
+    def value(item: Mapping[str, Any]) -> str:
+        if item["value"] is None:
+            return "not a number"
+        if isinstance(item["value"], str):
+            return item["value"]
+        spread = item["standard_uncertainty"]
+        if spread is None:
+            unit = "" if item["unit"] == "1" else f" {item['unit']}"
+            return f"{item['value']:.6g}{unit}"
+        return format_measured(item["value"], spread, item["unit"])
+
+    head = ("quantity", "value", "path")
+    quantities = [
+        (item["name"].replace("_", " "), value(item), item["path"]) for item in found["quantities"]
+    ]
+    yield Table("Quantities (± standard uncertainty, k = 1)", head, quantities)
+    arrays = [_array_row(item) for item in found["arrays"]]
+    yield Table("Arrays", ("path", "shape", "from", "to", "unit", "missing"), arrays)
+    checks = [
+        (
+            check["name"].replace("_", " "),
+            "-" if check["value"] is None else f"{check['value']:.3g}",
+            "-" if check["limit"] is None else f"{check['limit']:.3g}",
+            "passed" if check["passed"] else "FAILED",
+        )
+        for check in found["checks"]
+    ]
+    failed = frozenset(i for i, check in enumerate(found["checks"]) if not check["passed"])
+    yield Table("Quality checks", ("check", "value", "limit", "result"), checks, failed)
+    meanings = [
+        (check["name"].replace("_", " "), check["meaning"])
+        for check in found["checks"]
+        if not check["passed"]
+    ]
+    yield Table("What the failures mean", ("", ""), meanings)
+    yield Table("Provenance", ("", ""), list(_provenance(found["provenance"])))
+
+
+def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:
+    def number(value: float | None) -> str:
+        return "-" if value is None else f"{value:.5g}"
+
+    return (
+        item["path"],
+        " x ".join(str(n) for n in item["shape"]) or "one",
+        number(item["minimum"]),
+        number(item["maximum"]),
+        item["unit"],
+        str(item["missing"] or "-"),
+    )
+
+
+def _provenance(found: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for name, value in found.items():
+        words = name.replace("_", " ")
+        if isinstance(value, Mapping):
+            for key, part in value.items():
+                yield f"{words}: {key}".replace("_", " "), _plain(part)
+        elif isinstance(value, list):
+            for part in value:
+                yield words, str(part)
+        else:
+            yield from ((words, line) for line in str(value).splitlines() if line)
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key}: {_plain(part)}" for key, part in value.items()) or "none"
+    return "not given" if value is None else str(value)

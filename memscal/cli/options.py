@@ -1,0 +1,221 @@
+"""Options that several commands share; each says its unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from memscal.model.film import ElasticFilm
+    from memscal.model.indenter import Indenter
+
+    _Number = click.ParamType[float]
+else:  # generic since click 8.2 only
+    _Number = click.ParamType
+
+__all__ = [
+    "FILE",
+    "FILM",
+    "Quantity",
+    "film_from",
+    "film_options",
+    "force_option",
+    "indenter_from",
+    "json_option",
+    "radius_options",
+    "scaled",
+]
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+FILE = click.Path(path_type=Path)
+"""A file's name; whether it can be read or written is the library's to say."""
+
+
+class Quantity(_Number):
+    """A finite number in a unit, which is shown as the name of the value.
+
+    Parameters
+    ----------
+    unit : str
+        As it reads in the help: ``mm``, ``percent``.
+    low, high : float
+        What it must lie between.
+    open_low : bool
+        Whether ``low`` itself is refused.
+    infinite : bool
+        Whether ``inf`` is allowed.
+    """
+
+    def __init__(
+        self,
+        unit: str,
+        *,
+        low: float = 0.0,
+        high: float = math.inf,
+        open_low: bool = True,
+        infinite: bool = False,
+    ) -> None:
+        self.name = unit.upper()
+        self.unit = unit
+        self.low, self.high, self.open_low, self.infinite = low, high, open_low, infinite
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Read the number; refuse one out of range."""
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number{self._in_unit}.", param, ctx)
+        finite = math.isfinite(number) or (self.infinite and number == math.inf)
+        above = number > self.low if self.open_low else number >= self.low
+        if not (finite and above and number <= self.high):
+            self.fail(f"{value} is not {self._range}{self._in_unit}.", param, ctx)
+        return number
+
+    @property
+    def _in_unit(self) -> str:
+        return f" (in {self.unit})" if self.unit not in ("number", "ratio", "inf") else ""
+
+    @property
+    def _range(self) -> str:
+        bounds = []
+        if self.low > -math.inf:
+            bounds.append(("above" if self.open_low else "of at least") + f" {self.low:g}")
+        if self.high < math.inf:
+            bounds.append(f"at most {self.high:g}")
+        if not bounds:
+            return "a finite number"
+        return "a number " + " and ".join(bounds)
+
+
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON object in place of tables."
+)
+force_option = click.option("--force", is_flag=True, help="Replace outputs that exist.")
+
+FILM = ("young_modulus", "poisson_ratio", "thickness")
+"""What describes a film, by the names of its options."""
+
+_UNCERTAINTY = "Standard uncertainty (k = 1) of "
+
+
+def film_options(
+    *, defaults: Mapping[str, float] | None = None, uncertainties: bool = True
+) -> Callable[[_Command], _Command]:
+    """Add the film: modulus, Poisson's ratio, thickness, with or without their uncertainties."""
+    known = {} if defaults is None else defaults
+    ratio = Quantity("ratio", high=0.5, open_low=False)
+    entries: list[tuple[str, Quantity, str]] = [
+        ("young-modulus", Quantity("MPa"), "Young's modulus of the film, in MPa."),
+        ("poisson-ratio", ratio, "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."),
+        ("thickness", Quantity("mm"), "Thickness of the film, in mm."),
+    ]
+    if uncertainties:
+        entries += [
+            (
+                "young-modulus-uncertainty",
+                Quantity("MPa", open_low=False),
+                _UNCERTAINTY + "Young's modulus, in MPa.",
+            ),
+            (
+                "poisson-ratio-uncertainty",
+                Quantity("ratio", open_low=False),
+                _UNCERTAINTY + "Poisson's ratio.",
+            ),
+            (
+                "thickness-uncertainty",
+                Quantity("mm", open_low=False),
+                _UNCERTAINTY + "the thickness, in mm.",
+            ),
+        ]
+    return _all_of(entries, known)
+
+
+def radius_options(
+    *, default: float | None = None, uncertainty: float | None = None, uncertainties: bool = True
+) -> Callable[[_Command], _Command]:
+    """Add the indenter's radius, with or without its uncertainty."""
+    entries: list[tuple[str, Quantity, str]] = [
+        ("radius", Quantity("mm"), "Radius of the rod (not its diameter), in mm."),
+    ]
+    if uncertainties:
+        spread = Quantity("mm", open_low=False)
+        entries.append(("radius-uncertainty", spread, _UNCERTAINTY + "the radius, in mm."))
+    values = {"radius": default, "radius-uncertainty": uncertainty}
+    return _all_of(entries, {name: v for name, v in values.items() if v is not None})
+
+
+def _all_of(
+    entries: list[tuple[str, Quantity, str]], defaults: Mapping[str, float]
+) -> Callable[[_Command], _Command]:
+    def add(command: _Command) -> _Command:
+        for name, kind, about in reversed(entries):
+            default = defaults.get(name)
+            shown = default is not None
+            option = click.option(
+                f"--{name}", type=kind, default=default, show_default=shown, help=about
+            )
+            command = option(command)
+        return command
+
+    return add
+
+
+def scaled(value: float | None, per_si: float) -> float | None:
+    """Return a value in SI units, given how many of its units make one of them.
+
+    A division by a power of ten is correctly rounded: 0.25 mm becomes exactly ``0.25e-3`` m.
+    """
+    return None if value is None else value / per_si
+
+
+def film_from(given: Mapping[str, Any]) -> ElasticFilm:
+    """Return the film that the options describe.
+
+    Raises
+    ------
+    click.UsageError
+        If a part of it is missing.
+    """
+    _require("The film", given, FILM)
+    from memscal.model.film import ElasticFilm
+
+    def spread(name: str, per_si: float) -> float | None:
+        return scaled(given.get(f"{name}_uncertainty"), per_si)
+
+    return ElasticFilm(
+        young_modulus=given["young_modulus"] / 1e-6,
+        poisson_ratio=given["poisson_ratio"],
+        thickness=given["thickness"] / 1e3,
+        young_modulus_uncertainty=spread("young_modulus", 1e-6),
+        poisson_ratio_uncertainty=spread("poisson_ratio", 1.0),
+        thickness_uncertainty=spread("thickness", 1e3),
+    )
+
+
+def indenter_from(shape: str, given: Mapping[str, Any]) -> Indenter:
+    """Return the indenter that the options describe.
+
+    Raises
+    ------
+    click.UsageError
+        If its radius is missing.
+    """
+    _require("The indenter", given, ("radius",))
+    from memscal.model.indenter import Rod, Sphere
+
+    kind = {"rod": Rod, "sphere": Sphere}[shape]
+    spread = scaled(given.get("radius_uncertainty"), 1e3)
+    return kind(radius=given["radius"] / 1e3, radius_uncertainty=spread)
+
+
+def _require(what: str, given: Mapping[str, Any], names: tuple[str, ...]) -> None:
+    missing = ["--" + name.replace("_", "-") for name in names if given[name] is None]
+    if missing:
+        raise click.UsageError(f"{what} is not fully given: add {', '.join(missing)}.")

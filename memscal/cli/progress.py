@@ -1,0 +1,45 @@
+"""A sign of life on standard error while a step takes long; nothing where nobody watches."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+__all__ = ["working"]
+
+_FIRST_AFTER = 0.7
+_EVERY = 0.2
+_CLEAR = "\r\x1b[K"
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Show what is being done, and for how long, on a terminal and only if it takes long."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield
+        return
+    from threading import Event, Thread
+    from time import monotonic
+
+    done, stream, start = Event(), sys.stderr, monotonic()
+
+    def show() -> None:
+        if done.wait(_FIRST_AFTER):
+            return
+        with suppress(OSError, ValueError):
+            while True:
+                stream.write(f"{_CLEAR}{what} ... {monotonic() - start:.0f} s")
+                stream.flush()
+                if done.wait(_EVERY):
+                    break
+            stream.write(_CLEAR)
+            stream.flush()
+
+    thread = Thread(target=show, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
