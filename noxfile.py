@@ -94,7 +94,7 @@ def lint(session: nox.Session) -> None:
     session.run("ruff", "format", "--check", ".")
     session.run("codespell")
     session.run("rumdl", "check", ".")
-    session.run("repo-review", ".")
+    session.run("repo-review", ".", "--show", "err")
 
 
 @nox.session
