@@ -18,7 +18,7 @@ MODULES = {
 
 FLOW = [
     "version", "errors", "model", "axisymmetry", "mechanics", "deconvolution", "estimation",
-    "apparatus", "calibration", "simulation", "figures", "cli",
+    "apparatus", "calibration", "simulation", "figures", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 
