@@ -24,6 +24,8 @@ __all__ = [
     "units_of",
 ]
 
+_MAX_ITEMS = 10_000
+
 
 def require_schema(file: SafeFile, schema: str) -> str:
     """Return the schema version; refuse another schema or a newer major version."""
@@ -129,4 +131,6 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     value = from_json(file.where(path), file.text(path))
     if not isinstance(value, kind):
         raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
+    if isinstance(value, (list, dict)) and len(value) > _MAX_ITEMS:
+        raise FormatError(f"{file.where(path)} lists {len(value):,} items.")
     return value

@@ -120,6 +120,11 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
         file = h5py.File(BytesIO(data), "r")
     try:
         yield SafeFile(file, name, source)
+    except InputError as error:
+        if name in error.problem:
+            raise
+        # The dataclasses check values without knowing where they come from.
+        raise type(error)(f"{name}: {error.problem}", why=error.why, cure=error.cure) from error
     finally:
         with contextlib.suppress(Exception):
             file.close()
@@ -158,7 +163,7 @@ class SafeFile:
     def __init__(self, file: Any, name: str, source: SourceFile) -> None:
         self.name = name
         self.source = source
-        self._root = file.id
+        self._opened: dict[str, Any] = {"/": file["/"].id}
         self._budget = _MAX_TOTAL_BYTES
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
         self._texts: dict[str, str] = {}
@@ -206,25 +211,25 @@ class SafeFile:
             return self._read_attribute(path, name)
 
     def _open(self, path: str) -> Any:
-        """Follow a path along hard links; ``None`` where it ends."""
+        """Return the object at a path, each part of which is a hard link; ``None`` if absent."""
+        if path not in self._opened:
+            folder, _, name = path.rpartition("/")
+            self._opened[path] = self._follow(self._open(folder or "/"), path, name)
+        return self._opened[path]
+
+    def _follow(self, folder: Any, path: str, name: str) -> Any:
         from memscal.formats.hdf5_library import h5py
 
-        item: Any = self._root
-        opened = h5py.h5o.open(item, b"/")
-        for name in path.strip("/").split("/") if path != "/" else ():
-            if not isinstance(opened, h5py.h5g.GroupID):
-                return None
-            key = name.encode("ascii")
-            if not opened.links.exists(key):
-                return None
-            if opened.links.get_info(key).type != h5py.h5l.TYPE_HARD:
-                raise UnsafeFileError(
-                    f"{self.where(path)} is reached through a soft, external or other link.",
-                    why="A link can lead to another file, to a pipe, or round in a circle.",
-                    cure="Copy the linked data into the file.",
-                )
-            opened = h5py.h5o.open(opened, key)
-        return opened
+        key = name.encode("ascii")
+        if not isinstance(folder, h5py.h5g.GroupID) or not folder.links.exists(key):
+            return None
+        if folder.links.get_info(key).type != h5py.h5l.TYPE_HARD:
+            raise UnsafeFileError(
+                f"{self.where(path)} is reached through a soft, external or other link.",
+                why="A link can lead to another file, to a pipe, or round in a circle.",
+                cure="Copy the linked data into the file.",
+            )
+        return h5py.h5o.open(folder, key)
 
     def _dataset(self, path: str) -> Any:
         from memscal.formats.hdf5_library import h5py

@@ -60,7 +60,6 @@ def write_tree(
     OutputError
         If the file exists (and ``overwrite`` is false), is an input, or cannot be written.
     """
-    ensure_writable(path, overwrite=overwrite, inputs=inputs)
     atomic_write_bytes(path, tree_to_bytes(root), overwrite=overwrite, inputs=inputs)
 
 
@@ -71,12 +70,8 @@ def tree_to_bytes(root: Group) -> bytes:
     memory = BytesIO()
     with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
         for path, node in walk(root):
-            if path != "/" and not _NAME.fullmatch(path.rpartition("/")[2]):
-                raise InputError(
-                    f"{path} cannot be written: its name is not lower-case ASCII.",
-                    cure="Use the letters a to z, digits and underscores.",
-                )
             if isinstance(node, Group):
+                _check_names(path, node)
                 group = file if path == "/" else file.create_group(path)
                 for name, value in node.all_attributes.items():
                     _write_attribute(group, name, value)
@@ -86,6 +81,15 @@ def tree_to_bytes(root: Group) -> bytes:
                 _write_text(file, path, node)
         _attach_scales(file, root)
     return memory.getvalue()
+
+
+def _check_names(path: str, group: Group) -> None:
+    for name in group.children:
+        if not _NAME.fullmatch(name):
+            raise InputError(
+                f"{name!r} cannot be written into {path}: a name is lower-case ASCII.",
+                cure="Use the letters a to z, digits and underscores.",
+            )
 
 
 def _with_contents(root: Group, text: str) -> Group:

@@ -32,13 +32,16 @@ _DIMENSIONS = {
     "drift": "voltage",
     "noise": "voltage",
     "load": "force",
+    "seed": "dimensionless",
 }
+# One name for each axis of the covariance: netCDF tools want each dimension once.
+_AXES = ("parameter", "parameter_prime")
 _COVARIANCE = (
     "Covariance of the numbers, in the order of names: each parameter in the unit of its dataset."
 )
 
 
-def parameter_dimension(name: str, unit: str = "", *, default: str | None = None) -> str:
+def parameter_dimension(name: str, unit: str = "") -> str:
     """Return the dimension of a parameter: by its SI unit where that is given, else by its name.
 
     Raises
@@ -56,28 +59,34 @@ def parameter_dimension(name: str, unit: str = "", *, default: str | None = None
     known = [start for start in _DIMENSIONS if name == start or name.startswith(start + "_")]
     if known:
         return _DIMENSIONS[max(known, key=len)]
-    if default is not None:
-        return default
     raise InputError(
-        f"The parameter {name} has no unit.",
+        f"The unit of {name} is not known.",
         why="Every number in a file carries its unit.",
-        cure="Give its SI unit in ParameterSet(units=...).",
+        cure="Begin its name with one of "
+        + ", ".join(_DIMENSIONS)
+        + ", or give the SI unit of a parameter in ParameterSet(units=...).",
     )
 
 
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
     dimensions = _dimensions(parameters)
+    reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
+    if reserved:
+        raise InputError(
+            f"A parameter cannot be called {min(reserved)}.",
+            why="The group of the parameters holds something else of that name.",
+            cure="Give it another name.",
+        )
     children: dict[str, Node] = {"names": to_json("parameter names", list(parameters.names))}
     for name, value, dimension in zip(parameters.names, parameters.values, dimensions, strict=True):
         children[name] = si(float(value), dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
-    axes = ("parameter", "parameter_prime")
-    for axis in axes:
+    for axis in _AXES:
         children[axis] = index_axis(axis, len(parameters.names))
     scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions])
     numbers = parameters.covariance * scale[:, None] * scale[None, :]
-    children["covariance"] = Number(numbers, "1", axes, {"description": _COVARIANCE})
+    children["covariance"] = Number(numbers, "1", _AXES, {"description": _COVARIANCE})
     if budget:
         children["budget"] = budget_group(
             budget, dict(zip(parameters.names, dimensions, strict=True))

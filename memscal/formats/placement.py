@@ -61,10 +61,11 @@ def place_readings(
         raise InputError("No row of the table has a position.", cure="Check the columns.")
     if not known.all():
         notes.append(f"{int((~known).sum())} rows without a position were left out.")
+    numbers = None if numbers is None else numbers[known]
     xs, columns = xs[known], {name: values[known] for name, values in columns.items()}
     if ys is not None:
-        return _place_raster(xs, ys[known], columns, tolerance, average, notes)
-    repeat = _count_repeats(xs, None if numbers is None else numbers[known], notes)
+        return _place_raster(xs, ys[known], numbers, columns, tolerance, average, notes)
+    repeat = _count_repeats(xs, numbers, notes)
     if repeat.max() == 0:
         notes.append("A line scan without repeats: positions are kept as they are.")
         return Placed(xs, None, columns, None)
@@ -96,6 +97,7 @@ def _place_line(
 def _place_raster(
     xs: FloatArray,
     ys: FloatArray,
+    repeat: FloatArray | None,
     columns: Mapping[str, FloatArray],
     tolerance: float,
     average: bool,
@@ -112,6 +114,13 @@ def _place_raster(
     for name, grid in grids.items():
         _report(notes, name, grid, tolerance)
     flat = grids["y"].index * shape[1] + grids["x"].index
+    if repeat is not None and np.unique([repeat, flat], axis=1).shape[1] < flat.size:
+        raise InputError(
+            "One repeat has two readings at the same place of the grid.",
+            why=f"The grid found is {grids['x'].step * 1e3:.4g} mm by "
+            f"{grids['y'].step * 1e3:.4g} mm, and averaging would merge different positions.",
+            cure="Lower the grid tolerance, or check the column that numbers the repeats.",
+        )
     most = int(np.bincount(flat).max())
     if most > 1 and not average:
         raise InputError(

@@ -181,11 +181,20 @@ def _check_axes(file: SafeFile) -> None:
     axes = file.attribute(_DATA, "axes")
     if isinstance(axes, str):
         axes = tuple(axes.replace(":", " ").replace(",", " ").split())
-    if axes is not None and axes not in _AXES.values():
+    if axes is None:
+        return
+    if not isinstance(axes, tuple) or axes not in _AXES.values():
         raise FormatError(
             f"{file.where(_DATA)}@axes is {axes}.",
             why="A scan is stored along [x], [repeat, x] or [y, x].",
             cure="Transpose the data, or correct the attribute.",
+        )
+    if ("y" in axes) != file.has(f"{_DATA}/y"):
+        stated = "names y, but there is no" if "y" in axes else "does not name y, but there is a"
+        raise FormatError(
+            f"{file.where(_DATA)}@axes {stated} {_DATA}/y.",
+            why="Without it a raster and a repeated line scan look the same.",
+            cure="Add the missing axis, or correct the attribute.",
         )
 
 
@@ -195,7 +204,7 @@ def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
         if isinstance(value, str):
             children[name] = value
         else:
-            children[name] = si(value, parameter_dimension(name, default="dimensionless"))
+            children[name] = si(value, parameter_dimension(name))
     children["names"] = to_json("names of the synthetic truth", list(truth))
     return Group("NXcollection", children)
 

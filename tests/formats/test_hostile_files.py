@@ -96,9 +96,7 @@ def test_external_raw_storage_is_refused_and_the_other_file_stays_unread(
     secret = tmp_path / "secret.bin"
     secret.write_bytes(np.full(33, 42.0).tobytes())
     before = secret.stat().st_atime_ns
-    path = edited(
-        lambda g: g.create_dataset("u_zz", (33,), "f8", external=[(str(secret), 0, 264)])
-    )
+    path = edited(lambda g: g.create_dataset("u_zz", (33,), "f8", external=[(str(secret), 0, 264)]))
     assert_refused_cheaply(path, "external")
     assert secret.stat().st_atime_ns == before
 
@@ -266,12 +264,12 @@ def test_a_text_dataset_longer_than_any_text_is_refused(tmp_path: Path):
     with h5py.File(path, "r+") as file:
         del file["/entry/title"]
         file["/entry"].create_dataset("title", data=np.bytes_(b"a" * (2**22 + 1)))
-    with pytest.raises(UnsafeFileError, match="/entry/title"):
+    with pytest.raises(UnsafeFileError, match="/entry/title claims"):
         read_scan(path)
 
 
 def test_a_folder_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match="not a regular file|cannot be read"):
+    with pytest.raises(InputError, match="is not a regular file"):
         read_scan(tmp_path)
 
 
@@ -339,15 +337,12 @@ def test_an_artifact_with_a_flipped_bit_is_read_unchanged_or_refused(
     path.write_bytes(damaged)
     try:
         found = read_artifact(path)
-    except MemscalError as error:
-        assert "flipped.h5" in str(error) or "contents" in str(error)
-    else:
-        expected = make_artifact()
-        np.testing.assert_allclose(found.field.g, expected.field.g, rtol=1e-15)
-        np.testing.assert_allclose(
-            found.parameters.values, expected.parameters.values, rtol=1e-15
-        )
-        assert found.checks == expected.checks
+    except MemscalError:
+        return
+    expected = make_artifact()
+    np.testing.assert_allclose(found.field.g, expected.field.g, rtol=1e-15)
+    np.testing.assert_allclose(found.parameters.values, expected.parameters.values, rtol=1e-15)
+    assert found.checks == expected.checks
 
 
 def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(tmp_path: Path):
@@ -371,7 +366,11 @@ def test_bytes_flipped_all_over_a_scan_neither_crash_nor_hang_a_process(tmp_path
         "print(read, refused)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", sweep, str(path)], capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", sweep, str(path)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     read, refused = map(int, done.stdout.split())

@@ -1,0 +1,169 @@
+"""An altered artifact is refused; a newer major version is refused; a newer minor one is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from builders import make_artifact, make_profile, make_scan
+
+from memscal.errors import FormatError, SchemaVersionError
+from memscal.formats.artifact import read_artifact, write_artifact
+from memscal.formats.digest import content_digest
+from memscal.formats.fields import json_value
+from memscal.formats.hdf5_reader import open_hdf5
+from memscal.formats.reference import read_reference, write_reference
+from memscal.formats.scan import read_scan, write_scan
+from memscal.formats.schema import CONTENTS_PATH
+from memscal.formats.verify import stored_items
+
+
+@pytest.fixture
+def artifact(tmp_path: Path) -> Path:
+    write_artifact(make_artifact(), tmp_path / "a.h5")
+    return tmp_path / "a.h5"
+
+
+def change_a_value(file: h5py.File) -> None:
+    file["/entry/parameters/conversion_constant"][()] *= 1 + 1e-15
+
+
+def change_one_of_many(file: h5py.File) -> None:
+    file["/entry/apparatus_function/g"][3, 4] += 1e-9
+
+
+def change_a_unit(file: h5py.File) -> None:
+    file["/entry/radial_profile/r"].attrs["units"] = np.bytes_("um")
+
+
+def change_a_text(file: h5py.File) -> None:
+    del file["/entry/process/date"]
+    file["/entry/process"]["date"] = np.bytes_("2034-01-02T03:04:05+00:00")
+
+
+def change_a_verdict(file: h5py.File) -> None:
+    file["/entry/quality/symmetry/passed"][()] = 1
+
+
+def change_the_axes(file: h5py.File) -> None:
+    file["/entry/apparatus_function"].attrs["axes"] = np.array([b"x", b"y"])
+
+
+def take_something_away(file: h5py.File) -> None:
+    del file["/entry/parameters/baseline_errors"]
+
+
+def take_the_list_away(file: h5py.File) -> None:
+    del file["/entry/contents"]
+
+
+def take_the_digest_away(file: h5py.File) -> None:
+    del file.attrs["memscal_content_sha256"]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        change_a_value,
+        change_one_of_many,
+        change_a_unit,
+        change_a_text,
+        change_a_verdict,
+        change_the_axes,
+        take_something_away,
+        take_the_list_away,
+        take_the_digest_away,
+    ],
+)
+def test_an_artifact_that_was_altered_is_refused(
+    artifact: Path, change: Callable[[h5py.File], None]
+):
+    with h5py.File(artifact, "r+") as file:
+        change(file)
+    with pytest.raises(FormatError, match=r"a\.h5 was changed after it was written") as caught:
+        read_artifact(artifact)
+    assert "calibration" in caught.value.cure
+
+
+def test_a_copy_made_by_another_program_still_fits_its_digest(artifact: Path, tmp_path: Path):
+    """The digest is over the content, not over the bytes of the file."""
+    with h5py.File(artifact) as old, h5py.File(tmp_path / "copy.h5", "w", libver="latest") as new:
+        old.copy("/entry", new)
+        for name, value in old.attrs.items():
+            new.attrs[name] = value
+    assert (tmp_path / "copy.h5").read_bytes() != artifact.read_bytes()
+    assert read_artifact(tmp_path / "copy.h5").load == 1.0
+
+
+def test_what_other_programs_add_is_ignored(artifact: Path):
+    with h5py.File(artifact, "r+") as file:
+        file["/entry/my_notes"] = "added later"
+        file["/entry/loop"] = file["/entry"]
+        file["/entry/apparatus_function"].attrs["colour"] = "red"
+    assert read_artifact(artifact).load == 1.0
+
+
+@pytest.fixture(params=["scan", "reference", "artifact"])
+def versioned(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
+    path = tmp_path / f"{request.param}.h5"
+    write: Any
+    read: Any
+    write, read, thing = {
+        "scan": (write_scan, read_scan, make_scan()),
+        "reference": (write_reference, read_reference, make_profile()),
+        "artifact": (write_artifact, read_artifact, make_artifact()),
+    }[str(request.param)]
+    write(thing, path)
+
+    def read_version(version: str) -> Any:
+        with h5py.File(path, "r+") as file:
+            file.attrs["memscal_schema_version"] = version
+            file["/entry/of_the_future"] = h5py.Empty("f8")
+            if version != "1.0.0" and request.param == "artifact":
+                rewrite_digest(file)
+        return read(path)
+
+    return read_version
+
+
+def rewrite_digest(file: h5py.File) -> None:
+    """Give the file the digest that a program of that version would have written."""
+    file.flush()
+    with open_hdf5(file.filename) as safe:
+        digest = content_digest(stored_items(safe, json_value(safe, CONTENTS_PATH, dict, {})))
+    file.attrs["memscal_content_sha256"] = digest
+
+
+@pytest.mark.parametrize("version", ["2.0.0", "10.1.0"])
+def test_a_newer_major_version_is_refused_in_plain_words(versioned: Any, version: str):
+    with pytest.raises(SchemaVersionError, match=rf"newer memscal(.|\n)*{version}(.|\n)*Upgrade"):
+        versioned(version)
+
+
+@pytest.mark.parametrize("version", ["1.0.0", "1.7.3"])
+def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, version: str):
+    assert versioned(version).load == 1.0
+
+
+@pytest.mark.parametrize("version", ["", "one", "-1", "²"])
+def test_a_version_that_is_none_is_refused(versioned: Any, version: str):
+    with pytest.raises(FormatError, match="not a version"):
+        versioned(version)
+
+
+def test_an_older_major_version_is_refused(versioned: Any):
+    with pytest.raises(SchemaVersionError, match="not read any more"):
+        versioned("0.9.0")
+
+
+def test_the_wrong_kind_of_file_is_refused_by_name(artifact: Path, tmp_path: Path):
+    with pytest.raises(FormatError, match=r'"memscal-artifact", but "memscal-scan"'):
+        read_scan(artifact)
+    with h5py.File(tmp_path / "foreign.h5", "w") as file:
+        file["x"] = 1.0
+    with pytest.raises(FormatError, match="no memscal schema"):
+        read_scan(tmp_path / "foreign.h5")

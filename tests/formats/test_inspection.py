@@ -1,0 +1,120 @@
+"""What inspect says about a file, and what check finds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import pytest
+from builders import make_artifact, make_profile, make_scan
+
+from memscal.errors import FormatError, InputError
+from memscal.formats.artifact import write_artifact
+from memscal.formats.inspection import check, describe
+from memscal.formats.reference import write_reference
+from memscal.formats.scan import write_scan
+from memscal.formats.timestamp import timestamp
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_scan(make_scan("raster"), tmp_path / "scan.h5")
+    write_reference(make_profile(friction_coefficient=float("inf")), tmp_path / "reference.h5")
+    write_artifact(make_artifact(), tmp_path / "artifact.h5")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["scan", "reference", "artifact"])
+def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: Path, name: str):
+    path = folder / f"{name}.h5"
+    assert [(f.name, f.passed) for f in check(path)] == [
+        ("safety", True),
+        ("schema", True),
+        ("digest", True),
+        ("content", True),
+    ]
+    found = describe(path)
+    assert (found["file"], found["schema"]) == (f"{name}.h5", f"memscal-{name}")
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+
+
+def test_an_artifact_is_described_by_its_numbers_checks_and_origin(folder: Path):
+    found = describe(folder / "artifact.h5")
+    quantities = {q["name"]: q for q in found["quantities"]}
+    constant = quantities["conversion_constant"]
+    assert constant["unit"] == "mV/Pa"
+    assert constant["value"] == pytest.approx(3e-5)
+    assert constant["standard_uncertainty"] == pytest.approx(1e-7)
+    assert quantities["resolved_wavenumber"]["value"] == pytest.approx(3.7)
+    assert [c["passed"] for c in found["checks"]] == [True, False]
+    assert found["provenance"]["input_scan"] == "scan.h5"
+    assert found["provenance"]["configuration"]["method"] == "white-noise"
+
+
+def test_a_scan_is_described_by_its_arrays_and_said_to_be_synthetic(folder: Path):
+    found = describe(folder / "scan.h5")
+    arrays = {a["path"]: a for a in found["arrays"]}
+    signal = arrays["/entry/data/u_zz"]
+    assert (signal["shape"], signal["unit"], signal["missing"]) == ([9, 33], "mV", 9)
+    assert signal["maximum"] == pytest.approx(3.0)
+    assert "synthetic" in found["provenance"]["synthetic"]
+
+
+def test_an_altered_file_fails_at_its_digest(folder: Path):
+    with h5py.File(folder / "scan.h5", "r+") as file:
+        file["/entry/data/u_zz"][0, 0] = 7.0
+    last = check(folder / "scan.h5")[-1]
+    assert (last.name, last.passed) == ("digest", False)
+    assert "changed after it was written" in last.meaning
+
+
+@pytest.mark.parametrize(("name", "passed"), [("scan", True), ("artifact", False)])
+def test_only_an_artifact_must_have_a_digest(folder: Path, name: str, passed: bool):
+    with h5py.File(folder / f"{name}.h5", "r+") as file:
+        del file.attrs["memscal_content_sha256"]
+    digest = next(f for f in check(folder / f"{name}.h5") if f.name == "digest")
+    assert digest.passed is passed
+
+
+def test_a_scan_of_another_program_fails_at_what_it_lacks(folder: Path):
+    with h5py.File(folder / "scan.h5", "r+") as file:
+        del file.attrs["memscal_content_sha256"], file["/entry/indenter/load"]
+    last = check(folder / "scan.h5")[-1]
+    assert (last.name, last.passed) == ("content", False)
+    assert "/entry/indenter/load" in last.meaning
+
+
+def test_what_is_no_file_of_ours_fails_at_the_first_step(tmp_path: Path):
+    (tmp_path / "a.h5").write_bytes(b"text")
+    with h5py.File(tmp_path / "b.h5", "w"):
+        pass
+    for path in (tmp_path, tmp_path / "a.h5", tmp_path / "b.h5", tmp_path / "missing.h5"):
+        (finding,) = check(path)
+        assert (finding.name, finding.passed) == ("safety", False)
+        assert finding.meaning
+
+
+def test_a_newer_version_fails_at_the_schema(folder: Path):
+    with h5py.File(folder / "scan.h5", "r+") as file:
+        file.attrs["memscal_schema_version"] = "2.0.0"
+    last = check(folder / "scan.h5")[-1]
+    assert (last.name, last.passed) == ("schema", False)
+    assert "newer" in last.meaning
+
+
+def test_a_file_that_is_not_ours_is_not_described(tmp_path: Path):
+    with h5py.File(tmp_path / "b.h5", "w"):
+        pass
+    with pytest.raises(FormatError, match="not a file of memscal"):
+        describe(tmp_path / "b.h5")
+
+
+def test_the_time_is_that_of_the_build_where_one_is_given(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    assert timestamp() == "2023-11-14T22:13:20+00:00"
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
+        timestamp()
+    monkeypatch.delenv("SOURCE_DATE_EPOCH")
+    assert timestamp().endswith("+00:00")

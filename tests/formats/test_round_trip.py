@@ -1,0 +1,342 @@
+"""What is written is what is read: values, units, text and bytes."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from builders import make_artifact, make_film, make_profile, make_scan
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from memscal.errors import FormatError, InputError, UnitError
+from memscal.formats.artifact import read_artifact, write_artifact
+from memscal.formats.reference import read_reference, write_reference
+from memscal.formats.scan import read_scan, write_scan
+from memscal.model.apparatus import ParameterSet, QualityCheck
+from memscal.model.indenter import Sphere
+from memscal.model.provenance import SourceFile
+
+# Twice the rounding of one multiplication and one division by a power of ten.
+EXACT = 4.5e-16
+
+
+def assert_same(found: Any, expected: Any, *, but: tuple[str, ...] = (), where: str = "") -> None:
+    """Compare two values of the model field by field, numbers to the last bit but one."""
+    if dataclasses.is_dataclass(expected):
+        assert type(found) is type(expected), where
+        for field in dataclasses.fields(expected):
+            if field.name not in but:
+                pair = getattr(found, field.name), getattr(expected, field.name)
+                assert_same(*pair, but=but, where=f"{where}.{field.name}")
+    elif isinstance(expected, Mapping):
+        assert set(found) == set(expected), where
+        for key, value in expected.items():
+            assert_same(found[key], value, but=but, where=f"{where}[{key}]")
+    elif isinstance(expected, tuple):
+        assert len(found) == len(expected), where
+        for i, (a, b) in enumerate(zip(found, expected, strict=True)):
+            assert_same(a, b, but=but, where=f"{where}[{i}]")
+    elif isinstance(expected, (np.ndarray, float)):
+        np.testing.assert_allclose(found, expected, rtol=EXACT, atol=0, err_msg=where)
+    else:
+        assert found == expected, where
+
+
+@pytest.mark.parametrize("kind", ["line", "repeats", "raster"])
+def test_a_scan_comes_back_with_its_source_named(tmp_path: Path, kind: str):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(kind), path)
+    found = read_scan(path)
+    assert_same(found, make_scan(kind), but=("source",))
+    assert found.kind == kind
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    assert found.source == SourceFile("scan.h5", digest)
+
+
+def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):
+    bare: dict[str, Any] = dict.fromkeys(
+        ("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")
+    )
+    bare |= {"channels": {}, "title": "", "start_time": "", "end_time": "", "notes": ""}
+    write_scan(make_scan(**bare), tmp_path / "scan.h5")
+    assert_same(read_scan(tmp_path / "scan.h5"), make_scan(**bare), but=("source",))
+
+
+def test_a_reference_comes_back(tmp_path: Path):
+    profile = make_profile(indenter=Sphere(radius=128.8e-3, radius_uncertainty=1e-5))
+    write_reference(profile, tmp_path / "sphere.h5")
+    assert_same(read_reference(tmp_path / "sphere.h5"), profile, but=("source",))
+
+
+def test_full_stick_keeps_its_infinite_friction(tmp_path: Path):
+    write_reference(make_profile(friction_coefficient=np.inf), tmp_path / "a.h5")
+    assert read_reference(tmp_path / "a.h5").friction_coefficient == np.inf
+
+
+def test_a_reference_that_is_only_a_table_comes_back(tmp_path: Path):
+    absent = "sigma_rz depth contact_radius stick_radius friction_coefficient film indenter"
+    bare: dict[str, Any] = dict.fromkeys([*absent.split(), "convergence"])
+    profile = make_profile(**bare, loading="", solver="", discretisation="")
+    write_reference(profile, tmp_path / "a.h5")
+    assert_same(read_reference(tmp_path / "a.h5"), profile, but=("source",))
+
+
+def test_a_reference_in_a_scan_without_parameters_takes_those_of_the_scan(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan(load=2.5), path)
+    with h5py.File(path, "r+") as file:
+        del file["/entry/reference_parameters"], file["/entry/reference_process"]
+    found = read_scan(path).reference
+    assert found is not None
+    assert (found.load, found.film, found.indenter is not None) == (2.5, make_film(), True)
+
+
+def test_an_artifact_comes_back(tmp_path: Path):
+    write_artifact(make_artifact(), tmp_path / "a.h5")
+    found = read_artifact(tmp_path / "a.h5")
+    assert_same(found, make_artifact(), but=("source", "units"))
+    assert found.parameters.units == ("V/Pa", "m", "m", "m", "V")
+
+
+def test_a_covariance_between_different_units_comes_back(tmp_path: Path):
+    spread = np.array([1e-10, 1e-6, 2e-6, 1e-6, 1e-7])
+    correlation = np.full((5, 5), 0.3) + 0.7 * np.eye(5)
+    data = make_artifact()
+    parameters = dataclasses.replace(
+        data.parameters, covariance=correlation * spread[:, None] * spread
+    )
+    write_artifact(make_artifact(parameters=parameters), tmp_path / "a.h5")
+    found = read_artifact(tmp_path / "a.h5").parameters
+    np.testing.assert_allclose(found.covariance, parameters.covariance, rtol=1e-14)
+    with h5py.File(tmp_path / "a.h5") as file:  # as another program would read it
+        group = file["/entry/parameters"]
+        assert group["conversion_constant_errors"][()] == pytest.approx(1e-7)  # mV/Pa
+        assert group["covariance"][0, 1] == pytest.approx(0.3 * 1e-7 * 1e-3)  # mV/Pa mm
+
+
+def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it(tmp_path: Path):
+    values, covariance = np.array([2.0]), np.eye(1)
+    unnamed = make_artifact(parameters=ParameterSet(("tilt",), values, covariance), budget={})
+    with pytest.raises(InputError, match=r"unit of tilt(.|\n)*units="):
+        write_artifact(unnamed, tmp_path / "a.h5")
+    assert not (tmp_path / "a.h5").exists()
+    parameters = ParameterSet(("tilt",), values, covariance, units=("V/m",))
+    write_artifact(make_artifact(parameters=parameters, budget={}), tmp_path / "a.h5")
+    found = read_artifact(tmp_path / "a.h5").parameters
+    assert found.units == ("V/m",)
+    assert found["tilt"] == 2.0
+
+
+@pytest.mark.parametrize("name", ["names", "Größe", "../x", "a/b", "a b", ""])
+def test_a_parameter_name_that_cannot_stand_in_a_file_is_refused(tmp_path: Path, name: str):
+    parameters = ParameterSet((name,), np.ones(1), np.eye(1), units=("m",))
+    with pytest.raises(InputError):
+        write_artifact(make_artifact(parameters=parameters, budget={}), tmp_path / "a.h5")
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_check_names_are_kept_as_they_are_and_two_alike_are_refused(tmp_path: Path):
+    check = QualityCheck("Gaussian misfit (far)", 1.0, 2.0, True, "Fine.")
+    write_artifact(make_artifact(checks=(check,)), tmp_path / "a.h5")
+    assert read_artifact(tmp_path / "a.h5").checks == (check,)
+    with pytest.raises(InputError, match="gaussian_misfit_far"):
+        write_artifact(make_artifact(checks=(check, check)), tmp_path / "b.h5")
+
+
+def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp_path: Path):
+    configuration = {"seed": np.int64(3), "mu": float("inf"), "loads": np.array([1.0, 2.0])}
+    data = make_artifact()
+    process = dataclasses.replace(data.process, configuration=configuration)
+    write_artifact(make_artifact(process=process), tmp_path / "a.h5")
+    found = read_artifact(tmp_path / "a.h5").process.configuration
+    assert found == {"seed": 3, "mu": "inf", "loads": [1.0, 2.0]}
+
+
+WRITE: dict[str, Callable[[Path], None]] = {
+    "scan": lambda path: write_scan(make_scan(), path, overwrite=True),
+    "reference": lambda path: write_reference(make_profile(), path, overwrite=True),
+    "artifact": lambda path: write_artifact(make_artifact(), path, overwrite=True),
+}
+
+
+@pytest.mark.parametrize("kind", WRITE)
+def test_the_same_content_gives_the_same_bytes_a_second_later(tmp_path: Path, kind: str):
+    first, second = tmp_path / "a.h5", tmp_path / "b.h5"
+    WRITE[kind](first)
+    time.sleep(1.1)  # HDF5 counts times of change in seconds
+    WRITE[kind](second)
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_large_field_is_compressed_and_comes_back(tmp_path: Path):
+    x = np.linspace(-8e-3, 8e-3, 400)
+    y = np.linspace(-8e-3, 8e-3, 300)
+    u = np.exp(-(x**2) / 1e-6) * np.exp(-(y[:, None] ** 2) / 1e-6)
+    scan = make_scan("raster", x=x, y=y, u_zz=u, u_zz_errors=None, normal_load=None, channels={})
+    write_scan(scan, tmp_path / "a.h5")
+    np.testing.assert_allclose(read_scan(tmp_path / "a.h5").u_zz, u, rtol=EXACT)
+    with h5py.File(tmp_path / "a.h5") as file:
+        stored = file["/entry/data/u_zz"]
+        assert (stored.compression, stored.shuffle, stored.fletcher32) == ("gzip", True, True)
+    assert (tmp_path / "a.h5").stat().st_size < u.nbytes
+
+
+finite = st.floats(-1e6, 1e6, allow_subnormal=False)
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    x=hnp.arrays(np.float64, st.integers(1, 700), elements=finite, unique=True),
+    missing=st.floats(0, 1),
+    title=st.text(max_size=50),
+    notes=st.text(st.characters(categories=["L", "N", "P", "S"]), max_size=200),
+    load=st.floats(1e-6, 1e6),
+)
+def test_any_scan_comes_back(
+    tmp_path: Path, x: Any, missing: float, title: str, notes: str, load: float
+):
+    u = np.where(np.arange(x.size) < missing * x.size, np.nan, x)
+    bare: dict[str, Any] = dict.fromkeys(["u_zz_errors", "normal_load", "reference"])
+    scan = make_scan(x=x, u_zz=u, channels={}, title=title, notes=notes, load=load, **bare)
+    write_scan(scan, tmp_path / "scan.h5", overwrite=True)
+    found = read_scan(tmp_path / "scan.h5")
+    assert_same(found, scan, but=("source", "title"))
+    assert found.title == "".join(c for c in title if c.isprintable() or c in "\n\t")
+
+
+def other_program(path: Path) -> None:
+    """Write a scan by the contract with h5py alone, in other units and other types."""
+    with h5py.File(path, "w") as file:
+        file.attrs["memscal_schema"] = "memscal-scan"
+        file.attrs["memscal_schema_version"] = "1.0.0"
+        for name, value, units in (
+            ("entry/data/x", np.array([-1000, 0, 500], dtype="i2"), "um"),
+            ("entry/data/u_zz", np.array([1.0, 3.0, 2.0], dtype=">f4"), "uV"),
+            ("entry/indenter/radius", [0.25], "mm"),
+            ("entry/indenter/load", 100.0, "gram * standard_gravity"),
+            ("entry/sample/film/young_modulus", 2.2, "MPa"),
+            ("entry/sample/film/thickness", 0.2, "centimeter"),
+        ):
+            file[name] = value
+            file[name].attrs["units"] = units
+        file["entry/sample/film/poisson_ratio"] = 0.5
+        file["entry/indenter/shape"] = "rod"
+
+
+def test_a_scan_of_another_program_is_read_in_its_own_units(tmp_path: Path):
+    other_program(tmp_path / "scan.h5")
+    scan = read_scan(tmp_path / "scan.h5")
+    assert scan.x.tolist() == [-1e-3, 0.0, 0.5e-3]
+    np.testing.assert_allclose(scan.u_zz, [1e-6, 3e-6, 2e-6], rtol=1e-15)
+    assert scan.load == pytest.approx(0.980665, rel=1e-12)
+    assert scan.indenter.radius == 0.25e-3
+    assert scan.film.young_modulus == 2.2e6
+    assert scan.film.thickness == pytest.approx(2e-3, rel=1e-15)
+    assert scan.film.poisson_ratio == 0.5
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/entry/data/x",
+        "/entry/data/u_zz",
+        "/entry/indenter/load",
+        "/entry/indenter/radius",
+        "/entry/indenter/shape",
+        "/entry/sample/film/young_modulus",
+        "/entry/sample/film/poisson_ratio",
+        "/entry/sample/film/thickness",
+    ],
+)
+def test_a_missing_part_is_named_by_its_path(tmp_path: Path, path: str):
+    other_program(tmp_path / "scan.h5")
+    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+        del file[path]
+    with pytest.raises(FormatError, match=rf"scan\.h5: {path} is missing"):
+        read_scan(tmp_path / "scan.h5")
+
+
+@pytest.mark.parametrize(
+    ("path", "units", "wanted"),
+    [
+        ("/entry/data/x", "mV", "length"),
+        ("/entry/data/x", "parsnip", "unknown"),
+        ("/entry/data/u_zz", "T", "voltage"),
+        ("/entry/indenter/load", "kg", "force"),
+        ("/entry/sample/film/young_modulus", "N", "stress"),
+        ("/entry/sample/film/poisson_ratio", "mm", "dimensionless"),
+        ("/entry/data/x", None, "has no unit"),
+        ("/entry/indenter/load", None, "has no unit"),
+    ],
+)
+def test_a_wrong_or_missing_unit_is_named_with_its_path_and_the_right_one(
+    tmp_path: Path, path: str, units: str | None, wanted: str
+):
+    other_program(tmp_path / "scan.h5")
+    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+        if units is None:
+            del file[path].attrs["units"]
+        else:
+            file[path].attrs["units"] = units
+    with pytest.raises(UnitError, match=rf"scan\.h5: {path}(.|\n)*{wanted}") as caught:
+        read_scan(tmp_path / "scan.h5")
+    assert caught.value.cure
+
+
+def edit(path: Path, name: str, value: Any, units: str) -> None:
+    with h5py.File(path, "r+") as file:
+        if name in file:
+            del file[name]
+        file[name] = value
+        file[name].attrs["units"] = units
+
+
+def test_a_value_that_the_model_refuses_is_reported_with_the_file(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    for name, value, units, words in (
+        ("/entry/indenter/load", 0.0, "N", "load"),
+        ("/entry/sample/film/thickness", -1.0, "mm", "thickness"),
+        ("/entry/data/x", [0.0, 1.0], "mm", "u_zz has shape"),
+        ("/entry/data/x", [0.0, np.nan, 1.0], "mm", "finite"),
+    ):
+        path.unlink(missing_ok=True)
+        other_program(path)
+        edit(path, name, value, units)
+        with pytest.raises(InputError, match=rf"scan\.h5.*{words}"):
+            read_scan(path)
+
+
+def test_a_raster_with_its_axes_swapped_is_refused(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan("raster"), path)
+    with h5py.File(path, "r+") as file:
+        file["/entry/data"].attrs["axes"] = ["x", "y"]
+    with pytest.raises(FormatError, match=r"axes(.|\n)*Transpose"):
+        read_scan(path)
+
+
+def test_a_raster_without_its_second_axis_is_not_taken_for_repeats(tmp_path: Path):
+    path = tmp_path / "scan.h5"
+    write_scan(make_scan("raster"), path)
+    with h5py.File(path, "r+") as file:
+        del file["/entry/data/y"]
+    with pytest.raises(FormatError, match="there is no /entry/data/y"):
+        read_scan(path)
+
+
+def test_an_unknown_shape_of_indenter_is_refused(tmp_path: Path):
+    other_program(tmp_path / "scan.h5")
+    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+        del file["entry/indenter/shape"]
+        file["entry/indenter/shape"] = "cone"
+    with pytest.raises(FormatError, match='/entry/indenter/shape is "cone"'):
+        read_scan(tmp_path / "scan.h5")

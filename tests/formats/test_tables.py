@@ -1,0 +1,320 @@
+"""Tables as they leave an experiment or a FEM program, with everything that can be messy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builders import make_film
+from hypothesis import given
+from hypothesis import strategies as st
+
+from memscal.errors import FormatError, InputError, UnitError
+from memscal.formats.csv_table import read_table
+from memscal.formats.grid import find_grid
+from memscal.formats.scan import read_scan, write_scan
+from memscal.formats.table import ImportedScan, read_reference_table, read_scan_table
+from memscal.model.indenter import Rod
+
+
+def scan_table(path: Path, text: str, **options: Any) -> ImportedScan:
+    """Import a table with the usual options."""
+    table = path / "table.csv"
+    table.write_text(text, encoding="utf-8")
+    given = {"x": "x", "u": "u", "x_unit": "mm", "u_unit": "mV", "load": 1.0, **options}
+    return read_scan_table(table, film=make_film(), indenter=Rod(radius=0.25e-3), **given)
+
+
+def rows(*columns: Any, header: str, separator: str = ",") -> str:
+    """Write columns as text with full precision."""
+    lines = [separator.join(f"{v!r}" for v in row) for row in zip(*columns, strict=True)]
+    return "\n".join([header, *lines])
+
+
+def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u\n1.5,2\n-1,1\n0.25,3\n")
+    assert found.scan.kind == "line"
+    assert found.scan.x.tolist() == [1.5e-3, -1e-3, 0.25e-3]
+    assert found.scan.u_zz.tolist() == [2e-3, 1e-3, 3e-3]
+    assert any("kept as they are" in note for note in found.notes)
+
+
+def test_what_was_done_travels_with_the_scan(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u\n0,1\n1,2\n")
+    write_scan(found.scan, tmp_path / "scan.h5")
+    again = read_scan(tmp_path / "scan.h5")
+    assert again.notes.splitlines() == list(found.notes)
+    assert found.scan.source is not None
+    assert found.scan.source.sha256 in again.notes
+
+
+def test_repeats_with_messy_positions_share_places(tmp_path: Path):
+    text = "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1.02,2.2,2\n-0.01,1.1,2\n2.99,4.4,2\n"
+    found = scan_table(tmp_path, text, repeat="n")
+    assert found.scan.kind == "repeats"
+    np.testing.assert_allclose(found.scan.x, [-0.005e-3, 1.01e-3, 2.995e-3], rtol=1e-12)
+    np.testing.assert_allclose(
+        found.scan.u_zz, [[1e-3, 2e-3, 4e-3], [1.1e-3, 2.2e-3, 4.4e-3]], rtol=1e-12
+    )
+    assert any("0.01 mm from theirs" in note for note in found.notes)
+
+
+def test_a_repeat_that_lacks_a_point_has_nan_there(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u,n\n0,1,1\n1,2,1\n2,3,1\n0,1,2\n2,5,2\n", repeat="n")
+    np.testing.assert_array_equal(np.isnan(found.scan.u_zz), [[0, 0, 0], [0, 1, 0]])
+    assert any("1 of 6 points are missing" in note for note in found.notes)
+
+
+def test_equal_positions_without_a_repeat_column_are_counted(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u\n0,1\n1,2\n0,3\n1,4\n")
+    assert found.scan.u_zz.tolist() == [[1e-3, 2e-3], [3e-3, 4e-3]]
+    assert any("counted as repeats" in note for note in found.notes)
+
+
+def test_repeats_of_a_line_can_be_averaged_with_their_pooled_spread(tmp_path: Path):
+    text = "x,u\n0,1\n1,2\n0,3\n1,6\n"
+    found = scan_table(tmp_path, text, repeats="average").scan
+    assert found.u_zz.tolist() == [2e-3, 4e-3]
+    # Sums of squares 2 and 8 over one degree of freedom each: s = sqrt(5), over sqrt(2).
+    assert found.u_zz_errors is not None
+    np.testing.assert_allclose(found.u_zz_errors, np.sqrt(2.5) * 1e-3, rtol=1e-12)
+
+
+def test_repeats_spread_beyond_the_tolerance_are_refused(tmp_path: Path):
+    text = "x,u,n\n0,1,1\n1,2,1\n0.3,1,2\n1,2,2\n"
+    with pytest.raises(InputError, match=r"0\.15 mm(.|\n)*tolerance"):
+        scan_table(tmp_path, text, repeat="n")
+
+
+def messy_raster(seed: int, *, noise: float, missing: int, repeats: int) -> tuple[str, Any, Any]:
+    """A table of a raster in random order, and the raster."""
+    rng = np.random.default_rng(seed)
+    x, y = -4.0 + 0.5 * np.arange(7), 100.0 + 0.25 * np.arange(5)
+    u = rng.normal(size=(5, 7))
+    lost = rng.choice(35, missing, replace=False)
+    jj, ii = np.divmod(np.repeat(np.setdiff1d(np.arange(35), lost), repeats), 7)
+    order = rng.permutation(ii.size)
+    ii, jj = ii[order], jj[order]
+    xs = x[ii] + noise * 0.5 * rng.uniform(-1, 1, ii.size)
+    ys = y[jj] + noise * 0.25 * rng.uniform(-1, 1, ii.size)
+    u.ravel()[lost] = np.nan
+    return rows(xs.tolist(), ys.tolist(), u[jj, ii].tolist(), header="x,y,u"), u, lost
+
+
+@given(
+    seed=st.integers(0, 2**16),
+    noise=st.sampled_from([0.0, 1e-4, 0.03]),
+    missing=st.integers(0, 6),
+    repeats=st.integers(1, 3),
+)
+def test_a_messy_raster_finds_its_grid(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, noise: float, missing: int, repeats: int
+):
+    text, u, _ = messy_raster(seed, noise=noise, missing=missing, repeats=repeats)
+    options = {"y": "y", "repeats": "average" if repeats > 1 else "keep"}
+    scan = scan_table(tmp_path_factory.mktemp("t"), text, **options).scan
+    assert scan.y is not None
+    np.testing.assert_allclose(scan.x, (-4.0 + 0.5 * np.arange(7)) * 1e-3, atol=0.02e-3)
+    np.testing.assert_allclose(scan.y, (100.0 + 0.25 * np.arange(5)) * 1e-3, atol=0.01e-3)
+    np.testing.assert_allclose(scan.u_zz, u * 1e-3, rtol=1e-12, atol=1e-18)
+
+
+def test_a_raster_with_repeats_asks_before_it_averages(tmp_path: Path):
+    text, *_ = messy_raster(1, noise=0.01, missing=0, repeats=3)
+    with pytest.raises(InputError, match=r"up to 3 readings(.|\n)*average"):
+        scan_table(tmp_path, text, y="y")
+
+
+def test_the_uncertainty_of_averaged_repeats_is_that_of_the_mean(tmp_path: Path):
+    rng = np.random.default_rng(5)
+    x, y = np.meshgrid(np.arange(10.0), np.arange(9.0))
+    x, y = np.tile(x.ravel(), 5), np.tile(y.ravel(), 5)
+    noise = 0.2
+    text = rows(x.tolist(), y.tolist(), rng.normal(0, noise, x.size).tolist(), header="x,y,u")
+    scan = scan_table(tmp_path, text, y="y", repeats="average").scan
+    assert scan.u_zz_errors is not None
+    # 360 degrees of freedom: a relative standard deviation of 3.7 %.
+    expected = noise * 1e-3 / np.sqrt(5)
+    np.testing.assert_allclose(scan.u_zz_errors, expected, rtol=0.2)
+    assert np.std(scan.u_zz) == pytest.approx(expected, rel=0.35)
+
+
+def test_positions_off_the_grid_are_refused_with_the_best_grid_named(tmp_path: Path):
+    with pytest.raises(InputError, match=r"along x(.|\n)*best one has a step"):
+        scan_table(tmp_path, "x,y,u\n0,0,1\n1,0,1\n2.3,1,1\n3,1,1\n4,1,1\n", y="y")
+
+
+def test_a_misread_column_does_not_make_a_huge_grid(tmp_path: Path):
+    x = np.linspace(0, 1, 40) ** 2
+    text = rows(x.tolist(), x.tolist(), x.tolist(), header="x,y,u")
+    with pytest.raises(InputError, match="grid"):
+        scan_table(tmp_path, text, y="y", grid_tolerance=1e-6)
+
+
+@given(
+    step=st.floats(1e-6, 1.0),
+    start=st.floats(-10, 10),
+    size=st.integers(8, 40),
+    seed=st.integers(0, 2**16),
+)
+def test_the_grid_found_is_the_one_the_positions_were_made_on(
+    step: float, start: float, size: int, seed: int
+):
+    rng = np.random.default_rng(seed)
+    index = np.delete(np.arange(size), rng.choice(size, size // 4, replace=False))
+    index -= index[0]
+    positions = start * step + step * (index + rng.uniform(-0.02, 0.02, index.size))
+    grid = find_grid("x", positions, 0.1)
+    assert grid.deviation <= 0.1 * grid.step
+    assert grid.step == pytest.approx(step, rel=0.02)
+    np.testing.assert_array_equal(grid.index, index)
+
+
+def test_a_grid_that_would_merge_readings_of_one_repeat_is_refused(tmp_path: Path):
+    """Dense readings among wide gaps must not pass for repeats of one place."""
+    x = [0.0, 2.0, 4.0, 4.1, 4.2, 6.0, 8.0]
+    text = rows(x * 2, [0.0] * 7 + [2.0] * 7, [1.0] * 14, [1] * 14, header="x,y,u,n")
+    with pytest.raises(InputError, match="two readings"):
+        scan_table(tmp_path, text, y="y", repeat="n", repeats="average")
+
+
+def test_a_foreign_sensor_needs_a_scale_and_the_scale_is_recorded(tmp_path: Path):
+    with pytest.raises(UnitError, match=r'"uT"(.|\n)*u-scale'):
+        scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_unit="uT")
+    found = scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_unit="uT", u_scale=1e-6)
+    assert found.scan.u_zz.tolist() == [1e-6, 2e-6]
+    assert "1e-06 V was taken for one uT" in found.scan.notes
+
+
+@pytest.mark.parametrize("scale", [0.0, np.nan, np.inf])
+def test_a_scale_that_destroys_the_data_is_refused(tmp_path: Path, scale: float):
+    with pytest.raises(InputError, match="scale"):
+        scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_unit="uT", u_scale=scale)
+
+
+def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Path):
+    text = "x,u,f\n0,1,990\n1,2,1000\n2,2,1030\n"
+    found = scan_table(tmp_path, text, load=None, load_column="f", load_unit="mN")
+    assert found.scan.load == 1.0
+    assert found.scan.normal_load is not None
+    np.testing.assert_allclose(found.scan.normal_load, [0.99, 1.0, 1.03])
+    assert any("median" in note for note in found.notes)
+    with pytest.raises(InputError, match="load of the scan is not given"):
+        scan_table(tmp_path, text, load=None)
+
+
+def test_further_channels_are_carried(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u,s\n0,1,5\n1,2,6\n", u_xz="s")
+    assert found.scan.channels["u_xz"].tolist() == [5e-3, 6e-3]
+
+
+def test_rows_without_a_position_are_left_out_and_counted(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u\n0,1\n,7\n1,\n")
+    assert found.scan.x.size == 2
+    assert np.isnan(found.scan.u_zz[1])
+    assert any("1 rows without a position" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "decimal"),
+    [
+        ("x;u\n0,5;1,25\n1,5;2,5\n", ","),
+        ("x\tu\n0.5\t1.25\n1.5\t2.5\n", "."),
+        ("x u\n0.5   1.25\n 1.5 2.5\n", "."),
+        ("# made by a stage\n% in mm\nx,u\n0.5,1.25\n1.5,2.5\n", "."),
+        ('"x","u"\n"0.5","1.25"\n"1.5","2.5"\n', "."),
+        ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", "."),
+        ("x|u\n5D-1|1.25\n1.5|2.5d0\n", "."),
+    ],
+    ids=["German", "tabs", "spaces", "comments", "quotes", "Excel", "Fortran"],
+)
+def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text: str, decimal: str):
+    found = scan_table(tmp_path, text)
+    assert found.scan.x.tolist() == [0.5e-3, 1.5e-3]
+    assert found.scan.u_zz.tolist() == [1.25e-3, 2.5e-3]
+    assert read_table(tmp_path / "table.csv").decimal == decimal
+
+
+def test_columns_without_a_header_go_by_number(tmp_path: Path):
+    found = scan_table(tmp_path, "0,9,1\n1,9,2\n", x="1", u=3)
+    assert found.scan.u_zz.tolist() == [1e-3, 2e-3]
+
+
+@pytest.mark.parametrize("column", ["volts", "0", "3", -1])
+def test_a_column_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path, column: Any):
+    with pytest.raises(InputError, match=r"columns are: x, u\."):
+        scan_table(tmp_path, "x,u\n0,1\n1,2\n", u=column)
+
+
+def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):
+    with pytest.raises(FormatError, match=r"column 'u', data row 2: 'overload'"):
+        scan_table(tmp_path, "x,u\n0,1\n1,overload\n")
+
+
+@pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "x,u\n", "\0\0\0"])
+def test_a_file_without_a_table_is_refused(tmp_path: Path, text: str):
+    with pytest.raises(InputError, match=r"table\.csv"):
+        scan_table(tmp_path, text)
+
+
+@pytest.mark.parametrize("options", [{"repeats": "drop"}, {"grid_tolerance": 0.7}])
+def test_options_without_a_meaning_are_refused(tmp_path: Path, options: dict[str, Any]):
+    with pytest.raises(InputError):
+        scan_table(tmp_path, "x,u\n0,1\n1,2\n", **options)
+
+
+def reference_table(path: Path, text: str, **options: Any) -> Any:
+    """Import a FEM table with the usual options."""
+    table = path / "fem.csv"
+    table.write_text(text)
+    given = {"r": "r", "sigma": "s", "r_unit": "mm", "sigma_unit": "MPa", "load": 1.0, **options}
+    return read_reference_table(table, **given)
+
+
+def test_a_fem_table_is_sorted_and_converted_and_its_force_reported(tmp_path: Path):
+    r = np.linspace(0, 8, 401)
+    s = np.exp(-(r**2) / 2) / (2 * np.pi)  # 1 N with r in mm and s in MPa
+    order = np.random.default_rng(1).permutation(r.size)
+    found = reference_table(
+        tmp_path, rows(r[order].tolist(), (-s[order]).tolist(), header="r,s"), sign=-1
+    )
+    np.testing.assert_allclose(found.profile.r, r * 1e-3, rtol=1e-14)
+    np.testing.assert_allclose(found.profile.sigma_zz, s * 1e6, rtol=1e-14)
+    assert any("sorted by radius" in note for note in found.notes)
+    assert any("carries 1 N of the load of 1 N" in note for note in found.notes)
+
+
+def test_compression_counted_as_negative_is_refused_with_the_option_named(tmp_path: Path):
+    with pytest.raises(InputError, match=r"mostly negative(.|\n)*sign=-1"):
+        reference_table(tmp_path, "r,s\n0,-2\n1,-1\n2,-0.1\n")
+
+
+def test_a_table_for_which_the_option_is_wrong_is_refused_too(tmp_path: Path):
+    with pytest.raises(InputError, match="mostly negative"):
+        reference_table(tmp_path, "r,s\n0,2\n1,1\n2,0.1\n", sign=-1)
+
+
+def test_nodes_given_twice_are_averaged_and_reported(tmp_path: Path):
+    found = reference_table(tmp_path, "r,s\n0,2\n1,1.1\n1,0.9\n2,0.1\n")
+    assert found.profile.sigma_zz.tolist() == [2e6, 1e6, 0.1e6]
+    assert any("1 rows repeat a radius" in note and "0.05" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("r,s\n0,2\n1,\n2,1\n", "sigma_zz is not a number in data row 2"),
+        ("r,s\n0,2\nnan,3\n,1\n", "r is not a number in data row 2 and 1 more"),
+        ("r,s\n-1,2\n0,3\n1,2\n", "negative radius"),
+    ],
+)
+def test_a_fem_table_with_holes_or_negative_radii_is_refused(tmp_path: Path, text: str, words: str):
+    with pytest.raises(InputError, match=words):
+        reference_table(tmp_path, text)
+
+
+def test_shear_keeps_its_own_sign(tmp_path: Path):
+    found = reference_table(tmp_path, "r,s,t\n0,-2,0\n1,-1,0.3\n", sign=-1, shear="t")
+    assert found.profile.sigma_rz.tolist() == [0.0, 0.3e6]
