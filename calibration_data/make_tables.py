@@ -1,0 +1,97 @@
+"""Make the two tables of this folder, which no memscal command makes: run by make.sh."""
+
+from __future__ import annotations
+
+import csv
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+import memscal
+
+HERE = Path(__file__).parent
+
+READ_ME = "See README.md in this folder for how it was made."
+
+
+def write_table(
+    path: Path, comments: Iterable[str], header: tuple[str, ...], rows: Iterable[tuple[str, ...]]
+) -> None:
+    """Write comments, a header and rows as comma-separated text."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(f"# {line}\n" for line in comments)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+
+
+def messy_scan(path: Path) -> None:
+    """Write a rod scan as it leaves an experiment: three repeats, and nothing quite in place."""
+    conversion_constant, centre = 1e-7, -0.23  # V/Pa, mm
+    rng = np.random.default_rng(2008)
+    quiet = memscal.simulate(
+        conversion_constant=conversion_constant,
+        half_range=10e-3, points=4001, centre=(0.0, 0.0), noise=0.0, baseline=0.0, drift=0.0,
+    )  # fmt: skip
+    largest = quiet.u_zz.max() * 1e3
+
+    repeat = np.repeat([1, 2, 3], 33)
+    places = np.linspace(-8.0, 8.0, 33)
+    # The second repeat runs back; the stage reports where it came to rest, to 2 um.
+    x = np.concatenate([places, places[::-1], places]) + rng.normal(0.0, 2e-3, repeat.size)
+    load = 1.0 + 0.005 * rng.standard_normal(repeat.size)
+    u = load * np.interp(np.abs(x - centre), quiet.x * 1e3, quiet.u_zz * 1e3)
+    u += largest * (-0.02 + 0.004 * x / 8.0) + rng.normal(0.0, 0.005 * largest, u.size)
+
+    u[70] += 0.4 * largest  # an outlier, as when the table is knocked
+    readings = [f"{value:.5f}" for value in u]
+    for lost in (5, 40, 41):
+        readings[lost] = ""
+    readings[90] = "NaN"
+    never_taken = {12, 13, 60}
+    rows = [
+        (str(repeat[i]), repr(float(x[i])), f"{load[i]:.4f}", readings[i])
+        for i in range(repeat.size)
+        if i not in never_taken
+    ]
+    comments = (
+        "SYNTHETIC: calculated from a known truth, not measured. " + READ_ME,
+        f"Truth: A = {conversion_constant * 1e3:g} mV/Pa, centre {centre:g} mm.",
+        "G is a Gaussian of 0.561 mm; the noise is 0.5 % of the largest signal.",
+        "Film: E = 2.2 MPa, nu = 0.5, h = 2 mm. Rod: radius 0.25 mm.",
+    )
+    write_table(path, comments, ("repeat", "x (mm)", "load (N)", "U (mV)"), rows)
+
+
+def finite_element_reference(path: Path) -> None:
+    """Write the stress at the base of the film under 1 N, as a FEM program lists it.
+
+    The solution is that of tests/accuracy/test_rod_fem.py: scikit-fem, P4 displacement and P3
+    pressure on triangles.  It shares nothing with memscal's own solver.
+    """
+    from accuracy.test_rod_fem import solve_with_elements
+
+    rod = solve_with_elements(0.5, sticking=False)
+    order = np.argsort(rod.r)
+    kept: list[int] = []
+    for i in order:
+        # The elements under the rod's edge are far finer than the stress at the base needs.
+        if not kept or rod.r[i] - rod.r[kept[-1]] >= 0.02:
+            kept.append(i)
+    rows = [(f"{rod.r[i]:.6f}", f"{-rod.sigma_zz[i]:.8e}", f"{rod.sigma_rz[i]:.8e}") for i in kept]
+    comments = (
+        "SYNTHETIC: a calculation, not a measurement. " + READ_ME,
+        "Base of an incompressible film (E = 2.2 MPa, h = 2 mm) bonded to a rigid support, under",
+        "a rigid frictionless rod of radius 0.25 mm pressed with 1 N. Stresses at the integration",
+        "points of the elements' lower edges; tension is positive, as in most FEM programs.",
+    )
+    write_table(path, comments, ("r (mm)", "S33 (MPa)", "S13 (MPa)"), rows)
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, os.fspath(HERE.parent / "tests"))
+    messy_scan(HERE / "rod_scan_messy.csv")
+    finite_element_reference(HERE / "rod_reference_fem.csv")

@@ -1,0 +1,245 @@
+"""The shipped data are what their README says: synthetic, in order, and made by its commands."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import memscal
+from memscal.formats.inspection import check
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+
+DATA = Path(__file__).parents[2] / "calibration_data"
+README = (DATA / "README.md").read_text(encoding="utf-8")
+SCANS = ["rod_scan_33.h5", "rod_scan_65.h5", "rod_scan_three_loads.h5", "rod_scan_raster.h5"]
+TABLES = ["rod_scan_messy.csv", "rod_reference_fem.csv"]
+ARTIFACT = "rod_scan_65.apparatus.h5"
+
+
+def commands(block: str) -> list[list[str]]:
+    """Arguments of the memscal commands in the README's code blocks of one kind."""
+    blocks = re.findall(rf"^```{block}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+    lines = [shlex.split(line) for line in "".join(blocks).splitlines()]
+    return [arguments for program, *arguments in lines if program == "memscal"]
+
+
+def run_all(argument_lists: list[list[str]], folder: Path) -> None:
+    for arguments in argument_lists:
+        run = subprocess.run(
+            [sys.executable, "-m", "memscal", *arguments],
+            cwd=folder, env={**os.environ, "SOURCE_DATE_EPOCH": "0"},
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert run.returncode == 0, f"memscal {shlex.join(arguments)}\n{run.stderr}"
+
+
+@pytest.fixture(scope="module")
+def rebuilt(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the README's recipe was followed."""
+    folder = tmp_path_factory.mktemp("rebuilt")
+    run_all(commands("sh"), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the README's examples with the tables were followed."""
+    folder = tmp_path_factory.mktemp("imported")
+    (folder / "calibration_data").symlink_to(DATA)
+    run_all(commands("console"), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def calibrations() -> dict[str, memscal.Calibration]:
+    return {name: memscal.calibrate(memscal.read_scan(DATA / name)) for name in SCANS}
+
+
+@pytest.fixture(scope="module")
+def generator() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_tables", DATA / "make_tables.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def numbers(table: Path) -> np.ndarray:
+    rows = [line for line in table.read_text().splitlines() if not line.startswith("#")]
+    return np.genfromtxt(rows, delimiter=",", skip_header=1)
+
+
+def stated(item: ElasticFilm | Indenter) -> dict[str, float]:
+    """Values of a film or an indenter, without those that are not stated."""
+    return {name: value for name, value in asdict(item).items() if value is not None}
+
+
+def test_the_folder_holds_what_its_readme_lists_and_is_small() -> None:
+    listed = set(re.findall(r"^\| `([^`]+)`", README, flags=re.MULTILINE))
+    shipped = {path.name for path in DATA.iterdir() if path.suffix in {".h5", ".csv"}}
+    assert shipped == listed == {*SCANS, *TABLES, ARTIFACT}
+    assert sum(path.stat().st_size for path in DATA.iterdir() if path.is_file()) < 1_000_000
+
+
+@pytest.mark.parametrize("name", [*SCANS, ARTIFACT])
+def test_every_hdf5_file_is_in_order(name: str) -> None:
+    assert [finding for finding in check(DATA / name) if not finding.passed] == []
+
+
+def test_every_file_says_that_it_is_synthetic() -> None:
+    for name in SCANS:
+        scan = memscal.read_scan(DATA / name)
+        assert scan.synthetic
+        assert "synthetic" in scan.title.lower()
+    for name in TABLES:
+        assert (DATA / name).read_text(encoding="utf-8").startswith("# SYNTHETIC")
+    messages = memscal.load_apparatus(DATA / ARTIFACT).process.messages
+    assert any("synthetic" in message for message in messages)
+
+
+@pytest.mark.parametrize("name", SCANS)
+def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(
+    name: str, calibrations: dict[str, memscal.Calibration]
+) -> None:
+    calibration = calibrations[name]
+    assert calibration.passed
+    truth = memscal.read_scan(DATA / name).synthetic
+    assert truth is not None
+    assert truth["gaussian_sigma"] == 561e-6
+    found = calibration.apparatus.parameters
+    sought = {name: truth[name] for name in found.names if name in truth}
+    assert {"conversion_constant", "gaussian_sigma", "centre", "baseline", "drift"} <= set(sought)
+    sought["gaussian_sigma_deconvolved"] = truth["gaussian_sigma"]
+    for parameter, value in sought.items():
+        assert abs(found[parameter] - float(value)) < 4 * found.uncertainty(parameter), parameter
+
+
+def own_uncertainty(apparatus: memscal.ApparatusFunction) -> float:
+    """Uncertainty of A that two scans do not share, as they share film, rod and load."""
+    budget = apparatus.budget["conversion_constant"]
+    own = ("noise", "window", "raster_noise")
+    return float(np.linalg.norm([budget.get(source, 0.0) for source in own]))
+
+
+@pytest.mark.parametrize(
+    "name", ["rod_scan_33.h5", "rod_scan_three_loads.h5", "rod_scan_raster.h5"]
+)
+def test_lines_loads_and_raster_give_the_same_conversion_constant(
+    name: str, calibrations: dict[str, memscal.Calibration]
+) -> None:
+    one, other = calibrations["rod_scan_65.h5"].apparatus, calibrations[name].apparatus
+    expected = np.hypot(own_uncertainty(one), own_uncertainty(other))
+    assert expected < 0.02 * one.conversion_constant
+    assert abs(one.conversion_constant - other.conversion_constant) < 4 * expected
+
+
+@pytest.mark.parametrize("name", SCANS)
+def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -> None:
+    shipped, made = memscal.read_scan(DATA / name), memscal.read_scan(rebuilt / name)
+    for field in ("x", "y", "u_zz", "u_zz_errors", "normal_load"):
+        expected, found = getattr(shipped, field), getattr(made, field)
+        assert (expected is None) == (found is None), field
+        if expected is not None:
+            assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    for field in ("load", "load_uncertainty", "sensor", "title", "notes"):
+        assert getattr(made, field) == getattr(shipped, field), field
+    for field in ("film", "indenter"):
+        assert stated(getattr(made, field)) == pytest.approx(stated(getattr(shipped, field)))
+    assert made.synthetic is not None
+    assert shipped.synthetic is not None
+    assert made.synthetic.keys() == shipped.synthetic.keys()
+    for name, value in shipped.synthetic.items():
+        expected = value if isinstance(value, str) else pytest.approx(value, rel=1e-9)
+        assert made.synthetic[name] == expected, name
+
+
+def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt: Path) -> None:
+    shipped, made = (memscal.load_apparatus(folder / ARTIFACT) for folder in (DATA, rebuilt))
+    assert made.conversion_constant == pytest.approx(shipped.conversion_constant, rel=1e-9)
+    assert made.gaussian_sigma == pytest.approx(shipped.gaussian_sigma, rel=1e-9)
+    assert made.parameters.names == shipped.parameters.names
+    assert [c.name for c in made.checks] == [c.name for c in shipped.checks]
+    assert_allclose(made.radial_profile.g, shipped.radial_profile.g, atol=1e-6 * made.field.g.max())
+    assert_allclose(
+        made.radial_profile.g_errors, shipped.radial_profile.g_errors, rtol=1e-4,
+        atol=1e-6 * made.field.g.max(),
+    )  # fmt: skip
+
+
+def test_the_shipped_artifact_names_the_shipped_scan() -> None:
+    source = memscal.load_apparatus(DATA / ARTIFACT).process.input_scan
+    assert source is not None
+    scan = DATA / source.file_name
+    assert source.sha256 == hashlib.sha256(scan.read_bytes()).hexdigest()
+
+
+def test_the_tables_are_what_their_generator_makes(generator: ModuleType, tmp_path: Path) -> None:
+    generator.messy_scan(tmp_path / "rod_scan_messy.csv")
+    generator.finite_element_reference(tmp_path / "rod_reference_fem.csv")
+    for name, places in (("rod_scan_messy.csv", 1.1e-5), ("rod_reference_fem.csv", 1e-7)):
+        made, shipped = tmp_path / name, DATA / name
+        # A last digit may be rounded the other way by another version of a library.
+        assert_allclose(numbers(made), numbers(shipped), rtol=0, atol=places)
+
+
+def test_the_messy_table_is_messy_and_still_gives_its_truth(imported: Path) -> None:
+    scan = memscal.read_scan(imported / "messy.h5")
+    assert scan.u_zz.shape == (3, 33)
+    assert np.isnan(scan.u_zz).sum() == 3 + 4
+    apparatus = memscal.load_apparatus(imported / "messy.apparatus.h5")
+    assert sum("Outlier" in message for message in apparatus.process.messages) == 1
+    truth = {"conversion_constant": 1e-7, "gaussian_sigma": 561e-6, "centre": -0.23e-3}
+    for name, value in truth.items():
+        uncertainty = apparatus.parameters.uncertainty(name)
+        assert abs(apparatus.parameters[name] - value) < 4 * uncertainty, name
+
+
+def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows(
+    imported: Path, calibrations: dict[str, memscal.Calibration]
+) -> None:
+    """Bound the shift of A and sigma by what the table changes in the predicted voltages.
+
+    Voltages predicted from the table differ from those predicted from the built-in solution by
+    e_i.  Fitting either to the same scan differs to first order as if the scan had changed by e_i.
+    For a weighted linear estimate of a parameter, with gains c_i and noise s_i, that is
+    |sum c_i e_i| <= sqrt(sum c_i^2 s_i^2) sqrt(sum e_i^2 / s_i^2) by Cauchy and Schwarz: at most
+    the parameter's uncertainty from noise times the root of a chi-square.  As G has unit
+    integral, e_i is at most A times the largest error of the table, 5e-4 of the maximum by
+    tests/accuracy/test_rod_fem.py.
+    """
+    ours = calibrations["rod_scan_65.h5"].apparatus
+    theirs = memscal.load_apparatus(imported / "fem.apparatus.h5")
+    table = memscal.read_reference(imported / "fem.h5")
+    contact = memscal.indent(ours.film, ours.indenter, load=1.0)
+    scan = memscal.read_scan(DATA / "rod_scan_65.h5")
+    assert scan.u_zz_errors is not None
+    largest = np.max(np.abs(table.sigma_zz - contact.base_stress(table.r)))
+    assert largest < 5e-4 * contact.base_stress(0.0)
+
+    def voltage(stress: np.ndarray) -> np.ndarray:
+        distance = np.abs(scan.x - ours.parameters["centre"])
+        return np.interp(distance, table.r, ours.predict(table.r, stress))
+
+    moved = voltage(table.sigma_zz) - voltage(contact.base_stress(table.r))
+    # The deconvolved G dips below zero a little, so that the bound by its integral is not sharp.
+    assert np.max(np.abs(moved)) < 1.2 * ours.conversion_constant * largest
+    root_chi_square = float(np.linalg.norm(moved / scan.u_zz_errors))
+    assert root_chi_square < 0.5
+    for name in ("conversion_constant", "gaussian_sigma"):
+        noise = ours.budget[name]["noise"]
+        shift = abs(theirs.parameters[name] - ours.parameters[name])
+        assert shift < 1.1 * root_chi_square * noise, name
