@@ -59,10 +59,11 @@ def _method(solution: Solution) -> list[str]:
     regulariser = solution.regulariser
     if regulariser.name in _WINDOWS:
         return []
-    return [
+    left_out = (
         f"Method {regulariser.name}: uncertainties are first-order through its effective window, "
         f"without its own scatter. {regulariser.fails}"
-    ]
+    )
+    return [left_out]
 
 
 def _reference(solution: Solution) -> list[str]:

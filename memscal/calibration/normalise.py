@@ -61,7 +61,8 @@ def normalise(view: KernelView, start: float) -> NormalisedKernel:
 def fit_gaussian_to_kernel(r: FloatArray, g: FloatArray, start: float) -> float:
     """Width of the Gaussian of unit integral nearest to G over the plane, in m.
 
-    Minimises the integral of the squared difference, with weight r: the paper's fit.
+    Minimises the integral of the squared difference, with weight r: the paper's fit.  No width
+    below half a step of the radial grid is told apart from a point.
     """
     from scipy.optimize import least_squares
 
@@ -73,8 +74,18 @@ def fit_gaussian_to_kernel(r: FloatArray, g: FloatArray, start: float) -> float:
     def slope(scaled: FloatArray) -> FloatArray:
         return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
 
-    found = least_squares(misfit, [1.0], jac=slope, xtol=1e-12, ftol=1e-14, gtol=1e-14)
-    return float(abs(found.x[0]) * start)
+    narrowest = 0.5 * float(r[1] - r[0])
+    begin = max(start, 2 * narrowest) / start
+    found = least_squares(
+        misfit,
+        [begin],
+        jac=slope,
+        bounds=(narrowest / start, np.inf),
+        xtol=1e-12,
+        ftol=1e-14,
+        gtol=1e-14,
+    )
+    return float(found.x[0] * start)
 
 
 def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:

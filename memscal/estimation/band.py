@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0
 
-from memscal.errors import FitError
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
@@ -36,7 +35,7 @@ class Band:
     signal, noise : ndarray, shape (n,)
         Modulus of the voltage's transform and its noise, in V m^2 / N.
     relevant, resolved : float
-        Wavenumbers where the signal falls below ten and three times the noise, in rad/m.
+        Wavenumbers beyond which the signal stays below ten and three times the noise, in rad/m.
     weakest_voltage, weakest_reference : float
         Moduli of both fields' transforms at ``relevant``.
     """
@@ -51,25 +50,12 @@ class Band:
 
 
 def find_band(estimate: ProfileEstimate) -> Band:
-    """Find the relevant and the resolved band of a scan.
-
-    Raises
-    ------
-    FitError
-        If no component of the voltage stands ten times above its noise.
-    """
+    """Find the relevant and the resolved band of a scan."""
     spectrum = estimate.spectrum
     k, signal = spectrum.wavenumbers.k, np.abs(spectrum.values)
     noise = _planar_noise(estimate) if estimate.points.planar else _ring_noise(estimate, k)
     ratio = signal / noise
     relevant, resolved = _falls_below(k, ratio, RELEVANT), _falls_below(k, ratio, RESOLVED)
-    if relevant <= k[0]:
-        raise FitError(
-            f"The voltage's total stands only {ratio[0]:.1f} times above its noise; at least "
-            f"{RELEVANT:g} times are needed.",
-            why="No spectral component of the scan can be divided with any confidence.",
-            cure="Raise the load, average repeats, or scan closer to the sensor.",
-        )
     reference = np.abs(estimate.model.reference.values)
     weakest_voltage = float(np.interp(relevant, k, signal))
     weakest_reference = float(np.interp(relevant, k, reference))
@@ -77,13 +63,13 @@ def find_band(estimate: ProfileEstimate) -> Band:
 
 
 def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
-    """Return the first wavenumber where a ratio crosses a threshold, log-interpolated."""
-    below = np.flatnonzero(ratio < threshold)
-    if not below.size:
-        return float(k[-1])
-    i = int(below[0])
-    if i == 0:
-        return float(k[0])
+    """Return where a ratio falls below a threshold for good, log-interpolated.
+
+    The transform of a ring-shaped G passes through zero and comes back: such a gap ends no band.
+    """
+    i = int(np.flatnonzero(ratio >= threshold).max(initial=-1)) + 1
+    if i in (0, k.size):
+        return float(k[max(i - 1, 0)])
     upper, lower = np.log(ratio[i - 1]), np.log(max(ratio[i], np.finfo(float).tiny))
     return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.errors import FitError
 from memscal.estimation.departure import (
     DepartureBasis,
     WeighedFit,
@@ -22,6 +23,8 @@ __all__ = ["ProfileEstimate", "estimate_profile"]
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
+#: A conversion constant must exceed this many of its standard uncertainties.
+LEAST_SIGNIFICANCE = 5.0
 _WEIGHING_ROUNDS = 4
 
 
@@ -152,7 +155,8 @@ def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEs
     Raises
     ------
     FitError
-        If the scan does not determine the parameters.
+        If the scan does not determine the parameters: no centre within it, or no signal that
+        stands clear of zero.
     """
     model = ForwardModel(points, reference)
     stated = np.ones_like(points.u) if points.u_errors is None else points.u_errors**-2.0
@@ -168,7 +172,30 @@ def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEs
         if np.allclose(found, outlier, atol=0.02):
             break
         outlier = found
-    return ProfileEstimate(model, fit, basis, weighed, weights, outlier)
+    estimate = ProfileEstimate(model, fit, basis, weighed, weights, outlier)
+    _require_determined(estimate)
+    return estimate
+
+
+def _require_determined(estimate: ProfileEstimate) -> None:
+    """Refuse a scan that does not cross its sensor, or whose signal is lost in noise."""
+    points, integrals = estimate.points, estimate.basis.integrals
+    for name, positions, centre in zip("xy", (points.x, points.y), estimate.centre, strict=True):
+        if not positions.min() - points.step <= centre <= positions.max() + points.step:
+            raise FitError(
+                f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "
+                f"scan from {positions.min() * 1e3:.4g} mm to {positions.max() * 1e3:.4g} mm.",
+                why="A centre that was not crossed is not determined, nor is anything else.",
+                cure="Scan across the sensor.",
+            )
+    uncertainty = float(np.sqrt(integrals @ estimate.covariance @ integrals))
+    if not estimate.conversion_constant > LEAST_SIGNIFICANCE * uncertainty:
+        raise FitError(
+            f"The conversion constant would be ({estimate.conversion_constant:.2g} ± "
+            f"{uncertainty:.2g}) V/Pa: it is not told apart from zero.",
+            why="The voltage does not rise above its noise and baseline as the rod passes.",
+            cure="Check the channel and the positions; raise the load or average repeats.",
+        )
 
 
 def _outlier_weight(standardised: FloatArray, threshold: float) -> FloatArray:

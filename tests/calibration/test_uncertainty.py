@@ -1,0 +1,80 @@
+"""Uncertainties against brute force: inputs moved one by one, and the budget's own sums."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scans import TAILS, simulated
+
+import memscal
+from memscal.simulation import PAPER_FILM, PAPER_ROD
+
+PARAMETERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
+
+
+def calibrated(scan, film=PAPER_FILM, rod=PAPER_ROD):
+    return memscal.calibrate(scan, reference=memscal.indent(film, rod, load=1.0)).apparatus
+
+
+@pytest.mark.parametrize(
+    ("source", "change"),
+    [
+        ("thickness", lambda: {"film": replace(PAPER_FILM, thickness=2.02e-3)}),
+        ("poisson_ratio", lambda: {"film": replace(PAPER_FILM, poisson_ratio=0.495)}),
+        ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
+    ],
+)
+def test_each_input_of_the_reference_counts_what_moving_it_changes(source, change) -> None:
+    scan = simulated(film=PAPER_FILM, rod=PAPER_ROD, noise=0.002)
+    usual, moved = calibrated(scan), calibrated(scan, **change())
+    # The window of the deconvolved G follows the reference too, which first order leaves out.
+    for name, tolerance in (("gaussian_sigma", 0.05), ("gaussian_sigma_deconvolved", 0.25)):
+        difference = abs(moved.parameters[name] - usual.parameters[name])
+        assert usual.budget[name][source] == pytest.approx(difference, rel=tolerance, abs=2e-8)
+    # A follows from the total force, which no film changes: a part in a thousand at most.
+    for apparatus in (usual, moved):
+        assert apparatus.conversion_constant == pytest.approx(1e-7, rel=3e-3)
+
+
+def test_the_load_scales_the_conversion_constant_and_nothing_else() -> None:
+    scan = replace(simulated(), load_uncertainty=0.02)
+    apparatus = memscal.calibrate(scan).apparatus
+    assert apparatus.budget["conversion_constant"]["load"] == pytest.approx(
+        0.02 * apparatus.conversion_constant
+    )
+    assert apparatus.budget["gaussian_sigma"]["load"] == 0.0
+
+
+def test_young_s_modulus_is_stated_and_counts_nothing_at_a_given_load() -> None:
+    apparatus = memscal.calibrate(memscal.simulate()).apparatus
+    assert apparatus.budget["conversion_constant"]["young_modulus"] == 0.0
+
+
+@pytest.mark.parametrize("options", [{}, {"raster": True, "points": 17}])
+def test_the_budget_adds_up_to_the_stated_uncertainty(options) -> None:
+    apparatus = memscal.calibrate(memscal.simulate(**options)).apparatus
+    for name in PARAMETERS:
+        total = np.sqrt(sum(u**2 for u in apparatus.budget[name].values()))
+        assert total == pytest.approx(apparatus.parameters.uncertainty(name), rel=1e-9)
+
+
+def test_covariances_are_covariances() -> None:
+    apparatus = memscal.calibrate(memscal.simulate(kernel=TAILS)).apparatus
+    for covariance in (apparatus.parameters.covariance, apparatus.radial_profile.g_covariance):
+        scale = np.sqrt(np.diag(covariance))
+        correlation = covariance / np.outer(scale, scale)
+        np.testing.assert_allclose(correlation, correlation.T, atol=1e-12)
+        assert np.linalg.eigvalsh(correlation).min() > -1e-9
+    profile = apparatus.radial_profile
+    np.testing.assert_allclose(profile.g_errors**2, np.diag(profile.g_covariance))
+
+
+def test_noise_counts_in_proportion_and_the_window_closes_with_it() -> None:
+    quiet, loud = (memscal.calibrate(simulated(noise=n)).apparatus for n in (0.001, 0.01))
+    ratio = loud.budget["gaussian_sigma"]["noise"] / quiet.budget["gaussian_sigma"]["noise"]
+    assert 7 < ratio < 14
+    assert loud.resolved_wavenumber < quiet.resolved_wavenumber
+    hidden = "gaussian_sigma_deconvolved"
+    assert loud.budget[hidden]["window"] > quiet.budget[hidden]["window"] > 0

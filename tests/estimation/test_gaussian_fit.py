@@ -1,0 +1,105 @@
+"""The Gaussian fit: exact without noise, right in its derivatives, and robust at its start."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scans import CONVERSION, simulated
+
+import memscal
+from memscal.errors import FitError
+from memscal.estimation.forward import ForwardModel, gaussian_transfer
+from memscal.estimation.gaussian_fit import fit_gaussian
+from memscal.estimation.points import measured_points
+from memscal.estimation.reference import reference_spectrum
+from memscal.model.scan import Scan
+
+
+def forward(scan: Scan) -> ForwardModel:
+    points = measured_points(scan)
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    return ForwardModel(points, reference_spectrum(contact, points, scan.film.thickness))
+
+
+def fit(scan: Scan):
+    model = forward(scan)
+    return fit_gaussian(model, np.ones_like(model.points.u))
+
+
+@settings(max_examples=25)
+@given(
+    sigma=st.floats(0.15e-3, 1.2e-3),
+    centre=st.floats(-2.5e-3, 2.5e-3),
+    baseline=st.floats(-0.5, 0.5),
+    drift=st.floats(-0.3, 0.3),
+)
+def test_without_noise_every_parameter_is_recovered(sigma, centre, baseline, drift) -> None:
+    scan = simulated(
+        kernel=memscal.GaussianMixture((1.0,), (sigma,)),
+        centre=(centre, 0.0),
+        baseline=baseline,
+        drift=drift,
+        noise=0.0,
+    )
+    found = fit(scan)
+    # The film passes no more than exp(-kh): a width is known to what the fit converges to.
+    assert found.sigma == pytest.approx(sigma, rel=1e-5)
+    assert found.conversion_constant == pytest.approx(CONVERSION, rel=1e-6)
+    assert found.centre[0] == pytest.approx(centre, abs=1e-9)
+    assert found.drift[0] == pytest.approx(scan.synthetic["baseline"], abs=1e-9)
+    assert 2 * found.drift[1] == pytest.approx(scan.synthetic["drift"], abs=1e-9)
+
+
+def test_uneven_and_unsorted_positions_change_nothing() -> None:
+    even = simulated(noise=0.0, points=129)
+    chosen = np.random.default_rng().permutation(129)[:60]
+    uneven = replace(even, x=even.x[chosen], u_zz=even.u_zz[chosen])
+    assert fit(uneven).sigma == pytest.approx(fit(even).sigma, rel=1e-5)
+
+
+def test_a_raster_s_centre_is_found_in_both_directions() -> None:
+    scan = simulated(raster=True, points=17, noise=0.0, centre=(0.4e-3, -0.7e-3))
+    np.testing.assert_allclose(fit(scan).centre, [0.4e-3, -0.7e-3], atol=1e-9)
+
+
+def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
+    for raster in (False, True):
+        model = forward(simulated(raster=raster, points=13, noise=0.0))
+        found = fit_gaussian(model, np.ones_like(model.points.u))
+        plane = 2 if raster else 1
+
+        def predict(shift, found=found, model=model, plane=plane):
+            a, s = found.conversion_constant + shift[0], found.sigma + shift[1]
+            centre = found.centre.copy()
+            centre[:plane] += shift[2 : 2 + plane]
+            kernel = a * gaussian_transfer(model.k, s)
+            signal = model.signal(model.geometry(centre), kernel)
+            return signal + model.drift_columns @ (found.drift + shift[2 + plane :])
+
+        count = found.jacobian.shape[1]
+        steps = [1e-5 * CONVERSION, 1e-8, *[1e-8] * plane, *[1e-6] * (count - 2 - plane)]
+        for i, step in enumerate(steps):
+            shift = np.zeros(count)
+            shift[i] = step
+            slope = (predict(shift) - predict(-shift)) / (2 * step)
+            scale = np.abs(slope).max()
+            np.testing.assert_allclose(found.jacobian[:, i] / scale, slope / scale, atol=1e-6)
+
+
+@pytest.mark.parametrize("place", [0, 11, 31, 64])
+def test_one_gross_outlier_does_not_lead_the_search_astray(place: int) -> None:
+    scan = simulated(noise=0.002)
+    u = scan.u_zz.copy()
+    u[place] += 3 * u.max()
+    assert fit(replace(scan, u_zz=u)).centre[0] == pytest.approx(0.14e-3, abs=0.05e-3)
+
+
+def test_a_voltage_that_never_falls_again_is_refused() -> None:
+    scan = simulated()
+    bowl = 1e-4 * (scan.x / 1e-3) ** 2
+    with pytest.raises(FitError, match="apparatus function"):
+        fit(replace(scan, u_zz=-bowl))

@@ -1,0 +1,80 @@
+"""The tests of symmetry, linearity and roundness: rare false alarms, and real departures found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scans import estimated, simulated
+from scipy.stats import binom, chi2
+
+from memscal.estimation.hypotheses import (
+    axisymmetry_test,
+    chi_square_limit,
+    linearity_test,
+    symmetry_test,
+)
+
+
+def rejected(p_values: list[float], level: float) -> int:
+    return int(np.sum(np.array(p_values) < level))
+
+
+def test_the_limit_is_the_thousandth_of_chi_square() -> None:
+    assert chi_square_limit(3) == pytest.approx(chi2.isf(1e-3, 3))
+
+
+def test_symmetry_is_rejected_as_rarely_as_chance_demands() -> None:
+    scans = 120
+    p_values = []
+    for seed in range(scans):
+        odd = symmetry_test(estimated(simulated(seed=seed)))
+        p_values.append(chi2.sf(odd.fall, odd.count))
+    # A tenth of symmetric scans fall below p = 0.1, within what a binomial allows once in 1e6.
+    low, high = binom.ppf([1e-6, 1 - 1e-6], scans, 0.1)
+    assert low <= rejected(p_values, 0.1) <= high
+
+
+def test_a_tilted_rod_is_found() -> None:
+    scan = simulated(noise=0.002)
+    side = scan.x - 0.14e-3
+    bump = 0.05 * scan.u_zz.max() * (side / 1e-3) * np.exp(-((side / 1.2e-3) ** 2))
+    odd = symmetry_test(estimated(replace(scan, u_zz=scan.u_zz + bump)))
+    assert odd.fall > chi_square_limit(odd.count)
+
+
+def test_linearity_is_tested_only_where_loads_differ() -> None:
+    assert linearity_test(estimated(simulated())) is None
+
+
+@pytest.mark.parametrize("eta", [-0.05, 0.1])
+def test_a_gain_that_changes_with_load_is_measured(eta: float) -> None:
+    scan = simulated(load=[0.5, 1.0, 1.5], noise=0.002, baseline=0.0, drift=0.0)
+    bent = scan.u_zz * (1 + eta * (scan.normal_load - 1.0))
+    linear = linearity_test(estimated(replace(scan, u_zz=bent)))
+    assert linear.fall > chi_square_limit(1)
+    # First order in eta, and what departures absorb of it.
+    assert linear.coefficients[0] == pytest.approx(eta, abs=5 * linear.errors[0] + 0.3 * abs(eta))
+
+
+def test_linear_scans_at_several_loads_are_not_accused() -> None:
+    scans, level = 60, 0.1
+    p_values = []
+    for seed in range(scans):
+        linear = linearity_test(estimated(simulated(load=[0.5, 1.5], points=33, seed=seed)))
+        p_values.append(chi2.sf(linear.fall, 1))
+    low, high = binom.ppf([1e-6, 1 - 1e-6], scans, level)
+    assert low <= rejected(p_values, level) <= high
+
+
+def test_a_round_sensor_passes_and_an_elliptic_one_is_found() -> None:
+    scan = simulated(raster=True, points=17, noise=0.003)
+    even = axisymmetry_test(estimated(scan))
+    assert even.fall < chi2.isf(1e-6, even.count)
+    dx, dy = scan.x[None, :] - 0.14e-3, scan.y[:, None]
+    lobes = (dx**2 - dy**2) / 1e-6 * np.exp(-(dx**2 + dy**2) / 3e-6)
+    oval = replace(scan, u_zz=scan.u_zz + 0.02 * scan.u_zz.max() * lobes)
+    uneven = axisymmetry_test(estimated(oval))
+    assert uneven.fall > chi_square_limit(uneven.count)
+    assert uneven.size == pytest.approx(0.02 * np.abs(lobes).max(), rel=0.5)

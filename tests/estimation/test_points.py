@@ -1,0 +1,71 @@
+"""Points: what is left out is counted, and what cannot be calibrated is refused plainly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scans import simulated
+
+import memscal
+from memscal.errors import FitError, InputError
+from memscal.estimation.points import measured_points
+
+
+def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
+    scan = simulated(load=[0.5, 1.0], points=21)
+    u, load = scan.u_zz.copy(), np.array(scan.normal_load)
+    u[0, 3], load[1, 7] = np.nan, np.nan
+    points = measured_points(replace(scan, u_zz=u, normal_load=load))
+    assert points.missing == 2
+    assert points.u.size == 2 * 21 - 2
+    assert np.isfinite(points.u).all()
+    assert np.isfinite(points.load).all()
+
+
+def test_a_raster_keeps_both_coordinates_of_every_point() -> None:
+    scan = simulated(raster=True, points=9)
+    points = measured_points(scan)
+    assert points.planar
+    k = 5 * 9 + 2
+    assert (points.y[k], points.x[k], points.u[k]) == (scan.y[5], scan.x[2], scan.u_zz[5, 2])
+
+
+def test_repeats_share_positions_and_know_their_row() -> None:
+    points = measured_points(simulated(points=11, repeats=3))
+    assert np.array_equal(points.x[:11], points.x[11:22])
+    assert np.array_equal(np.unique(points.repeat), [0, 1, 2])
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        (lambda s: {"u_zz": np.full_like(s.u_zz, np.nan)}, InputError, "missing"),
+        (lambda s: {"u_zz": -s.u_zz}, InputError, "positive in compression"),
+        (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, InputError, "Every voltage"),
+        (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, InputError, "zero"),
+        (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, InputError, "above zero"),
+        (
+            lambda s: {"x": s.x[:5], "u_zz": s.u_zz[:5], "u_zz_errors": None},
+            FitError,
+            "at least 6",
+        ),
+    ],
+)
+def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, error, words) -> None:
+    scan = simulated()
+    with pytest.raises(error, match=words):
+        measured_points(replace(scan, **change(scan)))
+
+
+def test_a_negative_outlier_is_no_wrong_sign() -> None:
+    scan = simulated()
+    u = scan.u_zz.copy()
+    u[5] -= 10 * u.max()
+    assert measured_points(replace(scan, u_zz=u)).u.size == 65
+
+
+def test_a_scan_of_no_load_is_refused_when_it_is_made() -> None:
+    with pytest.raises(memscal.MemscalError, match="0 N"):
+        replace(simulated(), load=0.0)

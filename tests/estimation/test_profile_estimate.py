@@ -1,0 +1,108 @@
+"""The estimated profile: noise, outliers, departures from a Gaussian, and refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scans import CONVERSION, RING, estimated, simulated
+from scipy.stats import chi2
+
+import memscal
+from memscal.errors import FitError
+
+
+def test_without_noise_the_profile_is_the_scan() -> None:
+    scan = simulated(noise=0.0, kernel=RING)
+    estimate = estimated(scan)
+    np.testing.assert_allclose(estimate.predicted, scan.u_zz, atol=2e-4 * estimate.largest_signal)
+    assert estimate.conversion_constant == pytest.approx(CONVERSION, rel=1e-3)
+
+
+def test_the_noise_is_found_from_the_scatter_alone() -> None:
+    # 40 scans of about 60 degrees of freedom each: the pooled variance follows chi-square.
+    degrees, seeds = 60, range(40)
+    ratios = []
+    for seed in seeds:
+        scan = simulated(noise=0.01, state_noise=False, seed=seed)
+        ratios.append(estimated(scan).noise_scale / scan.synthetic["noise"])
+    pooled = np.mean(np.square(ratios))
+    low, high = chi2.ppf([1e-6, 1 - 1e-6], degrees * len(seeds)) / (degrees * len(seeds))
+    # Down-weighted chance outliers and spent departures take up to three percent.
+    assert low - 0.06 < pooled < high
+
+
+def test_stated_noise_that_is_too_small_is_raised_and_never_lowered() -> None:
+    scan = simulated(noise=0.01)
+    small = replace(scan, u_zz_errors=scan.u_zz_errors / 3)
+    large = replace(scan, u_zz_errors=scan.u_zz_errors * 3)
+    assert 2.0 < estimated(small).noise_scale < 4.0
+    assert estimated(large).noise_scale == 1.0
+
+
+@pytest.mark.parametrize("height", [-1.0, 0.3, 5.0])
+def test_an_outlier_is_found_weighed_down_and_moves_nothing(height: float) -> None:
+    scan = simulated(noise=0.002)
+    clean = estimated(scan)
+    u = scan.u_zz.copy()
+    u[20] += height * clean.largest_signal
+    spoilt = estimated(replace(scan, u_zz=u))
+    assert spoilt.outlier_weight[20] < 1e-3
+    assert np.sum(spoilt.outlier_weight < 0.5) <= 1 + np.sum(clean.outlier_weight < 0.5)
+    shift = abs(spoilt.conversion_constant - clean.conversion_constant)
+    errors = np.sqrt(spoilt.basis.integrals @ spoilt.covariance @ spoilt.basis.integrals)
+    assert shift < errors
+
+
+def test_a_gaussian_sensor_keeps_the_gaussian_and_a_ring_loses_it() -> None:
+    gaussian = [estimated(simulated(noise=0.002, seed=seed)) for seed in range(20)]
+    ring = [estimated(simulated(noise=0.002, seed=seed, kernel=RING)) for seed in range(20)]
+    assert np.median([e.weighed.gaussian_probability for e in gaussian]) > 0.5
+    assert max(e.weighed.gaussian_probability for e in ring) < 1e-3
+
+
+def test_repeats_narrow_the_uncertainty_as_their_square_root() -> None:
+    one, nine = estimated(simulated(seed=5)), estimated(simulated(seed=5, repeats=9))
+    ratio = np.sqrt(np.diag(one.gaussian_covariance) / np.diag(nine.gaussian_covariance))
+    # Up to Birge's ratio, which raises a single scan's stated noise by what its scatter exceeds it.
+    np.testing.assert_allclose(ratio * nine.noise_scale / one.noise_scale, 3.0, rtol=0.02)
+
+
+def test_a_scan_beside_the_sensor_is_refused() -> None:
+    scan = simulated(centre=(8.4e-3, 0.0))
+    with pytest.raises(FitError, match="outside the scan"):
+        estimated(scan)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_alone_is_no_calibration(seed: int) -> None:
+    scan = simulated()
+    noise = np.random.default_rng(seed).normal(0, 1e-4, scan.u_zz.shape)
+    with pytest.raises(FitError):
+        estimated(replace(scan, u_zz=noise, u_zz_errors=None))
+
+
+def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
+    scan = simulated(kernel=RING, noise=0.002, state_noise=False)
+    estimate = estimated(scan)
+    from memscal.estimation.departure import weigh_departures
+
+    change = np.zeros_like(scan.u_zz)
+    change[30] = 1e-3 * estimate.weighed.noise
+    moved = replace(estimate.points, u=estimate.points.u + change)
+    again = weigh_departures(
+        replace(estimate.model, points=moved),
+        estimate.gaussian,
+        estimate.basis,
+        estimate.weights,
+        float(estimate.outlier_weight.sum()),
+    )
+    # The posterior over strengths moves too, by second order: compare integrals, not rings.
+    expected = estimate.basis.integrals @ estimate.weighed.gain @ change
+    found = estimate.basis.integrals @ (again.mean - estimate.weighed.mean)
+    assert found == pytest.approx(expected, rel=0.2)
+
+
+def test_the_public_name_of_a_refusal_is_a_memscal_error() -> None:
+    assert issubclass(FitError, memscal.MemscalError)
