@@ -131,6 +131,7 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
     """
     spline = radial_spline(r, f)
     reach = float(r[-1])
-    nodes, weights = gauss_panels(reach, min(_PHASE / float(np.max(k)), reach / 4), _ORDER)
+    fastest = max(float(np.max(np.abs(k))), 1 / reach)
+    nodes, weights = gauss_panels(reach, min(_PHASE / fastest, reach / 4), _ORDER)
     measure = 2 * np.pi * weights * nodes
     return np.asarray(j0(np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))

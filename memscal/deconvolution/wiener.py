@@ -61,8 +61,8 @@ class Wiener:
         weakest = problem.weakest_reference / (
             problem.grid.cell_area * problem.grid.to_image(problem.reference).sum()
         )
-        # Along one axis: the first component weaker than the weakest relevant one.
-        index = max(int(np.argmax(spectrum[0] < weakest)), 1)
+        # Along one axis: the first component weaker than the weakest relevant one, or the last.
+        index = int(np.argmax(spectrum[0] < weakest)) or spectrum.shape[1] - 1
         balance = (self.amplitude * NOISE_RATIO * weakest / penalty[0, index]) ** 2
         restored = wiener(images.image, images.point_spread, balance, clip=False)
         return image_division(problem, restored * images.scale)

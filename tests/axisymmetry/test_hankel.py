@@ -1,0 +1,200 @@
+"""Hankel transforms against pairs in closed form and adaptive quadrature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.special import j0, j1, jv
+
+from memscal.axisymmetry.hankel import (
+    RadialSpectrum,
+    Wavenumbers,
+    hankel_transform,
+    radial_spline,
+)
+from memscal.errors import InputError
+from memscal.model.validation import FloatArray
+
+K = np.linspace(0.05, 20.0, 60)
+
+
+def gaussian(r: FloatArray) -> FloatArray:
+    return np.exp(-(r**2) / 2) / (2 * np.pi)
+
+
+def test_a_disc_becomes_a_jinc() -> None:
+    r = np.linspace(0.0, 1.0, 9)
+    jinc = 2 * np.pi * j1(K) / K
+    np.testing.assert_allclose(hankel_transform(r, np.ones(9), K), jinc, atol=1e-13)
+
+
+def test_a_paraboloid_becomes_a_second_order_jinc() -> None:
+    # Sonine: the integral of (1 - r^2) J0(kr) r over the unit disc is 2 J2(k)/k^2.
+    r = np.linspace(0.0, 1.0, 7)
+    exact = 4 * np.pi * jv(2, K) / K**2
+    np.testing.assert_allclose(hankel_transform(r, 1 - r**2, K), exact, atol=1e-13)
+
+
+@given(width=st.floats(1e-5, 1e3))
+def test_a_gaussian_becomes_a_gaussian_in_any_unit_of_length(width: float) -> None:
+    r = width * np.linspace(0.0, 9.0, 600)
+    k = np.array([0.0, 0.5, 1.0, 3.0]) / width
+    found = hankel_transform(r, gaussian(r / width) / width**2, k)
+    np.testing.assert_allclose(found, np.exp(-((k * width) ** 2) / 2), atol=1e-8)
+
+
+def test_a_point_load_below_a_surface_becomes_an_exponential() -> None:
+    # 1/(1 + r^2)^(3/2) and 2 pi exp(-k) are a pair.  By parts, with (r J1(kr))' = k r J0(kr),
+    # what lies beyond R is less than 2 (2 pi) R J1/(k R^3) <= 4 pi/(k R^2) sqrt(2/(pi k R)).
+    reach = 2000.0
+    r = np.concatenate([np.linspace(0.0, 20.0, 801), np.geomspace(20.0, reach, 800)[1:]])
+    k = np.array([0.3, 1.0, 2.5])
+    found = hankel_transform(r, (1 + r**2) ** -1.5, k)
+    beyond = 4 * np.pi / (k * reach**2) * np.sqrt(2 / (np.pi * k * reach))
+    np.testing.assert_array_less(np.abs(found - 2 * np.pi * np.exp(-k)), beyond + 1e-6)
+
+
+def test_a_ring_agrees_with_an_adaptive_rule() -> None:
+    def ring(r: float) -> float:
+        return float((r - 2.0) ** 2 * np.exp(-((r - 2.0) ** 2)) - 0.1 * np.exp(-(r**2)))
+
+    r = np.linspace(0.0, 9.0, 1501)
+    found = hankel_transform(r, np.array([ring(value) for value in r]), np.array([0.4, 2.2, 7.0]))
+    for k, value in zip([0.4, 2.2, 7.0], found, strict=True):
+        adaptive, _ = quad(
+            lambda s, k=k: 2 * np.pi * ring(s) * j0(k * s) * s, 0, 9, limit=200, epsabs=1e-12
+        )
+        assert value == pytest.approx(adaptive, abs=2e-8)
+
+
+def test_at_zero_the_transform_is_the_integral_over_the_plane() -> None:
+    r = np.linspace(0.0, 9.0, 400)
+    assert hankel_transform(r, gaussian(r), np.array([0.0]))[0] == pytest.approx(1.0, abs=1e-8)
+
+
+def test_the_transform_is_even_in_k() -> None:
+    r = np.linspace(0.0, 9.0, 400)
+    np.testing.assert_allclose(
+        hankel_transform(r, gaussian(r), -K), hankel_transform(r, gaussian(r), K), atol=1e-13
+    )
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.5])
+def test_the_error_falls_with_the_fourth_power_of_the_step(offset: float) -> None:
+    k = np.linspace(0.1, 6.0, 12)
+    errors = []
+    for count in (20, 40, 80, 160):
+        step = 10.0 / count
+        r = step * (np.arange(count + 1) + offset)
+        errors.append(np.abs(hankel_transform(r, gaussian(r), k) - np.exp(-(k**2) / 2)).max())
+    # Three halvings would give 16^3 = 4096; an order of 3.5 gives 1448.
+    assert errors[0] / errors[-1] > 1448
+    assert errors[-1] < 1e-7
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_transform_is_linear(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    r = np.sort(rng.uniform(0.0, 5.0, 40))
+    r = r[np.concatenate([[True], np.diff(r) > 1e-2])]
+    f, g = rng.normal(size=(2, r.size))
+    a, b = rng.normal(size=2)
+    combined = hankel_transform(r, a * f + b * g, K)
+    separate = a * hankel_transform(r, f, K) + b * hankel_transform(r, g, K)
+    scale = np.abs(hankel_transform(r, f, K)).max() + np.abs(hankel_transform(r, g, K)).max()
+    np.testing.assert_allclose(combined, separate, atol=1e-10 * scale)
+
+
+@pytest.mark.parametrize("start", [0.0, 1e-12, 0.02, 0.1])
+def test_a_spline_has_no_kink_on_the_axis_wherever_the_table_begins(start: float) -> None:
+    r = np.concatenate([[start], np.arange(0.15, 8.0, 0.05)])
+    spline = radial_spline(r, np.cos(r))
+    inner = np.linspace(0.0, 1.0, 201)
+    np.testing.assert_allclose(spline(inner), np.cos(inner), atol=2e-5)
+    slope = (spline(np.array([1e-4])) - spline(np.array([0.0]))) / 1e-4
+    assert abs(slope[0]) < 1e-3
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=4, max_size=20))
+def test_a_spline_passes_through_its_table(values: list[float]) -> None:
+    r, f = np.arange(len(values)) * 0.3, np.array(values)
+    np.testing.assert_allclose(radial_spline(r, f)(r), f, atol=1e-9)
+
+
+def test_three_radii_are_too_few() -> None:
+    with pytest.raises(InputError, match="3 radii cannot be interpolated"):
+        radial_spline(np.arange(3.0), np.arange(3.0))
+
+
+@given(product=st.floats(1.0, 3000.0), k_max=st.floats(6.5, 60.0))
+def test_nodes_resolve_the_radii_that_they_are_made_for(product: float, k_max: float) -> None:
+    # The weights carry k dk / 2 pi; beyond k_max the Gaussian's transform is below exp(-21).
+    r_max = product / k_max
+    wavenumbers = Wavenumbers.covering(k_max, r_max)
+    r = np.linspace(0.0, r_max, 50)
+    found = wavenumbers.synthesise(np.exp(-(wavenumbers.k**2) / 2), r)
+    left_out = np.exp(-(k_max**2) / 2) / (2 * np.pi)
+    np.testing.assert_allclose(found, gaussian(r), atol=left_out + 1e-13)
+
+
+def test_nodes_for_smaller_radii_would_not_do() -> None:
+    wavenumbers = Wavenumbers.covering(12.0, 2.0)
+    r = np.array([60.0])
+    assert abs(wavenumbers.synthesise(np.exp(-(wavenumbers.k**2) / 2), r)[0]) > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("function", "transform", "k_max"),
+    [
+        (lambda r: (1 + r**2) ** -1.5, lambda k: 2 * np.pi * np.exp(-k), 36.0),
+        (gaussian, lambda k: np.exp(-(k**2) / 2), 9.0),
+        # Two Gaussians, one taken off the other: a ring with a hole of no stress.
+        (
+            lambda r: np.exp(-(r**2) / 4) - np.exp(-(r**2)),
+            lambda k: 4 * np.pi * np.exp(-(k**2)) - np.pi * np.exp(-(k**2) / 4),
+            12.0,
+        ),
+    ],
+)
+def test_synthesis_inverts_transforms_known_in_closed_form(
+    function: Callable[[FloatArray], FloatArray],
+    transform: Callable[[FloatArray], FloatArray],
+    k_max: float,
+) -> None:
+    r = np.linspace(0.0, 30.0, 24).reshape(4, 6)
+    wavenumbers = Wavenumbers.covering(k_max, 30.0)
+    spectrum = RadialSpectrum(wavenumbers, transform(wavenumbers.k))
+    np.testing.assert_allclose(spectrum.at(r), function(r), atol=1e-12)
+
+
+@pytest.mark.parametrize("r_max", [0.5, 3.0, 200.0])
+def test_the_integral_is_the_transform_at_zero(r_max: float) -> None:
+    # A ring: one Gaussian taken off another; its integral over the plane is 4 pi - pi.
+    k = Wavenumbers.covering(12.0, r_max)
+    ring = RadialSpectrum(k, 4 * np.pi * np.exp(-(k.k**2)) - np.pi * np.exp(-(k.k**2) / 4))
+    assert ring.integral == pytest.approx(3 * np.pi, rel=1e-10)
+
+
+def test_transform_and_synthesis_undo_each_other() -> None:
+    r = np.linspace(0.0, 10.0, 801)
+    profile = (1 - r**2 / 3) * np.exp(-(r**2) / 2)
+    wavenumbers = Wavenumbers.covering(12.0, 10.0)
+    back = wavenumbers.synthesise(hankel_transform(r, profile, wavenumbers.k), r)
+    np.testing.assert_allclose(back, profile, atol=1e-8)
+
+
+def test_the_product_of_transforms_is_the_transform_of_the_convolution() -> None:
+    # Convolving 1/(a^2 + r^2)^(3/2) fields adds their depths: exp(-ak) exp(-bk).
+    wavenumbers = Wavenumbers.covering(40.0, 20.0)
+
+    def depth(a: float, r: FloatArray) -> FloatArray:
+        return a / (2 * np.pi * (a**2 + r**2) ** 1.5)
+
+    r = np.linspace(0.0, 20.0, 31)
+    product = np.exp(-0.7 * wavenumbers.k) * np.exp(-0.8 * wavenumbers.k)
+    np.testing.assert_allclose(wavenumbers.synthesise(product, r), depth(1.5, r), atol=1e-12)

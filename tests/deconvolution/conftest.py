@@ -1,0 +1,103 @@
+"""Division problems whose answer is known in closed form."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
+from memscal.deconvolution.problem import Division, DivisionProblem
+from memscal.model.validation import FloatArray
+
+A = 3e-8
+STRESS_WIDTH, KERNEL_WIDTH = 0.9e-3, 0.561e-3
+
+
+def _gaussian(r: FloatArray, width: float) -> FloatArray:
+    return np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
+
+
+def _axis(count: int, step: float, offset: float = 0.0) -> FloatArray:
+    return (np.arange(count) - count // 2) * step + offset
+
+
+GRIDS: dict[str, tuple[FieldGrid, FieldGrid]] = {
+    "quarter plane": (EvenGrid(129, 0.1e-3), EvenGrid(129, 0.1e-3)),
+    "lattice": (
+        Lattice(_axis(161, 0.12e-3), _axis(141, 0.11e-3)),
+        Lattice(_axis(161, 0.12e-3), _axis(141, 0.11e-3)),
+    ),
+    "lattice off centre": (
+        Lattice(_axis(161, 0.12e-3, 0.63e-3), _axis(141, 0.11e-3, -0.41e-3)),
+        Lattice(_axis(161, 0.12e-3), _axis(141, 0.11e-3)),
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Gaussians:
+    """A Gaussian stress through a Gaussian kernel, without noise."""
+
+    problem: DivisionProblem
+    exact: FloatArray
+    stress_transform: FloatArray
+    kernel_transform: FloatArray
+
+    def error(self, division: Division) -> float:
+        """Relative L2 error of the quotient, as an image."""
+        found = self.problem.grid.to_image(division.field) / A
+        exact = self.problem.grid.to_image(self.exact)
+        return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+
+    def transform(self, division: Division) -> FloatArray:
+        """Transform of the quotient about its centre; one at zero if A is right."""
+        return self.problem.grid.transfer(division.field) / A
+
+
+def _make(grid_name: str = "quarter plane", weakest: float = 1e-3) -> Gaussians:
+    grid, centred = GRIDS[grid_name]
+    k = np.sqrt(-2 * np.log(weakest)) / STRESS_WIDTH
+    both = float(np.hypot(STRESS_WIDTH, KERNEL_WIDTH))
+    problem = DivisionProblem(
+        grid,
+        A * _gaussian(grid.radius, both),
+        _gaussian(grid.radius, STRESS_WIDTH),
+        A * float(np.exp(-((k * both) ** 2) / 2)),
+        weakest,
+    )
+    return Gaussians(
+        problem,
+        _gaussian(centred.radius, KERNEL_WIDTH),
+        np.exp(-((grid.wavenumber * STRESS_WIDTH) ** 2) / 2),
+        np.exp(-((grid.wavenumber * KERNEL_WIDTH) ** 2) / 2),
+    )
+
+
+@pytest.fixture
+def gaussians() -> Callable[..., Gaussians]:
+    """Return the maker of problems: by the grid's name and the weakest relevant component."""
+    return _make
+
+
+@pytest.fixture(params=GRIDS)
+def on_each_grid(request: pytest.FixtureRequest) -> Callable[..., Gaussians]:
+    """Return the maker of problems on one of the grids."""
+    return lambda weakest=1e-3: _make(request.param, weakest)
+
+
+@pytest.fixture(params=[name for name in GRIDS if name.startswith("lattice")])
+def on_each_lattice(request: pytest.FixtureRequest) -> Callable[..., Gaussians]:
+    """Return the maker of problems on one of the lattices."""
+    return lambda weakest=1e-3: _make(request.param, weakest)
+
+
+@pytest.fixture
+def seed() -> int:
+    """Return another seed in every run; the log of a failed test names it."""
+    value = int(np.random.SeedSequence().generate_state(1)[0])
+    logging.getLogger(__name__).info("seed %d", value)
+    return value

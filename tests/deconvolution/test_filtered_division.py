@@ -1,0 +1,120 @@
+"""Division by a spectral window: the quotient, the window, and the formulas of the windows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.special import expm1
+
+from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
+from memscal.deconvolution.problem import DivisionProblem, filtered_division, image_division
+from memscal.deconvolution.tikhonov import Tikhonov
+from memscal.deconvolution.white_noise import WhiteNoise
+from memscal.model.validation import FloatArray
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def small_lattice() -> Lattice:
+    return Lattice((np.arange(9) - 4) * 0.5, (np.arange(7) - 3) * 0.4)
+
+
+def random_problem(seed: int, grid: FieldGrid) -> tuple[DivisionProblem, FloatArray]:
+    """A random kernel behind a stress whose transform has no zero."""
+    rng = np.random.default_rng(seed)
+    shape = grid.radius.shape
+    spectrum = grid.forward(rng.normal(size=shape))
+    reference = grid.inverse(spectrum + 2.0 * np.abs(spectrum).max())
+    if isinstance(grid, Lattice):
+        reference = np.fft.ifftshift(reference)  # its axis at the lattice's first point
+    kernel = rng.normal(size=shape)
+    problem = DivisionProblem(grid, grid.convolve(kernel, reference), reference, 1.0, 1.0)
+    return problem, kernel
+
+
+@pytest.mark.parametrize("grid", [EvenGrid(9, 0.5), small_lattice()], ids=["quarter", "lattice"])
+@given(seed=SEEDS)
+def test_an_open_window_undoes_a_convolution(grid: FieldGrid, seed: int) -> None:
+    problem, kernel = random_problem(seed, grid)
+    division = filtered_division(problem, np.ones_like(grid.wavenumber))
+    np.testing.assert_allclose(division.field, kernel, atol=1e-9)
+
+
+@pytest.mark.parametrize("grid", [EvenGrid(9, 0.5), small_lattice()], ids=["quarter", "lattice"])
+@given(seed=SEEDS)
+def test_a_window_scales_each_component_of_the_quotient(grid: FieldGrid, seed: int) -> None:
+    problem, kernel = random_problem(seed, grid)
+    window = np.exp(-grid.wavenumber / 5)
+    division = filtered_division(problem, window)
+    expected = window * grid.transfer(kernel)
+    np.testing.assert_allclose(grid.transfer(division.field), expected, atol=1e-9)
+    assert division.window is window
+
+
+def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there() -> None:
+    grid = EvenGrid(9, 0.5)
+    reference = grid.inverse(np.where(grid.wavenumber < 4.0, 1.0, 0.0))
+    window = np.where(grid.wavenumber < 3.0, 1.0, 1e-10)
+    division = filtered_division(DivisionProblem(grid, reference, reference, 1.0, 1.0), window)
+    expected = np.where(grid.wavenumber < 3.0, 1.0, 0.0)
+    np.testing.assert_allclose(grid.forward(division.field), expected, atol=1e-12)
+
+
+@given(seed=SEEDS, amplitude=st.floats(0.1, 10), weakest=st.floats(0.1, 10))
+def test_tikhonov_is_the_solution_of_its_normal_equations(
+    seed: int, amplitude: float, weakest: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    grid = small_lattice()
+    voltage, reference = rng.normal(size=(2, 7, 9))
+    problem = DivisionProblem(grid, voltage, reference, 1.0, weakest)
+    found = Tikhonov(amplitude=amplitude).divide(problem).field
+    # Convolution as a dense matrix: column j is the reference, moved to pixel j of the kernel.
+    columns = [
+        np.roll(reference, (i - 3, j - 4), axis=(0, 1)).ravel() for i in range(7) for j in range(9)
+    ]
+    matrix = np.stack(columns, axis=1) * grid.cell_area
+    # Parseval gives both terms of the functional the same factor: alpha is in no need of one.
+    alpha = (amplitude * 0.1 * weakest) ** 2
+    stacked = np.concatenate([matrix, np.sqrt(alpha) * np.eye(63)])
+    target = np.concatenate([voltage.ravel(), np.zeros(63)])
+    solution = np.linalg.lstsq(stacked, target, rcond=None)[0].reshape(7, 9)
+    scale = np.abs(solution).max()
+    np.testing.assert_allclose(found, solution, atol=1e-6 * scale)
+
+
+@given(amplitude=st.floats(1e-2, 1e2), weakest=st.floats(1e-4, 0.5))
+def test_both_windows_are_the_formulas_that_they_state(amplitude: float, weakest: float) -> None:
+    grid = EvenGrid(33, 0.25)
+    reference = np.exp(-(grid.radius**2) / 2) / (2 * np.pi)
+    problem = DivisionProblem(grid, reference, reference, 1.0, weakest)
+    z2 = np.exp(-(grid.wavenumber**2))
+    s2 = (0.1 * amplitude * weakest) ** 2
+    tikhonov = Tikhonov(amplitude=amplitude).divide(problem).window
+    np.testing.assert_allclose(tikhonov, z2 / (z2 + s2), atol=1e-9)
+    white = WhiteNoise(amplitude=amplitude).divide(problem).window
+    # Where z has sunk into rounding, at 1e-16, so has the window: at 1e-32/s^2.
+    np.testing.assert_allclose(white, -expm1(-z2 / s2), atol=1e-9)
+
+
+def test_tikhonov_leaves_half_where_white_noise_leaves_nearly_two_thirds() -> None:
+    # At |z| = s the windows are 1/2 and 1 - 1/e.
+    grid = EvenGrid(9, 0.5)
+    delta = np.zeros((9, 9))
+    delta[0, 0] = 1 / grid.cell_area
+    problem = DivisionProblem(grid, delta, delta, 1.0, 10.0)
+    np.testing.assert_allclose(Tikhonov().divide(problem).window, 0.5)
+    np.testing.assert_allclose(WhiteNoise().divide(problem).window, 1 - np.exp(-1))
+
+
+@given(seed=SEEDS)
+def test_the_window_of_an_image_is_what_is_left_of_each_component(seed: int) -> None:
+    grid = small_lattice()
+    problem, kernel = random_problem(seed, grid)
+    window = np.exp(-grid.wavenumber / 5)
+    image = grid.to_image(grid.inverse(window * grid.transfer(kernel)))
+    division = image_division(problem, image)
+    np.testing.assert_array_equal(division.field, image)
+    np.testing.assert_allclose(division.window, window, atol=1e-6)

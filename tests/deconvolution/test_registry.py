@@ -1,0 +1,127 @@
+"""Regularisers by name: ours, others', and the names that do not exist."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import memscal
+from memscal.deconvolution.registry import create_regulariser, regulariser_names
+from memscal.errors import InputError
+
+PLUG_IN = '''
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from memscal.deconvolution.problem import filtered_division
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cutoff:
+    """A sharp edge in k."""
+
+    k_max: float = 3e3
+    name: ClassVar[str] = "cutoff"
+    assumes: ClassVar[str] = "G is band-limited."
+    fails: ClassVar[str] = "Rings."
+
+    def divide(self, problem):
+        return filtered_division(problem, np.where(problem.grid.wavenumber < self.k_max, 1.0, 0.0))
+
+
+class Impostor:
+    name = "tikhonov"
+'''
+
+
+@pytest.fixture
+def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An installed distribution with two entry points, one of a name that is taken."""
+    (tmp_path / "sharp_edges.py").write_text(PLUG_IN, encoding="utf-8")
+    info = tmp_path / "sharp_edges-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: sharp-edges\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[memscal.regularisers]\ncutoff = sharp_edges:Cutoff\ntikhonov = sharp_edges:Impostor\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+@pytest.mark.parametrize("name", regulariser_names())
+def test_every_name_creates_a_method_that_says_what_it_is(name: str) -> None:
+    regulariser = create_regulariser(name)
+    assert regulariser.name == name
+    # Sentences, not words.
+    for statement in (regulariser.assumes, regulariser.fails):
+        assert len(statement.split()) > 3
+        assert statement.endswith(".")
+    assert regulariser.assumes != regulariser.fails
+
+
+@pytest.mark.parametrize("name", regulariser_names())
+def test_a_seed_reaches_only_those_that_draw(name: str) -> None:
+    regulariser = create_regulariser(name, seed=41)
+    draws = name in {"white-noise-draw", "unsupervised-wiener"}
+    assert getattr(regulariser, "seed", None) == (41 if draws else None)
+
+
+def test_the_method_of_the_paper_comes_first() -> None:
+    assert regulariser_names()[0] == create_regulariser("white-noise").name
+
+
+def test_an_unknown_name_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(InputError, match="no method named landweber") as caught:
+        create_regulariser("landweber")
+    for name in regulariser_names():
+        assert name in caught.value.cure
+
+
+def test_an_unknown_option_is_refused_with_the_options_there_are() -> None:
+    with pytest.raises(InputError, match="tikhonov has no option alpha, beta") as caught:
+        create_regulariser("tikhonov", beta=1, alpha=1, amplitude=2)
+    assert "amplitude" in caught.value.cure
+
+
+def test_an_option_reaches_its_method() -> None:
+    assert create_regulariser("richardson-lucy", iterations=7).iterations == 7
+
+
+@pytest.mark.usefixtures("plug_in")
+def test_a_plug_in_is_listed_after_our_own_and_each_name_once() -> None:
+    names = regulariser_names()
+    assert names[-1] == "cutoff"
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.usefixtures("plug_in")
+def test_a_plug_in_is_created_with_its_options_and_without_the_seed() -> None:
+    regulariser = create_regulariser("cutoff", k_max=2e3, seed=3)
+    assert type(regulariser).__module__ == "sharp_edges"
+    assert regulariser.k_max == 2e3
+
+
+@pytest.mark.usefixtures("plug_in")
+def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
+    regulariser = create_regulariser("tikhonov")
+    assert type(regulariser).__module__ == "memscal.deconvolution.tikhonov"
+
+
+@pytest.mark.usefixtures("plug_in")
+def test_a_calibration_runs_with_a_plug_in() -> None:
+    scan = memscal.simulate(noise=0.002, seed=5)
+    apparatus = memscal.calibrate(scan, method="cutoff", k_max=2.5e3).apparatus
+    assert apparatus.process.configuration["method"] == "cutoff"
+    assert apparatus.process.configuration["options"] == {"k_max": 2.5e3}
+    transfer = apparatus.transfer
+    beyond = transfer.k > 2.6e3
+    np.testing.assert_array_equal(transfer.window[beyond], 0.0)
+    np.testing.assert_array_equal(transfer.window[transfer.k < 2.4e3], 1.0)
+
+
+def test_without_the_plug_in_its_name_is_unknown() -> None:
+    with pytest.raises(InputError, match="no method named cutoff"):
+        create_regulariser("cutoff")

@@ -1,0 +1,153 @@
+"""The classical restorations: centre, units and scale, and what each of them promises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from memscal.axisymmetry.grids import Lattice
+from memscal.deconvolution.problem import DivisionProblem, Regulariser
+from memscal.deconvolution.tikhonov import Tikhonov
+from memscal.deconvolution.wiener import RichardsonLucy, UnsupervisedWiener, Wiener
+
+CLASSICAL = [Wiener(), UnsupervisedWiener(), RichardsonLucy()]
+
+
+def named(regulariser: Regulariser) -> str:
+    return regulariser.name
+
+
+@pytest.mark.parametrize("regulariser", CLASSICAL, ids=named)
+def test_the_integral_is_the_conversion_constant(
+    regulariser: Regulariser, on_each_grid: Callable
+) -> None:
+    gaussians = on_each_grid()
+    image = gaussians.problem.grid.to_image(regulariser.divide(gaussians.problem).field)
+    total = image.sum() * gaussians.problem.grid.cell_area
+    assert total == pytest.approx(3e-8, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("regulariser", "error"), [(Wiener(), 0.035), (RichardsonLucy(), 0.01)], ids=["wiener", "rl"]
+)
+def test_without_noise_the_kernel_comes_back_centred_and_to_scale(
+    regulariser: Regulariser, error: float, on_each_grid: Callable
+) -> None:
+    # A kernel one pixel off its place would be wrong by 0.1 mm in 0.56 mm: about 0.13.
+    gaussians = on_each_grid()
+    assert gaussians.error(regulariser.divide(gaussians.problem)) < error
+
+
+@pytest.mark.parametrize(
+    ("regulariser", "error"),
+    [(Wiener(), 1e-3), (UnsupervisedWiener(), 3e-2), (RichardsonLucy(), 1e-2)],
+    ids=["wiener", "unsupervised", "rl"],
+)
+def test_strong_components_come_back(
+    regulariser: Regulariser, error: float, on_each_grid: Callable
+) -> None:
+    gaussians = on_each_grid()
+    strong = gaussians.stress_transform > 0.05
+    found = gaussians.transform(regulariser.divide(gaussians.problem))[strong]
+    np.testing.assert_allclose(found, gaussians.kernel_transform[strong], atol=error)
+
+
+@pytest.mark.parametrize("factor", [2.0**-20, 2.0**20])
+@pytest.mark.parametrize("regulariser", [*CLASSICAL, Tikhonov()], ids=named)
+def test_the_unit_of_voltage_does_not_matter(
+    regulariser: Regulariser, factor: float, gaussians: Callable
+) -> None:
+    # Powers of two: the unsupervised filter takes the rounding of noise-free data for noise.
+    problem = gaussians("lattice").problem
+    scaled = DivisionProblem(
+        problem.grid,
+        factor * problem.voltage,
+        problem.reference,
+        factor * problem.weakest_voltage,
+        problem.weakest_reference,
+    )
+    once, again = regulariser.divide(problem), regulariser.divide(scaled)
+    np.testing.assert_allclose(
+        again.field / factor, once.field, atol=1e-9 * np.abs(once.field).max()
+    )
+
+
+@pytest.mark.parametrize("regulariser", [*CLASSICAL, Tikhonov()], ids=named)
+def test_the_unit_of_stress_does_not_matter(regulariser: Regulariser, gaussians: Callable) -> None:
+    problem = gaussians("lattice").problem
+    scaled = DivisionProblem(
+        problem.grid,
+        problem.voltage,
+        2.0**20 * problem.reference,
+        problem.weakest_voltage,
+        2.0**20 * problem.weakest_reference,
+    )
+    once, again = regulariser.divide(problem), regulariser.divide(scaled)
+    np.testing.assert_allclose(
+        again.field * 2.0**20, once.field, atol=1e-9 * np.abs(once.field).max()
+    )
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 1.0, 10.0])
+def test_the_penalty_of_wiener_is_the_noise_at_the_edge_of_the_relevant_band(
+    on_each_lattice: Callable, amplitude: float
+) -> None:
+    # Just beyond the weakest relevant component w, the window is |z|^2/(|z|^2 + (0.1 a w)^2).
+    gaussians = on_each_lattice(weakest=1e-2)
+    division = Wiener(amplitude=amplitude).divide(gaussians.problem)
+    index = int(np.argmax(gaussians.stress_transform[0] < 1e-2))
+    z2 = gaussians.stress_transform[0, index] ** 2
+    expected = z2 / (z2 + (0.1 * amplitude * 1e-2) ** 2)
+    assert division.window[0, index] == pytest.approx(expected, abs=2e-3)
+
+
+def test_wiener_does_not_smooth_away_a_raster_too_coarse_to_show_the_band_edge() -> None:
+    # At 1 mm the last component of the lattice is still relevant.
+    axis = (np.arange(19) - 9) * 1e-3
+    grid = Lattice(axis, axis)
+    reference = np.exp(-((grid.radius / 0.9e-3) ** 2) / 2) / (2 * np.pi * 0.9e-3**2)
+    kernel = np.exp(-((grid.radius / 0.6e-3) ** 2) / 2) / (2 * np.pi * 0.6e-3**2)
+    problem = DivisionProblem(grid, grid.convolve(kernel, reference), reference, 1e-5, 1e-3)
+    division = Wiener().divide(problem)
+    np.testing.assert_allclose(division.field, kernel, atol=0.01 * kernel.max())
+
+
+def test_richardson_and_lucy_keep_the_kernel_positive_where_others_overshoot(
+    on_each_grid: Callable,
+) -> None:
+    problem = on_each_grid(weakest=1e-2).problem
+    assert Tikhonov().divide(problem).field.min() < 0
+    field = RichardsonLucy().divide(problem).field
+    assert field.min() > -1e-12 * field.max()
+
+
+def test_more_steps_of_richardson_and_lucy_resolve_more(gaussians: Callable) -> None:
+    problem = gaussians()
+    errors = [
+        problem.error(RichardsonLucy(iterations=count).divide(problem.problem))
+        for count in (2, 8, 32)
+    ]
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_the_unsupervised_sampler_repeats_with_its_seed(gaussians: Callable, seed: int) -> None:
+    problem = gaussians().problem
+    first, second, other = (
+        UnsupervisedWiener(seed=value).divide(problem).field for value in (seed, seed, seed + 1)
+    )
+    np.testing.assert_array_equal(first, second)
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("regulariser", CLASSICAL, ids=named)
+def test_windows_lie_between_nothing_and_all(
+    regulariser: Regulariser, on_each_grid: Callable
+) -> None:
+    problem = on_each_grid().problem
+    window = regulariser.divide(problem).window
+    assert window.shape == problem.grid.wavenumber.shape
+    assert window.min() >= 0
+    assert window.max() <= 1
+    assert window[0, 0] == pytest.approx(1, abs=1e-2)

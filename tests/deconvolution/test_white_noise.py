@@ -1,0 +1,184 @@
+"""The paper's white noise: its expectation, its draws, and what holds for any seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, gamma
+
+from memscal.axisymmetry.grids import EvenGrid, Lattice
+from memscal.deconvolution.problem import DivisionProblem
+from memscal.deconvolution.white_noise import WhiteNoise, WhiteNoiseDraw
+
+RARE = 1e-9
+"""Probability with which a correct program would fail one of the random tests here."""
+
+
+def square_lattice(count: int, step: float = 0.5) -> Lattice:
+    axis = (np.arange(count) - count // 2) * step
+    return Lattice(axis, axis)
+
+
+def spike(grid: Lattice, height: float) -> np.ndarray:
+    """A field of the same transform, ``height``, at every wavenumber."""
+    field = np.zeros((grid.y.size, grid.x.size))
+    field[0, 0] = height / grid.cell_area
+    return field
+
+
+def truncated_mean_bound(count: int, cut: float) -> float:
+    """Largest error of the mean of ``count`` values 1/(z + n) cut off at |z + n| < ``cut``.
+
+    For E|n|^2 = 1.  The density of z + n is at most 1/pi, so that E|1/(z + n)|^2 without the
+    disc is at most 2 ln(1/cut) + 1; Bernstein's inequality bounds what is kept.  What is cut
+    has, the density's slope being at most sqrt(2/e)/pi, an expectation of 2 sqrt(2/e) cut^2.
+    """
+    odds = np.log(4 / RARE)
+    variance = 2 * np.log(1 / cut) + 1
+    bernstein = np.sqrt(2 * variance * odds / count) + 2 * odds / (3 * cut * count)
+    return float(np.sqrt(2) * bernstein + 2 * np.sqrt(2 / np.e) * cut**2)
+
+
+@pytest.mark.parametrize("ratio", [0.4, 0.8, 1.2, 2.0])
+def test_the_window_is_the_mean_reciprocal_over_circular_noise(ratio: float, seed: int) -> None:
+    grid = EvenGrid(9, 0.5)
+    delta = np.zeros((9, 9))
+    delta[0, 0] = ratio / grid.cell_area
+    window = WhiteNoise().divide(DivisionProblem(grid, delta, delta, 1.0, 10.0)).window
+    rng = np.random.default_rng(seed)
+    count, cut = 2_000_000, 0.02
+    noise = (rng.normal(size=count) + 1j * rng.normal(size=count)) / np.sqrt(2)
+    phase = np.exp(2j * np.pi * rng.random())
+    total = ratio * phase + noise
+    mean = np.sum(1 / total[np.abs(total) > cut]) / count
+    bound = truncated_mean_bound(count, cut)
+    assert bound < 0.03
+    assert abs(ratio * phase * mean - window[0, 0]) < ratio * bound
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+def test_a_draw_scatters_around_the_expectation(ratio: float, seed: int) -> None:
+    # Both fields are spikes: every component of the quotient is another draw of z/(z + n).
+    grid = square_lattice(513)
+    field = spike(grid, ratio)
+    problem = DivisionProblem(grid, field, field, 0.0, 10.0)
+    kept = []
+    for draw in range(3):
+        division = WhiteNoiseDraw(seed=seed + draw).divide(problem)
+        quotient = grid.transfer(division.field)[:, 1:].ravel()
+        kept.append(np.where(np.abs(quotient) < ratio / 0.02, quotient, 0.0))
+    mean = np.concatenate(kept).mean()
+    bound = ratio * truncated_mean_bound(3 * 513 * 256, 0.02)
+    assert bound < 0.14
+    np.testing.assert_allclose(division.window, 1 - np.exp(-(ratio**2)))
+    assert abs(mean - (1 - np.exp(-(ratio**2)))) < bound
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 1.0, 4.0])
+def test_the_noise_has_the_spectral_amplitude_that_it_claims(amplitude: float, seed: int) -> None:
+    # No voltage, and a stress of unit transform without noise: the quotient is the noise.
+    # By Parseval the sum of its squares is that of the pixels' normal deviates.
+    grid = square_lattice(101, 0.03)
+    image = noise_alone(grid, amplitude, seed, weakest_voltage=7e-3)
+    spectrum = np.fft.fft2(image) * grid.cell_area
+    s = amplitude * 0.1 * 7e-3
+    low, high = chi2.ppf([RARE, 1 - RARE], 101**2) / 101**2
+    assert low < np.mean(np.abs(spectrum) ** 2) / s**2 < high
+    # White: within a circle of wave vectors there is as much of it as outside.
+    frequency = np.fft.fftfreq(101)
+    inner = np.hypot.outer(frequency, frequency) < 0.3
+    inner[0, 0] = False
+    pairs = int(inner.sum()) // 2
+    low, high = gamma.ppf([RARE, 1 - RARE], pairs) / pairs
+    assert low < np.mean(np.abs(spectrum[inner]) ** 2) / s**2 < high
+
+
+def noise_alone(
+    grid: Lattice, amplitude: float, seed: int, *, weakest_voltage: float
+) -> np.ndarray:
+    # So weak a reference brings no noise of its own.
+    problem = DivisionProblem(grid, spike(grid, 0.0), spike(grid, 1.0), weakest_voltage, 1e-100)
+    return WhiteNoiseDraw(amplitude=amplitude, seed=seed).divide(problem).field
+
+
+def test_many_draws_approach_the_expectation_in_the_resolved_band(
+    on_each_lattice: Callable, seed: int
+) -> None:
+    # With a = m/u and b = n/z the quotient is 1 + a - b + (b^2 - ab)/(1 + b) of the noise-free
+    # one.  The mean of the linear terms is normal; that of the squares follows a gamma law.
+    gaussians = on_each_lattice(weakest=1e-3)
+    problem, draws, strong = gaussians.problem, 24, 30.0
+    s, t = 0.1 * problem.weakest_reference, 0.1 * problem.weakest_voltage
+    stress = gaussians.stress_transform / s
+    volts = gaussians.stress_transform * gaussians.kernel_transform * 3e-8 / t
+    band = (stress > strong) & (volts > strong)
+    assert band.sum() > 100
+    fields = [WhiteNoiseDraw(seed=seed + i).divide(problem).field for i in range(draws)]
+    mean = problem.grid.transfer(np.mean(fields, axis=0))[band]
+    expected = problem.grid.transfer(WhiteNoise().divide(problem).field)[band]
+    a, b = 1 / volts[band], 1 / stress[band]
+    odds = np.log(8 * band.sum() * draws / RARE)
+    # A real or a circular normal deviate exceeds sqrt(2 odds) with probability 2 exp(-odds).
+    linear = np.sqrt(2 * odds / draws) * np.hypot(a, b)
+    worst = np.sqrt(2 * odds) * b
+    assert worst.max() < 0.5
+    mean_square = 2 * gamma.isf(RARE / band.sum() / 2, draws / 2) / draws
+    square = mean_square * (1.5 * b**2 + 0.5 * a**2) / (1 - worst)
+    deviation = np.abs(mean / expected - 1)
+    np.testing.assert_array_less(deviation, linear + square + 1e-9)
+    assert deviation.max() > 1e-6  # they are draws
+
+
+def test_a_seed_gives_the_same_draw_and_another_seed_another(
+    gaussians: Callable, seed: int
+) -> None:
+    problem = gaussians().problem
+    first = WhiteNoiseDraw(seed=seed).divide(problem).field
+    np.random.default_rng(seed).normal(size=100)
+    np.testing.assert_array_equal(first, WhiteNoiseDraw(seed=seed).divide(problem).field)
+    assert not np.array_equal(first, WhiteNoiseDraw(seed=seed + 1).divide(problem).field)
+
+
+def test_a_draw_leaves_the_global_random_state_alone(gaussians: Callable) -> None:
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    WhiteNoiseDraw(seed=1).divide(gaussians().problem)
+    np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
+
+
+def test_the_expectation_is_deterministic(on_each_grid: Callable) -> None:
+    problem = on_each_grid().problem
+    first, second = (WhiteNoise().divide(problem).field for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_strong_components_do_not_notice_two_decades_of_amplitude(on_each_grid: Callable) -> None:
+    # The largest amplitude makes the noise as strong as the weakest relevant component: six
+    # times that strength, the window has closed by exp(-36).
+    gaussians = on_each_grid(weakest=1e-4)
+    strong = gaussians.stress_transform > 6e-4
+    for amplitude in (0.1, 1.0, 10.0):
+        division = WhiteNoise(amplitude=amplitude).divide(gaussians.problem)
+        found = gaussians.transform(division)[strong]
+        np.testing.assert_allclose(found, gaussians.kernel_transform[strong], atol=1e-8)
+
+
+@pytest.mark.parametrize(("weakest", "error"), [(1e-3, 0.03), (1e-5, 5e-3), (1e-7, 1e-3)])
+def test_without_noise_the_quotient_is_the_kernel_up_to_what_the_window_takes(
+    on_each_grid: Callable, weakest: float, error: float
+) -> None:
+    gaussians = on_each_grid(weakest)
+    division = WhiteNoise().divide(gaussians.problem)
+    # By Parseval the error is the kernel's power behind the window.
+    lost = gaussians.kernel_transform * (1 - division.window)
+    if isinstance(gaussians.problem.grid, EvenGrid):
+        sides = np.full(lost.shape[0], 2.0)
+        sides[0] = sides[-1] = 1.0
+        weights = np.multiply.outer(sides, sides)
+    else:
+        weights = np.full(lost.shape, 2.0)
+        weights[:, 0] = 1.0
+    expected = np.sqrt(np.sum(weights * lost**2) / np.sum(weights * gaussians.kernel_transform**2))
+    assert gaussians.error(division) == pytest.approx(expected, rel=2e-2)
+    assert gaussians.error(division) < error
