@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.formats.hdf5_lengths import attribute_text_lengths, text_length
 from memscal.formats.hdf5_limits import (
     MAX_TEXT_BYTES,
     check_layout,
@@ -119,7 +120,7 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     with _damage_named(f"{name} cannot be opened as HDF5"):
         file = h5py.File(BytesIO(data), "r")
     try:
-        yield SafeFile(file, name, source)
+        yield SafeFile(file, name, source, data)
     except InputError as error:
         if name in error.problem:
             raise
@@ -158,11 +159,14 @@ class SafeFile:
         Its base name, for messages.
     source : SourceFile
         Name and SHA-256 of its bytes.
+    data : bytes
+        The bytes.
     """
 
-    def __init__(self, file: Any, name: str, source: SourceFile) -> None:
+    def __init__(self, file: Any, name: str, source: SourceFile, data: bytes) -> None:
         self.name = name
         self.source = source
+        self._data = data
         self._opened: dict[str, Any] = {"/": file["/"].id}
         self._budget = _MAX_TOTAL_BYTES
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
@@ -250,6 +254,15 @@ class SafeFile:
                 f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file.",
             )
 
+    def _check_length(self, path: str, length: int) -> None:
+        if length > MAX_TEXT_BYTES:
+            raise refuse(
+                self.where(path),
+                f"claims a text of {length:,} bytes",
+                f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is.",
+            )
+        self._spend(path, length)
+
     def _read_array(self, path: str) -> np.ndarray[Any, Any]:
         from memscal.formats.hdf5_library import h5py
 
@@ -268,6 +281,8 @@ class SafeFile:
         self._spend(path, claimed_bytes(dataset))
         from memscal.formats.hdf5_library import h5py
 
+        if dataset.get_type().is_variable_str():
+            self._check_length(path, text_length(self._data, dataset.get_offset() or -1))
         return printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
 
     def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
@@ -290,6 +305,10 @@ class SafeFile:
         text = attribute.get_type().get_class() == h5py.h5t.STRING
         check_type(where, attribute.get_type(), text=text)
         self._spend(path, size)
+        if text and attribute.get_type().is_variable_str():
+            address = h5py.h5o.get_info(item).addr
+            for length in attribute_text_lengths(self._data, address, key, number):
+                self._check_length(f"{path}@{name}", length)
         value = h5py.AttributeManager(_Owner(item))[name]
         if not text:
             return np.asarray(value).reshape(-1)[0].item() if number else None

@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
 from memscal.formats import hdf5_reader
 from memscal.formats.artifact import read_artifact, write_artifact
+from memscal.formats.hdf5_lengths import attribute_text_lengths
 from memscal.formats.scan import read_scan, write_scan
 
 SIGNAL = "/entry/data/u_zz"
@@ -256,6 +257,68 @@ def test_text_of_variable_length_as_other_programs_write_it_is_read(tmp_path: Pa
     scan = read_scan(path)
     assert scan.indenter.shape == "sphere"
     assert scan.x[0] == pytest.approx(-8e-6)
+
+
+@pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
+@pytest.mark.parametrize("further", [0, 5, 30])
+def test_variable_text_is_read_in_every_version_of_the_format(
+    tmp_path: Path, libver: str, further: int
+):
+    """Where attributes are many, HDF5 moves them out of the object's header."""
+    write_scan(make_scan(), tmp_path / "ours.h5")
+    with (
+        h5py.File(tmp_path / "ours.h5") as ours,
+        h5py.File(tmp_path / "scan.h5", "w", libver=libver) as file,
+    ):
+        ours.copy("/entry", file)
+        x = file["/entry/data/x"]
+        del file["/entry/title"], x.attrs["units"]
+        file["/entry/title"] = "variable"
+        for item in (file, x):
+            for i in range(further):
+                item.attrs[f"further_{i}"] = "y" * i
+        x.attrs["units"] = "um"
+        for name, value in ours.attrs.items():
+            file.attrs[name] = value.decode()
+    scan = read_scan(tmp_path / "scan.h5")
+    assert (scan.title, scan.x[0]) == ("variable", pytest.approx(-8e-6))
+
+
+@pytest.mark.parametrize("further", [0, 30])
+@pytest.mark.parametrize("place", ["dataset", "attribute"])
+def test_a_variable_text_that_claims_four_gibibytes_is_refused_before_memory_is_taken(
+    tmp_path: Path, further: int, place: str
+):
+    path = tmp_path / "scan.h5"
+    marker = "a text of 33 bytes to be found..."
+    write_scan(make_scan(), path)
+    with h5py.File(path, "r+") as file:
+        x = file["/entry/data/x"]
+        del file["/entry/title"], x.attrs["units"]
+        for i in range(further):
+            x.attrs[f"further_{i}"] = "y"
+        file["/entry/title"] = marker if place == "dataset" else "title"
+        x.attrs["units"] = marker if place == "attribute" else "mm"
+    data = path.read_bytes()
+    descriptor = len(marker).to_bytes(4, "little") + data.rfind(b"GCOL").to_bytes(8, "little")
+    assert data.count(descriptor) == 1
+    path.write_bytes(data.replace(descriptor, b"\xff" * 4 + descriptor[4:]))
+    with pytest.raises(UnsafeFileError, match="claims a text of 4,294,967,295 bytes"):
+        read_scan(path)
+
+
+@pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
+@pytest.mark.parametrize("further", [0, 5, 30])
+def test_the_claims_of_an_attribute_are_found_wherever_hdf5_stores_it(
+    tmp_path: Path, libver: str, further: int
+):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver=libver, track_order=further == 5) as file:
+        for i in range(further):
+            file.attrs[f"further_{i}"] = "y" * i
+        file.attrs["axes"] = ["repeat", "x"]
+        header = h5py.h5o.get_info(file.id).addr
+    assert attribute_text_lengths(path.read_bytes(), header, b"axes", 2) == [6, 1]
 
 
 def test_a_text_dataset_longer_than_any_text_is_refused(tmp_path: Path):
