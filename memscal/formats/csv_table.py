@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import FormatError, InputError
-from memscal.formats.hdf5_reader import read_bytes
+from memscal.formats.file_bytes import read_bytes
 from memscal.formats.text import printable
 from memscal.model.provenance import SourceFile
 from memscal.model.validation import FloatArray
