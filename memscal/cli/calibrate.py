@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli.calibration_outputs import Outputs
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
 from memscal.cli.options import FILE, force_option, json_option
 from memscal.cli.output import emit_json, message, note, warn
@@ -18,6 +18,7 @@ from memscal.cli.targets import FigurePath, beside, prove_writable
 if TYPE_CHECKING:
     from memscal.calibration.procedure import Calibration
     from memscal.calibration.sweep import Sweep
+    from memscal.cli.tables import Table
     from memscal.deconvolution.problem import Regulariser
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
@@ -32,22 +33,6 @@ Examples:
   memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
   memscal calibrate scan.h5 --sweep --sweep-figure sweep.pdf
 """
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Where the results go."""
-
-    artifact: Path
-    report: Path | None
-    figures: tuple[Path, ...]
-    sweep_figure: Path | None
-
-    @property
-    def paths(self) -> tuple[Path, ...]:
-        """All of them, the artifact first."""
-        others = (self.report, *self.figures, self.sweep_figure)
-        return (self.artifact, *(path for path in others if path is not None))
 
 
 def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
@@ -162,7 +147,9 @@ def command(
     if sweeping or sweep_figure:
         with working("Sweeping the noise amplitude"):
             swept = found.sweep(seed=seed or 0)
-    _write(found, swept, outputs, force)
+    with working("Drawing"):
+        ready = outputs.rendered(found, swept)
+    outputs.write(found, ready, force=force)
     return _tell(found, swept, outputs, as_json)
 
 
@@ -245,51 +232,15 @@ def _rehearse(
     message("Nothing was written (--dry-run).")
 
 
-def _write(found: Calibration, swept: Sweep | None, outputs: Outputs, force: bool) -> None:
-    """Write every output; all are ready in memory before the first is written."""
-    from memscal.formats.atomic import atomic_write_bytes
-
-    with working("Drawing"):
-        ready = _rendered(found, swept, outputs)
-    found.apparatus.save(outputs.artifact, overwrite=force)
-    for path, data in ready.items():
-        atomic_write_bytes(path, data, overwrite=force)
-
-
-def _rendered(found: Calibration, swept: Sweep | None, outputs: Outputs) -> dict[Path, bytes]:
-    ready: dict[Path, bytes] = {}
-    if outputs.figures:
-        from memscal.figures.calibration import calibration_figure
-        from memscal.figures.render import figure_format, render_figure
-
-        figure = calibration_figure(found.apparatus)
-        for path in outputs.figures:
-            ready[path] = render_figure(figure, figure_format(path.suffix))
-    if outputs.report is not None:
-        from memscal.figures.report import html_report
-
-        ready[outputs.report] = html_report(found.apparatus).encode("utf-8")
-    if outputs.sweep_figure is not None and swept is not None:
-        from memscal.figures.render import figure_format, render_figure
-        from memscal.figures.sweep import sweep_figure
-
-        suffix = figure_format(outputs.sweep_figure.suffix)
-        ready[outputs.sweep_figure] = render_figure(sweep_figure(swept), suffix)
-    return ready
-
-
 def _tell(found: Calibration, swept: Sweep | None, outputs: Outputs, as_json: bool) -> int:
     """Print the results and the messages; return the exit code."""
     from memscal.cli.calibration_view import calibration_json, calibration_tables
-    from memscal.cli.sweep_view import sweep_json, sweep_table
     from memscal.cli.tables import emit_tables
 
     if as_json:
-        result = calibration_json(found, outputs.artifact)
-        emit_json(result if swept is None else {**result, "sweep": sweep_json(swept)})
+        emit_json({**calibration_json(found, outputs.artifact), **_swept_json(swept)})
     else:
-        tables = calibration_tables(found)
-        emit_tables(*(tables if swept is None else [*tables, sweep_table(swept)]))
+        emit_tables(*calibration_tables(found), *_swept_tables(swept))
     failed = [check.name for check in found.apparatus.checks if not check.passed]
     for text in found.apparatus.process.messages:
         (warn if text.startswith("Quality check") else note)(text)
@@ -301,3 +252,19 @@ def _tell(found: Calibration, swept: Sweep | None, outputs: Outputs, as_json: bo
     count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
     warn(f"{count} failed ({named}). {outputs.artifact.name} was written and is marked so.")
     return CHECK_FAILED
+
+
+def _swept_json(swept: Sweep | None) -> dict[str, Any]:
+    if swept is None:
+        return {}
+    from memscal.cli.sweep_view import sweep_json
+
+    return {"sweep": sweep_json(swept)}
+
+
+def _swept_tables(swept: Sweep | None) -> list[Table]:
+    if swept is None:
+        return []
+    from memscal.cli.sweep_view import sweep_table
+
+    return [sweep_table(swept)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import click
 
@@ -27,7 +27,7 @@ __all__ = [
     "indenter_from",
     "json_option",
     "radius_options",
-    "scaled",
+    "si",
 ]
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -167,12 +167,23 @@ def _all_of(
     return add
 
 
-def scaled(value: float | None, per_si: float) -> float | None:
-    """Return a value in SI units, given how many of its units make one of them.
+@overload
+def si(value: float, power: int) -> float: ...
+@overload
+def si(value: float | None, power: int) -> float | None: ...
+def si(value: float | None, power: int) -> float | None:
+    """Return a value times a power of ten, rounded as if it had been typed so.
 
-    A division by a power of ten is correctly rounded: 0.25 mm becomes exactly ``0.25e-3`` m.
+    Examples
+    --------
+    >>> si(0.14, -3), 0.14 / 1e3
+    (0.00014, 0.00014000000000000001)
     """
-    return None if value is None else value / per_si
+    if value is None or not math.isfinite(value):
+        return value
+    from decimal import Decimal
+
+    return float(Decimal(repr(value)).scaleb(power))
 
 
 def film_from(given: Mapping[str, Any]) -> ElasticFilm:
@@ -186,16 +197,13 @@ def film_from(given: Mapping[str, Any]) -> ElasticFilm:
     _require("The film", given, FILM)
     from memscal.model.film import ElasticFilm
 
-    def spread(name: str, per_si: float) -> float | None:
-        return scaled(given.get(f"{name}_uncertainty"), per_si)
-
     return ElasticFilm(
-        young_modulus=given["young_modulus"] / 1e-6,
+        young_modulus=si(given["young_modulus"], 6),
         poisson_ratio=given["poisson_ratio"],
-        thickness=given["thickness"] / 1e3,
-        young_modulus_uncertainty=spread("young_modulus", 1e-6),
-        poisson_ratio_uncertainty=spread("poisson_ratio", 1.0),
-        thickness_uncertainty=spread("thickness", 1e3),
+        thickness=si(given["thickness"], -3),
+        young_modulus_uncertainty=si(given.get("young_modulus_uncertainty"), 6),
+        poisson_ratio_uncertainty=given.get("poisson_ratio_uncertainty"),
+        thickness_uncertainty=si(given.get("thickness_uncertainty"), -3),
     )
 
 
@@ -211,8 +219,8 @@ def indenter_from(shape: str, given: Mapping[str, Any]) -> Indenter:
     from memscal.model.indenter import Rod, Sphere
 
     kind = {"rod": Rod, "sphere": Sphere}[shape]
-    spread = scaled(given.get("radius_uncertainty"), 1e3)
-    return kind(radius=given["radius"] / 1e3, radius_uncertainty=spread)
+    spread = si(given.get("radius_uncertainty"), -3)
+    return kind(radius=si(given["radius"], -3), radius_uncertainty=spread)
 
 
 def _require(what: str, given: Mapping[str, Any], names: tuple[str, ...]) -> None:

@@ -19,8 +19,9 @@ from memscal.cli.options import (
     indenter_from,
     json_option,
     radius_options,
+    si,
 )
-from memscal.cli.output import emit_json, finite, message, note
+from memscal.cli.output import emit_json, finite, message
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ def command(
 
     settings: dict[str, Any] = {"friction": friction, "loading": loading, "backend": backend}
     if depths:
-        contacts = indent(film, body, depth=[depth / 1e6 for depth in depths], **settings)
+        contacts = indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
     else:
         contacts = indent(film, body, load=list(loads or (1.0,)), **settings)
     if output is not None:
@@ -149,7 +150,6 @@ def _tell(contacts: Sequence[Contact], loading: str, output: Path | None, as_jso
         from memscal.cli.tables import emit_tables
 
         emit_tables(_table(contacts[0], solutions))
-        note(_SINGULAR)
     if output is not None:
         message(f"Written: {output}")
 

@@ -19,6 +19,7 @@ from memscal.cli.options import (
     indenter_from,
     json_option,
     radius_options,
+    si,
 )
 from memscal.cli.output import emit_json, message, note
 from memscal.cli.targets import prove_writable
@@ -216,18 +217,18 @@ def _simulate(
     return simulate(
         film=film,
         rod=rod,
-        kernel=GaussianMixture(weights, tuple(sigma / 1e6 for sigma in sigmas)),
-        conversion_constant=given["conversion_constant"] / 1e3,
+        kernel=GaussianMixture(weights, tuple(si(sigma, -6) for sigma in sigmas)),
+        conversion_constant=si(given["conversion_constant"], -3),
         load=loads[0] if len(loads) == 1 else loads,
-        half_range=given["half_range"] / 1e3,
+        half_range=si(given["half_range"], -3),
         points=given["points"],
         repeats=given["repeats"],
         raster=given["raster"],
-        noise=given["noise"] / 100,
-        centre=(given["centre"] / 1e3, given["centre_y"] / 1e3),
-        baseline=given["baseline"] / 100,
-        drift=given["drift"] / 100,
-        load_uncertainty=given["load_uncertainty"] / 100,
+        noise=si(given["noise"], -2),
+        centre=(si(given["centre"], -3), si(given["centre_y"], -3)),
+        baseline=si(given["baseline"], -2),
+        drift=si(given["drift"], -2),
+        load_uncertainty=si(given["load_uncertainty"], -2),
         state_noise=given["state_noise"],
         seed=given["seed"],
     )

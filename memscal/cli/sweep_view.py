@@ -17,16 +17,18 @@ __all__ = ["sweep_json", "sweep_table"]
 
 def sweep_table(sweep: Sweep) -> Table:
     """Return every second amplitude: the exact expectation, and the middle draw of the seeds."""
+    power = _power(sweep.conversion_constant / MV)
+    scale = MV * 10.0**power
     rows = []
     for i in range(0, sweep.amplitude.size, 2):
-        a, width = sweep.conversion_constant[i] / MV, sweep.gaussian_sigma_deconvolved[i] / MM
+        a, width = sweep.conversion_constant[i] / scale, sweep.gaussian_sigma_deconvolved[i] / MM
         rows.append(
             (
                 f"{sweep.amplitude[i]:.3g}",
-                _number(a, ".5g"),
+                _number(a, ".4f"),
                 _number(width, ".4f"),
                 _number(100 * sweep.relative_rms[i], ".3g"),
-                _draws(sweep.seed_conversion_constant[i] / MV, ".5g"),
+                _draws(sweep.seed_conversion_constant[i] / scale, ".4f"),
                 _draws(sweep.seed_gaussian_sigma[i] / MM, ".4f"),
                 _draws(100 * sweep.seed_relative_rms[i], ".3g"),
             )
@@ -36,7 +38,7 @@ def sweep_table(sweep: Sweep) -> Table:
         "Dependence on the noise amplitude (1 is the rule's choice): the expectation, and the "
         f"median of {count} draws"
     )
-    head = ("amplitude", "A (mV/Pa)", "σ(G) (mm)", "rms (%)")
+    head = ("amplitude", f"A (1e{power} mV/Pa)", "σ(G) (mm)", "rms (%)")
     return Table(title, (*head, "A, draws", "σ(G), draws", "rms, draws"), rows)
 
 
@@ -64,6 +66,12 @@ def _series(expected: FloatArray, draws: FloatArray, scale: float, unit: str) ->
 
 def _listed(values: FloatArray, scale: float) -> list[float | None]:
     return [finite(float(value) / scale) for value in values]
+
+
+def _power(values: FloatArray) -> int:
+    """Return the power of ten to name in the head in place of a row of zeros."""
+    known = np.abs(values[np.isfinite(values) & (values != 0)])
+    return int(np.floor(np.log10(np.median(known)))) if known.size else 0
 
 
 def _draws(values: FloatArray, form: str) -> str:

@@ -1,0 +1,210 @@
+"""Outputs that cannot be written: known before anything is computed, and nothing is lost."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from console import Run, names
+
+OLD = b"an artifact from last week"
+
+
+@pytest.fixture
+def old(folder: Path) -> Path:
+    """An artifact from before."""
+    path = folder / "out.h5"
+    path.write_bytes(OLD)
+    return path
+
+
+@pytest.fixture
+def no_computing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fail the test if the calibration is reached."""
+
+    def reached(*_: object, **__: object) -> None:
+        raise AssertionError("The calibration was reached.")
+
+    monkeypatch.setattr("memscal.calibration.procedure.calibrate", reached)
+
+
+def failing_after(count: int, code: int, original: Callable[..., object]) -> Callable[..., object]:
+    """A system call that fails with an error after it has worked some times."""
+    calls = 0
+
+    def call(*arguments: object) -> object:
+        nonlocal calls
+        calls += 1
+        if calls > count:
+            raise OSError(code, os.strerror(code))
+        return original(*arguments)
+
+    return call
+
+
+@pytest.mark.usefixtures("no_computing")
+def test_a_full_disk_is_known_before_computing(
+    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.fsync", failing_after(0, errno.ENOSPC, os.fsync))
+    refused = run("calibrate", scan, "-o", old, "--force")
+    assert refused.code == 4
+    assert "No space left" in refused.err
+    assert "Free some space" in refused.err
+    assert old.read_bytes() == OLD
+    assert names(folder) == ["out.h5", "scan.h5"]
+
+
+def test_a_disk_that_fills_up_meanwhile_leaves_the_old_artifact(
+    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The proof before computing is one flush; the artifact's own is the second.
+    monkeypatch.setattr("os.fsync", failing_after(1, errno.ENOSPC, os.fsync))
+    refused = run("calibrate", scan, "-o", old, "--force")
+    assert refused.code == 4
+    assert refused.out == ""
+    assert "untouched" in refused.err
+    assert old.read_bytes() == OLD
+    assert names(folder) == ["out.h5", "scan.h5"]
+
+
+@pytest.mark.usefixtures("no_computing")
+def test_a_read_only_disk_is_known_before_computing(
+    run: Run, scan: Path, old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real_open = os.open
+
+    def read_only(path: str, flags: int, *rest: int, **more: int) -> int:
+        if flags & os.O_CREAT:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        return real_open(path, flags, *rest, **more)
+
+    monkeypatch.setattr("os.open", read_only)
+    refused = run("calibrate", scan, "-o", old, "--force")
+    assert refused.code == 4
+    assert "Read-only file system" in refused.err
+    assert old.read_bytes() == OLD
+
+
+@pytest.mark.usefixtures("no_computing")
+@pytest.mark.parametrize("name", ["--output", "--report", "--figure", "--sweep-figure"])
+def test_every_output_is_proven_writable_before_computing(
+    run: Run, scan: Path, folder: Path, name: str
+) -> None:
+    refused = run("calibrate", scan, name, "missing/out.png")
+    assert refused.code == 4
+    assert "missing" in refused.err
+    assert "Create the folder" in refused.err
+    assert names(folder) == ["scan.h5"]
+
+
+@pytest.mark.usefixtures("no_computing")
+@pytest.mark.parametrize("spelling", ["scan.h5", "./scan.h5", "link.h5", "twin.h5"])
+def test_an_output_is_never_an_input_even_if_forced(
+    run: Run, scan: Path, folder: Path, spelling: str
+) -> None:
+    before = scan.read_bytes()
+    (folder / "link.h5").symlink_to("scan.h5")
+    (folder / "twin.h5").hardlink_to(folder / "scan.h5")
+    refused = run("calibrate", "scan.h5", "-o", spelling, "--force")
+    assert refused.code == 4
+    assert "also an input" in refused.err
+    assert scan.read_bytes() == before
+
+
+@pytest.mark.usefixtures("no_computing")
+def test_a_report_does_not_replace_the_reference(run: Run, scan: Path) -> None:
+    run("reference", "rod", "-o", "rod.h5")
+    before = Path("rod.h5").read_bytes()
+    refused = run("calibrate", scan, "--reference", "rod.h5", "--report", "rod.h5", "--force")
+    assert refused.code == 4
+    assert Path("rod.h5").read_bytes() == before
+
+
+@pytest.mark.usefixtures("no_computing")
+@pytest.mark.parametrize("name", [".", "/dev/null", "scan.h5/out.h5", "a" * 300])
+def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name: str) -> None:
+    refused = run("calibrate", scan, "-o", name, "--force")
+    assert refused.code == 4
+    assert refused.err.startswith("Error: The output ")
+
+
+def test_an_interruption_leaves_the_old_artifact(
+    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("memscal.formats.artifact.write_tree", interrupted)
+    stopped = run("calibrate", scan, "-o", old, "--force")
+    assert stopped.code == 130
+    assert "Interrupted" in stopped.err
+    assert "Traceback" not in stopped.err
+    assert old.read_bytes() == OLD
+    assert names(folder) == ["out.h5", "scan.h5"]
+
+
+def test_a_figure_that_fails_leaves_nothing_half_done(
+    run: Run, scan: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr("memscal.figures.calibration.calibration_figure", broken)
+    failed = run("calibrate", scan, "--figure", "a.png")
+    assert failed.code == 70
+    assert names(folder) == ["scan.h5"]
+
+
+def test_an_internal_error_is_owned_up_to_without_a_traceback(
+    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("the flux capacitor\nis empty")
+
+    monkeypatch.setattr("memscal.calibration.procedure.calibrate", broken)
+    failed = run("calibrate", scan)
+    assert failed.code == 70
+    assert "memscal itself failed" in failed.err
+    assert "the flux capacitor is empty" in failed.err
+    assert "--debug" in failed.err
+    assert "Traceback" not in failed.err
+    for arguments in (["--debug", "calibrate", scan], ["calibrate", scan, "--debug"]):
+        shown = run(*arguments)
+        assert shown.code == 70
+        assert "Traceback" in shown.err
+        assert "flux capacitor" in shown.err
+
+
+def test_running_out_of_memory_is_said_plainly(
+    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def greedy(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("memscal.calibration.procedure.calibrate", greedy)
+    failed = run("calibrate", scan)
+    assert failed.code == 70
+    assert "out of memory" in failed.err
+
+
+def test_a_python_warning_becomes_one_line_of_words(
+    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import warnings
+
+    from memscal.calibration.procedure import calibrate
+
+    def warning(*given: object, **options: object) -> object:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.warn("the film is old", UserWarning, stacklevel=1)
+        return calibrate(*given, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("memscal.calibration.procedure.calibrate", warning)
+    done = run("calibrate", scan)
+    assert done.code == 0
+    assert "Warning: UserWarning: the film is old" in done.err.splitlines()

@@ -1,0 +1,267 @@
+"""``memscal calibrate``: what it writes, prints and returns."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from console import Run, names
+
+import memscal
+from memscal.calibration.sweep import Sweep, sweep_noise
+from memscal.cli.options import si
+
+
+def test_the_artifact_lies_beside_the_scan_and_holds_its_truth(run: Run, scan: Path) -> None:
+    done = run("calibrate", scan)
+    assert done.code == 0, done.err
+    apparatus = memscal.load_apparatus(scan.with_name("scan.apparatus.h5"))
+    spread = apparatus.parameters.uncertainty("conversion_constant")
+    assert abs(apparatus.conversion_constant - 1e-7) < 5 * spread
+    assert apparatus.process.input_scan is not None
+    assert apparatus.process.input_scan.file_name == "scan.h5"
+
+
+def test_results_go_to_standard_output_and_messages_to_standard_error(run: Run, scan: Path) -> None:
+    done = run("calibrate", scan)
+    assert "conversion constant" in done.out
+    assert "±" in done.out
+    assert "Written" not in done.out
+    assert "Written: " in done.err
+    assert "synthetic" in done.err
+
+
+def test_json_is_one_object_in_the_form_of_the_contract(run: Run, scan: Path) -> None:
+    done = run("calibrate", scan, "--json")
+    found = done.json
+    assert list(found) == [
+        "schema_version", "artifact", "method", "conversion_constant", "gaussian_sigma",
+        "gaussian_sigma_deconvolved", "centre", "baseline", "resolved_wavenumber",
+        "reconvolution", "checks", "warnings",
+    ]  # fmt: skip
+    assert (found["schema_version"], found["method"]) == ("1", "white-noise")
+    units = {
+        "conversion_constant": "mV/Pa",
+        "gaussian_sigma": "mm",
+        "gaussian_sigma_deconvolved": "mm",
+        "centre": "mm",
+        "baseline": "mV",
+    }
+    for name, unit in units.items():
+        assert list(found[name]) == ["value", "standard_uncertainty", "unit"]
+        assert found[name]["unit"] == unit
+    assert set(found["resolved_wavenumber"]) == {"value", "unit"}
+    assert set(found["reconvolution"]) == {
+        "relative_rms", "gaussian_relative_rms", "chi2_reduced", "gaussian_chi2_reduced",
+    }  # fmt: skip
+    assert all(set(c) == {"name", "value", "limit", "passed"} for c in found["checks"])
+
+
+def test_json_and_artifact_say_the_same_in_their_own_units(run: Run, scan: Path) -> None:
+    found = run("calibrate", scan, "--json").json
+    apparatus = memscal.load_apparatus(found["artifact"])
+    for name, scale in [
+        ("conversion_constant", 1e3),
+        ("gaussian_sigma", 1e3),
+        ("gaussian_sigma_deconvolved", 1e3),
+        ("centre", 1e3),
+        ("baseline", 1e3),
+    ]:
+        assert found[name]["value"] == pytest.approx(scale * apparatus.parameters[name])
+        assert found[name]["standard_uncertainty"] == pytest.approx(
+            scale * apparatus.parameters.uncertainty(name)
+        )
+    assert found["resolved_wavenumber"]["value"] == pytest.approx(
+        apparatus.resolved_wavenumber / 1e3
+    )
+    assert found["warnings"] == list(apparatus.process.messages)
+    relative = np.sqrt(np.mean(apparatus.reconvolution.residual**2))
+    largest = np.ptp(apparatus.reconvolution.u_zz_predicted)
+    assert found["reconvolution"]["relative_rms"] == pytest.approx(relative / largest, rel=0.1)
+
+
+def test_a_failed_check_is_exit_code_1_with_the_artifact_written_and_marked(
+    run: Run, drifting_scan: Path, folder: Path
+) -> None:
+    done = run("calibrate", drifting_scan, "-o", "out.h5", "--json")
+    assert done.code == 1
+    assert {c["name"]: c["passed"] for c in done.json["checks"]}["baseline_drift"] is False
+    apparatus = memscal.load_apparatus("out.h5")
+    assert not apparatus.passed
+    meaning = next(c.meaning for c in apparatus.checks if c.name == "baseline_drift")
+    assert meaning in done.err
+    assert "out.h5 was written and is marked" in done.err
+
+
+def test_a_failed_check_stands_out_in_the_table(
+    run: Run, drifting_scan: Path, folder: Path
+) -> None:
+    done = run("calibrate", drifting_scan, "-o", "out.h5")
+    (line,) = [line for line in done.out.splitlines() if "baseline drift  " in line]
+    assert line.endswith("FAILED")
+
+
+def test_an_artifact_is_not_replaced_unless_forced(run: Run, scan: Path, folder: Path) -> None:
+    old = folder / "scan.apparatus.h5"
+    old.write_bytes(b"old")
+    refused = run("calibrate", scan)
+    assert refused.code == 4
+    assert "--force" in refused.err
+    assert refused.out == ""
+    assert old.read_bytes() == b"old"
+    assert run("calibrate", scan, "--force").code == 0
+    assert memscal.load_apparatus(old).passed
+
+
+def test_a_dry_run_checks_everything_and_writes_nothing(run: Run, scan: Path, folder: Path) -> None:
+    done = run("calibrate", scan, "--dry-run", "--figure", "a.png", "--report", "a.html")
+    assert done.code == 0
+    for name in ("scan.apparatus.h5", "a.png", "a.html", "65 points", "rod, solved on the film"):
+        assert name in done.out
+    assert names(folder) == ["scan.h5"]
+
+
+def test_a_dry_run_in_json_names_the_outputs(run: Run, scan: Path, folder: Path) -> None:
+    found = run("calibrate", scan, "--dry-run", "--json").json
+    assert found["dry_run"] is True
+    assert [Path(path).name for path in found["outputs"]] == ["scan.apparatus.h5"]
+
+
+def test_a_dry_run_refuses_what_a_real_run_would_refuse(run: Run, scan: Path) -> None:
+    run("reference", "rod", "-o", "rod.h5")
+    profile = memscal.read_reference("rod.h5")
+    cut = memscal.StressProfile(r=profile.r[:60], sigma_zz=profile.sigma_zz[:60], load=1.0)
+    memscal.write_reference(cut, "short.h5")
+    refused = run("calibrate", scan, "--reference", "short.h5", "--dry-run")
+    assert refused.code == 3
+    assert "Extend the reference" in refused.err
+
+
+def test_figures_and_report_are_written_in_their_formats(
+    run: Run, scan: Path, folder: Path
+) -> None:
+    figures = ["--figure", "a.png", "--figure", "a.pdf"]
+    done = run("calibrate", scan, *figures, "--report", "a.html")
+    assert done.code == 0, done.err
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("a.pdf").read_bytes().startswith(b"%PDF")
+    assert "<html" in Path("a.html").read_text(encoding="utf-8")
+    assert all(name in done.err for name in ("a.png", "a.pdf", "a.html"))
+
+
+def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, scan: Path) -> None:
+    own = run("calibrate", scan, "--json", "-o", "own.h5").json
+    assert run("reference", "rod", "-o", "rod.h5").code == 0
+    given = run("calibrate", scan, "--reference", "rod.h5", "--json", "-o", "given.h5").json
+    # The file holds a table of the same solution: to its accuracy nothing changes.
+    assert given["conversion_constant"]["value"] == pytest.approx(
+        own["conversion_constant"]["value"], rel=1e-5
+    )
+    source = memscal.load_apparatus("given.h5").process.input_reference
+    assert source is not None
+    assert source.file_name == "rod.h5"
+
+
+def test_a_reference_that_is_a_table_is_sent_to_import(run: Run, scan: Path) -> None:
+    Path("fem.csv").write_text("r,s\n0,1\n1,0\n")
+    refused = run("calibrate", scan, "--reference", "fem.csv")
+    assert refused.code == 3
+    assert "memscal import fem.csv --format reference" in refused.err
+
+
+def test_a_method_and_its_options_reach_the_artifact(run: Run, scan: Path) -> None:
+    options = ["--method", "tikhonov", "--option", "amplitude=0.5", "-o", "out.h5"]
+    done = run("calibrate", scan, *options, "--json")
+    assert done.json["method"] == "tikhonov"
+    configuration = memscal.load_apparatus("out.h5").process.configuration
+    assert configuration["method"] == "tikhonov"
+    assert configuration["options"]["amplitude"] == 0.5
+
+
+def test_the_seed_decides_a_draw_and_is_recorded(run: Run, scan: Path) -> None:
+    def width(seed: int, name: str) -> float:
+        arguments = ["--method", "white-noise-draw", "--seed", seed, "-o", name, "--json"]
+        value = run("calibrate", scan, *arguments).json["gaussian_sigma_deconvolved"]["value"]
+        return float(value)
+
+    assert width(5, "a.h5") == width(5, "b.h5") != width(6, "c.h5")
+    assert memscal.load_apparatus("c.h5").process.configuration["seed"] == 6
+
+
+def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path) -> None:
+    assert "--seed changes nothing" in run("calibrate", scan, "--seed", 3).err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (["--method", "magic"], "white-noise"),
+        (["--option", "amplitude"], "NAME=VALUE"),
+        (["--option", "amplitud=1"], "amplitude"),
+        (["--option", "seed=1"], "--seed"),
+        (["--figure", "a.jpg"], ".png"),
+        (["--figure", "a.png", "--sweep-figure", "./a.png"], "Two outputs"),
+        (["--report", "scan.apparatus.h5"], "Two outputs"),
+        (["--seed", "x"], "--seed"),
+        (["--colour"], "--colour"),
+    ],
+)
+def test_wrong_usage_is_exit_code_2_with_a_hint(
+    run: Run, scan: Path, folder: Path, arguments: list[str], hint: str
+) -> None:
+    refused = run("calibrate", scan, *arguments)
+    assert refused.code == 2
+    assert hint in refused.err
+    assert "--help" in refused.err
+    assert refused.out == ""
+    assert names(folder) == ["scan.h5"]
+
+
+def test_a_sweep_is_shown_drawn_and_given_as_json(
+    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def short(found: memscal.Calibration, *, seed: int) -> Sweep:
+        return sweep_noise(found.solution, amplitudes=5, draws=2, seed=seed)
+
+    monkeypatch.setattr(memscal.Calibration, "sweep", short)
+    shown = run("calibrate", scan, "--sweep")
+    assert "noise amplitude" in shown.out
+    found = run("calibrate", scan, "--force", "--json", "--sweep-figure", "sweep.SVG").json
+    sweep = found["sweep"]
+    amplitude = sweep["amplitude"]
+    assert max(amplitude) / min(amplitude) == pytest.approx(100)
+    assert sweep["conversion_constant"]["unit"] == "mV/Pa"
+    middle = amplitude.index(1.0)
+    assert sweep["conversion_constant"]["values"][middle] == pytest.approx(
+        found["conversion_constant"]["value"], rel=1e-6
+    )
+    assert len(sweep["relative_rms"]["draws"]) == len(amplitude)
+    assert b"<svg" in Path("sweep.SVG").read_bytes()
+
+
+def test_the_name_of_the_artifact_keeps_what_is_no_suffix(
+    run: Run, good_scan: Path, folder: Path
+) -> None:
+    shutil.copy(good_scan, folder / "film_0.5mm")
+    assert run("calibrate", "film_0.5mm").code == 0
+    assert (folder / "film_0.5mm.apparatus.h5").is_file()
+
+
+def test_an_output_may_be_reached_through_a_link_and_the_link_stays(
+    run: Run, scan: Path, folder: Path
+) -> None:
+    (folder / "store").mkdir()
+    (folder / "out.h5").symlink_to("store/real.h5")
+    assert run("calibrate", scan, "-o", "out.h5").code == 0
+    assert (folder / "out.h5").is_symlink()
+    assert memscal.load_apparatus(folder / "store" / "real.h5").passed
+
+
+@pytest.mark.parametrize(("typed", "power"), [(0.14, -3), (2.2, 6), (561.0, -6), (1e-4, -3)])
+def test_a_number_typed_in_a_unit_is_the_number_that_python_reads_in_si(
+    typed: float, power: int
+) -> None:
+    mantissa, _, exponent = repr(typed).partition("e")
+    assert si(typed, power) == float(f"{mantissa}e{int(exponent or 0) + power}")

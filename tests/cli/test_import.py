@@ -1,0 +1,173 @@
+"""``memscal import``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from console import Run, names
+
+import memscal
+
+SET_UP = [
+    *("--load", 1, "--load-uncertainty", 0.01, "--radius", 0.25, "--radius-uncertainty", 0.002),
+    *("--young-modulus", 2.2, "--young-modulus-uncertainty", 0.1, "--poisson-ratio", 0.5),
+    *("--poisson-ratio-uncertainty", 0.004, "--thickness", 2, "--thickness-uncertainty", 0.02),
+]
+COLUMNS = ["--x", "position", "--x-unit", "mm", "--u", "voltage", "--u-unit", "mV"]
+
+
+def write_table(path: Path, head: str, rows: np.ndarray) -> Path:
+    lines = [head, *(",".join(repr(float(value)) for value in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def table(folder: Path) -> Path:
+    """A line scan as a table, in mm and mV."""
+    scan = memscal.simulate(seed=1)
+    rows = np.stack([scan.x * 1e3, scan.u_zz * 1e3], axis=1)
+    return write_table(folder / "scan.csv", "position,voltage", rows)
+
+
+def test_an_imported_scan_can_be_calibrated(run: Run, table: Path) -> None:
+    done = run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP)
+    assert done.code == 0, done.err
+    assert run("calibrate", "scan.h5").code == 0
+    found = memscal.load_apparatus("scan.apparatus.h5")
+    direct = memscal.calibrate(memscal.simulate(seed=1, state_noise=False)).apparatus
+    assert found.conversion_constant == pytest.approx(direct.conversion_constant, rel=1e-6)
+
+
+def test_the_options_say_what_the_table_does_not(run: Run, table: Path) -> None:
+    labels = ["--sensor-name", "S1", "--sensor-model", "MEMS", "--title", "Monday's scan"]
+    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *labels)
+    scan = memscal.read_scan("scan.h5")
+    assert scan.film == memscal.ElasticFilm(
+        young_modulus=2.2e6,
+        poisson_ratio=0.5,
+        thickness=2e-3,
+        young_modulus_uncertainty=0.1e6,
+        poisson_ratio_uncertainty=0.004,
+        thickness_uncertainty=0.02e-3,
+    )
+    assert scan.indenter == memscal.Rod(radius=0.25e-3, radius_uncertainty=0.002e-3)
+    assert (scan.load, scan.load_uncertainty) == (1.0, 0.01)
+    assert (scan.sensor.name, scan.sensor.model, scan.sensor.channel) == ("S1", "MEMS", "zz")
+    assert scan.title == "Monday's scan"
+
+
+def test_messy_repeats_are_snapped_and_averaged_and_it_is_said(run: Run, folder: Path) -> None:
+    rng = np.random.default_rng(0)
+    places = np.repeat(np.arange(-8.0, 8.5, 0.5), 3)
+    numbers = np.tile([0, 1, 2], 33)
+    messy = places + rng.uniform(-0.02, 0.02, places.size)
+    u = 3 * np.exp(-(places**2) / 2)
+    rows = np.stack([messy, u, numbers], axis=1)
+    write_table(folder / "scan.csv", "position,voltage,repeat", np.delete(rows, 10, axis=0))
+    repeats = ["--repeat", "repeat", "--repeats"]
+    done = run("import", "scan.csv", "-o", "mean.h5", *COLUMNS, *SET_UP, *repeats, "average")
+    assert done.code == 0, done.err
+    assert "averaged" in done.out
+    assert memscal.read_scan("mean.h5").u_zz.shape == (33,)
+    done = run("import", "scan.csv", "-o", "kept.h5", *COLUMNS, *SET_UP, *repeats, "keep", "--json")
+    assert any("1 of 99 points are missing" in note for note in done.json["notes"])
+    assert memscal.read_scan("kept.h5").u_zz.shape == (3, 33)
+    strict = [*COLUMNS, *SET_UP, *repeats, "keep", "--grid-tolerance", 0.001]
+    refused = run("import", "scan.csv", "-o", "strict.h5", *strict)
+    assert refused.code == 3
+    assert "grid tolerance" in refused.err
+
+
+def test_a_raster_of_another_kind_of_sensor_states_its_scale(run: Run, folder: Path) -> None:
+    x, y = np.meshgrid(np.arange(8.0), np.arange(6.0))
+    rows = np.stack([x.ravel(), y.ravel(), np.hypot(x, y).ravel()], axis=1)
+    write_table(folder / "raster.csv", "x,y,field", rows)
+    raster = ["--x", 1, "--y", 2, "--x-unit", "mm", "--u", "field", "--u-unit", "uT", *SET_UP]
+    refused = run("import", "raster.csv", "-o", "raster.h5", *raster)
+    assert refused.code == 3
+    assert "--u-scale" in refused.err
+    done = run("import", "raster.csv", "-o", "raster.h5", *raster, "--u-scale", 1e-6)
+    assert done.code == 0, done.err
+    assert "1e-06 V was taken for one uT" in done.out
+    scan = memscal.read_scan("raster.h5")
+    assert scan.u_zz.shape == (6, 8)
+    assert scan.u_zz[3, 4] == pytest.approx(5e-6)
+
+
+def test_a_column_of_loads_is_kept_per_point(run: Run, folder: Path) -> None:
+    rows = np.stack([np.arange(9.0), np.arange(9.0), np.full(9, 500.0)], axis=1)
+    write_table(folder / "scan.csv", "position,voltage,force", rows)
+    rest = SET_UP[4:]
+    load = ["--load-column", "force", "--load-unit", "mN"]
+    assert run("import", "scan.csv", "-o", "scan.h5", *COLUMNS, *rest, *load).code == 0
+    scan = memscal.read_scan("scan.h5")
+    assert scan.load == 0.5
+    assert scan.normal_load is not None
+    assert np.all(scan.normal_load == 0.5)
+
+
+def test_a_fem_table_becomes_a_reference(run: Run, folder: Path) -> None:
+    film = memscal.simulate().film
+    profile = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=1.0).profile()
+    rows = np.stack([profile.r * 1e3, -profile.sigma_zz * 1e-6], axis=1)
+    write_table(folder / "fem.csv", "r,S33", rows)
+    columns = ["--r", "r", "--r-unit", "mm", "--sigma", "S33", "--sigma-unit", "MPa", "--load", 1]
+    wrong = run("import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns)
+    assert wrong.code == 3
+    assert "--sign -1" in wrong.err
+    done = run(
+        "import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns, "--sign", "-1",
+        "--solver", "a FEM program",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    found = memscal.read_reference("rod.h5")
+    np.testing.assert_allclose(found.sigma_zz, profile.sigma_zz, rtol=1e-12, atol=1e-9)
+    assert found.solver == "a FEM program"
+    assert found.film is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hints"),
+    [
+        ([], ["--x", "--x-unit", "--u", "--u-unit"]),
+        (COLUMNS, ["--load-column"]),
+        ([*COLUMNS, "--load", 1], ["--young-modulus", "--poisson-ratio", "--thickness"]),
+        ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
+        (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
+        ([*COLUMNS, *SET_UP, "--repeats", "drop"], ["average"]),
+    ],
+)
+def test_what_is_missing_is_named_all_at_once(
+    run: Run, table: Path, folder: Path, arguments: list[object], hints: list[str]
+) -> None:
+    refused = run("import", table, "-o", "scan.h5", *arguments)
+    assert refused.code == 2
+    assert all(hint in refused.err for hint in hints), refused.err
+    assert names(folder) == ["scan.csv"]
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (["--x", "place"], "Its columns are: position, voltage"),
+        (["--x-unit", "mV"], "mV"),
+        (["--u-unit", "bananas"], "bananas"),
+    ],
+)
+def test_a_wrong_column_or_unit_is_refused_by_name(
+    run: Run, table: Path, folder: Path, change: list[str], word: str
+) -> None:
+    refused = run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *change)
+    assert refused.code == 3
+    assert word in refused.err
+    assert names(folder) == ["scan.csv"]
+
+
+def test_the_table_itself_is_never_replaced(run: Run, table: Path) -> None:
+    before = table.read_bytes()
+    refused = run("import", table, "-o", table, *COLUMNS, *SET_UP, "--force")
+    assert refused.code == 4
+    assert table.read_bytes() == before

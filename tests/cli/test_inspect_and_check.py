@@ -1,0 +1,82 @@
+"""``memscal inspect`` and ``memscal check``."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import h5py
+import pytest
+from console import Run
+
+from memscal.formats.inspection import describe
+
+
+@pytest.fixture(scope="module")
+def shared_artifact(drifting_scan: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from memscal.cli import main
+
+    path = tmp_path_factory.mktemp("artifact") / "a.h5"
+    assert main(["calibrate", str(drifting_scan), "-o", str(path)]) == 1
+    return path
+
+
+@pytest.fixture
+def artifact(shared_artifact: Path, folder: Path) -> Path:
+    return Path(shutil.copy(shared_artifact, folder / "a.h5"))
+
+
+def test_inspect_shows_values_arrays_checks_and_provenance(run: Run, artifact: Path) -> None:
+    shown = run("inspect", artifact)
+    assert shown.code == 0
+    for text in (
+        "memscal-artifact",
+        "mV/Pa",
+        "/entry/apparatus_function/g ",
+        "FAILED",
+        "What the failures mean",
+        "scan.h5",
+        "white-noise",
+    ):
+        assert text in shown.out
+
+
+def test_inspect_in_json_is_the_librarys_description(run: Run, artifact: Path, scan: Path) -> None:
+    for path in (artifact, scan):
+        assert run("inspect", path, "--json").json == describe(path)
+
+
+def test_inspect_refuses_what_is_not_ours(run: Run, folder: Path) -> None:
+    Path("notes.txt").write_text("hello")
+    refused = run("inspect", "notes.txt")
+    assert refused.code == 3
+    assert refused.out == ""
+
+
+def test_check_passes_a_file_as_it_was_written(run: Run, artifact: Path) -> None:
+    done = run("check", artifact)
+    assert done.code == 0
+    assert done.err == ""
+    assert [line.split()[1] for line in done.out.splitlines()[3:]] == ["passed"] * 4
+
+
+def test_check_finds_a_number_that_was_changed(run: Run, artifact: Path) -> None:
+    with h5py.File(artifact, "r+") as file:
+        file["/entry/parameters/conversion_constant"][()] *= 1.01
+    done = run("check", artifact, "--json")
+    assert done.code == 3
+    assert done.json["passed"] is False
+    (failed,) = [finding for finding in done.json["findings"] if not finding["passed"]]
+    assert failed["name"] == "digest"
+    assert "not in order" in done.err
+    shown = run("check", artifact)
+    assert shown.code == 3
+    assert "FAILED" in shown.out
+
+
+@pytest.mark.parametrize("name", ["missing.h5", ".", "truncated.h5"])
+def test_check_of_what_cannot_be_read_is_exit_code_3(run: Run, artifact: Path, name: str) -> None:
+    Path("truncated.h5").write_bytes(artifact.read_bytes()[:5000])
+    done = run("check", name)
+    assert done.code == 3
+    assert "Traceback" not in done.err

@@ -1,0 +1,94 @@
+"""Words and tables for people."""
+
+from __future__ import annotations
+
+import io
+import sys
+import time
+
+import pytest
+
+from memscal.cli.output import readable
+from memscal.cli.progress import working
+from memscal.cli.tables import Table, emit_tables
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
+
+
+def stream(encoding: str) -> io.TextIOWrapper:
+    return io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+
+
+TABLE = Table(
+    "Quality checks",
+    ("check", "result"),
+    [("drift", "passed"), ("[bold]symmetry", "FAILED")],
+    frozenset({1}),
+)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "text"),
+    [
+        ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"),
+        ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
+        ("latin-1", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
+    ],
+)
+def test_a_number_stays_the_same_in_every_encoding(encoding: str, text: str) -> None:
+    assert readable("σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa", stream(encoding)) == text
+
+
+def test_controls_of_a_terminal_do_not_get_through() -> None:
+    assert "\x1b" not in readable("a\x1b[31mb", stream("utf-8"))
+
+
+def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]) -> None:
+    emit_tables(TABLE, Table("empty", ("a",), []))
+    assert capsys.readouterr().out == (
+        "Quality checks\n"
+        "  check           result\n"
+        "  --------------  ------\n"
+        "  drift           passed\n"
+        "  [bold]symmetry  FAILED\n"
+    )
+
+
+def test_a_terminal_gets_a_drawn_table_in_which_cells_are_text(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    emit_tables(TABLE)
+    shown = terminal.getvalue()
+    assert "[bold]symmetry" in shown
+    assert "\x1b[1;31m" in shown
+    assert "─" in shown
+
+
+def test_progress_appears_when_work_is_long_and_leaves_no_trace(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr("memscal.cli.progress._FIRST_AFTER", 0.0)
+    with working("Sweeping"):
+        while "Sweeping" not in terminal.getvalue():
+            time.sleep(0.001)
+    assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:
+    with working("Sweeping"):
+        pass
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,101 @@
+"""The program as a process of its own: streams, exit codes, and the same bytes twice."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+MEMSCAL = [sys.executable, "-m", "memscal"]
+
+
+def run(
+    *arguments: str,
+    cwd: Path,
+    preexec: Callable[[], None] | None = None,
+    stdout: int | None = subprocess.PIPE,
+    **environment: str,
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*MEMSCAL, *arguments],
+        cwd=cwd,
+        env={**os.environ, **environment},
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        preexec_fn=preexec,
+        check=False,
+    )
+
+
+def files_up_to(size: int) -> Callable[[], None]:
+    """A limit to the size of every file, which the system enforces for root too."""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    return limit
+
+
+def test_the_same_input_gives_the_same_bytes_twice(scan: Path, folder: Path) -> None:
+    for name in ("1", "2"):
+        environment = {"SOURCE_DATE_EPOCH": "1700000000", "PYTHONHASHSEED": name}
+        done = run("calibrate", "scan.h5", "-o", name, cwd=folder, **environment)
+        assert done.returncode == 0, done.stderr
+    assert (folder / "1").read_bytes() == (folder / "2").read_bytes()
+
+
+def test_a_failed_check_is_the_exit_code_of_the_process(drifting_scan: Path, folder: Path) -> None:
+    done = run("calibrate", str(drifting_scan), "-o", "out.h5", cwd=folder)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert (folder / "out.h5").is_file()
+
+
+def test_a_refusal_is_the_exit_code_of_the_process(folder: Path) -> None:
+    done = run("calibrate", "missing.h5", cwd=folder)
+    assert (done.returncode, done.stdout) == (3, "")
+
+
+def test_a_file_size_limit_leaves_the_old_artifact(scan: Path, folder: Path) -> None:
+    (folder / "out.h5").write_bytes(b"old")
+
+    arguments = ["calibrate", "scan.h5", "-o", "out.h5", "--force"]
+    done = run(*arguments, cwd=folder, preexec=files_up_to(4096))
+    assert done.returncode == 4, done.stderr
+    assert (folder / "out.h5").read_bytes() == b"old"
+    assert sorted(os.listdir(folder)) == ["out.h5", "scan.h5"]
+
+
+def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = run("inspect", "scan.h5", cwd=folder, stdout=writing)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path) -> None:
+    with (folder / "shown.txt").open("w") as shown:
+        limited = files_up_to(16)
+        done = run("inspect", "scan.h5", cwd=folder, stdout=shown.fileno(), preexec=limited)
+    assert done.returncode == 4
+    assert "cannot be printed: File too large" in done.stderr
+    assert "Exception ignored" not in done.stderr
+
+
+def test_a_terminal_without_the_characters_still_shows_the_right_number(
+    scan: Path, folder: Path
+) -> None:
+    done = run("calibrate", "scan.h5", cwd=folder, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.isascii()
+    assert "+/-" in done.stdout
+    (line,) = [text for text in done.stdout.splitlines() if "constant with" in text]
+    assert "e-5 mV/Pa" in line

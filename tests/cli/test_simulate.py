@@ -1,0 +1,97 @@
+"""``memscal simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from console import Run, names
+
+import memscal
+
+
+def test_the_defaults_are_those_of_the_library(run: Run, folder: Path) -> None:
+    done = run("simulate")
+    assert done.code == 0
+    assert names(folder) == ["synthetic_scan.h5"]
+    found, own = memscal.read_scan("synthetic_scan.h5"), memscal.simulate()
+    assert found.synthetic == own.synthetic
+    assert found.indenter == own.indenter
+    assert found.film.young_modulus_uncertainty == own.film.young_modulus_uncertainty
+    assert found.film.poisson_ratio_uncertainty == own.film.poisson_ratio_uncertainty
+    assert found.film.thickness_uncertainty == own.film.thickness_uncertainty
+    assert found.load_uncertainty == own.load_uncertainty
+    np.testing.assert_allclose(found.u_zz, own.u_zz, rtol=1e-12)
+
+
+def test_the_scan_is_labelled_as_synthetic_wherever_it_is_shown(run: Run, folder: Path) -> None:
+    done = run("simulate", "-o", "scan.h5")
+    assert "Synthetic scan" in done.out
+    assert "nothing in it was measured" in done.err
+    assert "synthetic" in run("inspect", "scan.h5").out
+    assert "synthetic" in run("calibrate", "scan.h5").err
+
+
+def test_options_mean_their_units(run: Run, folder: Path) -> None:
+    options = [
+        *("--sigma", 400, "--conversion-constant", 2e-4, "--load", 0.5, "--radius", 0.3),
+        *("--thickness", 3, "--young-modulus", 1.1, "--poisson-ratio", 0.48),
+        *("--half-range", 9, "--points", 41, "--noise", 0.2, "--centre", -0.3),
+        *("--baseline", 2, "--drift", -1, "--load-uncertainty", 3, "--seed", 4),
+    ]
+    done = run("simulate", "-o", "scan.h5", *options, "--json")
+    assert done.json["synthetic"] is True
+    scan = memscal.read_scan("scan.h5")
+    truth = scan.synthetic
+    assert truth is not None
+    assert truth["gaussian_sigma"] == pytest.approx(400e-6)
+    assert truth["conversion_constant"] == pytest.approx(2e-7)
+    assert truth["centre"] == pytest.approx(-0.3e-3)
+    assert (scan.load, scan.load_uncertainty) == pytest.approx((0.5, 0.015))
+    assert scan.indenter.radius == 0.3e-3
+    assert (scan.film.thickness, scan.film.young_modulus) == (3e-3, 1.1e6)
+    assert (scan.x[0], scan.x[-1], scan.x.size) == (-9e-3, 9e-3, 41)
+    largest = float(truth["noise"]) / 0.002
+    assert truth["baseline"] == pytest.approx(0.02 * largest)
+    assert truth["drift"] == pytest.approx(-0.01 * largest)
+    assert done.json["truth_si"]["conversion_constant"] == pytest.approx(2e-7)
+
+
+def test_repeats_loads_and_rasters_have_their_shapes(run: Run, folder: Path) -> None:
+    loads = ["--load", 0.5, "--load", 1, "--repeats", 2]
+    assert run("simulate", "-o", "loads.h5", *loads, "--points", 9).code == 0
+    assert memscal.read_scan("loads.h5").u_zz.shape == (4, 9)
+    assert run("simulate", "-o", "raster.h5", "--raster", "--points", 9).code == 0
+    assert memscal.read_scan("raster.h5").kind == "raster"
+
+
+def test_a_sum_of_gaussians_is_stored_as_truth(run: Run, folder: Path) -> None:
+    ring = ["--sigma", 700, "--weight", 1.5, "--sigma", 400, "--weight", -0.5]
+    assert run("simulate", "-o", "ring.h5", *ring).code == 0
+    truth = memscal.read_scan("ring.h5").synthetic
+    assert truth is not None
+    assert (truth["kernel_weights"], truth["kernel_sigmas_um"]) == ("1.5, -0.5", "700, 400")
+
+
+def test_noise_may_be_left_unstated(run: Run, folder: Path) -> None:
+    assert run("simulate", "-o", "scan.h5", "--no-state-noise").code == 0
+    assert memscal.read_scan("scan.h5").u_zz_errors is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["--sigma", 700, "--sigma", 400], 2),
+        (["--raster", "--repeats", 2], 2),
+        (["--points", 1], 2),
+        (["--noise", -1], 2),
+        (["--sigma", 700, "--weight", 0.5], 3),
+    ],
+)
+def test_what_makes_no_scan_is_refused(
+    run: Run, folder: Path, arguments: list[object], code: int
+) -> None:
+    refused = run("simulate", "-o", "scan.h5", *arguments)
+    assert refused.code == code
+    assert names(folder) == []
