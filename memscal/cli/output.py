@@ -64,10 +64,11 @@ def emit(text: str) -> None:
     OutputError
         If standard output cannot be written, as on a full disk.
     """
+    if sys.stdout is None:
+        return
     try:
-        click.echo(text)
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        _write_all(sys.stdout, text + "\n")
+        sys.stdout.flush()
     except BrokenPipeError:
         _discard_stdout()
     except OSError as failure:
@@ -77,6 +78,18 @@ def emit(text: str) -> None:
             why="They go to standard output.",
             cure="Free some space, or send standard output elsewhere.",
         ) from failure
+
+
+def _write_all(stream: TextIO, text: str) -> None:
+    """Write to the last byte: an unbuffered stream may take a part and say nothing."""
+    buffer = getattr(stream, "buffer", None)
+    if buffer is None:
+        stream.write(text)
+        return
+    stream.flush()
+    rest = memoryview(text.encode(stream.encoding, stream.errors or "strict"))
+    while rest:
+        rest = rest[buffer.write(rest) :]
 
 
 def _discard_stdout() -> None:

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 MEMSCAL = [sys.executable, "-m", "memscal"]
 
 
@@ -81,10 +83,19 @@ def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path) -> None
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path) -> None:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_results_that_cannot_be_printed_are_exit_code_4(
+    scan: Path, folder: Path, unbuffered: str
+) -> None:
     with (folder / "shown.txt").open("w") as shown:
-        limited = files_up_to(16)
-        done = run("inspect", "scan.h5", cwd=folder, stdout=shown.fileno(), preexec=limited)
+        done = run(
+            "inspect",
+            "scan.h5",
+            cwd=folder,
+            stdout=shown.fileno(),
+            preexec=files_up_to(16),
+            PYTHONUNBUFFERED=unbuffered,
+        )
     assert done.returncode == 4
     assert "cannot be printed: File too large" in done.stderr
     assert "Exception ignored" not in done.stderr
