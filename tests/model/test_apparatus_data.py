@@ -1,0 +1,59 @@
+"""Parameters, checks and the short cuts to them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from builders import CONVERSION, SIGMA, make_artifact
+from hypothesis import given
+from hypothesis import strategies as st
+
+from memscal.errors import InputError
+from memscal.model.apparatus import ParameterSet, QualityCheck
+
+
+def checked(*passed: bool) -> tuple[QualityCheck, ...]:
+    return tuple(QualityCheck(f"check {i}", 1.0, 2.0, ok, "") for i, ok in enumerate(passed))
+
+
+@given(st.lists(st.floats(1e-12, 1e12), min_size=1, max_size=6))
+def test_an_uncertainty_is_the_root_of_its_variance(deviations: list[float]) -> None:
+    names = tuple(f"p{i}" for i in range(len(deviations)))
+    values = np.arange(len(deviations), dtype=float)
+    parameters = ParameterSet(names, values, np.diag(np.square(deviations)))
+    for name, value, deviation in zip(names, values, deviations, strict=True):
+        assert parameters[name] == value
+        assert parameters.uncertainty(name) == pytest.approx(deviation)
+        assert name in parameters
+    assert "another" not in parameters
+
+
+@pytest.mark.parametrize(
+    ("values", "covariance", "units"),
+    [
+        (np.zeros(3), np.zeros((2, 2)), ()),
+        (np.zeros(2), np.zeros((3, 3)), ()),
+        (np.zeros(2), np.zeros(2), ()),
+        (np.zeros(2), np.zeros((2, 2)), ("m",)),
+    ],
+)
+def test_parameters_that_do_not_fit_together_are_refused(
+    values: np.ndarray, covariance: np.ndarray, units: tuple[str, ...]
+) -> None:
+    with pytest.raises(InputError, match="2 parameter names"):
+        ParameterSet(("a", "b"), values, covariance, units)
+
+
+def test_short_cuts_lead_to_the_parameters() -> None:
+    data = make_artifact()
+    assert data.conversion_constant == CONVERSION
+    assert data.gaussian_sigma == SIGMA
+    assert data.resolved_wavenumber == data.transfer.resolved_wavenumber == 3.7e3
+
+
+@pytest.mark.parametrize(
+    ("passed", "expected"),
+    [((), True), ((True, True), True), ((True, False, True), False), ((False,), False)],
+)
+def test_a_calibration_passes_if_every_check_does(passed: tuple[bool, ...], expected: bool) -> None:
+    assert make_artifact(checks=checked(*passed)).passed is expected

@@ -1,0 +1,115 @@
+"""Scans and stress profiles: shapes, values, and what is kept from later changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from builders import make_profile, make_scan
+from hypothesis import given
+from hypothesis import strategies as st
+
+from memscal.errors import InputError
+
+
+@pytest.mark.parametrize("kind", ["line", "repeats", "raster"])
+def test_a_scan_knows_its_kind(kind: str) -> None:
+    assert make_scan(kind).kind == kind
+
+
+def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
+    scan = make_scan("repeats")
+    one = slice(0, 1)
+    single = replace(
+        scan,
+        u_zz=scan.u_zz[one],
+        u_zz_errors=scan.u_zz_errors[one],
+        normal_load=scan.normal_load[one],
+        channels={},
+    )
+    assert single.kind == "repeats"
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "problem"),
+    [
+        ("line", {"u_zz": np.zeros(32)}, r"u_zz has shape \(32,\).*\(33,\) or \(repeat, 33\)"),
+        ("line", {"u_zz": np.zeros((2, 2, 33))}, "u_zz has shape"),
+        ("line", {"u_zz": np.zeros((0, 33))}, "u_zz has shape"),
+        ("line", {"u_zz": 1.0}, "u_zz has shape"),
+        ("raster", {"u_zz": np.zeros((33, 9))}, r"\(33, 9\).*\(9, 33\), from y and x"),
+        ("raster", {"u_zz": np.zeros(33)}, "u_zz has shape"),
+        ("line", {"u_zz_errors": np.zeros(3)}, "u_zz_errors has shape"),
+        ("line", {"normal_load": np.ones((2, 33))}, "normal_load has shape"),
+        ("line", {"channels": {"u_yz": np.zeros(7)}}, "u_yz has shape"),
+        ("line", {"x": np.full(33, np.nan)}, "x of the scan holds a value that is not finite"),
+        ("line", {"x": np.zeros((33, 1))}, "x of the scan has shape"),
+        ("raster", {"y": np.full(9, np.inf)}, "y of the scan"),
+        ("line", {"u_zz": np.full(33, np.inf)}, "infinite voltage"),
+        ("line", {"u_zz_errors": np.full(33, -1e-6)}, "negative standard uncertainty"),
+        ("line", {"load": 0.0}, "load of the scan is 0 N"),
+        ("line", {"load": -1.0}, "load of the scan is -1 N"),
+        ("line", {"load": float("nan")}, "load of the scan is nan N"),
+        ("line", {"load": float("inf")}, "load of the scan is inf N"),
+        ("line", {"load_uncertainty": -0.01}, "standard uncertainty of the load"),
+    ],
+)
+def test_a_scan_that_contradicts_itself_is_refused(
+    kind: str, changes: dict[str, Any], problem: str
+) -> None:
+    with pytest.raises(InputError, match=problem):
+        make_scan(kind, **changes)
+
+
+def test_a_missing_point_is_no_fault() -> None:
+    scan = make_scan(u_zz=np.full(33, np.nan))
+    assert np.all(np.isnan(scan.u_zz))
+
+
+def test_positions_need_not_be_sorted_centred_or_even() -> None:
+    x = np.random.default_rng(1).permutation(np.geomspace(1e-3, 9e-3, 33))
+    np.testing.assert_array_equal(make_scan(x=x).x, x)
+
+
+def test_a_scan_keeps_its_own_copy_of_its_data() -> None:
+    x, u, shear = np.linspace(-1e-3, 1e-3, 33), np.ones(33), np.ones(33)
+    scan = make_scan(x=x, u_zz=u, channels={"u_xz": shear})
+    x += 1.0
+    u += 1.0
+    shear += 1.0
+    assert scan.x.max() == pytest.approx(1e-3)
+    assert scan.u_zz.max() == 1.0
+    assert scan.channels["u_xz"].max() == 1.0
+    for array in (scan.x, scan.u_zz, scan.channels["u_xz"]):
+        assert not array.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"load": 0.0}, "load of the stress profile is 0 N"),
+        ({"r": np.linspace(1e-2, 0, 101)}, "r of the stress profile must increase"),
+        ({"r": np.zeros(101)}, "r of the stress profile must increase"),
+        ({"r": np.linspace(-1e-3, 1e-2, 101)}, "r of the stress profile is negative"),
+        ({"sigma_zz": np.zeros(100)}, "sigma_zz of the stress profile has 100 values for 101"),
+        ({"sigma_rz": np.zeros(102)}, "sigma_rz of the stress profile has 102 values for 101"),
+        ({"sigma_zz": np.full(101, np.nan)}, "sigma_zz of the stress profile holds"),
+        ({"sigma_zz": np.zeros((101, 1))}, "sigma_zz of the stress profile has shape"),
+    ],
+)
+def test_a_profile_that_contradicts_itself_is_refused(
+    changes: dict[str, Any], problem: str
+) -> None:
+    with pytest.raises(InputError, match=problem):
+        make_profile(**changes)
+
+
+@given(width=st.floats(0.2e-3, 1.2e-3), force=st.floats(1e-3, 1e3))
+def test_the_force_of_a_profile_is_its_integral(width: float, force: float) -> None:
+    r = np.linspace(0.0, 10e-3, 2001)
+    sigma = force * np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
+    profile = make_profile(r=r, sigma_zz=sigma, sigma_rz=None, load=force)
+    # The trapezoidal rule is off by (step/width)^2/12 at most.
+    assert profile.force == pytest.approx(force, rel=(5e-6 / width) ** 2 / 6)

@@ -1,0 +1,89 @@
+"""The checks that the data classes share: what passes, what does not, and what is said."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from memscal.errors import InputError
+from memscal.model.validation import (
+    finite_vector,
+    frozen_array,
+    require_increasing,
+    require_non_negative,
+    require_positive,
+    require_range,
+)
+
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
+
+
+def refused(check, *arguments) -> bool:
+    try:
+        check(*arguments)
+    except InputError:
+        return True
+    return False
+
+
+@given(NUMBERS)
+def test_positive_means_finite_and_above_zero(value: float) -> None:
+    assert refused(require_positive, "thickness", value) == (not 0 < value < math.inf)
+
+
+@given(NUMBERS)
+def test_not_negative_means_finite_and_zero_or_above(value: float) -> None:
+    assert refused(require_non_negative, "roughness", value) == (not 0 <= value < math.inf)
+
+
+@given(NUMBERS, NUMBERS, NUMBERS)
+def test_a_range_holds_both_of_its_ends_and_nothing_infinite(
+    value: float, low: float, high: float
+) -> None:
+    inside = low <= value <= high and math.isfinite(value)
+    assert refused(require_range, "ratio", value, low, high) == (not inside)
+
+
+def test_a_refusal_names_quantity_value_and_unit() -> None:
+    with pytest.raises(InputError, match=r"film thickness is -0\.002 m, but .* above zero"):
+        require_positive("film thickness", -2e-3, "m")
+    with pytest.raises(InputError, match=r"ratio is 0\.7, but it must lie from 0 to 0\.5"):
+        require_range("ratio", 0.7, 0.0, 0.5)
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1))
+def test_a_vector_is_copied_and_cannot_be_written(values: list[float]) -> None:
+    source = np.array(values)
+    vector = finite_vector("r", source)
+    source += 1.0
+    np.testing.assert_array_equal(vector, values)
+    with pytest.raises(ValueError, match="read-only"):
+        vector[0] = 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        frozen_array(values)[0] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("values", "problem"),
+    [
+        ([], r"shape \(0,\)"),
+        (1.0, r"shape \(\)"),
+        ([[1.0, 2.0]], r"shape \(1, 2\)"),
+        ([0.0, math.nan], "not finite"),
+        ([0.0, -math.inf], "not finite"),
+    ],
+)
+def test_what_is_no_finite_vector_is_refused(values: object, problem: str) -> None:
+    with pytest.raises(InputError, match=f"r of the profile .*{problem}"):
+        finite_vector("r of the profile", values)
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1))
+def test_increasing_means_each_above_the_last(values: list[float]) -> None:
+    strictly = all(b > a for a, b in itertools.pairwise(values))
+    assert refused(require_increasing, "r", np.array(values)) == (not strictly)

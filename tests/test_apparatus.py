@@ -1,0 +1,264 @@
+"""The apparatus function in use, against closed forms and direct quadrature."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from builders import CONVERSION, SIGMA, make_artifact
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import dblquad
+from scipy.signal import fftconvolve
+
+from memscal import ApparatusFunction, load_apparatus
+from memscal.errors import FormatError, InputError, OutputError, SchemaVersionError
+from memscal.formats.schema import VERSION_ATTRIBUTE
+from memscal.model.apparatus import ApparatusData, ApparatusRadial, TransferFunction
+from memscal.model.validation import FloatArray
+
+SUPPORT = 6e-3
+RADII = np.linspace(0.0, 12e-3, 601)
+
+
+def gaussian(r: FloatArray, width: float) -> FloatArray:
+    return np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
+
+
+def as_function(data: ApparatusData) -> ApparatusFunction:
+    return ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
+
+
+def with_kernel(kernel: Callable[[FloatArray], FloatArray]) -> ApparatusFunction:
+    """An apparatus function of this radial profile, tabulated out to 6 mm."""
+    r, k = np.linspace(0.0, SUPPORT, 401), np.linspace(0.0, 2.5e4, 101)
+    g = kernel(r)
+    errors = 0.02 * g
+    radial = ApparatusRadial(
+        r=r, g=g, g_errors=errors, g_gaussian=g, g_covariance=np.diag(errors**2)
+    )
+    transfer = TransferFunction(
+        k=k,
+        modulus=np.exp(-((k * SIGMA) ** 2) / 2),
+        modulus_errors=np.zeros(101),
+        window=np.ones(101),
+        resolved_wavenumber=3.7e3,
+    )
+    return as_function(replace(make_artifact(), radial_profile=radial, transfer=transfer))
+
+
+@pytest.fixture(scope="module")
+def apparatus() -> ApparatusFunction:
+    """A Gaussian apparatus function of 561 um."""
+    return with_kernel(lambda r: gaussian(r, SIGMA))
+
+
+@settings(max_examples=25)
+@given(width=st.floats(0.2e-3, 1.5e-3), load=st.floats(0.01, 100.0))
+def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(
+    width: float, load: float
+) -> None:
+    apparatus = with_kernel(lambda r: gaussian(r, SIGMA))
+    blurred = apparatus.convolve(RADII, load * gaussian(RADII, width))
+    exact = load * gaussian(RADII, float(np.hypot(width, SIGMA)))
+    np.testing.assert_allclose(blurred, exact, atol=1e-6 * exact[0])
+
+
+def test_a_ring_shaped_apparatus_function_is_convolved_as_it_is() -> None:
+    # Differences of Gaussians stay so, each width added in squares.
+    apparatus = with_kernel(lambda r: 2.0 * gaussian(r, 0.8e-3) - gaussian(r, 0.5e-3))
+    blurred = apparatus.convolve(RADII, gaussian(RADII, 1e-3))
+    exact = 2.0 * gaussian(RADII, np.hypot(0.8e-3, 1e-3)) - gaussian(RADII, np.hypot(0.5e-3, 1e-3))
+    np.testing.assert_allclose(blurred, exact, atol=1e-6 * exact[0])
+
+
+@pytest.mark.parametrize("place", [0.0, 0.7e-3, 2.3e-3])
+def test_the_convolution_is_the_double_integral_at_a_point(
+    apparatus: ApparatusFunction, place: float
+) -> None:
+    # A stress with a flank, 1/(1 + (r/w)^4), which is no sum of Gaussians.
+    def stress(r: Any) -> Any:
+        return 1e5 / (1 + (r / 1e-3) ** 4)
+
+    def integrand(angle: float, s: float) -> float:
+        distance = np.sqrt(place**2 + s**2 - 2 * place * s * np.cos(angle))
+        return float(2 * s * gaussian(s, SIGMA) * stress(distance))
+
+    direct, _ = dblquad(integrand, 0, 8 * SIGMA, 0, np.pi, epsabs=1e-3, epsrel=1e-8)
+    found = apparatus.convolve(RADII, stress(RADII))
+    at = int(np.argmin(np.abs(RADII - place)))
+    # What the table leaves out beyond 12 mm is 1e5/12^4 Pa.
+    assert found[at] == pytest.approx(direct, abs=1e5 / 12**4)
+    assert found[at] == pytest.approx(direct, rel=1e-5)
+
+
+def test_the_convolution_is_that_of_the_lifted_fields() -> None:
+    def kernel(r: FloatArray) -> FloatArray:
+        return 1.5 * gaussian(r, 0.7e-3) - 0.5 * gaussian(r, 1.0e-3)
+
+    def stress(r: FloatArray) -> FloatArray:
+        return (1 + (r / 1e-3) ** 2) * np.exp(-((r / 0.9e-3) ** 2))
+
+    axis = np.arange(-80, 81) * 0.1e-3
+    plane = np.hypot.outer(axis, axis)
+    direct = fftconvolve(stress(plane), kernel(plane), mode="same") * 0.1e-3**2
+    found = with_kernel(kernel).convolve(RADII, stress(RADII))
+    # Every fifth of the radii lies on the positive half axis of the plane.
+    np.testing.assert_allclose(found[:201:5], direct[80, 80:121], atol=1e-6 * found.max())
+
+
+def test_the_force_is_kept_up_to_the_integral_of_the_apparatus_function() -> None:
+    apparatus = with_kernel(lambda r: 0.9 * gaussian(r, SIGMA))
+    blurred = apparatus.convolve(RADII, 3.0 * gaussian(RADII, 0.8e-3))
+    force = 2 * np.pi * np.trapezoid(blurred * RADII, RADII)
+    assert force == pytest.approx(0.9 * 3.0, rel=1e-4)
+
+
+@settings(max_examples=25)
+@given(a=st.floats(-1e3, 1e3, width=16), b=st.floats(-1e3, 1e3, width=16))
+def test_the_convolution_is_linear(a: float, b: float) -> None:
+    apparatus = with_kernel(lambda r: gaussian(r, SIGMA))
+    one, two = gaussian(RADII, 1e-3), gaussian(RADII, 0.6e-3) * (RADII / 1e-3) ** 2
+    together = apparatus.convolve(RADII, a * one + b * two)
+    apart = a * apparatus.convolve(RADII, one) + b * apparatus.convolve(RADII, two)
+    np.testing.assert_allclose(together, apart, atol=1e-9 * (abs(a) + abs(b)) * one[0])
+
+
+def test_uneven_radii_give_the_same_as_even_ones(apparatus: ApparatusFunction) -> None:
+    uneven = np.concatenate([np.linspace(0.0, 4e-3, 300), np.geomspace(4e-3, 12e-3, 60)[1:]])
+    found = apparatus.convolve(uneven, gaussian(uneven, 0.9e-3))
+    exact = gaussian(uneven, float(np.hypot(0.9e-3, SIGMA)))
+    np.testing.assert_allclose(found, exact, atol=1e-6 * exact[0])
+
+
+def test_a_voltage_is_the_blurred_stress_times_the_constant(apparatus: ApparatusFunction) -> None:
+    stress = 2e5 * np.exp(-((RADII / 1e-3) ** 2))
+    volts = apparatus.predict(RADII, stress)
+    np.testing.assert_array_equal(volts, CONVERSION * apparatus.convolve(RADII, stress))
+    np.testing.assert_allclose(apparatus.stress(volts), apparatus.convolve(RADII, stress))
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (2, 5)])
+def test_a_measured_stress_has_the_shape_of_its_voltage(
+    apparatus: ApparatusFunction, shape: tuple[int, ...]
+) -> None:
+    found = apparatus.stress(np.full(shape, 6e-3))
+    assert np.shape(found) == shape
+    np.testing.assert_allclose(found, 6e-3 / CONVERSION)
+
+
+def test_the_radial_profile_is_that_of_the_table_between_its_radii(
+    apparatus: ApparatusFunction,
+) -> None:
+    r = np.linspace(-SUPPORT, SUPPORT, 997).reshape(-1, 1)
+    np.testing.assert_allclose(apparatus.radial(r), gaussian(r, SIGMA), atol=1e-2)
+    np.testing.assert_allclose(apparatus.radial_uncertainty(r), 0.02 * gaussian(r, SIGMA), atol=1)
+    assert apparatus.radial(r).shape == r.shape
+
+
+def test_beyond_the_support_there_is_nothing() -> None:
+    apparatus = with_kernel(np.ones_like)
+    inside, outside = SUPPORT * (1 - 1e-12), SUPPORT * (1 + 1e-12)
+    assert apparatus.radial(inside) == pytest.approx(1.0)
+    np.testing.assert_array_equal(apparatus.radial([outside, -outside, 1.0, np.inf]), 0.0)
+    np.testing.assert_array_equal(apparatus.radial_uncertainty([outside, 1.0]), 0.0)
+
+
+def test_no_stress_gives_no_voltage(apparatus: ApparatusFunction) -> None:
+    np.testing.assert_array_equal(apparatus.predict(RADII, 0 * RADII), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("r", "sigma", "problem"),
+    [
+        (RADII * 1e3, gaussian(RADII, 1e-3), "r reaches 12 m"),
+        (RADII[::40], gaussian(RADII[::40], 1e-3), "every 0.8 mm, coarser"),
+        (RADII[:101], gaussian(RADII[:101], 1e-3), "13.5% of the largest stress is left"),
+        (RADII[:-1], gaussian(RADII, 1e-3), "601 stresses for 600 radii"),
+        (RADII[::-1], gaussian(RADII, 1e-3), "r must increase"),
+        (RADII - 1e-4, gaussian(RADII, 1e-3), "r begins at -0.0001 m"),
+        (RADII[100:], gaussian(RADII[100:], 1e-3), "r begins at 0.002 m"),
+        (np.outer([1, 1], RADII), np.outer([1, 1], RADII), "r has shape"),
+        ([], [], "r has shape"),
+        (RADII, np.full(601, np.nan), "sigma_zz holds a value that is not finite"),
+        (RADII[:3], [1.0, 0.5, 0.0], "3 radii cannot be interpolated"),
+    ],
+)
+def test_a_table_that_cannot_be_convolved_is_refused(
+    apparatus: ApparatusFunction, r: Any, sigma: Any, problem: str
+) -> None:
+    for ask in (apparatus.convolve, apparatus.predict):
+        with pytest.raises(InputError, match=problem):
+            ask(r, sigma)
+
+
+def test_a_refusal_of_millimetres_names_the_unit(apparatus: ApparatusFunction) -> None:
+    with pytest.raises(InputError) as caught:
+        apparatus.convolve(RADII * 1e3, gaussian(RADII, 1e-3))
+    assert "metres, not millimetres" in caught.value.cure
+
+
+def test_steps_may_be_coarse_where_there_is_no_stress(apparatus: ApparatusFunction) -> None:
+    r = np.concatenate([np.linspace(0.0, 6e-3, 301), [8e-3, 10e-3, 12e-3]])
+    found = apparatus.convolve(r, gaussian(r, 0.9e-3))
+    assert found[0] == pytest.approx(gaussian(np.zeros(1), np.hypot(0.9e-3, SIGMA))[0], rel=1e-5)
+
+
+def test_saving_and_loading_changes_no_prediction(
+    apparatus: ApparatusFunction, tmp_path: Path
+) -> None:
+    path = tmp_path / "apparatus.h5"
+    apparatus.save(path)
+    loaded = load_apparatus(path)
+    assert isinstance(loaded, ApparatusFunction)
+    stress = 2e5 * np.exp(-((RADII / 1e-3) ** 2))
+    before, after = apparatus.predict(RADII, stress), loaded.predict(RADII, stress)
+    np.testing.assert_allclose(after, before, rtol=1e-12, atol=1e-14 * before[0])
+    r = np.linspace(0, 7e-3, 99)
+    np.testing.assert_allclose(loaded.radial(r), apparatus.radial(r), rtol=1e-12)
+    np.testing.assert_allclose(
+        loaded.radial_uncertainty(r), apparatus.radial_uncertainty(r), rtol=1e-12
+    )
+    assert loaded.stress(1e-3) == pytest.approx(apparatus.stress(1e-3), rel=1e-14)
+
+
+def test_a_file_is_not_replaced_unless_asked(apparatus: ApparatusFunction, tmp_path: Path) -> None:
+    path = tmp_path / "apparatus.h5"
+    path.write_bytes(b"years of work")
+    with pytest.raises(OutputError):
+        apparatus.save(path)
+    assert path.read_bytes() == b"years of work"
+    apparatus.save(path, overwrite=True)
+    assert load_apparatus(path).conversion_constant == pytest.approx(CONVERSION)
+    assert os.listdir(tmp_path) == ["apparatus.h5"]
+
+
+def test_a_file_of_a_future_major_version_is_refused_plainly(
+    apparatus: ApparatusFunction, tmp_path: Path
+) -> None:
+    path = tmp_path / "apparatus.h5"
+    apparatus.save(path)
+    with h5py.File(path, "r+") as file:
+        holder = next(item for item in (file, file["/entry"]) if VERSION_ATTRIBUTE in item.attrs)
+        holder.attrs[VERSION_ATTRIBUTE] = "2.0.0"
+    with pytest.raises(SchemaVersionError, match=r"newer memscal.*2\.0\.0") as caught:
+        load_apparatus(path)
+    assert "apparatus.h5" in str(caught.value)
+    assert caught.value.cure
+
+
+def test_a_file_changed_after_it_was_written_is_refused(
+    apparatus: ApparatusFunction, tmp_path: Path
+) -> None:
+    path = tmp_path / "apparatus.h5"
+    apparatus.save(path)
+    with h5py.File(path, "r+") as file:
+        file["/entry/radial_profile/g"][0] *= 1.01
+    with pytest.raises(FormatError, match="changed after it was written"):
+        load_apparatus(path)
