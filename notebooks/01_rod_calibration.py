@@ -420,7 +420,8 @@ sweep_figure(sweep)
 # Single draws tell more. Their $A$ is safe near the rule's choice, because $A$ is the quotient at
 # zero wavenumber, where both spectra are strongest. Their width is not: at any amplitude some
 # components are divided by almost nothing, and the ripples that this leaves in $G$ move a Gaussian
-# fitted to it by ten percent. The paper's recipe, read literally, is a single draw.
+# fitted to it by ten percent, now and then by far more. The paper's recipe, read literally, is a
+# single draw.
 #
 # ## 11. Using it: saving, loading, and another load
 #
