@@ -104,7 +104,7 @@ def group_positions(what: str, positions: FloatArray, repeat: IntArray, toleranc
     if np.unique(np.stack([repeat, index]), axis=1).shape[1] < positions.size:
         raise InputError(
             f"One repeat has two readings at the same {what}.",
-            cure="Name the column that numbers the repeats, or average them.",
+            cure="Name the column that numbers the repeats, or remove one of the readings.",
         )
     return Grid(places, index, step, deviation)
 
@@ -145,7 +145,7 @@ def _smallest_spacing(positions: FloatArray, repeat: IntArray) -> float:
     if not (np.isfinite(smallest) and smallest > 0):
         raise InputError(
             "One repeat has two readings at the same position, or fewer than two readings.",
-            cure="Name the column that numbers the repeats, or average them.",
+            cure="Name the column that numbers the repeats, or remove one of the readings.",
         )
     return smallest
 

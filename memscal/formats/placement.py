@@ -114,13 +114,12 @@ def _place_raster(
     for name, grid in grids.items():
         _report(notes, name, grid, tolerance)
     flat = grids["y"].index * shape[1] + grids["x"].index
-    if repeat is not None and np.unique([repeat, flat], axis=1).shape[1] < flat.size:
-        raise InputError(
-            "One repeat has two readings at the same place of the grid.",
-            why=f"The grid found is {grids['x'].step * 1e3:.4g} mm by "
-            f"{grids['y'].step * 1e3:.4g} mm, and averaging would merge different positions.",
-            cure="Lower the grid tolerance, or check the column that numbers the repeats.",
-        )
+    if repeat is not None:
+        for positions, grid in ((xs, grids["x"]), (ys, grids["y"])):
+            _check_merged(positions, np.stack([repeat, flat]), grid, tolerance)
+        twice = flat.size - np.unique([repeat, flat], axis=1).shape[1]
+        if twice:
+            notes.append(f"{twice} readings share their place with another of the same repeat.")
     most = int(np.bincount(flat).max())
     if most > 1 and not average:
         raise InputError(
@@ -131,6 +130,23 @@ def _place_raster(
     means, errors = _average(columns, flat, shape, notes)
     _report_missing(notes, means["u_zz"])
     return Placed(grids["x"].places, grids["y"].places, means, errors)
+
+
+def _check_merged(positions: FloatArray, keys: FloatArray, grid: Grid, tolerance: float) -> None:
+    """Refuse a grid that takes different positions of one repeat for one place."""
+    _, group = np.unique(keys, axis=1, return_inverse=True)
+    group = group.reshape(-1)  # NumPy 2.0 kept an axis here
+    low, high = np.full(group.max() + 1, np.inf), np.full(group.max() + 1, -np.inf)
+    np.minimum.at(low, group, positions)
+    np.maximum.at(high, group, positions)
+    widest = float((high - low).max())
+    if widest > 0.5 * tolerance * grid.step:
+        raise InputError(
+            f"One repeat has two readings {widest * 1e3:.4g} mm apart that would share a place.",
+            why=f"The grid found has a step of {grid.step * 1e3:.4g} mm, and averaging would merge "
+            "different positions.",
+            cure="Lower the grid tolerance, or check the columns of positions and repeats.",
+        )
 
 
 def _count_repeats(xs: FloatArray, numbers: FloatArray | None, notes: list[str]) -> IntArray:

@@ -180,6 +180,13 @@ def test_a_grid_that_would_merge_readings_of_one_repeat_is_refused(tmp_path: Pat
         scan_table(tmp_path, text, y="y", repeat="n", repeats="average")
 
 
+def test_a_place_read_twice_in_one_repeat_is_averaged_and_reported(tmp_path: Path):
+    text = "x,y,u,n\n0,0,1,1\n1,0,2,1\n0,1,3,1\n1,1,4,1\n0,0,5,1\n1,0.0001,6,2\n"
+    found = scan_table(tmp_path, text, y="y", repeat="n", repeats="average")
+    np.testing.assert_allclose(found.scan.u_zz, [[3e-3, 4e-3], [3e-3, 4e-3]], rtol=1e-12)
+    assert any("1 readings share their place" in note for note in found.notes)
+
+
 def test_a_foreign_sensor_needs_a_scale_and_the_scale_is_recorded(tmp_path: Path):
     with pytest.raises(UnitError, match=r'"uT"(.|\n)*u-scale'):
         scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_unit="uT")
