@@ -51,13 +51,13 @@ def field_noise(solution: Solution, wavenumbers: FloatArray) -> FieldNoise | Non
     if not estimate.points.planar:
         return None
     k, weights = estimate.model.k, estimate.model.reference.wavenumbers.weights
-    reference = np.abs(estimate.model.reference.values)
-    window = solution.window_at_nodes
-    amplified = np.divide(
-        window * solution.band.noise, reference, out=np.zeros_like(k), where=window > 0
-    )
-    grid = solution.fields.grid
-    area = grid.cell_area * solution.fields.voltage.size
+    fields = solution.fields
+    # Where both vanish, window and reference are divided on the grid, not interpolated apart.
+    axis, window = fields.along_axis(solution.quotient.division.window)
+    reference = fields.along_axis(np.abs(fields.grid.forward(fields.reference)))[1]
+    ratio = np.divide(window, reference, out=np.zeros_like(window), where=window > 0)
+    amplified = solution.band.noise * np.interp(k, axis, ratio, right=0.0)
+    area = fields.grid.cell_area * fields.voltage.size
     columns = j0(np.multiply.outer(kernel.view.r, k)) * (np.sqrt(weights / area) * amplified)
     return FieldNoise(
         conversion_constant=float(amplified[0]),

@@ -92,9 +92,12 @@ class Solution:
 
     @property
     def window_at_nodes(self) -> FloatArray:
-        """The regularisation's window at the quadrature nodes of the estimate."""
+        """The regularisation's window at the quadrature nodes of the estimate.
+
+        What the grid does not carry, beyond its last wavenumber, is as hidden as if windowed.
+        """
         k, window = self.fields.along_axis(self.quotient.division.window)
-        return np.interp(self.estimate.model.k, k, window)
+        return np.interp(self.estimate.model.k, k, window, right=0.0)
 
     @property
     def tail_share(self) -> float:

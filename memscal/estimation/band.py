@@ -35,7 +35,8 @@ class Band:
     signal, noise : ndarray, shape (n,)
         Modulus of the voltage's transform and its noise, in V m^2 / N.
     relevant, resolved : float
-        Wavenumbers beyond which the signal stays below ten and three times the noise, in rad/m.
+        Wavenumbers beyond which the signal stays below ten and three times the noise, in rad/m;
+        at most the last one that the scan's step samples.
     weakest_voltage, weakest_reference : float
         Moduli of both fields' transforms at ``relevant``.
     """
@@ -55,7 +56,10 @@ def find_band(estimate: ProfileEstimate) -> Band:
     k, signal = spectrum.wavenumbers.k, np.abs(spectrum.values)
     noise = _planar_noise(estimate) if estimate.points.planar else _ring_noise(estimate, k)
     ratio = signal / noise
-    relevant, resolved = _falls_below(k, ratio, RELEVANT), _falls_below(k, ratio, RESOLVED)
+    # Nothing finer than two steps of the scan was sampled, whatever its signal.
+    sampled = np.pi / estimate.points.step
+    relevant = min(_falls_below(k, ratio, RELEVANT), sampled)
+    resolved = min(_falls_below(k, ratio, RESOLVED), sampled)
     reference = np.abs(estimate.model.reference.values)
     weakest_voltage = float(np.interp(relevant, k, signal))
     weakest_reference = float(np.interp(relevant, k, reference))
@@ -74,19 +78,13 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
     return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
 
 
-def _measured_share(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Radius, noise per newton, and share of the measurement in each point's value."""
+def _ring_noise(estimate: ProfileEstimate, k: FloatArray) -> FloatArray:
     points = estimate.points
-    radius = np.hypot(points.x - estimate.centre[0], points.y - estimate.centre[1])
+    radius = np.abs(points.x - estimate.centre[0])
     signal = (estimate.predicted - estimate.background) / points.load
     noise = estimate.noise / points.load
     share = signal**2 / (signal**2 + noise**2) * estimate.outlier_weight
-    return radius, noise, share
-
-
-def _ring_noise(estimate: ProfileEstimate, k: FloatArray) -> FloatArray:
-    radius, noise, share = _measured_share(estimate)
-    area = _ring_areas(radius, tolerance=0.25 * estimate.points.step)
+    area = _ring_areas(radius, tolerance=0.25 * points.step)
     weighted = area * share * noise
     return np.asarray(np.sqrt(j0(np.multiply.outer(k, radius)) ** 2 @ weighted**2))
 
@@ -105,9 +103,11 @@ def _ring_areas(radius: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _planar_noise(estimate: ProfileEstimate) -> FloatArray:
-    """Noise of one component of a raster's transform: the same at every wavenumber."""
-    _, noise, share = _measured_share(estimate)
+    """Noise of one component of a raster's transform: the same at every wavenumber.
+
+    A raster is used as it is, so that every point brings its noise, be there signal or not.
+    """
     points = estimate.points
     cell = points.step * float(np.median(np.diff(np.unique(points.y))))
-    per_component = cell * np.sqrt(np.sum((share * noise) ** 2))
-    return np.full(estimate.model.k.size, per_component)
+    noise = estimate.noise / points.load * estimate.outlier_weight
+    return np.full(estimate.model.k.size, cell * np.sqrt(np.sum(noise**2)))

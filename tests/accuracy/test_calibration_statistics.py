@@ -171,3 +171,14 @@ def tuned_wiener(scan: memscal.Scan) -> tuple[float, float]:
         a = restored.sum() / stress.sum() / CONVERSION - 1
         best = min(best, (plane_error(r, g, wanted), a))
     return best
+
+
+def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
+    deviates = []
+    for seed in range(SEEDS):
+        scan = simulated(raster=True, points=25, seed=seed, centre=(0.3e-3, -0.2e-3))
+        p = memscal.calibrate(scan).apparatus.parameters
+        truths = {"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "centre_y": -0.2e-3}
+        deviates.append([(p[n] - truth) / p.uncertainty(n) for n, truth in truths.items()])
+    scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
+    assert (scatter < root_mean_square_limit(1.15)).all()
