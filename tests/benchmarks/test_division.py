@@ -1,0 +1,190 @@
+"""Speed, always as the ratio of two computations that take turns on the same machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+
+import memscal
+from memscal.axisymmetry.grids import EvenGrid
+from memscal.deconvolution.problem import DivisionProblem
+from memscal.deconvolution.white_noise import WhiteNoise
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
+from memscal.model.validation import FloatArray
+
+WIDTH = 16e-3
+STRESS_WIDTH, BLURRED_WIDTH = 0.9e-3, 1.06e-3
+WEAKEST = 1e-3
+
+
+def gaussian(r: FloatArray, width: float) -> FloatArray:
+    return np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
+
+
+def division_problem(pixels: int) -> DivisionProblem:
+    """Two Gaussians on a plane of ``pixels`` by ``pixels``, of which a quarter is kept."""
+    grid = EvenGrid(pixels // 2 + 1, WIDTH / pixels)
+    voltage, stress = gaussian(grid.radius, BLURRED_WIDTH), gaussian(grid.radius, STRESS_WIDTH)
+    # Grids remember their wavenumbers; neither side of a comparison is to compute them.
+    assert grid.wavenumber.size == voltage.size
+    return DivisionProblem(grid, voltage, stress, WEAKEST**1.4, WEAKEST)
+
+
+class PlainDivision:
+    """The same division on the whole plane by numpy's complex transform."""
+
+    def __init__(self, problem: DivisionProblem) -> None:
+        # One period: the last row and column are the first ones again.
+        self.voltage = problem.grid.to_image(problem.voltage)[:-1, :-1]
+        self.stress = problem.grid.to_image(problem.reference)[:-1, :-1]
+        self.cell_area = problem.grid.cell_area
+        self.noise2 = (0.1 * WEAKEST / self.cell_area) ** 2
+
+    def __call__(self) -> FloatArray:
+        z = np.fft.fft2(self.stress)
+        window = -np.expm1(-(z.real**2 + z.imag**2) / self.noise2)
+        quotient = np.fft.fft2(self.voltage) * (window / np.where(z == 0, 1.0, z))
+        return np.fft.fftshift(np.fft.ifft2(quotient).real) / self.cell_area
+
+
+def turns(one: Callable[[], Any], other: Callable[[], Any], rounds: int) -> float:
+    """Median time of one, in units of the other's; they take turns, and each warms up."""
+    one(), other()
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(rounds):
+        for work, record in zip((one, other), times, strict=True):
+            start = perf_counter()
+            work()
+            record.append(perf_counter() - start)
+    return median(times[0]) / median(times[1])
+
+
+@pytest.fixture(scope="module")
+def problem() -> DivisionProblem:
+    return division_problem(512)
+
+
+@pytest.fixture(scope="module")
+def plain(problem: DivisionProblem) -> PlainDivision:
+    return PlainDivision(problem)
+
+
+@pytest.fixture(scope="module")
+def scan() -> Scan:
+    return memscal.simulate(points=65, noise=0.002, centre=(0.0, 0.0), drift=0.0, seed=4)
+
+
+@pytest.fixture(scope="module")
+def reference(scan: Scan) -> StressProfile:
+    return memscal.indent(scan.film, scan.indenter, load=scan.load).profile()
+
+
+@pytest.mark.benchmark(group="division at 512 x 512")
+def test_a_quarter_plane_divides(benchmark: Any, problem: DivisionProblem) -> None:
+    division = benchmark.pedantic(WhiteNoise().divide, (problem,), rounds=20, warmup_rounds=1)
+    exact = gaussian(problem.grid.radius, np.sqrt(BLURRED_WIDTH**2 - STRESS_WIDTH**2))
+    np.testing.assert_allclose(division.field, exact, atol=0.05 * exact.max())
+
+
+@pytest.mark.benchmark(group="division at 512 x 512")
+def test_a_plain_complex_division_gives_the_same(
+    benchmark: Any, problem: DivisionProblem, plain: PlainDivision
+) -> None:
+    whole = benchmark.pedantic(plain, rounds=20, warmup_rounds=1)
+    # Its central pixel is the axis; the quarter lies to the lower right, less the last edge.
+    quarter = WhiteNoise().divide(problem).field[:-1, :-1]
+    np.testing.assert_allclose(whole[256:, 256:], quarter, atol=1e-6 * quarter.max())
+
+
+@pytest.mark.benchmark
+def test_a_quarter_plane_divides_faster_than_a_plain_complex_transform(
+    problem: DivisionProblem, plain: PlainDivision
+) -> None:
+    # Even against the bare quotient, without window or way back.
+    def bare() -> FloatArray:
+        return np.fft.fft2(plain.voltage) / (np.fft.fft2(plain.stress) + plain.noise2)
+
+    assert turns(lambda: WhiteNoise().divide(problem), plain, rounds=15) < 0.8
+    assert turns(lambda: WhiteNoise().divide(problem), bare, rounds=15) < 1.0
+
+
+@pytest.mark.benchmark
+def test_a_division_costs_as_many_steps_as_its_transforms(problem: DivisionProblem) -> None:
+    # N log N from 512 to 2048 is 19.6 times the work; three times that allows for caches.
+    # Anything that went as N^1.5 would cost 64 times, as N^2 256 times.
+    large = division_problem(2048)
+    steps = 16 * np.log(2048**2) / np.log(512**2)
+    ratio = turns(
+        lambda: WhiteNoise().divide(large), lambda: WhiteNoise().divide(problem), rounds=5
+    )
+    assert ratio < 3 * steps
+
+
+def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
+    """The paper's steps as plainly as they can be written: lift, add noise, divide, fit."""
+    pixels, rng = 512, np.random.default_rng(0)
+    axis = (np.arange(pixels) - pixels // 2) * (2 * WIDTH / pixels)
+    r = np.hypot.outer(axis, axis)
+    volts = (scan.u_zz + scan.u_zz[::-1])[scan.x.size // 2 :] / 2
+    volts = volts - np.mean(volts[-3:])
+    u = np.interp(r, scan.x[scan.x.size // 2 :], volts, right=0.0)
+    sigma = np.interp(r, reference.r, reference.sigma_zz, right=0.0)
+    pixel = 2 * WIDTH / pixels
+    weakest = 0.02 * np.abs([u.sum(), sigma.sum()]) / pixels
+    u = u + 0.1 * weakest[0] * rng.normal(size=u.shape)
+    sigma = sigma + 0.1 * weakest[1] * rng.normal(size=u.shape)
+    quotient = np.fft.fft2(u) / np.fft.fft2(sigma)
+    g = np.fft.fftshift(np.fft.ifft2(quotient).real) / pixel**2
+    rows = slice(pixels // 2 - 100, pixels // 2 + 101)
+
+    def bell(distance: FloatArray, constant: float, width: float) -> FloatArray:
+        return constant * gaussian(distance, width)
+
+    near = r[rows, rows].ravel()
+    found, _ = curve_fit(bell, near, g[rows, rows].ravel(), p0=(1e-7, 0.5e-3))
+    return np.asarray(found)
+
+
+@pytest.mark.benchmark(group="calibration of 65 points, reference given")
+def test_a_calibration_finds_the_truth(
+    benchmark: Any, scan: Scan, reference: StressProfile
+) -> None:
+    result = benchmark.pedantic(
+        memscal.calibrate, (scan,), {"reference": reference}, rounds=8, warmup_rounds=1
+    )
+    truth = scan.synthetic
+    assert truth is not None
+    apparatus = result.apparatus
+    assert apparatus.conversion_constant == pytest.approx(truth["conversion_constant"], rel=0.03)
+    assert apparatus.gaussian_sigma == pytest.approx(truth["gaussian_sigma"], rel=0.03)
+
+
+@pytest.mark.benchmark(group="calibration of 65 points, reference given")
+def test_a_plain_pipeline_finds_about_the_same(
+    benchmark: Any, scan: Scan, reference: StressProfile
+) -> None:
+    # No centre, no baseline, no uncertainties, no checks: what a script of one page does.
+    constant, width = benchmark.pedantic(
+        plain_pipeline, (scan, reference), rounds=8, warmup_rounds=1
+    )
+    assert constant == pytest.approx(1e-7, rel=0.4)
+    assert width == pytest.approx(561e-6, rel=0.4)
+
+
+@pytest.mark.benchmark
+def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(
+    scan: Scan, reference: StressProfile
+) -> None:
+    ratio = turns(
+        lambda: memscal.calibrate(scan, reference=reference),
+        lambda: plain_pipeline(scan, reference),
+        rounds=7,
+    )
+    assert ratio < 4
