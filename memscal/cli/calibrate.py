@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -162,6 +163,8 @@ def _regulariser(method: str, options: tuple[str, ...], seed: int | None) -> Reg
     if "seed" in given:
         raise click.UsageError("Give the seed as --seed, not as --option.")
     try:
+        if given:
+            _check_kinds(given, create_regulariser(method))
         regulariser = create_regulariser(method, seed=seed or 0, **given)
     except InputError as failure:
         raise click.UsageError(f"{failure.problem} {failure.cure}".strip()) from failure
@@ -178,6 +181,19 @@ def _option(text: str) -> tuple[str, Any]:
         return name, json.loads(value)
     except ValueError:
         return name, value
+
+
+def _check_kinds(given: dict[str, Any], usual: Regulariser) -> None:
+    """Refuse text where the method's own default is a number, or a part where it is a count."""
+    for name, value in given.items():
+        default = getattr(usual, name, None)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if isinstance(default, float) and not (number and math.isfinite(value)):
+            raise click.UsageError(
+                f"--option {name}={value}: {name} is a number, such as {default}."
+            )
+        if type(default) is int and type(value) is not int:
+            raise click.UsageError(f"--option {name}={value}: {name} is a whole number.")
 
 
 def _read(path: Path, reference: Path | None) -> tuple[Scan, StressProfile | None]:

@@ -89,16 +89,15 @@ def calibration_tables(found: Calibration) -> list[Table]:
     ]
     resolved = apparatus.resolved_wavenumber / PER_MM
     rows += [
+        ("method of division", "", found.solution.regulariser.name),
         ("resolved up to the wavenumber", "k", f"{resolved:.3g} rad/mm"),
         ("reconvolution with the deconvolved G", "", _misfit(found.solution.quotient.misfit)),
         ("reconvolution with the Gaussian", "", _misfit(found.solution.gaussian_misfit)),
     ]
     sensor = apparatus.sensor
     name = " ".join(part for part in (sensor.name, sensor.model) if part) or "the sensor"
-    method = found.solution.regulariser.name
     title = (
-        f"Apparatus function of {name}, channel {sensor.channel}, by {method} "
-        "(± standard uncertainty, k = 1)"
+        f"Apparatus function of {name}, channel {sensor.channel} (± standard uncertainty, k = 1)"
     )
     return [Table(title, ("", "", ""), rows), checks_table(apparatus.checks)]
 

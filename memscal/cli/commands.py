@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 
 import click
@@ -89,3 +90,17 @@ def memscal() -> None:
 
     Lengths are in mm, depths in um, loads in N and moduli in MPa; every option says its unit.
     """
+    if os.environ.get("SOURCE_DATE_EPOCH") is not None:
+        _check_clock()
+
+
+def _check_clock() -> None:
+    """Refuse a wrong SOURCE_DATE_EPOCH here: numpy reads it too, and fails on it in its own words.
+
+    An empty one counts as none, as it does for the files.
+    """
+    from memscal.formats.timestamp import timestamp
+
+    timestamp()
+    if not os.environ["SOURCE_DATE_EPOCH"]:
+        del os.environ["SOURCE_DATE_EPOCH"]

@@ -60,7 +60,7 @@ class Quantity(_Number):
         open_low: bool = True,
         infinite: bool = False,
     ) -> None:
-        self.name = unit.upper()
+        self.name = unit
         self.unit = unit
         self.low, self.high, self.open_low, self.infinite = low, high, open_low, infinite
 
@@ -78,9 +78,13 @@ class Quantity(_Number):
             self.fail(f"{value} is not {self._range}{self._in_unit}.", param, ctx)
         return number
 
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Return the unit as the name of the value: MM, but MPa."""
+        return self.name.upper() if self.unit.islower() else self.unit
+
     @property
     def _in_unit(self) -> str:
-        return f" (in {self.unit})" if self.unit not in ("number", "ratio", "inf") else ""
+        return f" (in {self.unit})" if self.unit != "ratio" else ""
 
     @property
     def _range(self) -> str:

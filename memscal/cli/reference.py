@@ -21,7 +21,7 @@ from memscal.cli.options import (
     radius_options,
     si,
 )
-from memscal.cli.output import emit_json, finite, message
+from memscal.cli.output import emit_json, finite, message, note
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
@@ -32,6 +32,9 @@ __all__ = ["command"]
 #: The paper's rod and sphere, in mm, and its film.
 RADIUS = {"rod": 0.25, "sphere": 128.8}
 FILM = {"young-modulus": 2.2, "poisson-ratio": 0.5, "thickness": 2.0}
+
+#: Share of the film's thickness up to which linear elasticity is taken at its word.
+_SHALLOW = 0.1
 
 _SINGULAR = (
     "The pressure under a flat rod grows without bound towards its edge: "
@@ -143,15 +146,30 @@ def command(
 
 def _tell(contacts: Sequence[Contact], loading: str, output: Path | None, as_json: bool) -> None:
     solutions = [_solution(contact, loading) for contact in contacts]
+    deep = [text for contact in contacts if (text := _deep(contact))]
     if as_json:
         head = {"schema_version": "1", "output": None if output is None else str(output)}
-        emit_json({**head, "solutions": solutions, "warnings": [_SINGULAR]})
+        emit_json({**head, "solutions": solutions, "warnings": [_SINGULAR, *deep]})
     else:
         from memscal.cli.tables import emit_tables
 
         emit_tables(_table(contacts[0], solutions))
+    for text in deep:
+        note(text)
     if output is not None:
         message(f"Written: {output}")
+
+
+def _deep(contact: Contact) -> str:
+    """Say where linear elasticity is formal."""
+    share = contact.depth / contact.film.thickness
+    if share <= _SHALLOW:
+        return ""
+    return (
+        f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the film's "
+        "thickness: linear elasticity is formal there, and its error is not part of the "
+        "convergence."
+    )
 
 
 def _solution(contact: Contact, loading: str) -> dict[str, Any]:

@@ -64,23 +64,21 @@ def _drawn(tables: Sequence[Table]) -> str:
     from rich.text import Text
 
     console = Console(highlight=False)
-    with console.capture() as capture:
-        for i, table in enumerate(tables):
-            drawn = RichTable(
-                title=Text(readable(table.title)),
-                title_justify="left",
-                title_style="bold",
-                box=box.SIMPLE_HEAD if any(table.head) else None,
-                show_header=any(table.head),
-                padding=(0, 1),
-            )
-            for name in table.head:
-                drawn.add_column(Text(readable(name)), overflow="fold")
-            for k, row in enumerate(table.rows):
-                # Text, not markup: a cell may hold what stood in a file.
-                cells = (Text(readable(cell)) for cell in row)
-                drawn.add_row(*cells, style="bold red" if k in table.marked else "")
-            if i:
-                console.print()
+    blocks = []
+    for table in tables:
+        drawn = RichTable(
+            box=box.SIMPLE_HEAD if any(table.head) else None,
+            show_header=any(table.head),
+            padding=(0, 1),
+        )
+        for name in table.head:
+            drawn.add_column(Text(readable(name)), overflow="fold")
+        for k, row in enumerate(table.rows):
+            # Text, not markup: a cell may hold what stood in a file.
+            cells = (Text(readable(cell)) for cell in row)
+            drawn.add_row(*cells, style="bold red" if k in table.marked else "")
+        with console.capture() as capture:
+            console.print(Text(readable(table.title)), style="bold")
             console.print(drawn)
-    return capture.get().rstrip("\n")
+        blocks.append("\n".join(line for line in capture.get().splitlines() if line.strip()))
+    return "\n\n".join(blocks)

@@ -110,3 +110,11 @@ def test_a_terminal_without_the_characters_still_shows_the_right_number(
     assert "+/-" in done.stdout
     (line,) = [text for text in done.stdout.splitlines() if "constant with" in text]
     assert "e-5 mV/Pa" in line
+
+
+def test_a_wrong_clock_is_refused_in_our_words(scan: Path, folder: Path) -> None:
+    done = run("calibrate", "scan.h5", cwd=folder, SOURCE_DATE_EPOCH="yesterday")
+    assert done.returncode == 3
+    assert "SOURCE_DATE_EPOCH is 'yesterday'" in done.stderr
+    done = run("calibrate", "scan.h5", cwd=folder, SOURCE_DATE_EPOCH="")
+    assert done.returncode == 0, done.stderr

@@ -114,3 +114,8 @@ def test_a_reference_is_not_replaced_unless_forced(run: Run, folder: Path) -> No
     assert Path("rod.h5").read_bytes() == b"old"
     assert run("reference", "rod", "-o", "rod.h5", "--force").code == 0
     assert memscal.read_reference("rod.h5").load == 1
+
+
+def test_a_depth_beyond_linear_elasticity_is_pointed_out(run: Run) -> None:
+    assert "29% of the film's thickness" in run("reference", "rod").err
+    assert run("reference", "rod", "--depth", 100).err == ""
