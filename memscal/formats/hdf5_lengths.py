@@ -1,7 +1,8 @@
 """How long variable-length text claims to be, found before the HDF5 library is asked for it.
 
 HDF5 sets aside the memory that a variable-length string claims, up to 4 GiB, before it finds
-out that the file holds no such string.  The claim stands in the file as a descriptor of 16
+out that the file holds no such string, and can walk for ever through the damaged heap that
+holds it.  The claim stands in the file as a descriptor of 16
 bytes (length, address, index; "HDF5 File Format Specification", section VIII): for a dataset
 where its storage begins, for an attribute in the header of its object.
 """
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 __all__ = ["attribute_text_lengths", "text_length"]
 
 _DESCRIPTOR = 16
+_OBJECT = 16  # header of an object in a global heap
 _CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
 _SHARED = 0x02
 _VARIABLE_LENGTH = 9  # class of the datatype
@@ -30,7 +32,34 @@ def text_length(data: bytes, address: int) -> int:
     """
     if not 0 <= address <= len(data) - _DESCRIPTOR:
         raise ValueError("the text lies outside the file")
-    return int(struct.unpack_from("<I", data, address)[0])
+    return _claim(data, data, address)
+
+
+def _claim(file: bytes, data: bytes, position: int) -> int:
+    """Return the length in a descriptor, after a look at the heap that it leads to."""
+    length, heap = struct.unpack_from("<IQ", data, position)
+    if length:
+        _check_heap(file, heap)
+    return int(length)
+
+
+def _check_heap(file: bytes, address: int) -> None:
+    """Refuse a global heap through which HDF5 would walk for ever, or out of the file.
+
+    Every object says how far it is to the next; free space (index 0) counts its own header.
+    """
+    if address > len(file) - 16 or file[address : address + 4] != b"GCOL":
+        raise ValueError("the text lies in no heap")
+    end = address + int.from_bytes(file[address + 8 : address + 16], "little")
+    position = address + 16
+    if not position <= end <= len(file):
+        raise ValueError("the heap of the text has a wrong size")
+    while position + _OBJECT <= end:
+        index, _, size = struct.unpack_from("<HHxxxxQ", file, position)
+        step = size if index == 0 else _OBJECT + -(-size // 8) * 8
+        if step < _OBJECT or position + step > end:
+            raise ValueError("the heap of the text is damaged")
+        position += step
 
 
 def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -> list[int]:
@@ -58,7 +87,8 @@ def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -
                 continue
             found, start = _attribute(message)
             if found == name:
-                return [text_length(message, start + i * _DESCRIPTOR) for i in range(number)]
+                starts = [start + i * _DESCRIPTOR for i in range(number)]
+                return [_claim(data, message, at) for at in starts]
     except (struct.error, IndexError) as error:
         raise ValueError("the header of its object is damaged") from error
     lengths = list(_dense_lengths(data, name, number))
@@ -86,7 +116,7 @@ def _dense_lengths(data: bytes, name: bytes, number: int) -> Iterator[int]:
             variable = dtype < len(message) and message[dtype] & 0x0F == _VARIABLE_LENGTH
             if named == name and variable and len(message) >= values + number * _DESCRIPTOR:
                 for i in range(number):
-                    yield text_length(message, values + i * _DESCRIPTOR)
+                    yield _claim(data, message, values + i * _DESCRIPTOR)
         position = data.find(wanted, position + 1)
 
 
