@@ -23,7 +23,7 @@ COMMANDS = {
 }
 """Command: its module in this package, and what it does."""
 
-SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+SETTINGS = {"help_option_names": ["--help", "-h"], "max_content_width": 100}
 
 
 class LazyGroup(click.Group):

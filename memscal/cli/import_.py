@@ -20,7 +20,7 @@ from memscal.cli.options import (
     json_option,
     radius_options,
 )
-from memscal.cli.output import emit, emit_json, message
+from memscal.cli.output import emit, emit_json, message, readable
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
             }
         )
     else:
-        emit("\n".join(found.notes))
+        emit(readable("\n".join(found.notes)))
     message(f"Written: {output}")
     return DONE
 
