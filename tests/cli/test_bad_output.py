@@ -208,3 +208,19 @@ def test_a_python_warning_becomes_one_line_of_words(
     done = run("calibrate", scan)
     assert done.code == 0
     assert "Warning: UserWarning: the film is old" in done.err.splitlines()
+
+
+@pytest.mark.parametrize("name", ["out.h5", "out.png"])
+def test_a_file_that_appears_during_the_computing_is_not_replaced(
+    run: Run, scan: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    from memscal.calibration.procedure import calibrate
+
+    def slow(*given: object, **options: object) -> object:
+        (folder / name).write_bytes(b"of another program")
+        return calibrate(*given, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("memscal.calibration.procedure.calibrate", slow)
+    refused = run("calibrate", scan, "-o", "out.h5", "--figure", "out.png")
+    assert refused.code == 4
+    assert (folder / name).read_bytes() == b"of another program"
