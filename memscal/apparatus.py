@@ -21,7 +21,7 @@ _LARGEST_RADIUS = 1.0
 _DECAYED = 0.01
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ApparatusFunction(ApparatusData):
     r"""A calibrated sensor: :math:`U_{zz} = A\,G \otimes \sigma_{zz}`.
 
@@ -106,6 +106,8 @@ class ApparatusFunction(ApparatusData):
 
     def _at(self, values: FloatArray, r: ArrayLike) -> FloatArray:
         radii = np.abs(np.asarray(r, dtype=np.float64))
+        if np.isnan(radii).any():
+            raise InputError("A radius is not a number.", cure="Leave missing radii out.")
         support = self.radial_profile.r
         spline = radial_spline(support, values)
         inside = radii <= support[-1]

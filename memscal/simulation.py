@@ -13,7 +13,7 @@ from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, StressSensor
-from memscal.model.validation import FloatArray
+from memscal.model.validation import FloatArray, require_non_negative, require_positive
 
 __all__ = ["GaussianMixture", "simulate"]
 
@@ -142,12 +142,13 @@ def simulate(
     >>> scan.u_zz.shape, scan.synthetic["gaussian_sigma"]
     ((33,), 0.000561)
     """
+    _require_plausible(half_range, points, repeats, noise, conversion_constant)
     truth = GaussianMixture() if kernel is None else kernel
     loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
-    if points < 2 or repeats < 1:
-        raise InputError("A scan needs two positions and one repeat at least.")
+    if loads.size == 0:
+        raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
     x = np.linspace(-half_range, half_range, points)
     y = x if raster else np.zeros(1)
     radius = np.hypot.outer(y - centre[1], x - centre[0])
@@ -171,7 +172,7 @@ def simulate(
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=rod,
         film=film,
-        sensor=StressSensor(name="simulated", model="synthetic", channel="zz"),
+        sensor=StressSensor(name="a simulated sensor", channel="zz"),
         title="Synthetic rod scan",
         notes="Synthetic data made by memscal simulate; nothing here was measured.",
         synthetic=_truth(
@@ -187,6 +188,16 @@ def simulate(
             },
         ),
     )
+
+
+def _require_plausible(
+    half_range: float, points: int, repeats: int, noise: float, conversion_constant: float
+) -> None:
+    require_positive("half_range", half_range, "m")
+    require_positive("conversion_constant", conversion_constant, "V/Pa")
+    require_non_negative("noise", noise)
+    if points < 2 or repeats < 1:
+        raise InputError("A scan needs two positions and one repeat at least.")
 
 
 def _blurred(

@@ -40,6 +40,8 @@ def _points(estimate: ProfileEstimate) -> list[str]:
         place = f"x = {points.x[i] * 1e3:.4g} mm"
         if points.planar:
             place += f", y = {points.y[i] * 1e3:.4g} mm"
+        if points.repeat.any():
+            place += f" of repeat {points.repeat[i]}"
         messages.append(
             f"Outlier at {place}: {points.u[i] * 1e3:.4g} mV instead of "
             f"{estimate.predicted[i] * 1e3:.4g} mV; its weight is "

@@ -30,7 +30,7 @@ from memscal.model.stress import StressProfile
 __all__ = ["Calibration", "calibrate"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """A finished calibration: its result, and every step that led to it.
 
@@ -45,6 +45,10 @@ class Calibration:
     apparatus: ApparatusFunction
     solution: Solution
 
+    def __repr__(self) -> str:
+        """Return the result in place of every step's arrays."""
+        return f"<Calibration by {self.solution.regulariser.name}: {self.apparatus!r}>"
+
     @property
     def passed(self) -> bool:
         """Whether every quality check passed."""
@@ -56,9 +60,9 @@ class Calibration:
         Parameters
         ----------
         amplitudes : int
-            How many amplitudes, from a tenth to ten times the rule's.
+            How many amplitudes, from a tenth to ten times the rule's; three or more.
         draws : int
-            How many seeded draws at each.
+            How many seeded draws at each; one or more.
         seed : int
             The first seed.
 
@@ -116,6 +120,11 @@ def calibrate(
     >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
     True
     """
+    if not isinstance(scan, Scan):
+        raise InputError(
+            f"calibrate() was given a {type(scan).__name__}, not a Scan.",
+            cure="Read a scan file with memscal.read_scan(path).",
+        )
     require_calibration_rod(scan)
     stress = reference_profile(scan, _read(reference))
     regulariser = _regulariser(method, seed, options)
@@ -135,12 +144,22 @@ def _read(
         from memscal.formats.reference import read_reference
 
         return read_reference(reference)
-    return reference
+    if reference is None or isinstance(reference, StressProfile | Contact):
+        return reference
+    raise InputError(
+        f"The reference is a {type(reference).__name__}.",
+        cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
+    )
 
 
 def _regulariser(method: str | Regulariser, seed: int, options: Mapping[str, Any]) -> Regulariser:
     if isinstance(method, str):
         return create_regulariser(method, seed=seed, **options)
+    if isinstance(method, type) or not callable(getattr(method, "divide", None)):
+        raise InputError(
+            f"The method is {method!r}, which cannot divide fields.",
+            cure="Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov.",
+        )
     if options:
         raise InputError(
             f"Options {', '.join(options)} were given beside a regulariser that is set up already.",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from memscal.calibration.normalise import NormalisedKernel
 from memscal.calibration.solution import Misfit, Solution
 from memscal.estimation.forward import gaussian_transfer
 from memscal.estimation.hypotheses import (
@@ -24,6 +23,8 @@ _BAND_LIMIT = 0.5
 _FORCE_LIMIT = 0.01
 _OUTLIER_LIMIT = 0.10
 _NOISE_LIMIT = 1.5
+_WIDTH_LIMIT = 3.0
+_NEGLIGIBLE_DIFFERENCE = 0.002
 
 
 def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
@@ -44,7 +45,29 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
             "reference. A failure means that G is not Gaussian at this noise: use the "
             "deconvolved G, not gaussian_sigma.",
         ),
-        _agreement(estimate, quotient.kernel, parameters),
+        _agreement(
+            parameters,
+            ("conversion_constant", "conversion_constant_gaussian"),
+            "method_agreement",
+            "Difference of the conversion constants by deconvolution and by the Gaussian fit, in "
+            "its standard uncertainty. A failure means that one of them is biased, as when G has "
+            "tails that a Gaussian lacks, or when the method of division failed.",
+        ),
+        _agreement(
+            parameters,
+            ("gaussian_sigma_deconvolved", "gaussian_sigma"),
+            "width_agreement",
+            "Difference of the widths fitted to the deconvolved G and to the scan, in its standard "
+            "uncertainty. A failure means that G is not Gaussian, or that the method of division "
+            "failed: look at both reconvolutions.",
+        ),
+        _check(
+            "width_over_thickness",
+            estimate.gaussian.sigma / solution.scan.film.thickness,
+            _WIDTH_LIMIT,
+            "Width of G over the film's thickness. A failure means that the unit of the positions "
+            "or of the film's thickness should be looked at.",
+        ),
         _check(
             "resolved_band",
             float(gaussian_transfer(np.array(solution.band.resolved), estimate.gaussian.sigma)),
@@ -89,23 +112,14 @@ def _check(name: str, value: float, limit: float, meaning: str) -> QualityCheck:
 
 
 def _agreement(
-    estimate: ProfileEstimate, kernel: NormalisedKernel, parameters: ParameterSet
+    parameters: ParameterSet, names: tuple[str, str], check: str, meaning: str
 ) -> QualityCheck:
-    i = parameters.names.index("conversion_constant")
-    j = parameters.names.index("conversion_constant_gaussian")
-    c = parameters.covariance
+    i, j = (parameters.names.index(name) for name in names)
+    c, values = parameters.covariance, parameters.values
     variance = max(c[i, i] + c[j, j] - 2 * c[i, j], 0.0)
-    gaussian = estimate.gaussian.conversion_constant
     # Differences below a fifth of a percent matter to nobody, however small their noise.
-    allowed = np.hypot(np.sqrt(variance), 0.002 * gaussian)
-    return _check(
-        "method_agreement",
-        abs(kernel.conversion_constant - gaussian) / allowed,
-        3.0,
-        "Difference of the conversion constants by deconvolution and by the Gaussian fit, in its "
-        "standard uncertainty. A failure means that one of them is biased, as when G has tails "
-        "that a Gaussian lacks.",
-    )
+    allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * values[j])
+    return _check(check, abs(values[i] - values[j]) / allowed, 3.0, meaning)
 
 
 def _drift(estimate: ProfileEstimate) -> QualityCheck:

@@ -41,7 +41,7 @@ class Misfit:
     degrees: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Quotient:
     """One division of the fields: the window, A and G, and what they predict for the scan.
 
@@ -54,7 +54,7 @@ class Quotient:
     misfit: Misfit
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """Every step of a calibration.
 

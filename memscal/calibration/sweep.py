@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.calibration.solution import Quotient, Solution, divide
-from memscal.deconvolution.problem import Regulariser
+from memscal.deconvolution.problem import Regulariser, require_count
 from memscal.deconvolution.white_noise import WhiteNoise, WhiteNoiseDraw
 from memscal.errors import FitError
 from memscal.model.validation import FloatArray
@@ -44,6 +44,8 @@ class Sweep:
 
 def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -> Sweep:
     """Repeat the division over two decades of noise amplitude and several seeds."""
+    require_count("sweep", "amplitudes", amplitudes, 3)
+    require_count("sweep", "draws", draws, 1)
     amplitude = np.logspace(-1, 1, amplitudes)
     expected = np.array([_outcome(solution, WhiteNoise(amplitude=a)) for a in amplitude])
     drawn = np.array(

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
 
 from memscal.axisymmetry.grids import FieldGrid
+from memscal.errors import InputError
 from memscal.model.validation import FloatArray
 
-__all__ = ["Division", "DivisionProblem", "Regulariser", "filtered_division", "image_division"]
+__all__ = [
+    "Division",
+    "DivisionProblem",
+    "Regulariser",
+    "filtered_division",
+    "image_division",
+    "require_amplitude",
+    "require_count",
+]
 
 #: The paper adds white noise "ten times weaker than the weakest relevant spectral component".
 NOISE_RATIO = 0.1
@@ -70,6 +80,24 @@ class Regulariser(Protocol):
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide the voltage field by the stress field."""
         ...
+
+
+def require_amplitude(method: str, amplitude: object) -> None:
+    """Refuse a noise amplitude that is no positive number."""
+    if not isinstance(amplitude, int | float) or not 0 < amplitude < math.inf:
+        raise InputError(
+            f"The amplitude of method {method} is {amplitude}, but it must be a positive number.",
+            cure="It is a factor on the rule's own choice: 1 keeps that, 2 doubles the noise.",
+        )
+
+
+def require_count(method: str, name: str, value: object, least: int) -> None:
+    """Refuse an option that is no whole number from ``least`` on."""
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+        raise InputError(
+            f"Option {name} of method {method} is {value}, but it must be a whole number of at "
+            f"least {least}."
+        )
 
 
 def filtered_division(problem: DivisionProblem, window: FloatArray) -> Division:

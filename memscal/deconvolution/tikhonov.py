@@ -12,6 +12,7 @@ from memscal.deconvolution.problem import (
     Division,
     DivisionProblem,
     filtered_division,
+    require_amplitude,
 )
 
 __all__ = ["Tikhonov"]
@@ -34,6 +35,9 @@ class Tikhonov:
     name: ClassVar[str] = "tikhonov"
     assumes: ClassVar[str] = "G has little power; all wavenumbers are equally likely to carry it."
     fails: ClassVar[str] = "Every component is a little too small, the peak of G with them."
+
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the Tikhonov window."""

@@ -13,6 +13,8 @@ from memscal.deconvolution.problem import (
     Division,
     DivisionProblem,
     filtered_division,
+    require_amplitude,
+    require_count,
 )
 
 __all__ = ["WhiteNoise", "WhiteNoiseDraw"]
@@ -41,6 +43,9 @@ class WhiteNoise:
         "A G with fine detail (sharp edges, a narrow ring) is smoothed to the resolved band."
     )
 
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
+
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the expected window."""
         z = np.abs(problem.grid.forward(problem.reference))
@@ -68,6 +73,10 @@ class WhiteNoiseDraw:
     name: ClassVar[str] = "white-noise-draw"
     assumes: ClassVar[str] = WhiteNoise.assumes
     fails: ClassVar[str] = "Draws are heavy-tailed: some carry ripples that others do not."
+
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
+        require_count(self.name, "seed", self.seed, 0)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide one draw; the window is that of its expectation."""

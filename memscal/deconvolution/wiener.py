@@ -7,7 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from memscal.deconvolution.problem import NOISE_RATIO, Division, DivisionProblem, image_division
+from memscal.deconvolution.problem import (
+    NOISE_RATIO,
+    Division,
+    DivisionProblem,
+    image_division,
+    require_amplitude,
+    require_count,
+)
 from memscal.model.validation import FloatArray
 
 __all__ = ["RichardsonLucy", "UnsupervisedWiener", "Wiener"]
@@ -50,6 +57,9 @@ class Wiener:
         "A lifted line scan has ring-shaped noise, not white: the penalty is a guess."
     )
 
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
+
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's Wiener-Hunt filter."""
         from skimage.restoration import wiener
@@ -85,6 +95,9 @@ class UnsupervisedWiener:
         "The noise of a lifted line scan is not white: almost no regularisation may be chosen."
     )
 
+    def __post_init__(self) -> None:
+        require_count(self.name, "seed", self.seed, 0)
+
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's unsupervised Wiener-Hunt restoration."""
         from skimage.restoration import unsupervised_wiener
@@ -112,6 +125,9 @@ class RichardsonLucy:
     fails: ClassVar[str] = (
         "Stopping is the regularisation: too early is too wide, too late is ripples."
     )
+
+    def __post_init__(self) -> None:
+        require_count(self.name, "iterations", self.iterations, 1)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's Richardson-Lucy restoration."""

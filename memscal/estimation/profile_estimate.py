@@ -23,6 +23,8 @@ __all__ = ["ProfileEstimate", "estimate_profile"]
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
+#: Error of the reference and of its transforms, relative to the largest signal.
+NUMERICAL_FLOOR = 1e-6
 #: A conversion constant must exceed this many of its standard uncertainties.
 LEAST_SIGNIFICANCE = 5.0
 _WEIGHING_ROUNDS = 4
@@ -68,9 +70,10 @@ class ProfileEstimate:
     def noise_scale(self) -> float:
         """Noise of a point (V); or, with stated uncertainties, the factor they must grow by.
 
-        Stated uncertainties are believed until the residuals exceed them (Birge's ratio).
+        Stated uncertainties are believed until the residuals exceed them (Birge's ratio).  A
+        scatter is never taken for less than the model's own numerical error.
         """
-        found = self.weighed.noise
+        found = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
         return found if self.points.u_errors is None else max(found, 1.0)
 
     @property
@@ -191,10 +194,11 @@ def _require_determined(estimate: ProfileEstimate) -> None:
     uncertainty = float(np.sqrt(integrals @ estimate.covariance @ integrals))
     if not estimate.conversion_constant > LEAST_SIGNIFICANCE * uncertainty:
         raise FitError(
-            f"The conversion constant would be ({estimate.conversion_constant:.2g} ± "
-            f"{uncertainty:.2g}) V/Pa: it is not told apart from zero.",
-            why="The voltage does not rise above its noise and baseline as the rod passes.",
-            cure="Check the channel and the positions; raise the load or average repeats.",
+            f"The conversion constant would be ({estimate.conversion_constant * 1e3:.2g} ± "
+            f"{uncertainty * 1e3:.2g}) mV/Pa: it is not told apart from zero.",
+            why="The voltage does not rise above its noise as the rod passes, or the scan is too "
+            "short to tell the profile's tail from the baseline.",
+            cure="Check channel and positions; scan farther; raise the load or average repeats.",
         )
 
 

@@ -3,10 +3,11 @@ r"""Stress at the base of the film under a given surface traction.
 .. math::
 
     \sigma_{zz}(r) &= \int_0^\infty (T\hat p - N\hat q)\,J_0(kr)\,k\,dk, \\
-    \sigma_{rz}(r) &= \int_0^\infty (S\hat p + R\hat q)\,J_1(kr)\,k\,dk,
+    \sigma_{rz}(r) &= -\int_0^\infty (S\hat p + R\hat q)\,J_1(kr)\,k\,dk,
 
-with the transfer functions of :mod:`memscal.mechanics.film_response`.  They fall like
-:math:`e^{-kh}`, so that a finite range of wavenumbers carries everything.
+the tractions of the base on the film (up and outward), with the transfer functions of
+:mod:`memscal.mechanics.film_response`.  They fall like :math:`e^{-kh}`, so that a
+finite range of wavenumbers carries everything.
 """
 
 from __future__ import annotations
@@ -61,16 +62,16 @@ def base_normal_spectrum(
 def base_shear_stress(
     elastic_film: ElasticFilm, traction: InterfaceTraction, r: FloatArray
 ) -> FloatArray:
-    r"""Return the shear stress :math:`\sigma_{rz}` at the base at ``r`` (m), in Pa.
+    """Return the radial traction of the base on the film at ``r`` (m), in Pa.
 
-    Positive where the film drags the base outward.
+    Positive outward; negative where the base holds a film back that is squeezed outward.
     """
     nu = elastic_film.poisson_ratio
 
     def spectrum(k: FloatArray) -> FloatArray:
         x = k * elastic_film.thickness
         pressed = film.base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
-        return pressed + film.base_shear_from_shear(x, nu) * traction.shear_transform(k)
+        return -(pressed + film.base_shear_from_shear(x, nu) * traction.shear_transform(k))
 
     return _hankel_synthesis(elastic_film, traction, r, spectrum, j1)
 

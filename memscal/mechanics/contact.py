@@ -64,8 +64,8 @@ class Contact:
     Notes
     -----
     Stresses are in Pa at radii in m.  Normal stress is positive in compression.  Shear is the
-    component :math:`\sigma_{rz}` with z from the base to the surface: positive where the
-    indenter drags the film outward (interface), and where the film drags the base outward.
+    traction on the film, positive outward, at both of its faces: under the indenter it is the
+    indenter's, at the base it is the base's, which holds the film back and is negative.
 
     Examples
     --------
@@ -120,9 +120,10 @@ class Contact:
         return 2 * np.pi * base_normal_spectrum(self.film, self.traction, wavenumbers)
 
     def base_shear(self, r: ArrayLike) -> FloatArray:
-        r"""Return the shear stress :math:`\sigma_{rz}` at the base, positive outward.
+        r"""Return the radial traction of the base on the film, in Pa, positive outward.
 
-        As :meth:`base_stress`; it is the traction of the film on its base.
+        As :meth:`base_stress`; with the third axis from base to surface it is
+        :math:`-\sigma_{rz}`, and it is negative where the film is squeezed outward.
         """
         return base_shear_stress(self.film, self.traction, _radii(r))
 

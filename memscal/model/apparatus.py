@@ -10,6 +10,7 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
+from memscal.model.notation import format_measured
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
@@ -126,15 +127,22 @@ class ParameterSet:
             )
 
     def __getitem__(self, name: str) -> float:
-        return float(self.values[self.names.index(name)])
+        return float(self.values[self._index(name)])
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
 
     def uncertainty(self, name: str) -> float:
         """Return the standard uncertainty (k = 1) of one parameter, in its SI unit."""
-        i = self.names.index(name)
+        i = self._index(name)
         return float(np.sqrt(self.covariance[i, i]))
+
+    def _index(self, name: str) -> int:
+        if name not in self.names:
+            raise InputError(
+                f"There is no parameter {name}.", cure=f"There are {', '.join(self.names)}."
+            )
+        return self.names.index(name)
 
 
 @dataclass(frozen=True)
@@ -148,7 +156,7 @@ class QualityCheck:
     meaning: str
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ApparatusData:
     """Everything that an apparatus-function artifact stores.
 
@@ -185,6 +193,20 @@ class ApparatusData:
     reference: StressProfile
     process: Process
     budget: Mapping[str, Mapping[str, float]]
+
+    def __repr__(self) -> str:
+        """Return the main numbers in place of thousands of array elements."""
+        a = format_measured(
+            self.conversion_constant * 1e3,
+            self.parameters.uncertainty("conversion_constant") * 1e3,
+            "mV/Pa",
+        )
+        sigma = format_measured(
+            self.gaussian_sigma * 1e3, self.parameters.uncertainty("gaussian_sigma") * 1e3, "mm"
+        )
+        failed = [check.name for check in self.checks if not check.passed]
+        checks = f"failed: {', '.join(failed)}" if failed else "all checks passed"
+        return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {checks}>"
 
     @property
     def conversion_constant(self) -> float:

@@ -26,7 +26,7 @@ class StressSensor:
     channel: str = "zz"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scan:
     """Sensor voltage against the position of the indenter, with what it was measured on.
 
@@ -106,6 +106,12 @@ class Scan:
         object.__setattr__(self, "channels", channels)
         self._check_values()
 
+    def __repr__(self) -> str:
+        """Return what was scanned in place of thousands of array elements."""
+        shape = " x ".join(str(n) for n in self.u_zz.shape)
+        reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
+        return f"<Scan: {self.kind}, {shape} points, x from {reach}, load {self.load:.4g} N>"
+
     @property
     def kind(self) -> str:
         """``"line"``, ``"repeats"`` or ``"raster"``, by the axes of ``u_zz``."""
@@ -132,7 +138,9 @@ class Scan:
 
     def _check_values(self) -> None:
         if np.any(np.isinf(self.u_zz)):
-            raise InputError("u_zz holds an infinite voltage.", cure="Mark missing points with NaN.")
+            raise InputError(
+                "u_zz holds an infinite voltage.", cure="Mark missing points with NaN."
+            )
         if not (np.isfinite(self.load) and self.load > 0):
             raise InputError(
                 f"The load of the scan is {self.load:g} N, but it must be above zero.",

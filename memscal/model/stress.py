@@ -20,7 +20,7 @@ from memscal.model.validation import (
 __all__ = ["StressProfile"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StressProfile:
     r"""Stress at the base of the film as a function of radius, for one load.
 
@@ -33,7 +33,7 @@ class StressProfile:
     load : float
         The normal load :math:`P` that produces it, in N.
     sigma_rz : ndarray, shape (n,), optional
-        Radial shear stress at the base, in Pa, positive outward.
+        Radial traction of the base on the film, in Pa, positive outward.
     depth, contact_radius, stick_radius : float, optional
         Indentation depth and radii, in m.
     friction_coefficient : float, optional
@@ -82,16 +82,29 @@ class StressProfile:
         for name in ("r", "sigma_zz", "sigma_rz"):
             values = getattr(self, name)
             if values is not None:
-                object.__setattr__(self, name, finite_vector(f"{name} of the stress profile", values))
+                object.__setattr__(
+                    self, name, finite_vector(f"{name} of the stress profile", values)
+                )
         require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
-            raise InputError("r of the stress profile is negative.", cure="Give radii, not positions.")
+            raise InputError(
+                "r of the stress profile is negative.", cure="Give radii, not positions."
+            )
         for name in ("sigma_zz", "sigma_rz"):
             values = getattr(self, name)
             if values is not None and values.shape != self.r.shape:
                 raise InputError(
                     f"{name} of the stress profile has {values.size} values for {self.r.size} radii."
                 )
+
+    def __repr__(self) -> str:
+        """Return what it is of in place of thousands of array elements."""
+        peak = float(np.abs(self.sigma_zz).max()) * 1e-3
+        reach = self.r[-1] * 1e3
+        return (
+            f"<StressProfile: load {self.load:.4g} N, {self.r.size} radii to {reach:.4g} mm, "
+            f"largest stress {peak:.4g} kPa>"
+        )
 
     @property
     def force(self) -> float:

@@ -118,7 +118,8 @@ def test_the_rod_agrees_with_finite_elements(nu: float, friction: float) -> None
     stiffness = contact.load / contact.depth * 1e-3
     assert stiffness == pytest.approx(elements.stiffness, rel=1e-4)
     sigma_zz = contact.base_stress(elements.r * 1e-3) * 1e-6
-    sigma_rz = contact.base_shear(elements.r * 1e-3) * 1e-6
+    # The component with the third axis upward is the traction of the film on its base.
+    sigma_rz = -contact.base_shear(elements.r * 1e-3) * 1e-6
     highest = np.max(sigma_zz)
     assert np.max(np.abs(elements.sigma_zz - sigma_zz)) < 5e-4 * highest
     assert np.max(np.abs(elements.sigma_rz - sigma_rz)) < 5e-4 * highest

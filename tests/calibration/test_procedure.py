@@ -204,3 +204,56 @@ def test_the_result_is_the_same_however_often_and_whatever_the_global_random_sta
     np.testing.assert_array_equal(one.field.g, two.field.g)
     np.testing.assert_array_equal(one.parameters.covariance, two.parameters.covariance)
     assert set(one.parameters.names) >= MAIN_PARAMETERS
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"reference": [1, 2]}, "The reference is a list"),
+        ({"method": 3}, "cannot divide"),
+        ({"method": Tikhonov}, "that is set up"),
+        ({"amplitude": "abc"}, "must be a positive number"),
+        ({"amplitude": -1.0}, "must be a positive number"),
+        ({"amplitude": float("nan")}, "must be a positive number"),
+        ({"method": "richardson-lucy", "iterations": 2.5}, "whole number"),
+        ({"method": "white-noise-draw", "seed": -1}, "whole number"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        memscal.calibrate(simulated(), **arguments)
+
+
+def test_a_path_in_place_of_a_scan_is_told_how_to_read_it() -> None:
+    with pytest.raises(InputError, match="read_scan"):
+        memscal.calibrate("scan.h5")
+
+
+def test_positions_in_the_wrong_unit_fail_a_check() -> None:
+    scan = simulated()
+    tenfold = memscal.calibrate(replace(scan, x=10 * scan.x))
+    assert not check(tenfold, "width_over_thickness").passed
+
+
+def test_a_draw_whose_width_went_astray_does_not_pass_for_good() -> None:
+    scan = simulated(noise=0.005)
+    for seed in range(12):
+        calibration = memscal.calibrate(scan, method="white-noise-draw", seed=seed)
+        parameters = calibration.apparatus.parameters
+        astray = abs(parameters["gaussian_sigma_deconvolved"] / SIGMA - 1) > 0.2
+        assert not (astray and calibration.passed)
+
+
+def test_a_noise_free_scan_is_known_to_the_model_s_own_error() -> None:
+    calibration = memscal.calibrate(simulated(noise=0.0))
+    assert calibration.passed
+    parameters = calibration.apparatus.parameters
+    for name in ("gaussian_sigma", "gaussian_sigma_deconvolved"):
+        assert parameters[name] == pytest.approx(SIGMA, rel=1e-3)
+
+
+def test_representations_are_one_line() -> None:
+    scan = simulated()
+    calibration = memscal.calibrate(scan)
+    for thing in (scan, calibration, calibration.apparatus, calibration.apparatus.reference):
+        assert len(repr(thing)) < 250

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import j0, j1
 
+from memscal.axisymmetry.quadrature import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response, rod
-from memscal.axisymmetry.quadrature import gauss_panels
 from memscal.mechanics.rod import solve_rod
 
 # Hayes, Keer, Herrmann and Mockros, J. Biomech. 5 (1972) 541, flat punch, nu = 0.5.
