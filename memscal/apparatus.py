@@ -19,6 +19,7 @@ __all__ = ["ApparatusFunction", "load_apparatus"]
 _LARGEST_RADIUS = 1.0
 #: What may be left of a stress at the end of its table.
 _DECAYED = 0.01
+_FEWEST_RADII = 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -122,8 +123,9 @@ class ApparatusFunction(ApparatusData):
             raise InputError(
                 f"r reaches {radii[-1]:g} m.", cure="Give radii in metres, not millimetres."
             )
-        step = float(np.diff(radii).max())
-        if radii[0] > step or radii[0] < 0:
+        if radii.size < _FEWEST_RADII:
+            raise InputError(f"A stress at {radii.size} radii cannot be interpolated.")
+        if not 0 <= radii[0] <= radii[1] - radii[0]:
             raise InputError(
                 f"r begins at {radii[0]:g} m.",
                 cure="Give the stress from the axis (r = 0) outward.",
@@ -132,10 +134,10 @@ class ApparatusFunction(ApparatusData):
         peak = float(np.abs(stress).max())
         strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak
         coarse = float(np.diff(radii)[strong].max(initial=0.0))
-        if coarse > self.gaussian_sigma:
+        if coarse > self.gaussian_sigma / 2:
             raise InputError(
-                f"The stress is given every {coarse * 1e3:.3g} mm, coarser than the apparatus "
-                f"function is wide ({self.gaussian_sigma * 1e3:.3g} mm).",
+                f"The stress is given every {coarse * 1e3:.3g} mm, coarser than half the "
+                f"width of the apparatus function ({self.gaussian_sigma * 1e3:.3g} mm).",
                 cure="Give the stress on a finer grid.",
             )
         if abs(stress[-1]) > _DECAYED * peak:

@@ -13,7 +13,12 @@ from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, StressSensor
-from memscal.model.validation import FloatArray, require_non_negative, require_positive
+from memscal.model.validation import (
+    FloatArray,
+    require_non_negative,
+    require_positive,
+    require_range,
+)
 
 __all__ = ["GaussianMixture", "simulate"]
 
@@ -56,13 +61,13 @@ class GaussianMixture:
             raise InputError(
                 f"{len(self.weights)} weights do not fit {len(self.sigmas)} widths of Gaussians."
             )
-        if abs(sum(self.weights) - 1) > 1e-9:
+        if not abs(sum(self.weights) - 1) <= 1e-9:
             raise InputError(
                 f"The weights of the Gaussians add up to {sum(self.weights):g}, not to 1.",
                 why="An apparatus function has unit integral.",
             )
-        if min(self.sigmas) <= 0:
-            raise InputError("A Gaussian of the apparatus function has no positive width.")
+        for sigma in self.sigmas:
+            require_positive("width of a Gaussian", sigma, "m")
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
@@ -121,7 +126,7 @@ def simulate(
         Scan a square instead of a line.
     noise, baseline, drift : float
         Standard deviation of the noise, offset, and change of the offset across the scan, each
-        as a share of the largest signal at the (mean) load.
+        as a share of the largest signal that the scan meets, at the (mean) load.
     centre : tuple of float
         Position of the sensor, in m.
     load_uncertainty : float, optional
@@ -143,12 +148,19 @@ def simulate(
     ((33,), 0.000561)
     """
     _require_plausible(half_range, points, repeats, noise, conversion_constant)
+    if not np.isfinite(centre).all() or seed < 0:
+        raise InputError(
+            f"The centre is {centre} m and the seed {seed}; the one must be finite, the other not "
+            "negative."
+        )
     truth = GaussianMixture() if kernel is None else kernel
     loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
     if loads.size == 0:
         raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
+    for each in loads:
+        require_positive("load", float(each), "N")
     x = np.linspace(-half_range, half_range, points)
     y = x if raster else np.zeros(1)
     radius = np.hypot.outer(y - centre[1], x - centre[0])
@@ -193,7 +205,7 @@ def simulate(
 def _require_plausible(
     half_range: float, points: int, repeats: int, noise: float, conversion_constant: float
 ) -> None:
-    require_positive("half_range", half_range, "m")
+    require_range("half_range", half_range, 1e-9, 1.0, "m")
     require_positive("conversion_constant", conversion_constant, "V/Pa")
     require_non_negative("noise", noise)
     if points < 2 or repeats < 1:
@@ -213,7 +225,7 @@ def _blurred(
 def _truth(kernel: GaussianMixture, values: dict[str, float]) -> dict[str, float | str]:
     truth: dict[str, float | str] = {
         "kernel": "sum of Gaussians of unit integral",
-        "kernel_weights": ", ".join(f"{w:g}" for w in kernel.weights),
+        "kernel_weights": ", ".join(repr(float(w)) for w in kernel.weights),
         "kernel_sigmas_um": ", ".join(f"{s * 1e6:g}" for s in kernel.sigmas),
         **values,
     }

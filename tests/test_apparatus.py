@@ -262,3 +262,20 @@ def test_a_file_changed_after_it_was_written_is_refused(
         file["/entry/radial_profile/g"][0] *= 1.01
     with pytest.raises(FormatError, match="changed after it was written"):
         load_apparatus(path)
+
+
+def test_a_single_radius_and_a_table_without_its_axis_are_refused():
+    apparatus = with_kernel(lambda r: gaussian(r, SIGMA))
+    with pytest.raises(InputError, match="cannot be interpolated"):
+        apparatus.convolve([0.0], [1.0])
+    r = np.concatenate([np.linspace(3e-3, 5e-3, 101), [9e-3]])
+    with pytest.raises(InputError, match="begins at"):
+        apparatus.convolve(r, np.exp(-(((r - 3e-3) / 3e-4) ** 2)))
+
+
+def test_an_artifact_keeps_its_arrays_and_names_its_parameters():
+    apparatus = with_kernel(lambda r: gaussian(r, SIGMA))
+    with pytest.raises(ValueError, match="read-only"):
+        apparatus.radial_profile.g[0] = 1.0
+    with pytest.raises(InputError, match="There is no parameter conversion"):
+        apparatus.parameters["conversion"]

@@ -203,8 +203,8 @@ def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: 
         ((0.5, 0.4), (1e-3, 1e-3), "add up to 0.9, not to 1"),
         ((0.5, 0.5), (1e-3,), "2 weights do not fit 1 widths"),
         ((), (), "0 weights"),
-        ((1.0,), (0.0,), "no positive width"),
-        ((1.0,), (-1e-3,), "no positive width"),
+        ((1.0,), (0.0,), "above zero"),
+        ((1.0,), (-1e-3,), "above zero"),
     ],
 )
 def test_a_mixture_that_is_no_apparatus_function_is_refused(
@@ -229,3 +229,34 @@ def test_a_mixture_that_is_no_apparatus_function_is_refused(
 def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         simulate(**options)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"conversion_constant": -1e-7},
+        {"noise": float("nan")},
+        {"half_range": 8.0},
+        {"load": []},
+        {"load": [-1.0, 3.0]},
+        {"seed": -1},
+        {"centre": (float("nan"), 0.0)},
+    ],
+)
+def test_bad_simulations_are_refused(options: dict[str, object]):
+    with pytest.raises(InputError):
+        simulate(**options)
+
+
+@pytest.mark.parametrize(
+    "arguments", [((float("nan"),), (1e-3,)), ((1.0,), (float("nan"),)), ((1.0,), (np.inf,))]
+)
+def test_mixtures_of_nan_are_refused(arguments):
+    with pytest.raises(InputError):
+        GaussianMixture(*arguments)
+
+
+def test_the_stored_truth_rebuilds_the_mixture():
+    kernel = GaussianMixture((1 / 3, 2 / 3), (0.5e-3, 1e-3))
+    truth = simulate(kernel=kernel, points=9).synthetic
+    assert tuple(float(w) for w in truth["kernel_weights"].split(",")) == kernel.weights

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.fft
 
 from memscal.axisymmetry.hankel import radial_spline
+from memscal.errors import InputError
 from memscal.model.validation import FloatArray
 
 __all__ = ["EvenGrid", "FieldGrid", "Lattice", "cut", "lift"]
@@ -54,6 +55,14 @@ class FieldGrid(Protocol):
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve a field that :meth:`inverse` returned with a lifted field."""
+        ...
+
+    def to_period(self, field: FloatArray) -> FloatArray:
+        """Return one period of the plane, as the transform sees it."""
+        ...
+
+    def from_quotient(self, period: FloatArray) -> FloatArray:
+        """Return a quotient of two periods, its zero at the first point, in the grid's layout."""
         ...
 
     def to_image(self, field: FloatArray) -> FloatArray:
@@ -128,6 +137,18 @@ class EvenGrid:
         sides[0] = 1.0
         return float(sides @ field @ sides * self.cell_area)
 
+    def to_period(self, field: FloatArray) -> FloatArray:
+        """Mirror the quarter to one period: 2 (count - 1) points, the axis at the first."""
+        right = np.concatenate([field, field[:, -2:0:-1]], axis=1)
+        return np.concatenate([right, right[-2:0:-1]], axis=0)
+
+    def from_quotient(self, period: FloatArray) -> FloatArray:
+        """Return the even part of a period, as a quarter plane."""
+        # Flipped about its first point, which a plain flip would carry to the last.
+        even = (period + np.roll(period[::-1], 1, axis=0)) / 2
+        even = (even + np.roll(even[:, ::-1], 1, axis=1)) / 2
+        return even[: self.count, : self.count]
+
     def to_image(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to the whole plane: odd size, axis at the central pixel."""
         right = np.concatenate([field[:, :0:-1], field], axis=1)
@@ -148,11 +169,24 @@ class Lattice:
     Parameters
     ----------
     x, y : ndarray, shape (n,) and (m,)
-        Evenly spaced positions relative to the axis of symmetry, in m.
+        Evenly spaced positions relative to the axis of symmetry, in m; odd numbers of them, so
+        that there is a central point.
+
+    Raises
+    ------
+    InputError
+        If there is no central point.
     """
 
     x: FloatArray
     y: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.x.size % 2 == 0 or self.y.size % 2 == 0:
+            raise InputError(
+                f"A lattice of {self.y.size} by {self.x.size} points has no central point.",
+                cure="Use odd numbers of points.",
+            )
 
     @property
     def spacing(self) -> tuple[float, float]:
@@ -228,6 +262,14 @@ class Lattice:
             return (np.arange(count) - count // 2) * step / factor
 
         return Lattice(axis(n * factor, dx), axis(m * factor, dy)), scipy.fft.fftshift(fine)
+
+    def to_period(self, field: FloatArray) -> FloatArray:
+        """Return the field itself: a lattice is its own period."""
+        return field
+
+    def from_quotient(self, period: FloatArray) -> FloatArray:
+        """Roll the quotient's zero from the first point to the central one."""
+        return np.asarray(scipy.fft.fftshift(period))
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Return the field itself: it already covers the plane."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0
 
-from memscal.axisymmetry.quadrature import gauss_panels
+from memscal.axisymmetry.quadrature import gauss_between, gauss_panels
 from memscal.errors import InputError
 from memscal.model.validation import FloatArray
 
@@ -33,6 +33,11 @@ __all__ = [
 # and their nodes are computed once.
 _ORDER = 64
 _PHASE = 90.0
+
+# Two nodes for each interval of a table: more than a cubic spline through it can vary.
+_TABLE_ORDER = 32
+_INTERVALS_PER_PANEL = 16
+_TABLE_PHASE = 40.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +108,8 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
     r"""Hankel transform of order zero of a tabulated radial function.
 
     An even cubic spline through the table is integrated from 0 to ``r[-1]`` by
-    Gauss-Legendre quadrature fine enough for the largest ``k``; beyond the table the
-    function counts as zero.
+    Gauss-Legendre quadrature fine enough for the table and for the largest ``k``; beyond the
+    table the function counts as zero.
 
     Parameters
     ----------
@@ -130,8 +135,16 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
     True
     """
     spline = radial_spline(r, f)
-    reach = float(r[-1])
-    fastest = max(float(np.max(np.abs(k))), 1 / reach)
-    nodes, weights = gauss_panels(reach, min(_PHASE / fastest, reach / 4), _ORDER)
+    nodes, weights = gauss_between(_panel_edges(r, float(np.max(np.abs(k)))), _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
     return np.asarray(j0(np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
+
+
+def _panel_edges(r: FloatArray, fastest: float) -> FloatArray:
+    """Ends of panels that hold few intervals of a table, and little phase of the kernel."""
+    knots = np.unique(np.concatenate([[0.0], r[::_INTERVALS_PER_PANEL], r[-1:]]))
+    pieces = np.maximum(np.ceil(np.diff(knots) * fastest / _TABLE_PHASE), 1).astype(int)
+    starts = np.repeat(knots[:-1], pieces)
+    widths = np.repeat(np.diff(knots) / pieces, pieces)
+    within = np.concatenate([np.arange(count) for count in pieces])
+    return np.append(starts + within * widths, knots[-1])

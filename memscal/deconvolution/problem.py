@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from functools import cached_property
+from numbers import Integral, Real
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -24,6 +26,8 @@ __all__ = [
 
 #: The paper adds white noise "ten times weaker than the weakest relevant spectral component".
 NOISE_RATIO = 0.1
+
+_CLOSED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,16 @@ class DivisionProblem:
     weakest_voltage: float
     weakest_reference: float
 
+    @cached_property
+    def voltage_spectrum(self) -> FloatArray:
+        """Transform of the voltage, in V m^2/N."""
+        return self.grid.forward(self.voltage)
+
+    @cached_property
+    def reference_spectrum(self) -> FloatArray:
+        """Transform of the base stress, dimensionless."""
+        return self.grid.forward(self.reference)
+
 
 @dataclass(frozen=True, eq=False)
 class Division:
@@ -69,8 +83,9 @@ class Division:
 class Regulariser(Protocol):
     """A way to divide fields whose transforms vanish.
 
-    Any object with these members will do; register a class, called without arguments, or
-    with ``seed=`` if it ``uses_seed``, under the entry point group ``memscal.regularisers``.
+    Any object with these members will do.  Register its class under the entry point group
+    ``memscal.regularisers``: it is called with the options that the user gave, and with
+    ``seed=`` where its signature has one.
     """
 
     name: ClassVar[str]
@@ -82,18 +97,18 @@ class Regulariser(Protocol):
         ...
 
 
-def require_amplitude(method: str, amplitude: object) -> None:
+def require_amplitude(method: str, amplitude: Any) -> None:
     """Refuse a noise amplitude that is no positive number."""
-    if not isinstance(amplitude, int | float) or not 0 < amplitude < math.inf:
+    if not isinstance(amplitude, Real) or not 0 < float(amplitude) < math.inf:
         raise InputError(
             f"The amplitude of method {method} is {amplitude}, but it must be a positive number.",
             cure="It is a factor on the rule's own choice: 1 keeps that, 2 doubles the noise.",
         )
 
 
-def require_count(method: str, name: str, value: object, least: int) -> None:
+def require_count(method: str, name: str, value: Any, least: int) -> None:
     """Refuse an option that is no whole number from ``least`` on."""
-    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+    if not isinstance(value, Integral) or int(value) < least:
         raise InputError(
             f"Option {name} of method {method} is {value}, but it must be a whole number of at "
             f"least {least}."
@@ -106,19 +121,19 @@ def filtered_division(problem: DivisionProblem, window: FloatArray) -> Division:
     Components whose window is below 1e-9 are left out: there the quotient of two
     transforms that have both vanished is rounding, not information.
     """
-    grid = problem.grid
-    voltage, reference = grid.forward(problem.voltage), grid.forward(problem.reference)
-    open_ = window > 1e-9
-    quotient = np.zeros_like(voltage)
-    np.divide(voltage, reference, out=quotient, where=open_)
-    return Division(grid.inverse(quotient * np.where(open_, window, 0.0)), window)
+    window = np.where(window > _CLOSED, window, 0.0)
+    quotient = np.zeros_like(problem.voltage_spectrum)
+    np.divide(problem.voltage_spectrum, problem.reference_spectrum, out=quotient, where=window > 0)
+    return Division(problem.grid.inverse(quotient * window), window)
 
 
 def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
     """Wrap an image that an image-restoration routine made, with its effective window."""
     grid = problem.grid
     field = grid.from_image(image)
-    voltage, reference = grid.forward(problem.voltage), grid.forward(problem.reference)
-    kept = np.abs(grid.transfer(field)) * np.abs(reference)
-    window = np.divide(kept, np.abs(voltage), out=np.zeros_like(kept), where=np.abs(voltage) > 0)
+    modulus, voltage = np.abs(problem.reference_spectrum), np.abs(problem.voltage_spectrum)
+    kept = np.abs(grid.transfer(field)) * modulus
+    # Where the reference has vanished, so has the voltage: their rounding has no window.
+    there = modulus > _CLOSED * modulus.max()
+    window = np.divide(kept, voltage, out=np.zeros_like(kept), where=there)
     return Division(field, np.clip(window, 0.0, 1.0))

@@ -36,7 +36,7 @@ def regulariser_names() -> tuple[str, ...]:
     return (*_OWN, *others)
 
 
-def create_regulariser(name: str, **options: Any) -> Regulariser:
+def create_regulariser(name: str, /, **options: Any) -> Regulariser:
     """Create a regulariser by name.
 
     Parameters
@@ -61,7 +61,8 @@ def create_regulariser(name: str, **options: Any) -> Regulariser:
     if "seed" not in accepted:
         options = {key: value for key, value in options.items() if key != "seed"}
     unknown = sorted(set(options) - set(accepted))
-    if unknown:
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in accepted.values())
+    if unknown and not takes_any:
         raise InputError(
             f"Method {name} has no option {', '.join(unknown)}.",
             cure=f"Its options are: {', '.join(accepted) or 'none'}.",
@@ -80,4 +81,12 @@ def _factory(name: str) -> Any:
             f"There is no method named {name}.",
             cure=f"Choose from {', '.join(regulariser_names())}.",
         )
-    return next(iter(found)).load()
+    point = next(iter(found))
+    try:
+        return point.load()
+    except Exception as error:
+        # Whatever another package's import raises, the user needs to know which package it is.
+        raise InputError(
+            f"The method {name}, {point.value}, could not be loaded: {error}.",
+            cure="Repair or remove the package that provides it.",
+        ) from error

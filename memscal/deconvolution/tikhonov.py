@@ -41,6 +41,6 @@ class Tikhonov:
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the Tikhonov window."""
-        power = np.abs(problem.grid.forward(problem.reference)) ** 2
         alpha = (self.amplitude * NOISE_RATIO * problem.weakest_reference) ** 2
+        power = np.abs(problem.reference_spectrum) ** 2
         return filtered_division(problem, power / (power + alpha))

@@ -48,9 +48,9 @@ class WhiteNoise:
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide with the expected window."""
-        z = np.abs(problem.grid.forward(problem.reference))
         s = self.amplitude * NOISE_RATIO * problem.weakest_reference
-        return filtered_division(problem, -np.expm1(-((z / s) ** 2)))
+        window = -np.expm1(-((np.abs(problem.reference_spectrum) / s) ** 2))
+        return filtered_division(problem, window)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +82,8 @@ class WhiteNoiseDraw:
         """Divide one draw; the window is that of its expectation."""
         grid = problem.grid
         rng = np.random.default_rng(self.seed)
-        numerator = grid.to_image(problem.voltage)
-        denominator = grid.to_image(problem.reference)
+        numerator = grid.to_period(problem.voltage)
+        denominator = grid.to_period(problem.reference)
         # Noise of spectral amplitude s has, per pixel, s / (cell area * sqrt(pixels)).
         per_pixel = self.amplitude * NOISE_RATIO / (grid.cell_area * np.sqrt(numerator.size))
         noisy_u = numerator + rng.normal(0, per_pixel * problem.weakest_voltage, numerator.shape)
@@ -91,6 +91,6 @@ class WhiteNoiseDraw:
             0, per_pixel * problem.weakest_reference, denominator.shape
         )
         quotient = scipy.fft.rfft2(noisy_u) / scipy.fft.rfft2(noisy_s)
-        image = scipy.fft.fftshift(scipy.fft.irfft2(quotient, s=numerator.shape)) / grid.cell_area
+        period = scipy.fft.irfft2(quotient, s=numerator.shape) / grid.cell_area
         expected = WhiteNoise(amplitude=self.amplitude).divide(problem)
-        return Division(grid.from_image(image), expected.window)
+        return Division(grid.from_quotient(period), expected.window)

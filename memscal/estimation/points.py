@@ -115,11 +115,6 @@ def _stated_errors(errors: FloatArray | None, keep: NDArray[np.bool_]) -> FloatA
 
 
 def _require_usable(points: ScanPoints) -> None:
-    if np.any(points.load <= 0):
-        raise InputError(
-            f"normal_load holds {points.load.min():g} N, but every load must be above zero.",
-            cure="Mark points without contact as missing (NaN).",
-        )
     positions = np.unique(np.stack([points.x, points.y]), axis=1).shape[1]
     needed = MINIMUM_POSITIONS + 2 * points.planar
     if positions < needed:

@@ -14,7 +14,7 @@ from memscal.model.notation import format_measured
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
+from memscal.model.validation import FloatArray, freeze_arrays
 
 __all__ = [
     "ApparatusData",
@@ -39,6 +39,9 @@ class ApparatusField:
     g: FloatArray
     g_errors: FloatArray
 
+    def __post_init__(self) -> None:
+        freeze_arrays(self, "x", "y", "g", "g_errors")
+
 
 @dataclass(frozen=True, eq=False)
 class ApparatusRadial:
@@ -53,6 +56,9 @@ class ApparatusRadial:
     g_errors: FloatArray
     g_gaussian: FloatArray
     g_covariance: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self, "r", "g", "g_errors", "g_gaussian", "g_covariance")
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +75,9 @@ class TransferFunction:
     modulus_errors: FloatArray
     window: FloatArray
     resolved_wavenumber: float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self, "k", "modulus", "modulus_errors", "window")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +96,11 @@ class Reconvolution:
     u_zz_predicted: FloatArray
     u_zz_gaussian: FloatArray
     residual: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze_arrays(
+            self, "x", "u_zz", "u_zz_errors", "u_zz_predicted", "u_zz_gaussian", "residual"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +131,7 @@ class ParameterSet:
     units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        freeze_arrays(self, "values", "covariance")
         n = len(self.names)
         if self.units and len(self.units) != n:
             raise InputError(f"{n} parameter names, but {len(self.units)} units.")

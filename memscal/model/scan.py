@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 
@@ -103,7 +104,7 @@ class Scan:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, self._like_signal(name, getattr(self, name)))
         channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
-        object.__setattr__(self, "channels", channels)
+        object.__setattr__(self, "channels", MappingProxyType(channels))
         self._check_values()
 
     def __repr__(self) -> str:
@@ -149,5 +150,16 @@ class Scan:
             )
         if self.load_uncertainty is not None:
             require_non_negative("standard uncertainty of the load", self.load_uncertainty)
-        if self.u_zz_errors is not None and np.any(self.u_zz_errors < 0):
-            raise InputError("u_zz_errors holds a negative standard uncertainty.")
+        if self.u_zz_errors is not None and np.any(
+            (self.u_zz_errors < 0) | np.isinf(self.u_zz_errors)
+        ):
+            raise InputError(
+                "u_zz_errors holds a standard uncertainty that is negative or infinite."
+            )
+        if self.normal_load is not None and np.any(
+            (self.normal_load <= 0) | np.isinf(self.normal_load)
+        ):
+            raise InputError(
+                "normal_load holds a load that is infinite or not above zero.",
+                cure="Mark points without contact as missing (NaN).",
+            )

@@ -94,7 +94,8 @@ class StressProfile:
             values = getattr(self, name)
             if values is not None and values.shape != self.r.shape:
                 raise InputError(
-                    f"{name} of the stress profile has {values.size} values for {self.r.size} radii."
+                    f"{name} of the stress profile has {values.size} values for {self.r.size} "
+                    "radii."
                 )
 
     def __repr__(self) -> str:

@@ -13,6 +13,7 @@ from memscal.errors import InputError
 __all__ = [
     "FloatArray",
     "finite_vector",
+    "freeze_arrays",
     "frozen_array",
     "require_increasing",
     "require_non_negative",
@@ -52,6 +53,12 @@ def frozen_array(values: ArrayLike, *, dtype: Any = np.float64) -> FloatArray:
     array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
+
+
+def freeze_arrays(owner: object, *names: str) -> None:
+    """Replace arrays of a frozen dataclass by read-only copies."""
+    for name in names:
+        object.__setattr__(owner, name, frozen_array(getattr(owner, name)))
 
 
 def finite_vector(what: str, values: ArrayLike) -> FloatArray:

@@ -10,6 +10,7 @@ from scipy.signal import fftconvolve
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, lift
 from memscal.axisymmetry.hankel import hankel_transform
+from memscal.errors import InputError
 from memscal.model.validation import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -252,3 +253,18 @@ def test_the_transform_of_a_lifted_field_is_the_hankel_transform_of_its_profile(
     k = grid.wavenumber[:40:7, :40:9]
     radial = hankel_transform(r, profile(r), k.ravel()).reshape(k.shape)
     np.testing.assert_allclose(spectrum[:40:7, :40:9], radial, atol=1e-7)
+
+
+def test_a_lattice_without_a_central_point_is_refused():
+    with pytest.raises(InputError, match="no central point"):
+        Lattice(np.arange(8) * 0.1, np.arange(7) * 0.2)
+
+
+def test_a_period_holds_the_plane_as_the_transform_sees_it():
+    grid = EvenGrid(9, 0.5)
+    field = np.random.default_rng().normal(size=(9, 9))
+    period = grid.to_period(field)
+    assert period.shape == (16, 16)
+    spectrum = np.fft.fft2(period) * grid.cell_area
+    np.testing.assert_allclose(spectrum[:9, :9].real, grid.forward(field), atol=1e-12)
+    np.testing.assert_allclose(grid.from_quotient(period), field, atol=1e-15)

@@ -198,3 +198,11 @@ def test_the_product_of_transforms_is_the_transform_of_the_convolution() -> None
     r = np.linspace(0.0, 20.0, 31)
     product = np.exp(-0.7 * wavenumbers.k) * np.exp(-0.8 * wavenumbers.k)
     np.testing.assert_allclose(wavenumbers.synthesise(product, r), depth(1.5, r), atol=1e-12)
+
+
+@pytest.mark.parametrize("width", [5e-3, 3e-3, 1e-3])
+def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated(width: float):
+    r = np.concatenate([np.linspace(0, 10 * width, 400), np.linspace(10 * width, 8, 400)[1:]])
+    k = np.array([0.0, 1.0, 5.0])
+    found = hankel_transform(r, np.exp(-0.5 * (r / width) ** 2) / (2 * np.pi * width**2), k)
+    np.testing.assert_allclose(found, np.exp(-0.5 * (width * k) ** 2), atol=1e-6)

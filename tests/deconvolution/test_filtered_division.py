@@ -50,7 +50,7 @@ def test_a_window_scales_each_component_of_the_quotient(grid: FieldGrid, seed: i
     division = filtered_division(problem, window)
     expected = window * grid.transfer(kernel)
     np.testing.assert_allclose(grid.transfer(division.field), expected, atol=1e-9)
-    assert division.window is window
+    np.testing.assert_array_equal(division.window, window)
 
 
 def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there() -> None:

@@ -125,3 +125,24 @@ def test_a_calibration_runs_with_a_plug_in() -> None:
 def test_without_the_plug_in_its_name_is_unknown() -> None:
     with pytest.raises(InputError, match="no method named cutoff"):
         create_regulariser("cutoff")
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("white-noise", {"amplitude": 0.0}),
+        ("white-noise-draw", {"amplitude": float("nan")}),
+        ("tikhonov", {"amplitude": "x"}),
+        ("wiener", {"amplitude": -1.0}),
+        ("unsupervised-wiener", {"seed": -1}),
+        ("richardson-lucy", {"iterations": 0}),
+        ("tikhonov", {"name": "x"}),
+    ],
+)
+def test_senseless_options_are_refused(name: str, options: dict[str, object]):
+    with pytest.raises(InputError):
+        create_regulariser(name, **options)
+
+
+def test_numpys_integers_are_whole_numbers():
+    create_regulariser("white-noise-draw", seed=np.int64(3))

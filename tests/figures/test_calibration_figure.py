@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -150,7 +152,10 @@ def test_residuals_are_in_units_of_the_standard_uncertainty(make_apparatus, draw
 
 def test_an_outlier_is_drawn_at_the_edge_and_does_not_stretch_the_axis(make_apparatus):
     data = make_apparatus()
-    data.reconvolution.residual[10] = 60 * data.reconvolution.u_zz_errors[10]
+    record = data.reconvolution
+    residual = record.residual.copy()
+    residual[10] = 60 * record.u_zz_errors[10]
+    data = replace(data, reconvolution=replace(record, residual=residual))
     axes = panels(calibration_figure(data))["residuals"]
     low, high = axes.get_ylim()
     assert high < 10
@@ -162,7 +167,9 @@ def test_an_outlier_is_drawn_at_the_edge_and_does_not_stretch_the_axis(make_appa
 
 def test_without_uncertainties_the_residuals_say_what_they_are_divided_by(make_apparatus):
     data = make_apparatus()
-    data.reconvolution.u_zz_errors[:] = 0.0
+    record = data.reconvolution
+    exact = replace(record, u_zz_errors=np.zeros_like(record.u_zz_errors))
+    data = replace(data, reconvolution=exact)
     axes = panels(calibration_figure(data))["residuals"]
     assert "own rms" in axes.get_ylabel()
     _, z = line(axes, "G: rms")
@@ -276,7 +283,9 @@ def test_a_sensor_of_any_name_is_drawn_as_plain_text(drawn, name):
 
 def test_a_conversion_constant_below_zero_leaves_out_the_stress_axis(make_apparatus):
     data = make_apparatus()
-    data.parameters.values[0] *= -1
+    values = data.parameters.values.copy()
+    values[0] *= -1
+    data = replace(data, parameters=replace(data.parameters, values=values))
     axes = panels(calibration_figure(data))["scan"]
     assert not axes.child_axes
     assert not [each for each in axes.lines if each.get_label().startswith("reference")]
