@@ -7,11 +7,14 @@ from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import QualityCheck
 from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
 
 __all__ = ["calibration_messages"]
 
 #: Methods that are a fixed window, whose uncertainties are therefore complete to first order.
 _WINDOWS = ("white-noise", "tikhonov")
+#: Relative difference below which two lengths or ratios are the same.
+_SAME = 1e-6
 
 
 def calibration_messages(solution: Solution, checks: tuple[QualityCheck, ...]) -> tuple[str, ...]:
@@ -78,9 +81,27 @@ def _reference(solution: Solution) -> list[str]:
             "there is not part of the uncertainties."
         )
         return [model_form]
+    messages = _other_set_up(scan, stress)
     if stress.convergence is None:
-        return ["The reference states no convergence: its own error is not counted."]
-    return []
+        messages.append("The reference states no convergence: its own error is not counted.")
+    return messages
+
+
+def _other_set_up(scan: Scan, stress: StressProfile) -> list[str]:
+    """Say where a reference was made for another film or indenter than the scan's."""
+    pairs = []
+    if stress.film is not None:
+        for name, unit in (("thickness", 1e3), ("poisson_ratio", 1.0)):
+            ours, theirs = getattr(scan.film, name), getattr(stress.film, name)
+            pairs.append((f"film {name.replace('_', ' ')}", ours * unit, theirs * unit))
+    if stress.indenter is not None:
+        pairs.append(("rod radius", scan.indenter.radius * 1e3, stress.indenter.radius * 1e3))
+    return [
+        f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "
+        f"{ours:.4g}{'' if 'ratio' in name else ' mm'}."
+        for name, ours, theirs in pairs
+        if abs(theirs - ours) > _SAME * abs(ours)
+    ]
 
 
 def _unstated(scan: Scan) -> list[str]:

@@ -257,3 +257,13 @@ def test_representations_are_one_line() -> None:
     calibration = memscal.calibrate(scan)
     for thing in (scan, calibration, calibration.apparatus, calibration.apparatus.reference):
         assert len(repr(thing)) < 250
+
+
+def test_a_reference_for_another_film_or_rod_is_noticed() -> None:
+    scan = simulated()
+    thicker = replace(scan.film, thickness=2.1e-3)
+    other = memscal.indent(thicker, memscal.Rod(radius=0.3e-3), load=1.0).profile()
+    text = "\n".join(memscal.calibrate(scan, reference=other).apparatus.process.messages)
+    assert "another film thickness than the scan's: 2.1 instead of 2 mm" in text
+    assert "another rod radius" in text
+    assert "poisson ratio" not in text
