@@ -199,7 +199,7 @@ def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path) -> Non
     [
         (["--method", "magic"], "white-noise"),
         (["--option", "amplitude"], "NAME=VALUE"),
-        (["--option", "amplitud=1"], "amplitude"),
+        (["--option", "amplitudes=1"], "amplitude"),
         (["--option", "seed=1"], "--seed"),
         (["--option", "amplitude=much"], "amplitude is a number"),
         (["--option", "amplitude=NaN"], "amplitude is a number"),
