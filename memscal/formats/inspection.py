@@ -65,6 +65,7 @@ _PROVENANCE = {
     "start_time": "/entry/start_time",
     "end_time": "/entry/end_time",
     "notes": "/entry/notes/data",
+    "reference_notes": "/entry/process/notes/data",
     "sensor": "/entry/instrument/stress_sensor/name",
     "sensor_model": "/entry/instrument/stress_sensor/model",
     "channel": "/entry/instrument/stress_sensor/channel",

@@ -12,7 +12,7 @@ from memscal.formats.fields import (
     require_text,
 )
 from memscal.formats.hdf5_reader import SafeFile
-from memscal.formats.tree import Group, Node, si
+from memscal.formats.tree import Group, Node, note, si
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod, Sphere
 from memscal.model.scan import StressSensor
@@ -153,6 +153,8 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
         made["convergence"] = si(profile.convergence, "dimensionless")
     if made:
         process["numerics"] = Group("NXparameters", made)
+    if profile.notes:
+        process["notes"] = note(profile.notes)
     return (
         Group("NXdata", data, {"signal": "sigma_zz", "axes": axes}),
         Group("NXcollection", parameters),
@@ -188,6 +190,7 @@ def read_profile(
         solver=optional_text(file, f"{process}/program"),
         discretisation=optional_text(file, f"{process}/numerics/discretisation"),
         convergence=optional_scalar(file, f"{process}/numerics/convergence", "dimensionless"),
+        notes=optional_text(file, f"{process}/notes/data"),
         source=file.source,
         **{
             name: optional_scalar(file, f"{parameters}/{name}", dimension)

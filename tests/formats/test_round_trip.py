@@ -72,7 +72,9 @@ def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):
 
 
 def test_a_reference_comes_back(tmp_path: Path):
-    profile = make_profile(indenter=Sphere(radius=128.8e-3, radius_uncertainty=1e-5))
+    profile = make_profile(
+        indenter=Sphere(radius=128.8e-3, radius_uncertainty=1e-5), notes="Two\nlines, é"
+    )
     write_reference(profile, tmp_path / "sphere.h5")
     assert_same(read_reference(tmp_path / "sphere.h5"), profile, but=("source",))
 

@@ -111,5 +111,30 @@ def test_the_force_of_a_profile_is_its_integral(width: float, force: float) -> N
     r = np.linspace(0.0, 10e-3, 2001)
     sigma = force * np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
     profile = make_profile(r=r, sigma_zz=sigma, sigma_rz=None, load=force)
-    # The trapezoidal rule is off by (step/width)^2/12 at most.
-    assert profile.force == pytest.approx(force, rel=(5e-6 / width) ** 2 / 6)
+    # The trapezoidal rule would be off by (step/width)^2/12; a cubic spline is by its square.
+    assert profile.force == pytest.approx(force, rel=(5e-6 / width) ** 4 + 1e-12)
+
+
+@given(
+    seed=st.integers(0, 2**16),
+    count=st.integers(3, 60),
+    axis=st.booleans(),
+    curvature=st.floats(-0.9, 2.0),
+)
+def test_the_force_of_uneven_radii_is_exact_where_a_spline_is(
+    seed: int, count: int, axis: bool, curvature: float
+) -> None:
+    """A stress a + b r^2 makes sigma r an odd cubic, which the mirrored spline is."""
+    steps = np.random.default_rng(seed).uniform(0.05, 1.0, count)
+    r = np.cumsum(steps) - (steps[0] if axis else 0.0)
+    reach = r[-1]
+    sigma = 1.0 + curvature * (r / reach) ** 2
+    profile = make_profile(r=r, sigma_zz=sigma, sigma_rz=None)
+    exact = np.pi * reach**2 * (1.0 + curvature / 2)
+    assert profile.force == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_single_radius_carries_the_force_of_an_even_pressure_or_none() -> None:
+    even = make_profile(r=[2e-3], sigma_zz=[1e5], sigma_rz=None)
+    assert even.force == pytest.approx(np.pi * 4e-6 * 1e5)
+    assert make_profile(r=[0.0], sigma_zz=[1e5], sigma_rz=None).force == 0.0
