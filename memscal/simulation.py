@@ -164,7 +164,7 @@ def simulate(
     x = np.linspace(-half_range, half_range, points)
     y = x if raster else np.zeros(1)
     radius = np.hypot.outer(y - centre[1], x - centre[0])
-    per_newton = conversion_constant * _blurred(film, rod, truth, radius)
+    per_newton = conversion_constant * _blurred(film, rod, truth, radius, float(loads.max()))
     row_loads = np.repeat(loads, repeats)
     signal = per_newton * row_loads[:, None] if not raster else per_newton * loads[0]
     largest = float(per_newton.max() * loads.mean())
@@ -213,12 +213,12 @@ def _require_plausible(
 
 
 def _blurred(
-    film: ElasticFilm, rod: Rod, kernel: GaussianMixture, radius: FloatArray
+    film: ElasticFilm, rod: Rod, kernel: GaussianMixture, radius: FloatArray, load: float
 ) -> FloatArray:
     """G convolved with the base stress per newton, in 1/m^2, at the given radii."""
-    contact = indent(film, rod, load=1.0)
+    contact = indent(film, rod, load=load)
     wavenumbers = Wavenumbers.covering(40 / film.thickness, float(radius.max()))
-    spectrum = contact.base_spectrum(wavenumbers.k) * kernel.transform(wavenumbers.k)
+    spectrum = contact.base_spectrum(wavenumbers.k) / load * kernel.transform(wavenumbers.k)
     return RadialSpectrum(wavenumbers, spectrum).at(radius)
 
 

@@ -236,16 +236,19 @@ class _RasterFields:
 def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatArray, FloatArray]:
     """Continue a raster's axis on both sides, to an odd number of points; index the points."""
     unique = np.unique(positions)
-    step = (unique[-1] - unique[0]) / (unique.size - 1)
+    reach = unique[-1] - unique[0]
+    # Whole rows or columns may be missing: steps are counted, not positions.
+    steps = int(np.rint(reach / np.median(np.diff(unique))))
+    step = reach / steps
     index = (positions - unique[0]) / step
-    if np.any(np.abs(index - np.rint(index)) > _RASTER_TOLERANCE * unique.size):
+    if np.any(np.abs(index - np.rint(index)) > _RASTER_TOLERANCE * steps):
         raise InputError(
             f"The raster's {name} positions are not evenly spaced.",
             why="A raster is transformed as it is, on its own lattice.",
             cure="Import it with positions snapped to a grid, or scan evenly.",
         )
-    padding = int(np.ceil(max(2 * extent - (unique[-1] - unique[0]), 0.0) / (2 * step))) + 1
-    count = unique.size + 2 * padding + (unique.size + 1) % 2
+    padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * step))) + 1
+    count = steps + 1 + 2 * padding + steps % 2
     axis = unique[0] + step * (np.arange(count) - padding)
     return axis, np.rint(index).astype(int) + padding
 

@@ -145,7 +145,7 @@ def reference_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[st
     film, rod, k = scan.film, scan.indenter, reference.wavenumbers.k
 
     def transform(new_film: ElasticFilm, new_rod: Indenter) -> FloatArray:
-        return reference_contact(new_film, new_rod, 1.0).base_spectrum(k)
+        return reference_contact(new_film, new_rod, scan.load).base_spectrum(k)
 
     centre = transform(film, rod)
     changes: dict[str, FloatArray] = {}

@@ -267,3 +267,32 @@ def test_a_reference_for_another_film_or_rod_is_noticed() -> None:
     assert "another film thickness than the scan's: 2.1 instead of 2 mm" in text
     assert "another rod radius" in text
     assert "poisson ratio" not in text
+
+
+def test_a_raster_may_miss_whole_rows_and_columns() -> None:
+    scan = simulated(raster=True, points=25, noise=0.002)
+    u = scan.u_zz.copy()
+    u[3], u[:, 7], u[10, 10] = np.nan, np.nan, np.nan
+    apparatus = memscal.calibrate(replace(scan, u_zz=u)).apparatus
+    error = apparatus.conversion_constant - CONVERSION
+    assert abs(error) < 5 * apparatus.parameters.uncertainty("conversion_constant")
+    assert "50 points of the scan are missing" in "\n".join(apparatus.process.messages)
+
+
+def test_lengths_and_voltages_of_any_size_give_the_same() -> None:
+    large = simulated(noise=0.005, seed=3)
+    film = replace(large.film, thickness=large.film.thickness * 1e-2)
+    small = simulated(
+        film=film,
+        rod=memscal.Rod(radius=large.indenter.radius * 1e-2),
+        kernel=memscal.GaussianMixture((1.0,), (SIGMA * 1e-2,)),
+        half_range=8e-5,
+        centre=(0.14e-5, 0.0),
+        load=1e-4,
+        conversion_constant=1e-2,
+        noise=0.005,
+        seed=3,
+    )
+    one, other = memscal.calibrate(large).apparatus, memscal.calibrate(small).apparatus
+    assert other.gaussian_sigma == pytest.approx(one.gaussian_sigma * 1e-2, rel=1e-6)
+    assert other.conversion_constant == pytest.approx(one.conversion_constant * 1e5, rel=1e-6)
