@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import itertools
 import os
 import re
 from collections.abc import Iterable
@@ -24,6 +25,8 @@ _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "sp
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 _MAX_NAME = 80
+_MAX_COMMENTS = 20
+_MAX_COMMENT = 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +101,9 @@ def read_table(
 ) -> Table:
     """Read a delimited text file.
 
-    Lines that begin with ``#`` or ``%`` are comments; the first line with a cell that is
-    no number is the header, and without one the columns have numbers only.
+    Lines that begin with ``#`` or ``%`` are comments, and those above the table are kept in
+    its notes; the first line with a cell that is no number is the header, and without one the
+    columns have numbers only.
 
     Parameters
     ----------
@@ -123,9 +127,11 @@ def read_table(
         notes.append("The table is not UTF-8; it was read as Latin-1.")
     if "\0" in text:
         raise FormatError(f"{name} is not a text file.", cure="Give a table as CSV.")
-    lines = [s for s in text.splitlines() if s.strip() and s.lstrip()[0] not in "#%"]
+    written = [line for line in text.splitlines() if line.strip()]
+    lines = [line for line in written if not _is_comment(line)]
     if not lines:
         raise FormatError(f"{name} holds no table.", cure="Give a table with one row per reading.")
+    notes += _head_comments(written)
     delimiter = delimiter or _find_delimiter(lines)
     rows = _split(name, lines, delimiter)
     headed = not all(_NUMBER.fullmatch(c) or c.lower() in _MISSING for c in rows[0])
@@ -148,6 +154,20 @@ def read_table(
         decimal=decimal,
         notes=tuple(notes),
     )
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip()[0] in "#%"
+
+
+def _head_comments(lines: list[str]) -> list[str]:
+    """Return what is written above the table: it may say that the data are synthetic."""
+    head = list(itertools.takewhile(_is_comment, lines))
+    shown = [printable(line.lstrip(" \t#%"), _MAX_COMMENT).strip() for line in head]
+    notes = [f"The table says: {line}" for line in shown[:_MAX_COMMENTS] if line]
+    if len(shown) > _MAX_COMMENTS:
+        notes.append(f"{len(shown) - _MAX_COMMENTS} more lines of comment were left out.")
+    return notes
 
 
 def _find_delimiter(lines: list[str]) -> str:

@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 from memscal.errors import InputError
 from memscal.model.validation import FloatArray
 
-__all__ = ["Grid", "find_grid", "group_positions"]
+__all__ = ["Grid", "find_grid", "group_positions", "spacing_in_words", "typical_spacing"]
 
 IntArray = NDArray[np.int64]
 _CANDIDATES = 200
+# Positions closer than this, of the typical spacing, differ by rounding only.
+_EQUAL = 1e-6
+_FINER = np.array([1.0, 0.3, 0.1, 0.03, 0.01])
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,20 +77,91 @@ def find_grid(what: str, positions: FloatArray, tolerance: float) -> Grid:
     raise _no_grid(what, best, tolerance)
 
 
-def group_positions(what: str, positions: FloatArray, repeat: IntArray, tolerance: float) -> Grid:
+def group_positions(
+    what: str, positions: FloatArray, repeat: IntArray, tolerance: float, *, closeness: float = 0.0
+) -> Grid:
     """Find the common places of repeated line scans, evenly spaced or not.
 
     The smallest spacing within one repeat is the measure: readings of different repeats
     belong together where they are closer than ``tolerance`` times that spacing.  A place is
     the mean of its readings.
 
+    Parameters
+    ----------
+    what : str
+        Name of the axis, for the message.
+    positions, repeat : ndarray, shape (n,)
+        Positions in m, and the repeat that each belongs to.
+    tolerance : float
+        Largest allowed deviation from a place, as a fraction of the smallest spacing.
+    closeness : float
+        Readings of one repeat closer than this fraction of its typical spacing share a place
+        too, unless places would then be wider than the tolerance; 0 if none may.
+
     Raises
     ------
     InputError
         If readings that belong together are spread further than the tolerance, or one
-        repeat has two readings at one place.
+        repeat has two readings at one place although none may.
     """
-    step = _smallest_spacing(positions, repeat)
+    if not closeness:
+        grid = _grouped(what, positions, _smallest_spacing(positions, repeat, 0.0), tolerance)
+        if np.unique(np.stack([repeat, grid.index]), axis=1).shape[1] < positions.size:
+            raise _two_readings(what)
+        return grid
+    typical = max(typical_spacing(positions[repeat == k]) for k in np.unique(repeat))
+    refusals = []
+    # Where a line is dense in the middle, a smaller distance tells its places from one another.
+    for share in (*(closeness * _FINER), _EQUAL):
+        try:
+            step = _smallest_spacing(positions, repeat, share * typical)
+            return _grouped(what, positions, step, tolerance)
+        except InputError as refusal:
+            refusals.append(refusal)
+    raise refusals[0]
+
+
+def typical_spacing(positions: FloatArray) -> float:
+    """Return the gap in which half of the length lies: repeated positions do not change it.
+
+    Examples
+    --------
+    >>> round(typical_spacing(np.array([0.0, 0.01, 0.5, 0.51, 1.0, 1.01])), 2)
+    0.49
+    """
+    gaps = np.sort(np.diff(np.sort(positions)))
+    if gaps.size == 0:
+        return 0.0
+    covered = np.cumsum(gaps)
+    return float(gaps[np.searchsorted(covered, 0.5 * covered[-1])])
+
+
+def spacing_in_words(places: FloatArray, tolerance: float) -> str:
+    """Say how far apart places are: by the step of their lattice, or from the least to the most.
+
+    Examples
+    --------
+    >>> spacing_in_words(np.array([0.0, 0.501, 0.999, 1.5]) * 1e-3, 0.1)
+    '0.4998 mm apart'
+    >>> spacing_in_words(np.array([0.0, 0.1, 0.2, 1.2]) * 1e-3, 0.1)
+    '0.1 to 1 mm apart'
+    """
+    gaps = np.diff(places)
+    if gaps.size == 0:
+        return "alone"
+    lattice = _fit(places, np.arange(places.size), gaps, float(np.median(gaps)))
+    if (
+        lattice is None
+        or lattice.deviation > tolerance * lattice.step
+        or np.ptp(lattice.index) > (2 * places.size)
+    ):
+        return f"{gaps.min() * 1e3:.4g} to {gaps.max() * 1e3:.4g} mm apart"
+    holes = lattice.places.size - places.size
+    tail = f", with {holes} left out between them" if holes else ""
+    return f"{lattice.step * 1e3:.4g} mm apart{tail}"
+
+
+def _grouped(what: str, positions: FloatArray, step: float, tolerance: float) -> Grid:
     order = np.argsort(positions, kind="stable")
     new_place = np.diff(positions[order]) > 0.5 * step
     index = np.empty(positions.size, dtype=np.int64)
@@ -100,11 +174,6 @@ def group_positions(what: str, positions: FloatArray, repeat: IntArray, toleranc
             f"Repeats of {what} lie up to {deviation * 1e3:.4g} mm from their common place; "
             f"{tolerance:g} of the smallest spacing ({step * 1e3:.4g} mm) is allowed.",
             cure="Raise the grid tolerance if the positions are as good as that.",
-        )
-    if np.unique(np.stack([repeat, index]), axis=1).shape[1] < positions.size:
-        raise InputError(
-            f"One repeat has two readings at the same {what}.",
-            cure="Name the column that numbers the repeats, or remove one of the readings.",
         )
     return Grid(places, index, step, deviation)
 
@@ -137,17 +206,28 @@ def _fit(positions: FloatArray, order: IntArray, gaps: FloatArray, step: float) 
     return Grid(places, index, fitted, deviation)
 
 
-def _smallest_spacing(positions: FloatArray, repeat: IntArray) -> float:
-    spacings = [
-        np.diff(np.sort(positions[repeat == k])).min(initial=np.inf) for k in np.unique(repeat)
-    ]
-    smallest = float(min(spacings))
-    if not (np.isfinite(smallest) and smallest > 0):
+def _smallest_spacing(positions: FloatArray, repeat: IntArray, closer: float) -> float:
+    """Return the smallest spacing within a repeat, but for those that are too close to be one."""
+    gaps = [np.diff(np.sort(positions[repeat == k])) for k in np.unique(repeat)]
+    spacings = np.concatenate(gaps)
+    if closer > 0:
+        spacings = spacings[spacings > closer]
+    if spacings.size == 0:
         raise InputError(
-            "One repeat has two readings at the same position, or fewer than two readings.",
-            cure="Name the column that numbers the repeats, or remove one of the readings.",
+            "No repeat has two readings at different positions.",
+            cure="Check the column of positions, and the one that numbers the repeats.",
         )
-    return smallest
+    if spacings.min() == 0:
+        raise _two_readings("position")
+    return float(spacings.min())
+
+
+def _two_readings(what: str) -> InputError:
+    return InputError(
+        f"One repeat has two readings at the same {what}.",
+        cure='Average them (repeats="average"; --repeats average), name the column that numbers '
+        "the repeats, or remove one of the readings.",
+    )
 
 
 def _no_grid(what: str, best: Grid | None, tolerance: float) -> InputError:

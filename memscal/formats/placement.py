@@ -8,13 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.grid import Grid, IntArray, find_grid, group_positions
+from memscal.formats.grid import (
+    Grid,
+    IntArray,
+    find_grid,
+    group_positions,
+    spacing_in_words,
+    typical_spacing,
+)
+from memscal.formats.repeats import average_columns
 from memscal.model.validation import FloatArray
 
 __all__ = ["Placed", "place_readings"]
 
 # A raster whose grid is this much larger than its data is a misread column.
 _MAX_EMPTINESS = 100
+# Positions closer than this share of the typical spacing are probably one place, and a table with
+# so large a share of them was probably repeated.
+_CLOSE = 0.1
+_MANY = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +46,7 @@ def place_readings(
     ys: FloatArray | None,
     numbers: FloatArray | None,
     tolerance: float,
-    average: bool,
+    averaged: bool,
     notes: list[str],
 ) -> Placed:
     """Sort readings into the arrays of a scan.
@@ -49,7 +61,7 @@ def place_readings(
         Number of the repeat that each reading belongs to.
     tolerance : float
         Largest distance of a reading from its place, as a fraction of the step.
-    average : bool
+    averaged : bool
         Whether repeats are averaged.
     notes : list of str
         What was done is added here.
@@ -64,27 +76,72 @@ def place_readings(
     numbers = None if numbers is None else numbers[known]
     xs, columns = xs[known], {name: values[known] for name, values in columns.items()}
     if ys is not None:
-        return _place_raster(xs, ys[known], numbers, columns, tolerance, average, notes)
+        return _place_raster(xs, ys[known], numbers, columns, tolerance, averaged, notes)
+    if averaged:
+        return _average_line(xs, numbers, columns, tolerance, notes)
     repeat = _count_repeats(xs, numbers, notes)
     if repeat.max() == 0:
-        notes.append("A line scan without repeats: positions are kept as they are.")
-        return Placed(xs, None, columns, None)
-    return _place_line(xs, repeat, columns, tolerance, average, notes)
+        return _single_line(xs, columns, averaged, notes)
+    return _repeated_line(xs, repeat, columns, tolerance, notes)
 
 
-def _place_line(
+def _single_line(
+    xs: FloatArray, columns: Mapping[str, FloatArray], averaged: bool, notes: list[str]
+) -> Placed:
+    notes.append("A line scan without repeats: positions are kept as they are.")
+    gaps = np.diff(np.sort(xs))
+    close = int(np.sum(gaps < _CLOSE * typical_spacing(xs)))
+    if close > _MANY * xs.size:
+        notes.append(
+            f"{close} of {xs.size} positions lie closer to another than {_CLOSE:.0%} of the "
+            "typical spacing. If they are repeats, name the column that numbers them "
+            '(repeat="..."; --repeat COLUMN), or '
+            + (
+                "raise the grid tolerance."
+                if averaged
+                else 'average them (repeats="average"; --repeats average).'
+            )
+        )
+    return Placed(xs, None, columns, None)
+
+
+def _average_line(
+    xs: FloatArray,
+    numbers: FloatArray | None,
+    columns: Mapping[str, FloatArray],
+    tolerance: float,
+    notes: list[str],
+) -> Placed:
+    """Average readings by place, several of one repeat too; without numbers all are alike."""
+    numbered = numbers is not None
+    repeat = _count_repeats(xs, numbers, []) if numbered else np.zeros(xs.size, dtype=np.int64)
+    # Unnumbered readings of a place reach as far on either side as the tolerance allows; those of
+    # one repeat were meant to be equal.
+    closeness = 0.5 * tolerance if numbered else min(2 * tolerance, 0.5)
+    grid = group_positions("x", xs, repeat, tolerance, closeness=closeness)
+    if grid.places.size == xs.size:
+        return _single_line(xs, columns, True, notes)
+    _report(notes, "x", spacing_in_words(grid.places, tolerance), grid, tolerance)
+    twice = xs.size - np.unique(np.stack([repeat, grid.index]), axis=1).shape[1]
+    if numbered and twice:
+        notes.append(f"{twice} readings share their place with another of the same repeat.")
+
+    def named(i: int) -> str:
+        return f"x = {grid.places[i] * 1e3:.4g} mm"
+
+    means, errors = average_columns(columns, grid.index, (grid.places.size,), named, numbers, notes)
+    return Placed(grid.places, None, means, errors)
+
+
+def _repeated_line(
     xs: FloatArray,
     repeat: IntArray,
     columns: Mapping[str, FloatArray],
     tolerance: float,
-    average: bool,
     notes: list[str],
 ) -> Placed:
     grid = group_positions("x", xs, repeat, tolerance)
-    _report(notes, "x", grid, tolerance)
-    if average:
-        means, errors = _average(columns, grid.index, grid.places.shape, notes)
-        return Placed(grid.places, None, means, errors)
+    _report(notes, "x", spacing_in_words(grid.places, tolerance), grid, tolerance)
     shape = (int(repeat.max()) + 1, grid.places.size)
     fields = {name: np.full(shape, np.nan) for name in columns}
     for name, values in columns.items():
@@ -100,7 +157,7 @@ def _place_raster(
     repeat: FloatArray | None,
     columns: Mapping[str, FloatArray],
     tolerance: float,
-    average: bool,
+    averaged: bool,
     notes: list[str],
 ) -> Placed:
     grids = {"x": find_grid("x", xs, tolerance), "y": find_grid("y", ys, tolerance)}
@@ -112,7 +169,7 @@ def _place_raster(
             cure="Check the position columns and their unit, or raise the grid tolerance.",
         )
     for name, grid in grids.items():
-        _report(notes, name, grid, tolerance)
+        _report(notes, name, f"{grid.step * 1e3:.4g} mm apart", grid, tolerance)
     flat = grids["y"].index * shape[1] + grids["x"].index
     if repeat is not None:
         for positions, grid in ((xs, grids["x"]), (ys, grids["y"])):
@@ -121,13 +178,19 @@ def _place_raster(
         if twice:
             notes.append(f"{twice} readings share their place with another of the same repeat.")
     most = int(np.bincount(flat).max())
-    if most > 1 and not average:
+    if most > 1 and not averaged:
         raise InputError(
             f"The raster has up to {most} readings at one place.",
             why="A raster scan has one value for each place.",
             cure='Average them (repeats="average"; --repeats average), or import one repeat.',
         )
-    means, errors = _average(columns, flat, shape, notes)
+
+    def named(i: int) -> str:
+        row, column = divmod(i, shape[1])
+        x, y = grids["x"].places[column] * 1e3, grids["y"].places[row] * 1e3
+        return f"x = {x:.4g} mm, y = {y:.4g} mm"
+
+    means, errors = average_columns(columns, flat, shape, named, repeat, notes)
     _report_missing(notes, means["u_zz"])
     return Placed(grids["x"].places, grids["y"].places, means, errors)
 
@@ -163,38 +226,11 @@ def _count_repeats(xs: FloatArray, numbers: FloatArray | None, notes: list[str])
     return repeat
 
 
-def _average(
-    columns: Mapping[str, FloatArray], flat: IntArray, shape: tuple[int, ...], notes: list[str]
-) -> tuple[dict[str, FloatArray], FloatArray | None]:
-    """Return means by place, and the standard uncertainty of u_zz from the pooled spread."""
-    size = int(np.prod(shape))
-    means, errors = {}, None
-    for name, values in columns.items():
-        good = np.isfinite(values)
-        number = np.bincount(flat[good], minlength=size).astype(float)
-        total = np.bincount(flat[good], weights=values[good], minlength=size)
-        mean = np.divide(total, number, out=np.full(size, np.nan), where=number > 0)
-        means[name] = mean.reshape(shape)
-        freedom = float(np.sum(np.maximum(number - 1, 0)))
-        if name == "u_zz" and freedom > 0:
-            spread = float(np.sqrt(np.sum((values[good] - mean[flat[good]]) ** 2) / freedom))
-            scatter = np.full(size, spread)
-            errors = np.divide(
-                scatter, np.sqrt(number), out=np.full(size, np.nan), where=number > 0
-            ).reshape(shape)
-            notes.append(
-                f"Repeats were averaged, {number[number > 0].mean():.3g} at a place on average; "
-                f"their pooled standard deviation is {spread * 1e3:.4g} mV "
-                f"({freedom:.0f} degrees of freedom), and u_zz_errors is that of the mean."
-            )
-    return means, errors
-
-
-def _report(notes: list[str], name: str, grid: Grid, tolerance: float) -> None:
+def _report(notes: list[str], name: str, apart: str, grid: Grid, tolerance: float) -> None:
     notes.append(
-        f"Along {name}: {grid.places.size} places, {grid.step * 1e3:.6g} mm apart; readings lie up "
+        f"Along {name}: {grid.places.size} places, {apart}; readings lie up "
         f"to {grid.deviation * 1e3:.3g} mm from theirs "
-        f"({grid.deviation / grid.step:.2g} of the step; {tolerance:g} is allowed)."
+        f"({grid.deviation / grid.step:.2g} of the smallest step; {tolerance:g} is allowed)."
     )
 
 

@@ -146,7 +146,7 @@ def read_scan_table(
         ys=None if y is None else to_si(table.column(y), x_unit, "length", table.where(y)),
         numbers=None if repeat is None else table.column(repeat),
         tolerance=grid_tolerance,
-        average=repeats == "average",
+        averaged=repeats == "average",
         notes=notes,
     )
     fields = dict(placed.fields)
