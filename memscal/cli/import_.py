@@ -43,16 +43,17 @@ Columns are given by their names in the header, or by their numbers counted from
 """
 
 _SCAN_NAMES = [
-    *("x", "x_unit", "u", "u_unit", "u_scale", "y", "repeat", "u_xz", "u_yz"),
+    *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "u_xz", "u_yz"),
     *("load_column", "load_unit", "load_uncertainty", "grid_tolerance", "repeats", "title"),
 ]
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _PROFILE_NAMES = ["r", "r_unit", "sigma", "sigma_unit", "shear", "solver"]
+_SIGNS = ("u_sign", "sign", "shear_sign")
 _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
     "scan": [*_SCAN_NAMES, *_SENSOR_NAMES.values()],
-    "reference": [*_PROFILE_NAMES, "sign"],
+    "reference": [*_PROFILE_NAMES, "sign", "shear_sign"],
 }
 _NEEDED = {
     "scan": ("x", "x_unit", "u", "u_unit"),
@@ -98,6 +99,11 @@ _NEEDED = {
     help="Scan: volts per unit of the readings, for a sensor whose output is not a voltage.",
 )
 @click.option(
+    "--u-sign",
+    type=click.Choice(["1", "-1"]),
+    help="Scan: -1 where the voltage falls when the indenter presses.  [default: 1]",
+)
+@click.option(
     "--grid-tolerance",
     type=float,
     metavar="SHARE",
@@ -107,7 +113,8 @@ _NEEDED = {
 @click.option(
     "--repeats",
     type=click.Choice(["keep", "average"]),
-    help="Scan: what to do with repeated readings.  [default: keep]",
+    help="Scan: what to do with repeated readings; averages leave out outlying readings and name "
+    "them.  [default: keep]",
 )
 @click.option("--sensor-name", metavar="TEXT", help="Scan: name of the sensor.")
 @click.option("--sensor-model", metavar="TEXT", help="Scan: model of the sensor.")
@@ -124,6 +131,12 @@ _NEEDED = {
     "--sign",
     type=click.Choice(["1", "-1"]),
     help="Reference: -1 where compression is negative in the table.  [default: 1]",
+)
+@click.option(
+    "--shear-sign",
+    type=click.Choice(["1", "-1"]),
+    help="Reference: -1 where the shear is the stress component S13 with axis 3 from the base to "
+    "the surface; 1 where it is the base's traction on the film, positive outward.  [default: 1]",
 )
 @click.option("--solver", metavar="TEXT", help="Reference: the program that calculated it.")
 @click.option(
@@ -151,9 +164,10 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
 
     A table says neither its units nor what was pressed on what: the options do. What was done to
     the readings (places found, points missing, repeats averaged) is printed, and kept in the
-    scan's notes.
+    notes of the file.
     """
     _check_usage(kind, given)
+    given |= {name: int(given[name]) for name in _SIGNS if given[name] is not None}
     prove_writable([output], force=force, inputs=[table])
     found = _scan(table, given) if kind == "scan" else _reference(table, given)
     _write(found, output, force)
@@ -217,8 +231,7 @@ def _reference(path: Path, given: dict[str, Any]) -> ImportedProfile:
 
     return read_reference_table(
         path,
-        **_given(given, [*_PROFILE_NAMES, *_TABLE_NAMES]),
-        sign=int(given["sign"] or 1),
+        **_given(given, [*_ONLY["reference"], *_TABLE_NAMES]),
         film=None if all(given[name] is None for name in FILM) else film_from(given),
         indenter=None if given["radius"] is None else indenter_from(given["indenter"], given),
     )

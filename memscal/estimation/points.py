@@ -145,5 +145,6 @@ def _require_positive_peak(points: ScanPoints) -> None:
             f"The voltage falls by {fall * points.load.mean() * 1e3:.4g} mV where the indenter is "
             "above the sensor.",
             why="Normal stress is positive in compression, so the voltage must rise.",
-            cure="Change the sign of u_zz, or swap the leads of the channel.",
+            cure="Change the sign of u_zz (u_sign=-1; memscal import ... --u-sign -1), or swap the "
+            "leads of the channel and measure again.",
         )

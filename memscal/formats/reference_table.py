@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,12 @@ from memscal.model.validation import FloatArray
 __all__ = ["ImportedProfile", "read_reference_table"]
 
 Column = str | int
+
+# A larger difference between force and load is warned of, one beyond a factor is refused.
+_WARNED = 0.03
+_REFUSED = 2.0
+# A table whose stress has not decayed to this share of its maximum ends early.
+_DECAYED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +44,7 @@ def read_reference_table(
     load: float,
     sign: int = 1,
     shear: Column | None = None,
+    shear_sign: int = 1,
     film: ElasticFilm | None = None,
     indenter: Indenter | None = None,
     solver: str = "",
@@ -60,7 +67,11 @@ def read_reference_table(
         -1 where the program counts compression as negative, as most FEM programs do; it
         turns the normal stress only.
     shear : str or int, optional
-        Column of the radial shear stress, positive outward.
+        Column of the radial shear stress.
+    shear_sign : {1, -1}
+        1 where the column is the radial traction of the base on the film, positive outward; -1
+        where it is the stress component S13 (S_rz) with the third axis from the base to the
+        surface, because the film's lower face looks the other way.
     film, indenter : optional
         What was pressed on what.
     solver : str
@@ -71,15 +82,17 @@ def read_reference_table(
     Returns
     -------
     ImportedProfile
-        The profile, sorted by radius, and what was done.
+        The profile, sorted by radius, and what was done: also recorded in ``profile.notes``.
 
     Raises
     ------
     InputError
-        If a value is missing, a radius is negative, or the stress is mostly tensile.
+        If a value is missing, a radius is negative, the stress is mostly tensile, or it carries
+        less than half or more than twice the load (less, only if it decays within the table).
     """
-    if sign not in (1, -1):
-        raise InputError(f"The sign is {sign}.", cure="Give 1 or -1.")
+    for name, value in (("sign", sign), ("shear sign", shear_sign)):
+        if value not in (1, -1):
+            raise InputError(f"The {name} is {value}.", cure="Give 1 or -1.")
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     notes = [
         f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
@@ -90,7 +103,8 @@ def read_reference_table(
         "sigma_zz": sign * to_si(table.column(sigma), sigma_unit, "stress", table.where(sigma)),
     }
     if shear is not None:
-        columns["sigma_rz"] = to_si(table.column(shear), sigma_unit, "stress", table.where(shear))
+        values = to_si(table.column(shear), sigma_unit, "stress", table.where(shear))
+        columns["sigma_rz"] = shear_sign * values
     for name, values in columns.items():
         _require_numbers(table.source.file_name, name, values)
     if columns["r"].min() < 0:
@@ -100,14 +114,6 @@ def read_reference_table(
             cure="Give one half of a section through the axis, with r from 0.",
         )
     columns = _sorted_by_radius(columns, notes)
-    force = _force(columns)
-    if force <= 0:
-        raise InputError(
-            f"The normal stress in {table.source.file_name} is mostly negative: it carries "
-            f"{force:.4g} N.",
-            why="Here compression is positive.",
-            cure="If the program counts compression as negative, say so (sign=-1; --sign -1).",
-        )
     profile = StressProfile(
         r=columns["r"],
         sigma_zz=columns["sigma_zz"],
@@ -118,12 +124,49 @@ def read_reference_table(
         solver=solver,
         source=table.source,
     )
-    reach = columns["r"][-1] * 1e3
-    notes.append(
-        f"The table carries {force:.4g} N of the load of {load:g} N ({force / load:.2%}) "
-        f"within r = {reach:.4g} mm."
+    notes += _compare_with_load(profile, table.source.file_name, (r_unit, sigma_unit))
+    return ImportedProfile(replace(profile, notes="\n".join(notes)), tuple(notes))
+
+
+def _compare_with_load(
+    profile: StressProfile, file_name: str, units: tuple[str, str]
+) -> tuple[str, ...]:
+    """Hold the force that the table carries against its load, which finds a wrong unit."""
+    force, load = profile.force, profile.load
+    if force <= 0:
+        raise InputError(
+            f"The normal stress in {file_name} is mostly negative: it carries {force:.4g} N.",
+            why="Here compression is positive.",
+            cure="If the program counts compression as negative, say so (sign=-1; --sign -1).",
+        )
+    ratio, reach = force / load, profile.r[-1] * 1e3
+    tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
+    early = tail > _DECAYED
+    within = f"within r = {reach:.4g} mm"
+    if ratio > _REFUSED or (ratio < 1 / _REFUSED and not early):
+        raise InputError(
+            f"The stress in {file_name} carries {force:.4g} N {within}, {ratio:.4g} times the load "
+            f"of {load:g} N.",
+            why="The force that the base carries must be the load.",
+            cure=f'Check the unit of the stresses ("{units[1]}"), the unit of the radii '
+            f'("{units[0]}"), the sign, that the column is the normal stress at the base, and '
+            "the load in N.",
+        )
+    carried = f"The table carries {force:.4g} N of the load of {load:g} N ({ratio:.2%}) {within}."
+    if abs(ratio - 1) <= _WARNED:
+        return (carried,)
+    cure = (
+        f"The table ends with {tail:.1%} of its maximum left: extend it to where the stress has "
+        "decayed."
+        if early and ratio < 1
+        else "Check the load, the units, and that the radii are fine enough under the indenter."
     )
-    return ImportedProfile(profile, tuple(notes))
+    warning = (
+        f"Warning: the table's force differs from the load by {abs(ratio - 1):.1%} of it. A "
+        "calibration takes stress per load from the table, so its conversion constant would be "
+        f"wrong by as much. {cure}"
+    )
+    return carried, warning
 
 
 def _require_numbers(file_name: str, name: str, values: FloatArray) -> None:
@@ -155,7 +198,3 @@ def _sorted_by_radius(columns: dict[str, FloatArray], notes: list[str]) -> dict[
         "of the maximum)."
     )
     return {"r": places, **means}
-
-
-def _force(columns: dict[str, FloatArray]) -> float:
-    return float(2 * np.pi * np.trapezoid(columns["sigma_zz"] * columns["r"], columns["r"]))

@@ -48,6 +48,7 @@ def read_scan_table(
     load_unit: str = "N",
     load_uncertainty: float | None = None,
     u_scale: float | None = None,
+    u_sign: int = 1,
     grid_tolerance: float = 0.1,
     repeats: str = "keep",
     sensor: StressSensor | None = None,
@@ -86,11 +87,15 @@ def read_scan_table(
     u_scale : float, optional
         Volts per unit of the ``u`` columns, for a sensor whose output is not a voltage;
         ``u_unit`` is then only its name, and the notes of the scan record the choice.
+    u_sign : {1, -1}
+        -1 where the voltage falls under compression, as with swapped leads: ``u`` is turned, and
+        the notes of the scan record it.  The other channels stay as they are.
     grid_tolerance : float
         Largest distance of a reading from its place, as a fraction of the grid's step.
     repeats : {"keep", "average"}
         What to do with repeats.  A raster can only average: the mean of each place, with a
-        standard uncertainty from the spread pooled over all places.
+        standard uncertainty from the spread pooled over all places.  Outlying readings are
+        left out of the mean and named in the notes.
     sensor, title
         Carried into the scan.
     delimiter, decimal : str, optional
@@ -116,12 +121,16 @@ def read_scan_table(
             "0.5.",
             why="Beyond half a step a reading has no nearest place.",
         )
+    if u_sign not in (1, -1):
+        raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     notes = [
         f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
         *table.notes,
     ]
-    columns = {"u_zz": _voltage(table, u, u_unit, u_scale)}
+    columns = {"u_zz": u_sign * _voltage(table, u, u_unit, u_scale)}
+    if u_sign < 0:
+        notes.append("The sign of u_zz was changed.")
     for name, column in (("u_xz", u_xz), ("u_yz", u_yz)):
         if column is not None:
             columns[name] = _voltage(table, column, u_unit, u_scale)

@@ -118,6 +118,7 @@ def test_a_voltage_of_the_wrong_sign_is_refused(refused: Callable[..., str], fol
     message = refused(written(folder / "scan.h5", u_zz=turned))
     assert "falls by" in message
     assert "sign of u_zz" in message
+    assert "--u-sign -1" in message
 
 
 def test_a_reference_that_does_not_cover_the_scan_is_refused(

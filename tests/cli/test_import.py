@@ -127,6 +127,53 @@ def test_a_fem_table_becomes_a_reference(run: Run, folder: Path) -> None:
     np.testing.assert_allclose(found.sigma_zz, profile.sigma_zz, rtol=1e-12, atol=1e-9)
     assert found.solver == "a FEM program"
     assert found.film is None
+    lossy = run(
+        "import", "fem.csv", "--format", "reference", "-o", "kilo.h5", *columns[:-3], "kPa",
+        "--load", 1, "--sign", "-1",
+    )  # fmt: skip
+    assert lossy.code == 3
+    assert '"kPa"' in lossy.err
+    assert "times the load" in lossy.err
+
+
+def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folder: Path) -> None:
+    """The shipped table is by finite elements, with S13 for the third axis upward."""
+    table = Path(__file__).parents[2] / "calibration_data" / "rod_reference_fem.csv"
+    done = run(
+        "import", table, "--format", "reference", "-o", "rod.h5", "--load", 1, "--sign", "-1",
+        "--r", "r (mm)", "--r-unit", "mm", "--sigma", "S33 (MPa)", "--sigma-unit", "MPa",
+        "--shear", "S13 (MPa)", "--shear-sign", "-1",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    assert "SYNTHETIC" in done.out
+    found = memscal.read_reference("rod.h5")
+    ours = memscal.indent(memscal.simulate().film, memscal.Rod(radius=0.25e-3), load=1.0)
+    shear = ours.base_shear(found.r)
+    assert found.sigma_rz is not None
+    np.testing.assert_allclose(found.sigma_rz, shear, atol=2e-3 * np.abs(shear).max())
+    assert found.force == pytest.approx(1.0, abs=1e-4)
+
+
+def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path) -> None:
+    r = np.linspace(0, 8, 81)
+    sigma = np.exp(-(r**2) / 2) / (2 * np.pi)
+    write_table(folder / "fem.csv", "r,S33,S13", np.stack([r, -sigma, -0.1 * r * sigma], axis=1))
+    done = run(
+        "import", "fem.csv", "--format", "reference", "-o", "rod.h5", "--r", "r", "--r-unit", "mm",
+        "--sigma", "S33", "--sigma-unit", "MPa", "--sign", "-1", "--load", 1,
+        "--shear", "S13", "--shear-sign", "-1",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    shear = memscal.read_reference("rod.h5").sigma_rz
+    assert shear is not None
+    np.testing.assert_allclose(shear, 0.1e6 * r * sigma, rtol=1e-12)
+    write_table(folder / "scan.csv", "position,voltage", np.stack([r, -sigma], axis=1))
+    done = run("import", "scan.csv", "-o", "scan.h5", *COLUMNS, *SET_UP, "--u-sign", "-1")
+    assert done.code == 0, done.err
+    np.testing.assert_allclose(memscal.read_scan("scan.h5").u_zz, sigma * 1e-3, rtol=1e-12)
+    refused = run("import", "scan.csv", "-o", "s.h5", *COLUMNS, *SET_UP, "--shear-sign", "-1")
+    assert refused.code == 2
+    assert "--shear-sign" in refused.err
 
 
 @pytest.mark.parametrize(

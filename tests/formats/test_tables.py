@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from memscal.errors import FormatError, InputError, UnitError
 from memscal.formats.csv_table import read_table
 from memscal.formats.grid import find_grid
+from memscal.formats.inspection import describe
+from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 from memscal.formats.table import ImportedScan, read_reference_table, read_scan_table
 from memscal.model.indenter import Rod
@@ -304,7 +306,7 @@ def test_a_table_for_which_the_option_is_wrong_is_refused_too(tmp_path: Path):
 
 
 def test_nodes_given_twice_are_averaged_and_reported(tmp_path: Path):
-    found = reference_table(tmp_path, "r,s\n0,2\n1,1.1\n1,0.9\n2,0.1\n")
+    found = reference_table(tmp_path, "r,s\n0,2\n1,1.1\n1,0.9\n2,0.1\n", load=7.0)
     assert found.profile.sigma_zz.tolist() == [2e6, 1e6, 0.1e6]
     assert any("1 rows repeat a radius" in note and "0.05" in note for note in found.notes)
 
@@ -322,6 +324,87 @@ def test_a_fem_table_with_holes_or_negative_radii_is_refused(tmp_path: Path, tex
         reference_table(tmp_path, text)
 
 
-def test_shear_keeps_its_own_sign(tmp_path: Path):
-    found = reference_table(tmp_path, "r,s,t\n0,-2,0\n1,-1,0.3\n", sign=-1, shear="t")
-    assert found.profile.sigma_rz.tolist() == [0.0, 0.3e6]
+@pytest.mark.parametrize("turned", [1, -1])
+def test_shear_keeps_its_own_sign(tmp_path: Path, turned: int):
+    text = "r,s,t\n0,-2,0\n1,-1,0.3\n"
+    found = reference_table(tmp_path, text, sign=-1, shear="t", shear_sign=turned, load=3.0)
+    assert found.profile.sigma_zz.tolist() == [2e6, 1e6]
+    assert found.profile.sigma_rz.tolist() == [0.0, turned * 0.3e6]
+
+
+def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film(tmp_path: Path):
+    """Traction is stress times normal; the film's lower face has the normal -z."""
+    shear = 0.3
+    stress = np.array([[0, 0, shear], [0, 0, 0], [shear, 0, -1.0]])
+    traction = stress @ [0, 0, -1.0]
+    found = reference_table(
+        tmp_path, f"r,s,t\n0,-2,0\n1,-1,{stress[0, 2]}\n", sign=-1, shear="t", shear_sign=-1,
+        load=3.0,
+    )  # fmt: skip
+    assert found.profile.sigma_rz[1] == pytest.approx(traction[0] * 1e6)
+    # The base pushes up on what is compressed: the traction is the (positive) pressure.
+    assert found.profile.sigma_zz[1] == pytest.approx(traction[2] * 1e6)
+
+
+@pytest.mark.parametrize("name", ["sign", "shear_sign"])
+def test_a_sign_is_one_or_minus_one(tmp_path: Path, name: str):
+    with pytest.raises(InputError, match="Give 1 or -1"):
+        reference_table(tmp_path, "r,s\n0,2\n1,1\n", load=3.0, **{name: 0})
+
+
+def gaussian_table(reach: float, factor: float = 1.0) -> str:
+    """1 N, with r in mm and s in MPa, up to a radius, on radii like those of a mesh."""
+    r = reach * np.linspace(0.02, 1, 120) ** 1.5
+    s = factor * np.exp(-(r**2) / 2) / (2 * np.pi)
+    return rows(r.tolist(), s.tolist(), header="r,s")
+
+
+def test_the_force_of_a_table_is_as_good_as_its_radii(tmp_path: Path):
+    found = reference_table(tmp_path, gaussian_table(8.0))
+    assert found.profile.force == pytest.approx(1.0, abs=1e-6)
+    assert any("(100.00%)" in note for note in found.notes)
+    assert not any("Warning" in note for note in found.notes)
+    assert found.profile.notes.splitlines() == list(found.notes)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 0.4, 2.5, 1e3])
+def test_a_force_far_from_the_load_is_refused_as_a_wrong_unit(tmp_path: Path, factor: float):
+    with pytest.raises(InputError, match=r"times the load(.|\n)*\"MPa\"(.|\n)*\"mm\"(.|\n)*sign"):
+        reference_table(tmp_path, gaussian_table(8.0, factor))
+
+
+@pytest.mark.parametrize("factor", [0.6, 0.95, 1.05, 1.9])
+def test_a_force_that_differs_from_the_load_is_warned_of(tmp_path: Path, factor: float):
+    found = reference_table(tmp_path, gaussian_table(8.0, factor))
+    (note,) = [note for note in found.notes if note.startswith("Warning")]
+    assert f"{abs(factor - 1):.1%}" in note
+    assert "conversion constant" in note
+    assert "Check the load" in note
+
+
+def test_a_table_that_ends_early_is_warned_of_and_not_refused(tmp_path: Path):
+    """Within one standard deviation a Gaussian carries 1 - exp(-1/2) of its force."""
+    found = reference_table(tmp_path, gaussian_table(1.0))
+    assert found.profile.force == pytest.approx(1 - np.exp(-0.5), rel=1e-6)
+    (note,) = [note for note in found.notes if note.startswith("Warning")]
+    assert "ends with 60.7% of its maximum left: extend it" in note
+    with pytest.raises(InputError, match="times the load"):
+        reference_table(tmp_path, gaussian_table(1.0), load=0.1)
+
+
+def test_what_a_reference_says_at_its_head_stays_with_it(tmp_path: Path):
+    found = reference_table(tmp_path, "# SYNTHETIC: a calculation\n" + gaussian_table(8.0))
+    write_reference(found.profile, tmp_path / "rod.h5")
+    again = read_reference(tmp_path / "rod.h5")
+    assert "The table says: SYNTHETIC: a calculation" in again.notes.splitlines()
+    assert found.profile.source.sha256 in again.notes
+    assert "SYNTHETIC" in describe(tmp_path / "rod.h5")["provenance"]["reference_notes"]
+
+
+def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u,s\n0,-1,5\n1,-2,6\n", u_sign=-1, u_xz="s")
+    assert found.scan.u_zz.tolist() == [1e-3, 2e-3]
+    assert found.scan.channels["u_xz"].tolist() == [5e-3, 6e-3]
+    assert "The sign of u_zz was changed." in found.scan.notes
+    with pytest.raises(InputError, match="Give 1 or -1"):
+        scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_sign=2)
