@@ -32,7 +32,8 @@ def command(file: Path, as_json: bool) -> int:
     """Show what a scan, a reference or an artifact holds.
 
     Quantities with their standard uncertainties, arrays with shape and range, quality checks, and
-    where all of it came from. Numbers are in the units of the file.
+    where all of it came from. Lengths are shown in mm and moduli in MPa; with --json, numbers are
+    in the units of the file.
     """
     from memscal.formats.inspection import describe
 
@@ -48,7 +49,6 @@ def command(file: Path, as_json: bool) -> int:
 
 def _tables(found: Mapping[str, Any]) -> Iterator[Table]:
     from memscal.cli.tables import Table
-    from memscal.model.notation import format_measured
 
     rows = [
         ("schema", f"{found['schema']} {found['schema_version']}"),
@@ -57,20 +57,9 @@ def _tables(found: Mapping[str, Any]) -> Iterator[Table]:
     ]
     yield Table(str(found["file"]), ("", ""), [row for row in rows if row[1]])
 
-    def value(item: Mapping[str, Any]) -> str:
-        if item["value"] is None:
-            return "not a number"
-        if isinstance(item["value"], str):
-            return item["value"]
-        spread = item["standard_uncertainty"]
-        if spread is None:
-            unit = "" if item["unit"] == "1" else f" {item['unit']}"
-            return f"{item['value']:.6g}{unit}"
-        return format_measured(item["value"], spread, item["unit"])
-
     head = ("quantity", "value", "path")
     quantities = [
-        (item["name"].replace("_", " "), value(item), item["path"]) for item in found["quantities"]
+        (item["name"].replace("_", " "), _value(item), item["path"]) for item in found["quantities"]
     ]
     yield Table("Quantities (± standard uncertainty, k = 1)", head, quantities)
     arrays = [_array_row(item) for item in found["arrays"]]
@@ -93,6 +82,33 @@ def _tables(found: Mapping[str, Any]) -> Iterator[Table]:
     ]
     yield Table("What the failures mean", ("", ""), meanings)
     yield Table("Provenance", ("", ""), list(_provenance(found["provenance"])))
+
+
+def _value(item: Mapping[str, Any]) -> str:
+    from memscal.model.notation import format_measured
+
+    if item["value"] is None:
+        return "not a number"
+    if isinstance(item["value"], str):
+        return item["value"]
+    factor, unit = _unit_to_show(item)
+    spread = item["standard_uncertainty"]
+    if spread is None:
+        return f"{item['value'] * factor:.6g}" + ("" if unit == "1" else f" {unit}")
+    return format_measured(item["value"] * factor, spread * factor, unit)
+
+
+def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
+    """Return the unit in which the command line asks for such a quantity, and the factor to it."""
+    from memscal.formats.units import dimension_of, to_si
+
+    unit = str(item["unit"])
+    dimension = dimension_of(unit, str(item["path"]))
+    if dimension == "length":
+        return float(to_si(1e3, unit, dimension, str(item["path"]))), "mm"
+    if dimension == "stress" and str(item["name"]).endswith("modulus"):
+        return float(to_si(1e-6, unit, dimension, str(item["path"]))), "MPa"
+    return 1.0, unit
 
 
 def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:

@@ -38,7 +38,6 @@ from memscal.model.validation import FloatArray
 
 __all__ = ["read_artifact", "write_artifact"]
 
-_TITLE = "Apparatus function of a tactile sensor"
 _RECONVOLUTION = ("u_zz", "u_zz_errors", "u_zz_predicted", "u_zz_gaussian", "residual")
 
 
@@ -123,8 +122,9 @@ def write_artifact(
 
 def _entry(data: ApparatusData) -> Group:
     reference, parameters, process = profile_groups(data.reference)
+    sensor = data.sensor.name
     children: dict[str, Node] = {
-        "title": _TITLE,
+        "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
         "apparatus_function": _field_group(data.field),
         "radial_profile": _radial_group(data.radial_profile),
         "transfer_function": _transfer_group(data.transfer),

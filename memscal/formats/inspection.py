@@ -23,6 +23,7 @@ from memscal.formats.schema import (
     SCAN_SCHEMA,
     SCHEMA_ATTRIBUTE,
 )
+from memscal.formats.units import dimension_of, to_si
 from memscal.formats.verify import altered
 
 __all__ = ["Finding", "check", "describe"]
@@ -195,14 +196,27 @@ def _quantities(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:
             if not file.has(path):
                 continue
             text = file.is_text(path)
-            errors = f"{path}_errors"
             yield {
                 "path": path,
                 "name": name,
                 "value": file.text(path) if text else _plain(file.array(path)),
-                "standard_uncertainty": _plain(file.array(errors)) if file.has(errors) else None,
+                "standard_uncertainty": _uncertainty(file, path),
                 "unit": None if text else units_of(file, path) or "1",
             }
+
+
+def _uncertainty(file: SafeFile, path: str) -> float | int | None:
+    """Return the uncertainty of a quantity in the unit of the quantity, whatever its own is."""
+    errors = f"{path}_errors"
+    if not file.has(errors):
+        return None
+    spread, unit, own = file.array(errors), units_of(file, path), units_of(file, errors)
+    if own != unit:
+        dimension = dimension_of(unit or "1", file.where(path))
+        spread = to_si(spread, own, dimension, file.where(errors)) / to_si(
+            1.0, unit, dimension, file.where(path)
+        )
+    return _plain(spread)
 
 
 def _arrays(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:

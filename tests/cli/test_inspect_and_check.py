@@ -46,6 +46,23 @@ def test_inspect_in_json_is_the_librarys_description(run: Run, artifact: Path, s
         assert run("inspect", path, "--json").json == describe(path)
 
 
+def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path) -> None:
+    run("simulate", "-o", "scan.h5", "--seed", 1)
+    with h5py.File("scan.h5", "r+") as file:  # as another program may write it
+        del file.attrs["memscal_content_sha256"]
+        thickness = file["/entry/sample/film/thickness"]
+        thickness[()] = 2000.0
+        thickness.attrs["units"] = "um"
+    lines = run("inspect", "scan.h5").out.splitlines()
+    (modulus,) = [line for line in lines if "film/young_modulus" in line]
+    assert "2.20 ± 0.10) MPa" in modulus
+    (film,) = [line for line in lines if "film/thickness" in line]
+    assert "2.000 ± 0.020) mm" in film
+    quantities = {q["name"]: q for q in run("inspect", "scan.h5", "--json").json["quantities"]}
+    assert quantities["young_modulus"]["unit"] == "Pa"
+    assert quantities["thickness"]["unit"] == "um"
+
+
 def test_inspect_refuses_what_is_not_ours(run: Run, folder: Path) -> None:
     Path("notes.txt").write_text("hello")
     refused = run("inspect", "notes.txt")

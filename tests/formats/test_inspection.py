@@ -15,6 +15,7 @@ from memscal.formats.inspection import check, describe
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
 from memscal.formats.timestamp import timestamp
+from memscal.model.scan import StressSensor
 
 
 @pytest.fixture
@@ -50,6 +51,27 @@ def test_an_artifact_is_described_by_its_numbers_checks_and_origin(folder: Path)
     assert [c["passed"] for c in found["checks"]] == [True, False]
     assert found["provenance"]["input_scan"] == "scan.h5"
     assert found["provenance"]["configuration"]["method"] == "white-noise"
+
+
+@pytest.mark.parametrize(
+    ("name", "title"), [("S1", "Apparatus function of S1"), ("", "Apparatus function")]
+)
+def test_an_artifact_is_titled_by_its_sensor_alone(tmp_path: Path, name: str, title: str):
+    data = make_artifact(sensor=StressSensor(name=name))
+    write_artifact(data, tmp_path / "a.h5")
+    assert describe(tmp_path / "a.h5")["title"] == title
+
+
+def test_an_uncertainty_is_told_in_the_unit_of_its_quantity(folder: Path):
+    with h5py.File(folder / "scan.h5", "r+") as file:
+        del file.attrs["memscal_content_sha256"]
+        spread = file["/entry/sample/film/thickness_errors"]  # 0.02 mm
+        spread[()] = 20.0
+        spread.attrs["units"] = "um"
+    quantities = {q["name"]: q for q in describe(folder / "scan.h5")["quantities"]}
+    thickness = quantities["thickness"]
+    assert (thickness["value"], thickness["unit"]) == (2.0, "mm")
+    assert thickness["standard_uncertainty"] == pytest.approx(0.02, rel=1e-12)
 
 
 def test_a_scan_is_described_by_its_arrays_and_said_to_be_synthetic(folder: Path):
