@@ -20,13 +20,16 @@ from memscal.cli.options import (
     json_option,
     radius_options,
 )
-from memscal.cli.output import emit, emit_json, message, readable
+from memscal.cli.output import emit, emit_json, message, readable, warn
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
     from memscal.formats.table import ImportedProfile, ImportedScan
 
 __all__ = ["command"]
+
+#: How the importer begins a note that the user should act on.
+_WARNING = "Warning: "
 
 EXAMPLES = """\b
 Examples:
@@ -181,7 +184,10 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
             }
         )
     else:
-        emit(readable("\n".join(found.notes)))
+        emit(readable("\n".join(n for n in found.notes if not n.startswith(_WARNING))))
+    for note in found.notes:
+        if note.startswith(_WARNING):
+            warn(note.removeprefix(_WARNING))
     message(f"Written: {output}")
     return DONE
 

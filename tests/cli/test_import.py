@@ -218,3 +218,18 @@ def test_the_table_itself_is_never_replaced(run: Run, table: Path) -> None:
     refused = run("import", table, "-o", table, *COLUMNS, *SET_UP, "--force")
     assert refused.code == 4
     assert table.read_bytes() == before
+
+
+def test_a_force_that_is_not_the_load_is_warned_of_beside_the_results(
+    run: Run, folder: Path
+) -> None:
+    r = np.linspace(0, 8, 200)
+    sigma = np.exp(-(r**2) / 2) / (2 * np.pi)  # 1 N, in MPa and mm
+    write_table(folder / "fem.csv", "r,s", np.stack([r, sigma], axis=1))
+    done = run(
+        "import", "fem.csv", "--format", "reference", "-o", "fem.h5", "--load", 1.1,
+        "--r", "r", "--r-unit", "mm", "--sigma", "s", "--sigma-unit", "MPa",
+    )  # fmt: skip
+    assert done.code == 0
+    assert "Warning: the table's force differs from the load" in done.err
+    assert "Warning" not in done.out
