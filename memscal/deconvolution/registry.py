@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Collection
 from importlib import import_module
-from importlib.metadata import entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from memscal.deconvolution.problem import Regulariser
 from memscal.errors import InputError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 __all__ = ["ENTRY_POINT_GROUP", "create_regulariser", "regulariser_names"]
 
@@ -32,7 +35,7 @@ def regulariser_names() -> tuple[str, ...]:
     >>> regulariser_names()[0]
     'white-noise'
     """
-    others = sorted({point.name for point in entry_points(group=ENTRY_POINT_GROUP)} - set(_OWN))
+    others = sorted({point.name for point in _plug_ins()} - set(_OWN))
     return (*_OWN, *others)
 
 
@@ -75,13 +78,13 @@ def _factory(name: str) -> Any:
     if name in _OWN:
         module, _, attribute = _OWN[name].partition(":")
         return getattr(import_module(module), attribute)
-    found = entry_points(group=ENTRY_POINT_GROUP, name=name)
+    found = [point for point in _plug_ins() if point.name == name]
     if not found:
         raise InputError(
             f"There is no method named {name}.",
             cure=f"Choose from {', '.join(regulariser_names())}.",
         )
-    point = next(iter(found))
+    point = found[0]
     try:
         return point.load()
     except Exception as error:
@@ -90,3 +93,10 @@ def _factory(name: str) -> Any:
             f"The method {name}, {point.value}, could not be loaded: {error}.",
             cure="Repair or remove the package that provides it.",
         ) from error
+
+
+def _plug_ins() -> Collection[EntryPoint]:
+    """Entry points of other packages; looked up only when one is asked for."""
+    from importlib.metadata import entry_points
+
+    return entry_points(group=ENTRY_POINT_GROUP)
