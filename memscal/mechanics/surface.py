@@ -1,0 +1,103 @@
+r"""What a contact solver needs of a film: how its surface answers to tractions on rings.
+
+Pressure and radial shear at the surface are linear between the radii :math:`r_j` of concentric
+rings (the *hat* functions), and the displacements of the surface are taken at the same radii:
+
+.. math::
+
+    w_i &= \sum_j C^{wp}_{ij}\,p_j + C^{wq}_{ij}\,q_j, \\
+    u_i &= \sum_j C^{up}_{ij}\,p_j + C^{uq}_{ij}\,q_j,
+
+with the depression :math:`w` (positive into the film) and the outward displacement :math:`u`.
+Every way to solve the film, by Hankel transforms or by finite elements, comes down to such a
+:class:`SurfaceCompliance`, and to the field inside the film that follows from the tractions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from memscal.model.film import ElasticFilm
+from memscal.model.validation import FloatArray
+
+__all__ = ["FilmField", "FilmModel", "SurfaceCompliance"]
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceCompliance:
+    """Displacements of the film's surface at rings, for tractions linear between the rings.
+
+    Parameters
+    ----------
+    r : ndarray, shape (n,)
+        Radii of the rings in m, increasing from 0.  Beyond the last there is no traction; a
+        traction of the last ring falls to zero as a step.
+    normal : ndarray, shape (n, n)
+        Depression at ``r[i]`` under unit pressure of ring ``j``, in m/Pa.
+    normal_by_shear : ndarray, shape (n, n)
+        Depression at ``r[i]`` under unit outward traction of ring ``j``, in m/Pa.
+    radial_by_pressure : ndarray, shape (n, n)
+        Outward displacement at ``r[i]`` under unit pressure of ring ``j``, in m/Pa.
+    radial : ndarray, shape (n, n)
+        Outward displacement at ``r[i]`` under unit outward traction of ring ``j``, in m/Pa.
+    """
+
+    r: FloatArray
+    normal: FloatArray
+    normal_by_shear: FloatArray
+    radial_by_pressure: FloatArray
+    radial: FloatArray
+
+    @property
+    def areas(self) -> FloatArray:
+        r"""Integrals of the hats over the surface, in m^2: the load is ``areas @ p``."""
+        r = self.r
+        widths = np.diff(r)
+        areas = np.zeros_like(r)
+        areas[:-1] += widths * (2 * r[:-1] + r[1:])
+        areas[1:] += widths * (r[:-1] + 2 * r[1:])
+        return areas * np.pi / 3
+
+
+class FilmField(Protocol):
+    """The field in a film under given tractions, where it is looked at: its two faces.
+
+    Radii are in m, of any shape.
+    """
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa, compression positive."""
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa, positive outward."""
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return the normal displacement of the surface in m, positive into the film."""
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return the radial displacement of the surface in m, positive outward."""
+
+
+class FilmModel(Protocol):
+    """A film whose surface answers to tractions on rings, by one method or another."""
+
+    @property
+    def film(self) -> ElasticFilm:
+        """The film."""
+
+    @property
+    def compliance(self) -> SurfaceCompliance:
+        """Its surface's compliance."""
+
+    @property
+    def discretisation(self) -> str:
+        """What was discretised and how finely, in words."""
+
+    def field(self, pressure: FloatArray, shear: FloatArray) -> FilmField:
+        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""
