@@ -6,13 +6,17 @@ from typing import Protocol
 
 from memscal.model.validation import FloatArray
 
-__all__ = ["InterfaceTraction"]
+__all__ = ["HalfSpaceIntegrals", "InterfaceTraction"]
+
+HalfSpaceIntegrals = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+r"""Four parts of a surface's displacements: depression by pressure and by shear, outward
+displacement by pressure and by shear."""
 
 
 class InterfaceTraction(Protocol):
     r"""Axisymmetric pressure and radial shear on the film's surface, within ``radius``.
 
-    Whatever the indenter, the stress at the base needs no more than these transforms.
+    Whatever the indenter, the field in the film needs no more than these transforms.
     """
 
     @property
@@ -30,3 +34,10 @@ class InterfaceTraction(Protocol):
 
     def shear_transform(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`\int q\,J_1(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+
+    def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
+        r"""Return what the displacements of a half-space's surface at ``r`` (m) are made of.
+
+        In Pa m: :math:`\int\hat p\,J_0(kr)\,dk`, :math:`\int\hat q\,J_0(kr)\,dk`,
+        :math:`\int\hat p\,J_1(kr)\,dk` and :math:`\int\hat q\,J_1(kr)\,dk`.
+        """

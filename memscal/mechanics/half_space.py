@@ -1,0 +1,150 @@
+r"""Surface of a half-space under tractions that are linear between rings.
+
+With the pressure :math:`p` and the outward traction :math:`q`, the shear modulus :math:`G` and
+:math:`\beta = (1-2\nu)/2(1-\nu)`, the depression and the outward displacement of the surface are
+
+.. math::
+
+    w(x) &= \frac{1-\nu}{G}\Big[\int L_{00}(x, s)\,p\,s\,ds - \beta\int_x^\infty q\,ds\Big], \\
+    u(x) &= \frac{1-\nu}{G}\Big[\int L_{11}(x, s)\,q\,s\,ds
+            - \frac{\beta}{x}\int_0^x p\,s\,ds\Big],
+
+where :math:`L_{nn} = \int_0^\infty J_n(kx)\,J_n(ks)\,dk` are complete elliptic integrals: with
+:math:`t = \min(x, s)/\max(x, s)`,
+
+.. math::
+
+    L_{00} = \frac{2}{\pi\max}\,K(t), \qquad
+    L_{11} = \frac{2}{\pi\min}\,[K(t) - E(t)]
+
+(Johnson, Contact Mechanics, 1985, chapter 3).  They are singular as :math:`\ln|x - s|`.  Elements
+near to where they are singular are integrated with nodes that crowd there; all others by a plain
+Gauss rule.  Both are exact to about 1e-11.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ellipkm1, elliprd
+
+from memscal.model.validation import FloatArray
+
+__all__ = ["coupling_integrals", "singular_integrals"]
+
+# Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.
+_ORDER = 8
+# Crowding: nodes v^5 with 24 Gauss points in v take the logarithm to 1e-12.
+_NEAR_ORDER = 24
+_CROWDING = 5
+
+
+def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    r"""Return :math:`\int L_{nn}(x_i, s)\,\phi_j(s)\,s\,ds` for n = 0 and 1.
+
+    Parameters
+    ----------
+    x : ndarray, shape (m,)
+        Radii at which the surface is looked at, in m.
+    rings : ndarray, shape (n,)
+        Radii of the rings, increasing, in m; :math:`\phi_j` is 1 on ring j and falls linearly to
+        zero at its neighbours.
+
+    Returns
+    -------
+    tuple of ndarray, shape (m, n) each, in m.
+    """
+    starts, ends = rings[:-1], rings[1:]
+    lengths = ends - starts
+    nodes, weights = np.polynomial.legendre.leggauss(_ORDER)
+    share = (nodes + 1) / 2
+    s = starts[:, None] + lengths[:, None] * share
+    measure = s * lengths[:, None] * weights / 2
+    kernels = _kernels(x[:, None, None], s[None], np.abs(x[:, None, None] - s))
+    rising, falling = measure * share, measure * (1 - share)
+    away = np.maximum(starts - x[:, None], x[:, None] - ends)
+    near = away < lengths
+
+    found = []
+    corrections = _near_integrals(x, starts, ends, near)
+    for kernel, (near_falling, near_rising) in zip(kernels, corrections, strict=True):
+        left = np.einsum("meo,eo->me", kernel, falling)
+        right = np.einsum("meo,eo->me", kernel, rising)
+        left[near], right[near] = near_falling, near_rising
+        total = np.zeros((x.size, rings.size))
+        total[:, :-1] += left
+        total[:, 1:] += right
+        found.append(total)
+    return found[0], found[1]
+
+
+def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    r"""Return :math:`\int_{x_i}^\infty \phi_j\,ds` and :math:`\int_0^{x_i} \phi_j\,s\,ds / x_i`.
+
+    As :func:`singular_integrals`; the second is 0 on the axis.
+    """
+    starts, ends = rings[:-1], rings[1:]
+    lengths = ends - starts
+    reach = np.clip((x[:, None] - starts) / lengths, 0.0, 1.0)
+    # Integrals of 1 - v and v, and of their products with s = start + length v, up to ``reach``.
+    falling, rising = reach - reach**2 / 2, reach**2 / 2
+    beyond = (lengths * (0.5 - falling), lengths * (0.5 - rising))
+    within = (
+        lengths * (starts * falling + lengths * (reach**2 / 2 - reach**3 / 3)),
+        lengths * (starts * rising + lengths * reach**3 / 3),
+    )
+    inverse = np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
+    sums = []
+    for left, right in (beyond, within):
+        total = np.zeros((x.size, rings.size))
+        total[:, :-1] += left
+        total[:, 1:] += right
+        sums.append(total)
+    return sums[0], sums[1] * inverse
+
+
+def _kernels(
+    x: FloatArray, s: FloatArray, distance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return L00 and L11; free of cancellation, also where x and s are close or far apart."""
+    larger, smaller = np.maximum(x, s), np.minimum(x, s)
+    complement = distance * (larger + smaller) / larger**2
+    # K - E = t^2 R_D(0, 1 - t^2, 1) / 3, Carlson's form.
+    difference = smaller / larger * elliprd(0.0, complement, 1.0) / 3
+    scale = 2 / (np.pi * larger)
+    return scale * ellipkm1(complement), scale * difference
+
+
+def _near_integrals(
+    x: FloatArray, starts: FloatArray, ends: FloatArray, near: NDArray[np.bool_]
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return the integrals with falling and rising hat over the near elements, per kernel.
+
+    An element is cut where it is nearest to the point; in both parts the nodes crowd there.
+    """
+    point, element = np.nonzero(near)
+    start, end, at = starts[element], ends[element], x[point]
+    cut = np.clip(at, start, end)
+    v, weights = _crowded()
+    totals = [(np.zeros(point.size), np.zeros(point.size)) for _ in range(2)]
+    for side in (start, end):
+        part = np.flatnonzero(side != cut)
+        width = (side - cut)[part, None]
+        s = cut[part, None] + width * v
+        distance = np.abs(at - cut)[part, None] + np.abs(width) * v
+        measure = np.abs(width) * weights * s
+        rising = (s - start[part, None]) / (end - start)[part, None]
+        for total, kernel in zip(totals, _kernels(at[part, None], s, distance), strict=True):
+            total[0][part] += np.sum(kernel * measure * (1 - rising), axis=1)
+            total[1][part] += np.sum(kernel * measure * rising, axis=1)
+    return totals
+
+
+@lru_cache(maxsize=1)
+def _crowded() -> tuple[FloatArray, FloatArray]:
+    """Return nodes on (0, 1) that crowd towards 0, and their weights."""
+    nodes, weights = np.polynomial.legendre.leggauss(_NEAR_ORDER)
+    u = (nodes + 1) / 2
+    return u**_CROWDING, weights / 2 * _CROWDING * u ** (_CROWDING - 1)

@@ -1,0 +1,168 @@
+r"""The bonded film by Hankel transforms: compliance of its surface, and the field below it.
+
+The half-space's share of the compliance is in closed form (:mod:`memscal.mechanics.half_space`).
+What the rigid base adds falls off as :math:`(kh)^2 e^{-2kh}` and is summed by Gauss quadrature
+over :math:`k`, in panels that resolve the oscillation of the Bessel functions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import j0, j1
+
+from memscal.axisymmetry.quadrature import gauss_panels
+from memscal.mechanics import film_response
+from memscal.mechanics.base_stress import (
+    base_normal_spectrum,
+    base_normal_stress,
+    base_shear_stress,
+)
+from memscal.mechanics.half_space import coupling_integrals, singular_integrals
+from memscal.mechanics.rings import RingTraction, hat_transforms
+from memscal.mechanics.surface import SurfaceCompliance
+from memscal.mechanics.traction import HalfSpaceIntegrals, InterfaceTraction
+from memscal.model.film import ElasticFilm
+from memscal.model.validation import FloatArray
+
+__all__ = ["HankelField", "HankelFilm"]
+
+# x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
+_LARGEST_KH = 22.0
+# Phase, in rad, that one panel of the k-quadrature may span.
+_PHASE = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class HankelFilm:
+    """A bonded film of infinite extent, whose surface carries tractions on rings.
+
+    Parameters
+    ----------
+    film : ElasticFilm
+        The film.
+    r : ndarray, shape (n,)
+        Radii of the rings in m, increasing from 0.
+
+    Examples
+    --------
+    Under a uniform pressure much wider than thick, a compressible film is an oedometer: it is
+    thinned by p h / M, with the modulus M = 2G (1 - nu)/(1 - 2 nu):
+
+    >>> film = ElasticFilm(young_modulus=1.0, poisson_ratio=0.25, thickness=1.0)
+    >>> wide = HankelFilm(film, np.linspace(0.0, 40.0, 41))
+    >>> oedometer = film.shear_modulus * 2 * 0.75 / 0.5
+    >>> round(float((wide.compliance.normal @ np.ones(41))[0]) * oedometer, 6)
+    1.0
+    """
+
+    film: ElasticFilm
+    r: FloatArray
+
+    @cached_property
+    def compliance(self) -> SurfaceCompliance:
+        """Displacements of the rings under tractions on the rings."""
+        singular = singular_integrals(self.r, self.r)
+        coupled = coupling_integrals(self.r, self.r)
+        k, weights = _wavenumbers(self.film, 2 * self.r[-1])
+        layer = _layer_integrals(
+            self.film, self.r, (k, weights), *hat_transforms(self.r, k)
+        )
+        return SurfaceCompliance(
+            self.r,
+            *_displacements(self.film, (singular[0], coupled[0], coupled[1], singular[1]), layer),
+        )
+
+    @property
+    def discretisation(self) -> str:
+        """What was discretised, in words."""
+        return "Hankel transforms, Gauss-Legendre in k"
+
+    def field(self, pressure: FloatArray, shear: FloatArray) -> HankelField:
+        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""
+        return HankelField(self.film, RingTraction(self.r, pressure, shear))
+
+
+@dataclass(frozen=True, eq=False)
+class HankelField:
+    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`."""
+
+    film: ElasticFilm
+    traction: InterfaceTraction
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa; zero where it is below 1e-13 of its peak."""
+        return base_normal_stress(self.film, self.traction, r)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa."""
+        return base_shear_stress(self.film, self.traction, r)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+        return 2 * np.pi * base_normal_spectrum(self.film, self.traction, k)
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return the normal displacement of the surface in m, positive into the film."""
+        w_by_p, w_by_q, _, _ = self._parts(r)
+        return np.asarray(w_by_p + w_by_q).reshape(np.shape(r))
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return the radial displacement of the surface in m, positive outward."""
+        _, _, u_by_p, u_by_q = self._parts(r)
+        return np.asarray(u_by_p + u_by_q).reshape(np.shape(r))
+
+    def _parts(self, r: FloatArray) -> HalfSpaceIntegrals:
+        x = np.ravel(np.asarray(r, dtype=np.float64))
+        traction = self.traction
+        k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
+        layer = _layer_integrals(
+            self.film,
+            x,
+            (k, weights),
+            traction.pressure_transform(k),
+            traction.shear_transform(k),
+        )
+        return _displacements(self.film, traction.half_space_integrals(x), layer)
+
+
+def _wavenumbers(film: ElasticFilm, reach: float) -> tuple[FloatArray, FloatArray]:
+    """Return quadrature nodes for the layer's share, seen at distances up to ``reach``."""
+    h = film.thickness
+    return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / max(reach, h)))
+
+
+def _layer_integrals(
+    film: ElasticFilm,
+    x: FloatArray,
+    wavenumbers: tuple[FloatArray, FloatArray],
+    pressure_transform: FloatArray,
+    shear_transform: FloatArray,
+) -> HalfSpaceIntegrals:
+    """Return what the base takes from the surface's displacements at ``x``, times G/(1 - nu)."""
+    k, weights = wavenumbers
+    kh, nu = k * film.thickness, film.poisson_ratio
+    normal, radial = j0(np.multiply.outer(x, k)) * weights, j1(np.multiply.outer(x, k)) * weights
+    coupling = film_response.coupling_correction(kh, nu)
+    return (
+        (normal * film_response.normal_correction(kh, nu)) @ pressure_transform,
+        (normal * coupling) @ shear_transform,
+        (radial * coupling) @ pressure_transform,
+        (radial * film_response.radial_correction(kh, nu)) @ shear_transform,
+    )
+
+
+def _displacements(
+    film: ElasticFilm, half_space: HalfSpaceIntegrals, layer: HalfSpaceIntegrals
+) -> HalfSpaceIntegrals:
+    """Add both shares up to the depression by p and q, and the outward displacement by p and q."""
+    nu = film.poisson_ratio
+    scale, beta = (1 - nu) / film.shear_modulus, film_response.half_space_coupling(nu)
+    return (
+        scale * (half_space[0] + layer[0]),
+        scale * (beta * half_space[1] + layer[1]),
+        scale * (beta * half_space[2] + layer[2]),
+        scale * (half_space[3] + layer[3]),
+    )

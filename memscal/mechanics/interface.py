@@ -1,0 +1,217 @@
+r"""What lies between indenter and film: friction, and the compliance of a rough interface.
+
+A smooth interface that obeys Amontons' law is rigid: surfaces that touch do not approach each
+other, and do not slide before the shear reaches :math:`\mu p`.  The contact of a rough surface
+yields in both directions:
+
+- *normally*, the pressure rises gradually as the mean planes approach
+  (:class:`GreenwoodTripp`, :class:`ExponentialCompliance`);
+- *tangentially*, the interface yields elastically up to a *slip length* of the order of the rms
+  roughness, whatever the load, before it slips:
+
+  .. math:: q = -\mu p\,\frac{e}{\ell}, \qquad |e| \le \ell,
+
+  where :math:`e` is the elastic part of the relative displacement (elasto-plastic-like law;
+  Bureau, Caroli and Baumberger, Proc. R. Soc. A 459 (2003) 2787).
+
+With both compliances zero the rigid interface returns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.special import gamma, pbdv
+
+from memscal.model.film import ElasticFilm
+from memscal.model.validation import FloatArray, require_non_negative, require_positive
+
+__all__ = ["ExponentialCompliance", "GreenwoodTripp", "Interface", "NormalLaw"]
+
+# Separations, in units of the law's length, between which a law is inverted.
+_CLOSEST = -60.0
+_FARTHEST = 12.0
+
+
+class NormalLaw(Protocol):
+    """Pressure of a rough interface against the separation of its mean planes."""
+
+    @property
+    def length(self) -> float:
+        """Length over which the pressure changes, in m; 0 for a rigid interface."""
+
+    def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return the pressure in Pa at a ``separation`` in m."""
+
+    def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return minus the derivative of the pressure by the separation, in Pa/m."""
+
+    def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return the separation in m at which the pressure (above 0) is ``pressure`` in Pa."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GreenwoodTripp:
+    r"""Normal compliance of a rough film under a smooth indenter.
+
+    Asperities of equal tip radius and Gaussian heights bear the pressure
+
+    .. math::
+
+        p(d) = \tfrac43\,\eta\,E^*\sqrt{\beta}\,\sigma^{3/2}\,F_{3/2}(d/\sigma), \qquad
+        F_n(t) = \int_t^\infty (s - t)^n\,\frac{e^{-s^2/2}}{\sqrt{2\pi}}\,ds
+
+    at the separation :math:`d` (Greenwood and Tripp, J. Appl. Mech. 34 (1967) 153).
+
+    Parameters
+    ----------
+    roughness : float
+        Standard deviation :math:`\sigma` of the asperities' heights, in m; 0 is rigid.
+    asperity_density : float
+        Number :math:`\eta` of asperities per area, in 1/m^2.
+    asperity_radius : float
+        Radius :math:`\beta` of their tips, in m.
+
+    Examples
+    --------
+    In the units of the original paper, with its parameter mu = 4, the pressure at d = sigma:
+
+    >>> film = ElasticFilm(young_modulus=0.75, poisson_ratio=0.5, thickness=1.0)
+    >>> law = GreenwoodTripp(roughness=1.0, asperity_density=3.0, asperity_radius=1.0)
+    >>> round(float(law.pressure(np.array(1.0), film)), 4)
+    0.3027
+    """
+
+    roughness: float
+    asperity_density: float
+    asperity_radius: float
+
+    def __post_init__(self) -> None:
+        require_non_negative("roughness of the interface", self.roughness)
+        require_positive("asperity density", self.asperity_density, "1/m^2")
+        require_positive("asperity radius", self.asperity_radius, "m")
+
+    @property
+    def length(self) -> float:
+        """The roughness, in m."""
+        return self.roughness
+
+    def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return the pressure in Pa at a ``separation`` in m."""
+        return self._scale(film) * _gaussian_moment(1.5, separation / self.roughness)
+
+    def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return minus the derivative of the pressure by the separation, in Pa/m."""
+        moment = _gaussian_moment(0.5, separation / self.roughness)
+        return 1.5 * self._scale(film) / self.roughness * moment
+
+    def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return the separation in m at which the pressure is ``pressure`` in Pa."""
+        low = np.full(np.shape(pressure), _CLOSEST)
+        high = np.full(np.shape(pressure), _FARTHEST)
+        wanted = pressure / self._scale(film)
+        # Bisection: the moment falls through eighty orders of magnitude, and always falls.
+        for _ in range(52):
+            middle = (low + high) / 2
+            above = _gaussian_moment(1.5, middle) > wanted
+            low, high = np.where(above, middle, low), np.where(above, high, middle)
+        return np.asarray(self.roughness * (low + high) / 2)
+
+    def _scale(self, film: ElasticFilm) -> float:
+        bearing = self.asperity_density * self.asperity_radius**0.5 * self.roughness**1.5
+        return 4 / 3 * film.contact_modulus * bearing
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExponentialCompliance:
+    r"""Normal compliance :math:`p = p_1\,e^{-d/\lambda}`.
+
+    It is the limit of light pressure of rough surfaces with many scales, where the length
+    :math:`\lambda` is of the order of half the rms roughness and :math:`p_1` of the order of the
+    modulus (Persson, Phys. Rev. Lett. 99 (2007) 125502).
+
+    Parameters
+    ----------
+    decay_length : float
+        :math:`\lambda`, in m; 0 is rigid.
+    reference_pressure : float
+        :math:`p_1`, the pressure at which the mean planes meet (d = 0), in Pa.
+    """
+
+    decay_length: float
+    reference_pressure: float
+
+    def __post_init__(self) -> None:
+        require_non_negative("decay length of the interface", self.decay_length)
+        require_positive("reference pressure of the interface", self.reference_pressure, "Pa")
+
+    @property
+    def length(self) -> float:
+        """The decay length, in m."""
+        return self.decay_length
+
+    def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return the pressure in Pa at a ``separation`` in m."""
+        return np.asarray(self.reference_pressure * np.exp(-separation / self.decay_length))
+
+    def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return minus the derivative of the pressure by the separation, in Pa/m."""
+        return self.pressure(separation, film) / self.decay_length
+
+    def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
+        """Return the separation in m at which the pressure is ``pressure`` in Pa."""
+        return np.asarray(-self.decay_length * np.log(pressure / self.reference_pressure))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interface:
+    r"""Compliance of the interface between indenter and film; rigid by default.
+
+    Parameters
+    ----------
+    normal : GreenwoodTripp or ExponentialCompliance, optional
+        Law of pressure against separation.
+    slip_length : float
+        Elastic tangential displacement :math:`\ell` at which the interface slips, in m.
+
+    Raises
+    ------
+    InputError
+        If the slip length is negative or not finite.
+
+    Examples
+    --------
+    >>> Interface(slip_length=1.82e-6).rigid, Interface().rigid
+    (False, True)
+    """
+
+    normal: GreenwoodTripp | ExponentialCompliance | None = None
+    slip_length: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative("slip length", self.slip_length)
+
+    @property
+    def normal_law(self) -> NormalLaw | None:
+        """The normal law, or ``None`` where it is rigid."""
+        return self.normal if self.normal is not None and self.normal.length > 0 else None
+
+    @property
+    def rigid(self) -> bool:
+        """Whether nothing yields."""
+        return self.normal_law is None and self.slip_length == 0
+
+
+def _gaussian_moment(order: float, t: FloatArray) -> FloatArray:
+    r"""Return :math:`F_n(t)`; with a parabolic cylinder function (Gradshteyn 3.462.1)."""
+    bounded = np.clip(t, _CLOSEST, _FARTHEST)
+    cylinder, _ = pbdv(-order - 1, bounded)
+    closed = gamma(order + 1) / np.sqrt(2 * np.pi) * np.exp(-(bounded**2) / 4) * cylinder
+    # Deep in the surface every asperity touches: the moment of a Gaussian far above its mean,
+    # where the cylinder function overflows.
+    deep = np.minimum(t, -1.0)
+    series = (-deep) ** order * (1 + order * (order - 1) / (2 * deep**2))
+    series += (-deep) ** order * order * (order - 1) * (order - 2) * (order - 3) / (8 * deep**4)
+    return np.where(t < -20.0, series, closed)
