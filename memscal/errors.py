@@ -72,7 +72,16 @@ class FitError(MemscalError):
 
 
 class ConvergenceError(MemscalError):
-    """A numerical solution that did not reach its stated accuracy."""
+    """A numerical solution that did not reach its stated accuracy.
+
+    Attributes
+    ----------
+    last : object or None
+        The last state that did converge, where there is one: for a contact, a
+        :class:`memscal.Contact`.
+    """
+
+    last: object | None = None
 
 
 class OutputError(MemscalError):

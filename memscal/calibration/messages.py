@@ -6,6 +6,7 @@ from memscal.calibration.solution import Solution
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import QualityCheck
+from memscal.model.indenter import RoundIndenter
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
@@ -94,7 +95,7 @@ def _other_set_up(scan: Scan, stress: StressProfile) -> list[str]:
         for name, unit in (("thickness", 1e3), ("poisson_ratio", 1.0)):
             ours, theirs = getattr(scan.film, name), getattr(stress.film, name)
             pairs.append((f"film {name.replace('_', ' ')}", ours * unit, theirs * unit))
-    if stress.indenter is not None:
+    if isinstance(stress.indenter, RoundIndenter):
         pairs.append(("rod radius", scan.indenter.radius * 1e3, stress.indenter.radius * 1e3))
     return [
         f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "

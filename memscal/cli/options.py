@@ -11,7 +11,7 @@ import click
 
 if TYPE_CHECKING:
     from memscal.model.film import ElasticFilm
-    from memscal.model.indenter import Indenter
+    from memscal.model.indenter import RoundIndenter
 
     _Number = click.ParamType[float]
 else:  # generic since click 8.2 only
@@ -211,7 +211,7 @@ def film_from(given: Mapping[str, Any]) -> ElasticFilm:
     )
 
 
-def indenter_from(shape: str, given: Mapping[str, Any]) -> Indenter:
+def indenter_from(shape: str, given: Mapping[str, Any]) -> RoundIndenter:
     """Return the indenter that the options describe.
 
     Raises

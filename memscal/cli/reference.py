@@ -199,7 +199,7 @@ def _table(contact: Contact, solutions: Sequence[dict[str, Any]]) -> Any:
     film = contact.film
     friction = "sticking" if math.isinf(contact.friction) else "frictionless"
     title = (
-        f"A {friction} {contact.indenter.shape} of radius {contact.indenter.radius * 1e3:.4g} mm "
+        f"A {friction} {contact.indenter.shape} of radius {contact.contact_radius * 1e3:.4g} mm "
         f"on a film of {film.thickness * 1e3:.4g} mm, E = {film.young_modulus * 1e-6:.4g} MPa, "
         f"Poisson's ratio {film.poisson_ratio:.4g} ({contact.backend})"
     )

@@ -13,7 +13,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter, Rod
+from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
@@ -58,7 +58,7 @@ def require_calibration_rod(scan: Scan) -> None:
         )
 
 
-def reference_contact(film: ElasticFilm, indenter: Indenter, load: float) -> Contact:
+def reference_contact(film: ElasticFilm, indenter: RoundIndenter, load: float) -> Contact:
     """Solve the rod of a scan, frictionless: friction changes its base stress by about 1e-3."""
     return indent(film, indenter, load=load)
 
@@ -144,7 +144,7 @@ def reference_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[st
     """
     film, rod, k = scan.film, scan.indenter, reference.wavenumbers.k
 
-    def transform(new_film: ElasticFilm, new_rod: Indenter) -> FloatArray:
+    def transform(new_film: ElasticFilm, new_rod: RoundIndenter) -> FloatArray:
         return reference_contact(new_film, new_rod, scan.load).base_spectrum(k)
 
     centre = transform(film, rod)

@@ -18,8 +18,8 @@ from memscal.formats.parts import (
     instrument_group,
     profile_groups,
     read_film,
-    read_indenter,
     read_profile,
+    read_round_indenter,
     read_sensor,
     sample_group,
 )
@@ -75,7 +75,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         )
     load = require_scalar(file, "/entry/indenter/load", "force")
     film = read_film(file, "/entry/sample/film")
-    indenter = read_indenter(file, "/entry/indenter")
+    indenter = read_round_indenter(file, "/entry/indenter")
     parts = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
     return ApparatusData(
         field=_read_field(file, "/entry/apparatus_function"),

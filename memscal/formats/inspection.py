@@ -52,7 +52,7 @@ _QUANTITIES = {
     SCAN_SCHEMA: {"/entry/indenter": "shape radius load", "/entry/sample/film": _FILM},
     REFERENCE_SCHEMA: {
         "/entry/parameters": _PROFILE,
-        "/entry/parameters/indenter": "shape radius",
+        "/entry/parameters/indenter": "shape radius inclination",
         "/entry/parameters/film": _FILM,
         "/entry/process/numerics": "convergence discretisation",
     },

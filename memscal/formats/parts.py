@@ -14,7 +14,7 @@ from memscal.formats.fields import (
 from memscal.formats.hdf5_reader import SafeFile
 from memscal.formats.tree import Group, Node, note, si
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter, Rod, Sphere
+from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
@@ -26,6 +26,7 @@ __all__ = [
     "read_film",
     "read_indenter",
     "read_profile",
+    "read_round_indenter",
     "read_sensor",
     "sample_group",
 ]
@@ -42,7 +43,7 @@ _PROFILE = {
     "stick_radius": "length",
     "friction_coefficient": "dimensionless",
 }
-_SHAPES: dict[str, type[Indenter]] = {"rod": Rod, "sphere": Sphere}
+_ROUND: dict[str, type[RoundIndenter]] = {"rod": Rod, "sphere": Sphere}
 
 
 def film_group(film: ElasticFilm) -> Group:
@@ -79,12 +80,16 @@ def indenter_group(
     indenter: Indenter, load: float | None = None, load_uncertainty: float | None = None
 ) -> Group:
     """Return an indenter as an NXcollection, with its nominal load."""
-    children: dict[str, Node] = {
-        "shape": indenter.shape,
-        "radius": si(indenter.radius, "length"),
-    }
-    if indenter.radius_uncertainty is not None:
-        children["radius_errors"] = si(indenter.radius_uncertainty, "length")
+    children: dict[str, Node] = {"shape": indenter.shape}
+    if isinstance(indenter, RoundIndenter):
+        children["radius"] = si(indenter.radius, "length")
+        if indenter.radius_uncertainty is not None:
+            children["radius_errors"] = si(indenter.radius_uncertainty, "length")
+    if isinstance(indenter, Cone):
+        children["inclination"] = si(indenter.inclination, "angle")
+    if isinstance(indenter, Profile):
+        face = {"r": si(indenter.r, "length", ("r",)), "z": si(indenter.z, "length", ("r",))}
+        children["face"] = Group("NXdata", face, {"signal": "z", "axes": ("r",)})
     if load is not None:
         children["load"] = si(load, "force")
     if load_uncertainty is not None:
@@ -94,17 +99,34 @@ def indenter_group(
 
 def read_indenter(file: SafeFile, path: str) -> Indenter:
     """Read an indenter."""
-    shape = require_text(file, f"{path}/shape").strip().lower()
-    if shape not in _SHAPES:
+    shape = _shape(file, path)
+    if shape == Cone.shape:
+        return Cone(inclination=require_scalar(file, f"{path}/inclination", "angle"))
+    if shape == Profile.shape:
+        return Profile(
+            r=require_array(file, f"{path}/face/r", "length", ndim=1),
+            z=require_array(file, f"{path}/face/z", "length", ndim=1),
+        )
+    return read_round_indenter(file, path)
+
+
+def read_round_indenter(file: SafeFile, path: str) -> RoundIndenter:
+    """Read a rod or a sphere, the indenters of a scan."""
+    shape = _shape(file, path)
+    if shape not in _ROUND:
         raise FormatError(
             f'{file.where(path)}/shape is "{shape}".',
-            why="The contact model is known for a flat rod and for a sphere.",
+            why="A scan is made with a flat rod or with a sphere.",
             cure='Write "rod" or "sphere".',
         )
-    return _SHAPES[shape](
+    return _ROUND[shape](
         radius=require_scalar(file, f"{path}/radius", "length"),
         radius_uncertainty=optional_scalar(file, f"{path}/radius_errors", "length"),
     )
+
+
+def _shape(file: SafeFile, path: str) -> str:
+    return require_text(file, f"{path}/shape").strip().lower()
 
 
 def instrument_group(sensor: StressSensor) -> Group:

@@ -26,8 +26,8 @@ from memscal.formats.parts import (
     instrument_group,
     profile_groups,
     read_film,
-    read_indenter,
     read_profile,
+    read_round_indenter,
     read_sensor,
     sample_group,
 )
@@ -86,7 +86,7 @@ def scan_from(file: SafeFile) -> Scan:
     require_schema(file, SCAN_SCHEMA)
     load = require_scalar(file, "/entry/indenter/load", "force")
     film = read_film(file, "/entry/sample/film")
-    indenter = read_indenter(file, "/entry/indenter")
+    indenter = read_round_indenter(file, "/entry/indenter")
     _check_axes(file)
     channels = {
         name: require_array(file, f"{_DATA}/{name}", "voltage")

@@ -13,7 +13,7 @@ from memscal.formats.placement import place_readings
 from memscal.formats.reference_table import ImportedProfile, read_reference_table
 from memscal.formats.units import to_si
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
+from memscal.model.indenter import RoundIndenter
 from memscal.model.scan import Scan, StressSensor
 from memscal.model.validation import FloatArray
 
@@ -38,7 +38,7 @@ def read_scan_table(
     x_unit: str,
     u_unit: str,
     film: ElasticFilm,
-    indenter: Indenter,
+    indenter: RoundIndenter,
     load: float | None = None,
     y: Column | None = None,
     repeat: Column | None = None,

@@ -31,6 +31,7 @@ SI_UNITS = {
     "wavenumber": "rad/m",
     "voltage per length": "V/m",
     "dimensionless": "1",
+    "angle": "rad",
 }
 
 # Dimension -> unit that our writers use.
@@ -45,6 +46,7 @@ FILE_UNITS = {
     "wavenumber": "rad/mm",
     "voltage per length": "mV/mm",
     "dimensionless": "1",
+    "angle": "rad",
 }
 
 # Canonical unit -> (dimension, power of ten that takes it to SI).
@@ -84,6 +86,7 @@ _CANONICAL = {
     "1/mm": ("wavenumber", 3),
     "V/m": ("voltage per length", 0),
     "mV/mm": ("voltage per length", 0),
+    "rad": ("angle", 0),
     "1": ("dimensionless", 0),
     "": ("dimensionless", 0),
 }

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from memscal.errors import InputError
-from memscal.mechanics.base_stress import (
-    base_normal_spectrum,
-    base_normal_stress,
-    base_shear_stress,
-)
+from memscal.errors import DomainError, InputError
+from memscal.mechanics.interface import Interface
+from memscal.mechanics.surface import FilmField
 from memscal.mechanics.traction import InterfaceTraction
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
+from memscal.model.indenter import Indenter, Rod
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
-__all__ = ["Contact"]
+__all__ = ["Contact", "too_deep"]
 
 # Default radii of a profile, in film thicknesses.  The film passes nothing that varies faster
 # than exp(-kh): with these steps, near the contact and far from it, a cubic spline is good to
@@ -32,6 +30,8 @@ _FAR_REACH = 26.0
 # The profile ends where the stress stays below this fraction of its maximum, which happens
 # within the far reach for any Poisson's ratio.
 _PROFILE_FLOOR = 1e-9
+# Radii at which the largest interface pressure is sought.
+_PRESSURE_SAMPLES = 2001
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,26 +40,41 @@ class Contact:
 
     Parameters
     ----------
-    film, indenter
-        What was pressed on what.
+    film, indenter, interface
+        What was pressed on what, and what was between them.
     load : float
         Normal load :math:`P`, in N.
     depth : float
         Indentation depth :math:`\delta`, in m.
-    contact_radius, stick_radius : float
-        Radius of the contact and of the part of it that sticks, in m.
+    contact_radius : float
+        Radius of the contact in m.  Where the interface is normally compliant the contact has no
+        edge: it is the radius at which the pressure has fallen to a thousandth of its largest.
+    stick_radius : float
+        Radius of the part of the contact that sticks, in m.
     friction : float
-        Amontons' coefficient; ``inf`` for a contact that sticks all over.
+        Amontons' coefficient; ``inf`` for a contact that sticks wherever it touches.
     loading : str
-        ``"incremental"`` or ``"total"``; ``""`` where it makes no difference (any rod).
+        ``"incremental"`` or ``"total"``; ``""`` where it makes no difference (a rod).
+    strain : str
+        ``"linear"``: small strain; ``"finite"``: the neo-Hookean film at finite strain.
     backend : str
-        ``"hankel"``: linear elasticity by Hankel transforms.
+        ``"hankel"``: Hankel transforms; ``"fem"``: finite elements.
     convergence : float
-        Largest change of the base stress under refinement, relative to its maximum.
+        Largest change of base stress, load and depth under refinement, relative to the largest
+        stress, the load and the depth.
+    steps : int
+        Steps of the loading from the untouched film.
     discretisation : str
         What was refined, in words.
     traction : InterfaceTraction
         Pressure and shear at the interface.
+    inside : FilmField
+        The field in the film.
+    elastic_energy : float
+        Energy stored in the film, in J.
+    work, dissipated_energy : float or None
+        Work done by the indenter and lost to friction on the way, in J; ``None`` for a contact
+        that is loaded in one step, which has no way.
 
     Notes
     -----
@@ -87,8 +102,15 @@ class Contact:
     loading: str
     backend: str
     convergence: float
+    steps: int
     discretisation: str
     traction: InterfaceTraction
+    inside: FilmField
+    elastic_energy: float
+    work: float | None
+    dissipated_energy: float | None
+    interface: Interface = field(default_factory=Interface)
+    strain: str = "linear"
 
     def base_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the normal stress :math:`\sigma_{zz}` at the base, compression positive.
@@ -108,7 +130,7 @@ class Contact:
         InputError
             If a radius is negative or not finite.
         """
-        return base_normal_stress(self.film, self.traction, _radii(r))
+        return self.inside.base_normal(_radii(r))
 
     def base_spectrum(self, k: ArrayLike) -> FloatArray:
         r"""Return the two-dimensional Fourier transform of the base stress, in N.
@@ -116,8 +138,7 @@ class Contact:
         At ``k`` in rad/m, of any shape and sign:
         :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, which is the load at k = 0.
         """
-        wavenumbers = np.abs(np.asarray(k, dtype=np.float64))
-        return 2 * np.pi * base_normal_spectrum(self.film, self.traction, wavenumbers)
+        return self.inside.base_spectrum(np.abs(np.asarray(k, dtype=np.float64)))
 
     def base_shear(self, r: ArrayLike) -> FloatArray:
         r"""Return the radial traction of the base on the film, in Pa, positive outward.
@@ -125,7 +146,7 @@ class Contact:
         As :meth:`base_stress`; with the third axis from base to surface it is
         :math:`-\sigma_{rz}`, and it is negative where the film is squeezed outward.
         """
-        return base_shear_stress(self.film, self.traction, _radii(r))
+        return self.inside.base_shear(_radii(r))
 
     def interface_pressure(self, r: ArrayLike) -> FloatArray:
         """Return the pressure between indenter and film in Pa; zero outside the contact.
@@ -137,6 +158,27 @@ class Contact:
     def interface_shear(self, r: ArrayLike) -> FloatArray:
         """Return the radial traction on the film in Pa, positive outward; zero outside."""
         return self.traction.shear(_radii(r))
+
+    @property
+    def max_interface_stress(self) -> float:
+        """Largest pressure at the interface in Pa; ``inf`` under a rod, at its edge."""
+        if isinstance(self.indenter, Rod):
+            return math.inf
+        r = np.linspace(0.0, self.contact_radius, _PRESSURE_SAMPLES)
+        return float(np.max(self.traction.pressure(r)))
+
+    @property
+    def max_base_stress(self) -> float:
+        """Largest normal stress at the base, in Pa."""
+        return float(self._default_profile.sigma_zz.max())
+
+    def surface_depression(self, r: ArrayLike) -> FloatArray:
+        """Return the normal displacement of the film's surface in m, positive into the film."""
+        return self.inside.depression(_radii(r))
+
+    def surface_outward(self, r: ArrayLike) -> FloatArray:
+        """Return the radial displacement of the film's surface in m, positive outward."""
+        return self.inside.outward(_radii(r))
 
     def profile(self, r: ArrayLike | None = None) -> StressProfile:
         """Return the stress at the base as a table, such as a calibration divides by.
@@ -170,7 +212,7 @@ class Contact:
             loading=self.loading,
             film=self.film,
             indenter=self.indenter,
-            solver=f"memscal, {self.backend} backend",
+            solver=f"memscal, {self.backend} backend, {self.strain} strain",
             discretisation=self.discretisation,
             convergence=self.convergence,
         )
@@ -180,6 +222,16 @@ class Contact:
         near = np.arange(0.0, edge + _NEAR_REACH, _NEAR_STEP)
         far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
         return np.concatenate([near, far]) * self.film.thickness
+
+
+def too_deep(film: ElasticFilm, indenter: Indenter, load: float, depth: float) -> DomainError:
+    """Return the error for an indenter that would pass through the film."""
+    return DomainError(
+        f"Under {load:g} N the {indenter.shape} would sink {depth * 1e6:.4g} um into a film of "
+        f"{film.thickness * 1e6:.4g} um.",
+        why="Linear elasticity knows no such state.",
+        cure="Lower the load or the depth, or check the film's modulus and thickness.",
+    )
 
 
 def _radii(r: ArrayLike) -> FloatArray:

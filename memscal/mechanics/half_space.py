@@ -105,9 +105,7 @@ def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     return sums[0], sums[1] * inverse
 
 
-def _kernels(
-    x: FloatArray, s: FloatArray, distance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return L00 and L11; free of cancellation, also where x and s are close or far apart."""
     larger, smaller = np.maximum(x, s), np.minimum(x, s)
     complement = distance * (larger + smaller) / larger**2

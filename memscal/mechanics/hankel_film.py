@@ -67,9 +67,7 @@ class HankelFilm:
         singular = singular_integrals(self.r, self.r)
         coupled = coupling_integrals(self.r, self.r)
         k, weights = _wavenumbers(self.film, 2 * self.r[-1])
-        layer = _layer_integrals(
-            self.film, self.r, (k, weights), *hat_transforms(self.r, k)
-        )
+        layer = _layer_integrals(self.film, self.r, (k, weights), *hat_transforms(self.r, k))
         return SurfaceCompliance(
             self.r,
             *_displacements(self.film, (singular[0], coupled[0], coupled[1], singular[1]), layer),

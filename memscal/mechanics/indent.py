@@ -8,9 +8,13 @@ from typing import overload
 
 import numpy as np
 
-from memscal.errors import DomainError, InputError
-from memscal.mechanics.contact import Contact
-from memscal.mechanics.rod import RodSolution, solve_rod
+from memscal.errors import InputError
+from memscal.mechanics.contact import Contact, too_deep
+from memscal.mechanics.hankel_film import HankelField
+from memscal.mechanics.interface import Interface
+from memscal.mechanics.rod import solve_rod
+from memscal.mechanics.solver.problem import Depth, Load, Target
+from memscal.mechanics.solver.request import RingRequest, solve_on_rings
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.model.validation import FloatArray, require_positive
@@ -18,6 +22,9 @@ from memscal.model.validation import FloatArray, require_positive
 __all__ = ["indent"]
 
 _Several = Sequence[float] | FloatArray
+
+# Fewer rings than this resolve no contact.
+_FEWEST_RINGS = 16
 
 
 @overload
@@ -30,6 +37,10 @@ def indent(
     friction: float = 0.0,
     loading: str = "incremental",
     backend: str = "hankel",
+    interface: Interface | None = None,
+    strain: str = "linear",
+    film_radius: float | None = None,
+    rings: int | None = None,
 ) -> Contact: ...
 @overload
 def indent(
@@ -41,6 +52,10 @@ def indent(
     friction: float = 0.0,
     loading: str = "incremental",
     backend: str = "hankel",
+    interface: Interface | None = None,
+    strain: str = "linear",
+    film_radius: float | None = None,
+    rings: int | None = None,
 ) -> list[Contact]: ...
 @overload
 def indent(
@@ -52,6 +67,10 @@ def indent(
     friction: float = 0.0,
     loading: str = "incremental",
     backend: str = "hankel",
+    interface: Interface | None = None,
+    strain: str = "linear",
+    film_radius: float | None = None,
+    rings: int | None = None,
 ) -> list[Contact]: ...
 def indent(
     film: ElasticFilm,
@@ -62,24 +81,44 @@ def indent(
     friction: float = 0.0,
     loading: str = "incremental",
     backend: str = "hankel",
+    interface: Interface | None = None,
+    strain: str = "linear",
+    film_radius: float | None = None,
+    rings: int | None = None,
 ) -> Contact | list[Contact]:
     r"""Press a rigid indenter on a bonded film, to a load or to a depth.
 
     Parameters
     ----------
     film : ElasticFilm
-        The film; linear elastic, bonded to a rigid base.
-    indenter : Rod
-        The indenter.  This version solves the flat rod.
+        The film; elastic, bonded to a rigid base.
+    indenter : Rod, Sphere, Cone or Profile
+        The indenter.
     load, depth : float or sequence of float
-        Normal load in N, or indentation depth in m: one of them.
+        Normal load in N, or indentation depth in m: one of them.  A sequence is a path: its
+        states are visited in the order given, also downward (unloading) and up again.
     friction : float
-        Amontons' coefficient between rod and film: 0 (slides freely) or ``inf`` (sticks).
+        Amontons' coefficient between indenter and film, from 0 (slides freely) to ``inf``
+        (sticks wherever it touches).
     loading : str
-        ``"incremental"`` or ``"total"``.  Under a rod it makes no difference: the contact does
-        not grow.
+        ``"incremental"``: as in a slow loading, a point of the film sticks where it first
+        touched.  ``"total"``: every state is reached in one step from the untouched film; with
+        ``friction=inf`` nothing in the contact has moved sideways.  Under a rod, whose contact
+        does not grow, both are the same.
     backend : str
-        ``"hankel"``.
+        ``"hankel"``: Hankel transforms on a film of infinite extent.  ``"fem"``: finite elements
+        on a film with a free edge; slower, and independent.
+    interface : Interface, optional
+        Compliance of the interface; rigid by default.
+    strain : str
+        ``"linear"`` or ``"finite"``: a neo-Hookean film at finite strain, by finite elements,
+        for a frictionless or sticking rod or sphere.
+    film_radius : float, optional
+        Radius of the film's free edge in m, for finite elements; by default twelve thicknesses
+        away from the contact.
+    rings : int, optional
+        Rings from the axis to the largest contact, at least 16.  By default they are doubled
+        until base stress, load and depth change by less than 1e-4.
 
     Returns
     -------
@@ -88,14 +127,18 @@ def indent(
     Raises
     ------
     InputError
-        If load or depth is not positive, or both or none are given.
+        If an argument makes no sense, or if load and depth are both or neither given.
     DomainError
-        If the request lies outside what the model or this version can do.
+        If the request lies outside what the model holds for: the contact outgrows the film or
+        the indenter's known face, or the indenter would pass through the film.
+    ConvergenceError
+        If the contact does not settle, or has not converged; ``last`` is the last contact found.
 
     Notes
     -----
-    Load and depth are proportional, :math:`P = 2 E^* a\,\delta\,\kappa(a/h, \nu)`.  The paper
-    finds its sensor's output linear in the load, too.  See :mod:`memscal.mechanics.rod`.
+    Contact is unilateral, friction Amontons'; see :mod:`memscal.mechanics.solver`.  A rod that
+    slides freely or sticks is solved to higher accuracy; see :mod:`memscal.mechanics.rod`.
+    Solutions are remembered: the same request is answered at once.
 
     Examples
     --------
@@ -105,87 +148,111 @@ def indent(
     >>> contact = indent(film, Rod(radius=0.25e-3), load=1.0)
     >>> print(f"{contact.depth * 1e3:.3f} mm, {contact.load / contact.depth * 1e-3:.3f} N/mm")
     0.587 mm, 1.704 N/mm
-    >>> [round(c.load, 3) for c in indent(film, Rod(radius=0.25e-3), depth=[1e-4, 2e-4])]
-    [0.17, 0.341]
+
+    The paper's sphere, with friction, along a loading:
+
+    >>> from memscal.model.indenter import Sphere
+    >>> sphere = Sphere(radius=128.8e-3)
+    >>> for contact in indent(film, sphere, load=[0.34, 1.37], friction=0.3):
+    ...     print(f"{contact.depth * 1e6:.1f} um, {contact.contact_radius * 1e3:.2f} mm")
+    16.9 um, 1.98 mm
+    30.7 um, 2.83 mm
     """
-    _check_request(indenter, friction, loading, backend)
+    _check_request(friction, loading, backend, strain, rings)
+    targets, several = _targets(load, depth)
+    interface = interface or Interface()
+    contacts: list[Contact]
+    if _is_plain_rod(indenter, friction, backend, interface):
+        contacts = [_rod_contact(film, indenter, target, friction) for target in targets]
+    else:
+        request = RingRequest(
+            film=film,
+            indenter=indenter,
+            interface=interface,
+            targets=targets,
+            friction=float(friction),
+            loading=loading,
+            backend=backend,
+            film_radius=film_radius,
+            rings=rings,
+        )
+        contacts = list(solve_on_rings(request))
+    return contacts if several else contacts[0]
+
+
+def _targets(
+    load: float | _Several | None, depth: float | _Several | None
+) -> tuple[tuple[Target, ...], bool]:
+    """Return what is to be reached, and whether a list was asked for."""
     if (load is None) == (depth is None):
         raise InputError(
             "Give either a load or a depth" + (", not both." if load is not None else "."),
             why="One follows from the other.",
         )
-    sticking = math.isinf(friction)
-    solution = solve_rod(
-        indenter.radius / film.thickness, float(film.poisson_ratio), sticking=sticking
-    )
-    stiffness = 2 * film.contact_modulus * indenter.radius * solution.stiffness_factor
     given = np.asarray(load if depth is None else depth, dtype=np.float64)
-    if given.ndim > 1:
+    if given.ndim > 1 or given.size == 0:
         raise InputError(f"The loads or depths have shape {given.shape}; give a flat list.")
     for value in given.flat:
         require_positive("load" if depth is None else "depth", value, "N" if depth is None else "m")
-    loads, depths = (given, given / stiffness) if depth is None else (given * stiffness, given)
-    contacts = [
-        _rod_contact(film, indenter, solution, float(one_load), float(one_depth), friction)
-        for one_load, one_depth in zip(loads.flat, depths.flat, strict=True)
-    ]
-    return contacts[0] if given.ndim == 0 else contacts
+    kind = Load if depth is None else Depth
+    return tuple(kind(float(value)) for value in given.flat), given.ndim == 1
 
 
-def _rod_contact(
-    film: ElasticFilm,
-    rod: Indenter,
-    solution: RodSolution,
-    load: float,
-    depth: float,
-    friction: float,
-) -> Contact:
+def _is_plain_rod(indenter: Indenter, friction: float, backend: str, interface: Interface) -> bool:
+    """Whether the solution in spherical Bessel functions applies."""
+    slides_or_sticks = friction == 0 or math.isinf(friction)
+    # Without friction there is nothing for a slip length to act on.
+    rigid = interface.rigid or (friction == 0 and interface.normal_law is None)
+    return isinstance(indenter, Rod) and slides_or_sticks and rigid and backend == "hankel"
+
+
+def _rod_contact(film: ElasticFilm, rod: Indenter, target: Target, friction: float) -> Contact:
+    assert isinstance(rod, Rod)
+    sticking = math.isinf(friction)
+    solution = solve_rod(rod.radius / film.thickness, float(film.poisson_ratio), sticking=sticking)
+    stiffness = 2 * film.contact_modulus * rod.radius * solution.stiffness_factor
+    load = target.value if isinstance(target, Load) else target.value * stiffness
+    depth = target.value if isinstance(target, Depth) else target.value / stiffness
     if depth >= film.thickness:
-        raise DomainError(
-            f"Under {load:g} N the rod would sink {depth * 1e6:.4g} um into a film of "
-            f"{film.thickness * 1e6:.4g} um.",
-            why="Linear elasticity knows no such state.",
-            cure="Lower the load or the depth, or check the film's modulus and thickness.",
-        )
+        raise too_deep(film, rod, load, depth)
     terms = solution.pressure_terms.size
+    traction = solution.traction(rod.radius, load)
     return Contact(
         film=film,
         indenter=rod,
         load=load,
         depth=depth,
         contact_radius=rod.radius,
-        stick_radius=rod.radius if math.isinf(friction) else 0.0,
+        stick_radius=rod.radius if sticking else 0.0,
         friction=float(friction),
         loading="",
         backend="hankel",
         convergence=solution.convergence,
+        steps=1,
         discretisation=f"{terms} spherical Bessel functions per traction, Gauss-Legendre in k",
-        traction=solution.traction(rod.radius, load),
+        traction=traction,
+        inside=HankelField(film, traction),
+        elastic_energy=load * depth / 2,
+        work=load * depth / 2,
+        dissipated_energy=0.0,
     )
 
 
-def _check_request(indenter: Indenter, friction: float, loading: str, backend: str) -> None:
-    """Refuse what this version cannot solve, and what makes no sense."""
-    if loading not in ("incremental", "total"):
-        raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')
+def _check_request(
+    friction: float, loading: str, backend: str, strain: str, rings: int | None
+) -> None:
+    """Refuse what makes no sense."""
+    for name, value, known in (
+        ("loading", loading, ("incremental", "total")),
+        ("backend", backend, ("hankel", "fem")),
+        ("strain", strain, ("linear", "finite")),
+    ):
+        if value not in known:
+            raise InputError(f'{name} is {value!r}, but it is "{known[0]}" or "{known[1]}".')
     if math.isnan(friction) or friction < 0:
         raise InputError(f"friction is {friction:g}, but a friction coefficient is not negative.")
-    if backend != "hankel":
-        known = backend == "fem"
-        raise (DomainError if known else InputError)(
-            f"The backend {backend!r} is " + ("not in this version." if known else "not known."),
-            cure='Use backend="hankel".',
-        )
-    if not isinstance(indenter, Rod):
-        raise DomainError(
-            f"The indenter is a {indenter.shape}, but this version solves the flat rod only.",
-            cure="Press a Rod, or read the stress of another program from a reference file.",
-        )
-    if not (friction == 0 or math.isinf(friction)):
-        raise DomainError(
-            f"friction is {friction:g}, but under a rod this version knows 0 (slides freely) and "
-            "inf (sticks).",
-            why="In between, a ring at the rod's edge slips.  At the base, 0 and inf differ by "
-            "about a thousandth for a rod much narrower than the film is thick.",
-            cure="Use 0 and inf: they bracket every coefficient.",
+    if rings is not None and rings < _FEWEST_RINGS:
+        raise InputError(
+            f"rings is {rings}, but a contact takes at least {_FEWEST_RINGS}.",
+            cure="Leave it out: rings are then doubled until the contact has converged.",
         )

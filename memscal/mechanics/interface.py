@@ -120,7 +120,7 @@ class GreenwoodTripp:
         return np.asarray(self.roughness * (low + high) / 2)
 
     def _scale(self, film: ElasticFilm) -> float:
-        bearing = self.asperity_density * self.asperity_radius**0.5 * self.roughness**1.5
+        bearing: float = self.asperity_density * self.asperity_radius**0.5 * self.roughness**1.5
         return 4 / 3 * film.contact_modulus * bearing
 
 
@@ -152,7 +152,7 @@ class ExponentialCompliance:
         """The decay length, in m."""
         return self.decay_length
 
-    def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
+    def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:  # noqa: ARG002
         """Return the pressure in Pa at a ``separation`` in m."""
         return np.asarray(self.reference_pressure * np.exp(-separation / self.decay_length))
 
@@ -160,7 +160,7 @@ class ExponentialCompliance:
         """Return minus the derivative of the pressure by the separation, in Pa/m."""
         return self.pressure(separation, film) / self.decay_length
 
-    def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
+    def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:  # noqa: ARG002
         """Return the separation in m at which the pressure is ``pressure`` in Pa."""
         return np.asarray(-self.decay_length * np.log(pressure / self.reference_pressure))
 

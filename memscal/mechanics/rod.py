@@ -38,7 +38,9 @@ from memscal.axisymmetry.quadrature import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response
 from memscal.mechanics.base_stress import base_normal_stress
+from memscal.mechanics.rod_surface import rod_integrals
 from memscal.mechanics.spherical_bessel import spherical_bessel
+from memscal.mechanics.traction import HalfSpaceIntegrals
 from memscal.model.film import ElasticFilm
 from memscal.model.validation import FloatArray
 
@@ -98,6 +100,12 @@ class RodTraction:
     def shear_transform(self, k: FloatArray) -> FloatArray:
         """Return the shear's Hankel transform at ``k`` (rad/m), in N."""
         return self._transform(self.shear_terms, 1, k)
+
+    def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
+        """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
+        unit = self.load / (2 * np.pi * self.radius)
+        found = rod_integrals(r / self.radius, self.pressure_terms, self.shear_terms)
+        return found[0] * unit, found[1] * unit, found[2] * unit, found[3] * unit
 
     def _transform(self, terms: FloatArray, first: int, k: FloatArray) -> FloatArray:
         if terms.size == 0:

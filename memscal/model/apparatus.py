@@ -9,7 +9,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
+from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
@@ -202,7 +202,7 @@ class ApparatusData:
     parameters: ParameterSet
     checks: tuple[QualityCheck, ...]
     film: ElasticFilm
-    indenter: Indenter
+    indenter: RoundIndenter
     sensor: StressSensor
     load: float
     reference: StressProfile

@@ -10,7 +10,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
+from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray, finite_vector, frozen_array, require_non_negative
@@ -78,7 +78,7 @@ class Scan:
     x: FloatArray
     u_zz: FloatArray
     load: float
-    indenter: Indenter
+    indenter: RoundIndenter
     film: ElasticFilm
     sensor: StressSensor = field(default_factory=StressSensor)
     y: FloatArray | None = None

@@ -1,0 +1,1 @@
+"""The contact of an indenter with a film, solved ring by ring."""
