@@ -1,0 +1,161 @@
+"""The sphere, with and without friction, against GetFEM, whose elements and contact are not ours.
+
+GetFEM is run by the Python that it belongs to.  Set MEMSCAL_FULL_STUDY for a finer mesh, smaller
+steps and a contact that only sticks.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import shutil
+import subprocess
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from accuracy.contact_edge import contact_radius, load_beyond
+
+import memscal
+
+FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
+STEP, LAYERS = (0.05, 8) if FULL else (0.1, 6)
+STEPS = (50, 100, 200) if FULL else (15, 30)
+FRICTIONS = (0.3, 1.0, math.inf) if FULL else (0.3, 1.0)
+LOADS = (0.34, 0.69, 1.37, 2.75)
+PROGRAM = Path(__file__).with_name("getfem_sphere.py")
+# As good as infinite: the shear of a sticking contact stays below the pressure.
+STICKING = 1e3
+
+pytestmark = pytest.mark.accuracy
+
+
+@pytest.fixture(scope="module", autouse=True)
+def python() -> str:
+    """The Python that GetFEM belongs to."""
+    found = shutil.which("python3", path="/usr/bin")
+    probe = [found or "", "-c", "import getfem"]
+    if found and subprocess.run(probe, capture_output=True, check=False).returncode == 0:
+        return found
+    pytest.skip("GetFEM (Debian package python3-getfem) is not installed")
+
+
+@lru_cache
+def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> list[dict[str, Any]]:
+    """States of the paper's sphere and film at the paper's loads, in mm, N and MPa."""
+    case = {
+        "young_modulus": 2.2,
+        "poisson_ratio": 0.5,
+        "thickness": 2.0,
+        "radius": 128.8,
+        "friction": min(friction, STICKING),
+        "loads": LOADS,
+        "steps": steps,
+        "contact": 4.2,
+        "step": step,
+        "layers": LAYERS,
+        "first_depth": 2e-3,
+    }
+    done = subprocess.run(
+        [python, str(PROGRAM)],
+        input=json.dumps(case),
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    states = json.loads(done.stdout)["states"]
+    return [
+        {name: np.array(v) if isinstance(v, list) else v for name, v in s.items()} for s in states
+    ]
+
+
+@lru_cache
+def by_memscal(friction: float) -> list[memscal.Contact]:
+    film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    sphere = memscal.Sphere(radius=128.8e-3)
+    return memscal.indent(film, sphere, load=LOADS, friction=friction, loading="incremental")
+
+
+def edge(state: dict[str, Any]) -> float:
+    """Contact radius in mm."""
+    r, pressure = state["r"], state["pressure"]
+    last = r[pressure > 0.02 * pressure.max()].max()
+    return contact_radius(r, load_beyond(r, pressure), last)
+
+
+def differences(contact: memscal.Contact, state: dict[str, Any]) -> dict[str, float]:
+    """Depth and contact radius relative to memscal's; stresses to the highest of their face."""
+    base = contact.base_stress(state["base_r"] * 1e-3) * 1e-6
+    base_shear = contact.base_shear(state["base_shear_r"] * 1e-3) * 1e-6
+    r = state["r"][state["r"] < 0.9e3 * contact.contact_radius]
+    pressure = contact.interface_pressure(r * 1e-3) * 1e-6
+    shear = contact.interface_shear(r * 1e-3) * 1e-6
+    return {
+        "depth": abs(state["depth"] * 1e-3 / contact.depth - 1),
+        "contact radius": abs(edge(state) * 1e-3 / contact.contact_radius - 1),
+        "highest base stress": abs(state["base_normal"].max() / base.max() - 1),
+        "base stress": np.max(np.abs(state["base_normal"] - base)) / base.max(),
+        "base shear": np.max(np.abs(state["base_shear"] - base_shear)) / base.max(),
+        "pressure": np.max(np.abs(state["pressure"][: r.size] - pressure)) / pressure.max(),
+        "shear": np.max(np.abs(state["shear"][: r.size] - shear)) / pressure.max(),
+    }
+
+
+def in_the_limit(coarse: list[dict[str, Any]], fine: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """States for infinitely many steps, by extrapolation: the error goes with their length."""
+    return [
+        {name: 2 * last[name] - first[name] for name in last}
+        for first, last in zip(coarse, fine, strict=True)
+    ]
+
+
+def worst(friction: float, states: list[dict[str, Any]]) -> dict[str, float]:
+    """The largest differences over all loads."""
+    each = [differences(*pair) for pair in zip(by_memscal(friction), states, strict=True)]
+    return {name: max(one[name] for one in each) for name in each[0]}
+
+
+def test_getfem_agrees_on_the_sphere_without_friction(python: str) -> None:
+    # Without friction the path is of no account, and a step per load is enough.
+    states = by_getfem(python, 0.0, len(LOADS), 0.025 if FULL else 0.05)
+    found = worst(0.0, states)
+    assert found["depth"] < 1e-4
+    assert found["contact radius"] < 1e-3
+    assert found["highest base stress"] < 3e-4
+    assert found["base stress"] < 3e-4
+    assert found["base shear"] < 2e-4
+    assert found["pressure"] < 2e-3
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_getfem_agrees_on_the_sphere_with_friction(python: str, friction: float) -> None:
+    coarse, fine = (by_getfem(python, friction, steps) for steps in STEPS[-2:])
+    found = worst(friction, in_the_limit(coarse, fine))
+    limit = 5e-4 if FULL else 2e-3
+    for name in ("depth", "contact radius", "highest base stress", "base stress", "base shear"):
+        assert found[name] < limit, name
+    assert found["pressure"] < 5e-3
+    # Under the last steps' rings, the shear itself goes down less evenly.
+    assert worst(friction, fine)["shear"] < 3e-2
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_smaller_steps_bring_getfem_closer(python: str, friction: float) -> None:
+    errors = [worst(friction, by_getfem(python, friction, n))["base stress"] for n in STEPS]
+    assert all(fine < coarse / 1.5 for coarse, fine in itertools.pairwise(errors))
+
+
+def test_friction_moves_getfem_by_far_more_than_the_two_differ(python: str) -> None:
+    slippery, rough = (by_getfem(python, mu, STEPS[-1])[-1] for mu in (0.3, 1.0))
+    frictionless = by_memscal(0.0)[-1]
+    highest = frictionless.base_stress([0.0])[0] * 1e-6
+    for state in (slippery, rough):
+        assert state["base_normal"].max() > 1.2 * highest
+        assert state["depth"] * 1e-3 < 0.95 * frictionless.depth
+    assert rough["base_normal"].max() > 1.003 * slippery["base_normal"].max()
