@@ -46,7 +46,7 @@ def grid(step, layers, contact, thickness):
     """Radii with one step in the contact and coarser beyond, and heights finer at both faces."""
     radii = list(np.arange(0.0, contact + step / 2, step))
     while radii[-1] < REACH:
-        widest = 0.05 * thickness if radii[-1] < contact + thickness else thickness
+        widest = 2 * step if radii[-1] < contact + thickness else thickness
         radii.append(radii[-1] + min(1.25 * (radii[-1] - radii[-2]), widest))
     radii = np.array(radii)
     end = radii > contact

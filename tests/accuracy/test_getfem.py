@@ -1,7 +1,7 @@
 """The sphere, with and without friction, against GetFEM, whose elements and contact are not ours.
 
-GetFEM is run by the Python that it belongs to.  Set MEMSCAL_FULL_STUDY for a finer mesh, smaller
-steps and a contact that only sticks.
+GetFEM is run by the Python that it belongs to.  Set MEMSCAL_FULL_STUDY for a finer mesh and
+smaller steps.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from accuracy.contact_edge import contact_radius, load_beyond
 import memscal
 
 FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
-STEP, LAYERS = (0.05, 8) if FULL else (0.1, 6)
-STEPS = (50, 100, 200) if FULL else (15, 30)
-FRICTIONS = (0.3, 1.0, math.inf) if FULL else (0.3, 1.0)
+STEP, LAYERS = (0.05, 8) if FULL else (0.1, 5)
+STEPS = (50, 100, 200) if FULL else (50, 100)
+FRICTIONS = (0.3, 1.0, math.inf)
 LOADS = (0.34, 0.69, 1.37, 2.75)
 PROGRAM = Path(__file__).with_name("getfem_sphere.py")
 # As good as infinite: the shear of a sticking contact stays below the pressure.
@@ -140,15 +140,15 @@ def test_getfem_agrees_on_the_sphere_with_friction(python: str, friction: float)
     limit = 5e-4 if FULL else 2e-3
     for name in ("depth", "contact radius", "highest base stress", "base stress", "base shear"):
         assert found[name] < limit, name
-    assert found["pressure"] < 5e-3
-    # Under the last steps' rings, the shear itself goes down less evenly.
-    assert worst(friction, fine)["shear"] < 3e-2
+    assert found["pressure"] < 6e-3
+    # The shear of the interface has a stair for every step, which no extrapolation takes away.
+    assert worst(friction, fine)["shear"] < 2e-2
 
 
 @pytest.mark.parametrize("friction", FRICTIONS)
 def test_smaller_steps_bring_getfem_closer(python: str, friction: float) -> None:
     errors = [worst(friction, by_getfem(python, friction, n))["base stress"] for n in STEPS]
-    assert all(fine < coarse / 1.5 for coarse, fine in itertools.pairwise(errors))
+    assert all(fine < coarse / 1.3 for coarse, fine in itertools.pairwise(errors))
 
 
 def test_friction_moves_getfem_by_far_more_than_the_two_differ(python: str) -> None:
