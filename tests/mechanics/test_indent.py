@@ -205,8 +205,6 @@ def test_a_rod_pushed_through_the_film_is_refused() -> None:
         ({"rings": 3}, "at least 16"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_plain_words(
-    wrong: dict[str, Any], message: str
-) -> None:
+def test_what_makes_no_sense_is_refused_in_plain_words(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         indent(FILM, Sphere(radius=0.1288), load=1.0, **wrong)

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from memscal.errors import ConvergenceError
 from memscal.mechanics.solver.at_once import step_at_once
-from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target, Touch
+from memscal.mechanics.solver.edge import meet_at, mixture, reached
+from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target
 from memscal.mechanics.solver.step import take_step
 from memscal.model.validation import FloatArray
 
@@ -92,85 +93,98 @@ def _in_one_step(
         yield PathPoint(state, 1, _elastic_energy(problem, state), None, None)
 
 
+@dataclass(eq=False)
+class _Walk:
+    """Where the path has come to, and what the way has cost."""
+
+    problem: ContactProblem
+    state: ContactState
+    steps: int = 0
+    work: float = 0.0
+    dissipated: float = 0.0
+
+    def step_to(self, following: ContactState) -> None:
+        before = self.state
+        self.work += (before.load + following.load) / 2 * (following.depth - before.depth)
+        self.dissipated += _dissipation(self.problem, before, following)
+        self.state, self.steps = following, self.steps + 1
+
+    def point(self) -> PathPoint:
+        energy = _elastic_energy(self.problem, self.state)
+        # Where nothing is lost, whatever the way, the energy in the film is the work done.
+        lossless = self.problem.friction == 0 and self.problem.normal_law is None
+        work = energy if lossless else self.work
+        return PathPoint(self.state, self.steps, energy, work, self.dissipated)
+
+
 def _step_by_step(
     problem: ContactProblem, targets: Sequence[Target], increments: int
 ) -> Iterator[PathPoint]:
-    """Follow the path; add up work and dissipation."""
-    state, steps, work, dissipated = problem.virgin(), 0, 0.0, 0.0
-
-    def reached() -> PathPoint:
-        energy = _elastic_energy(problem, state)
-        # Where nothing is lost, whatever the way, the energy in the film is the work done.
-        lossless = problem.friction == 0 and problem.normal_law is None
-        return PathPoint(state, steps, energy, energy if lossless else work, dissipated)
-
+    """Follow the path from target to target."""
+    walk = _Walk(problem, problem.virgin())
+    # The last state of the path that a target interrupted, and the way it went.
+    resume, upward = walk, True
     farthest = max(target.value for target in targets)
     for target in targets:
+        rising = target.value > reached(walk.state, target)
+        if rising == upward:
+            walk = resume
         try:
-            for following in _states_to(problem, state, target, farthest, increments):
-                work += (state.load + following.load) / 2 * (following.depth - state.depth)
-                dissipated += _dissipation(problem, state, following)
-                state, steps = following, steps + 1
+            if problem.normal_law is not None:
+                _walk_evenly(walk, target, farthest, increments)
+            elif problem.friction == 0:
+                walk.step_to(take_step(problem, walk.state, target))
+            else:
+                resume, upward = _walk_ring_by_ring(walk, target, rising=rising), rising
         except ConvergenceError as error:
-            error.last = reached() if steps else None
+            error.last = walk.point() if walk.steps else None
             raise
-        yield reached()
+        yield walk.point()
+        if problem.friction == 0 or problem.normal_law is not None:
+            resume = walk
 
 
-def _states_to(
-    problem: ContactProblem,
-    state: ContactState,
-    target: Target,
-    farthest: float,
-    increments: int,
-) -> Iterator[ContactState]:
-    """Yield the states of the steps to one target, which is the last."""
-    if problem.normal_law is not None:
-        yield from _even_steps(problem, state, target, farthest, increments)
-        return
-    if problem.friction == 0:
-        yield take_step(problem, state, target)
-        return
-    rising = target.value > _reached(state, target)
-    while (event := _next_event(problem, state, rising=rising)) is not None:
-        following = take_step(problem, _onset(state, rising=rising), event)
-        if not _between(following, state, target):
-            break
-        yield following
-        state = following
-    yield from _to_target(problem, state, target, rising=rising)
+def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
+    """Go to the target, ring by ring; return the walk as it was at the last ring before it.
+
+    A path that goes on in the same direction goes on from there: looking at a state between two
+    rings must not change those that follow.
+    """
+    problem = walk.problem
+    while (following := _next_meeting(problem, walk.state, target, rising=rising)) is not None:
+        if not _between(following, walk.state, target):
+            before = replace(walk)
+            walk.step_to(mixture(walk.state, following, target))
+            return before
+        walk.step_to(following)
+    _walk_with_given_contact(walk, target)
+    return walk
 
 
-def _to_target(
-    problem: ContactProblem, state: ContactState, target: Target, *, rising: bool
-) -> Iterator[ContactState]:
-    """Yield the last steps to a target, on the way to which no ring's touch comes any more."""
-    # Under a rod the contact is given, also where an edge that sticks pulls at the film.
-    given = not np.any(_reachable(problem, problem.virgin().touching))
-    count = _STEPS_OF_A_FIXED_CONTACT if given and state.load > 0 else 1
-    begin = _reached(state, target)
+def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
+    """Go to a target under an indenter with no more rings to touch, such as a rod.
+
+    The first loading is one step, because everything grows in proportion.  An edge that sticks
+    may pull at the film.
+    """
+    count = _STEPS_OF_A_FIXED_CONTACT if walk.state.load > 0 else 1
+    begin = reached(walk.state, target)
     for share in np.arange(1, count + 1) / count:
         value = begin + (target.value - begin) * float(share)
         goal = target if share == 1 else replace(target, value=value)
-        state = take_step(problem, _onset(state, rising=rising), goal, same_contact=given)
-        yield state
+        walk.step_to(take_step(walk.problem, walk.state, goal, same_contact=True))
 
 
-def _even_steps(
-    problem: ContactProblem,
-    state: ContactState,
-    target: Target,
-    farthest: float,
-    increments: int,
-) -> Iterator[ContactState]:
-    """Yield states that are evenly spaced in the contact radius of a sphere."""
+def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) -> None:
+    """Go to a target in steps that are even in the contact radius of a sphere."""
     power = 3 if isinstance(target, Load) else 2
-    begin, end = ((v / farthest) ** (1 / power) for v in (_reached(state, target), target.value))
+    start = reached(walk.state, target)
+    begin, end = ((value / farthest) ** (1 / power) for value in (start, target.value))
     count = max(1, math.ceil(increments * abs(end - begin) - 1e-9))
     for share in np.linspace(begin, end, count + 1)[1:-1]:
-        state = take_step(problem, state, replace(target, value=farthest * float(share) ** power))
-        yield state
-    yield take_step(problem, state, target)
+        goal = replace(target, value=farthest * float(share) ** power)
+        walk.step_to(take_step(walk.problem, walk.state, goal))
+    walk.step_to(take_step(walk.problem, walk.state, target))
 
 
 def _onset(state: ContactState, *, rising: bool) -> ContactState:
@@ -178,18 +192,25 @@ def _onset(state: ContactState, *, rising: bool) -> ContactState:
     return state if rising else replace(state, touching=state.touching & (state.pressure > 0))
 
 
-def _next_event(problem: ContactProblem, state: ContactState, *, rising: bool) -> Touch | None:
-    """Return the ring where the surfaces meet, or part, next; ``None`` where there is none."""
-    touching = _onset(state, rising=rising).touching
-    reachable = _reachable(problem, touching)
-    if rising:
-        candidates, measure = reachable, problem.separations(state)
-    else:
-        candidates, measure = touching & _neighbours(reachable), state.pressure
-    where = np.flatnonzero(candidates)
-    if where.size == 0 or (not rising and np.count_nonzero(touching) < 2):
+def _next_meeting(
+    problem: ContactProblem, state: ContactState, target: Target, *, rising: bool
+) -> ContactState | None:
+    """Return the next state in which the surfaces just meet at a ring at the contact's edge.
+
+    A contact with a hole has two edges: what meets, or parts, first comes next.  ``None`` where
+    the contact cannot grow or shrink.
+    """
+    onset = _onset(state, rising=rising)
+    edge = _reachable(problem, onset.touching)
+    if not rising:
+        edge = onset.touching & _neighbours(edge)
+        if np.count_nonzero(onset.touching) < 2:
+            return None
+    states = [meet_at(problem, onset, int(ring)) for ring in np.flatnonzero(edge)]
+    if not states:
         return None
-    return Touch(int(where[np.argmin(measure[where])]))
+    nearest = min if rising else max
+    return nearest(states, key=lambda following: reached(following, target))
 
 
 def _reachable(problem: ContactProblem, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -204,13 +225,9 @@ def _neighbours(rings: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return beside
 
 
-def _reached(state: ContactState, target: Target) -> float:
-    return state.load if isinstance(target, Load) else state.depth
-
-
 def _between(following: ContactState, state: ContactState, target: Target) -> bool:
     """Whether a step brought the state nearer to the target without passing it."""
-    begin, now = _reached(state, target), _reached(following, target)
+    begin, now = reached(state, target), reached(following, target)
     return begin < now <= target.value or begin > now >= target.value
 
 
@@ -223,9 +240,11 @@ def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:
 
 def _dissipation(problem: ContactProblem, before: ContactState, after: ContactState) -> float:
     """Return the work of friction against the slip between two states, in J."""
-    both = before.touching & after.touching
-    slipped = np.where(both, after.anchor - before.anchor, 0.0)
-    shear = (before.shear + after.shear) / 2
+    slips = before.touching & (after.pressure > 0) & (after.slip != 0)
+    slipped = np.where(slips, after.anchor - before.anchor, 0.0)
+    # A ring that turns around slips under the shear that it has at the end.
+    steady = before.slip == after.slip
+    shear = np.where(steady, (before.shear + after.shear) / 2, after.shear)
     return -_surface_integral(problem.compliance.r, (shear, slipped))
 
 

@@ -8,6 +8,7 @@ placing: it is found with a coarse contact, and the result is compared on twice 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,10 +19,14 @@ __all__ = ["even_rings", "rings_around", "rings_under_a_rod"]
 
 # Rings beyond the largest contact, so that it can end where it will.
 _MARGIN = 4
-# Halvings of the spacing towards a contact's edge, on either side.
-_HALVINGS = 5
+# At a contact's edge the spacing has shrunk by this factor, and grows away from it by this share
+# of the distance.
+_FINEST = 1 / 16
+_GROWTH = 0.4
 # A rod's rings crowd as the fourth power of their number counted from the edge.
 _CROWDING = 4.0
+# Radii at which the spacing is tabulated.
+_SAMPLES = 100_001
 
 
 def even_rings(reach: float, count: int) -> FloatArray:
@@ -42,19 +47,14 @@ def rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArray
         Even rings up to ``reach``; those at the edges come on top.
     """
     spacing = reach / count
-    rings = np.asarray(spacing * np.arange(count + 1 + _MARGIN), dtype=np.float64)
+    r = np.linspace(0.0, reach + _MARGIN * spacing, _SAMPLES)
+    local = np.full(r.size, spacing)
     for edge in edges:
-        steps = spacing * 0.5 ** np.arange(1, _HALVINGS + 1)
-        rings = np.concatenate([rings, edge - steps, [edge], edge + steps])
-    rings = np.asarray(np.unique(rings))
-    # Even rings that fall among the crowd would only make slivers.
-    finest = spacing * 0.5**_HALVINGS
-    keep = np.ones(rings.size, dtype=bool)
-    last = 0
-    for i in range(1, rings.size):
-        keep[i] = rings[i] - rings[last] > 0.6 * finest
-        last = i if keep[i] else last
-    return np.asarray(rings[keep])
+        graded = np.hypot(_FINEST * spacing, _GROWTH * (r - edge))
+        local = np.minimum(local, graded)
+    # Where the number of rings passed so far is whole, there is one.
+    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (1 / local[1:] + 1 / local[:-1]))])
+    return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
 def rings_under_a_rod(radius: float, count: int) -> FloatArray:

@@ -77,14 +77,14 @@ class ContactProblem:
         return np.asarray(self.heights - state.depth + w)
 
     def virgin(self) -> ContactState:
-        """Return the state before the first touch."""
-        nothing = np.zeros(self.size)
+        """Return the state of the first touch, at the ring (or rings) of the lowest height."""
+        nothing, lowest = np.zeros(self.size), float(self.heights.min())
         return ContactState(
             pressure=nothing,
             shear=nothing,
-            depth=0.0,
+            depth=lowest,
             load=0.0,
-            touching=self.heights <= 0,
+            touching=self.heights <= lowest,
             slip=np.zeros(self.size, dtype=np.int8),
             anchor=nothing,
             outward=nothing,

@@ -91,6 +91,7 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
     count = request.rings or _FEWEST_RINGS
     coarse = _solve(request, _rings(request, edges, reach, max(count // 2, 8)))
     while True:
+        edges = [contact.contact_radius for contact in coarse]
         fine = _solve(request, _rings(request, edges, reach, count))
         changes = [_change(*pair) for pair in zip(fine, coarse, strict=True)]
         if max(changes) < _SETTLED or request.rings or 2 * count > _MOST_RINGS:
@@ -127,7 +128,14 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
     reach = film.thickness
     while True:
         rings = even_rings(reach, _COARSE)
-        states = [point.state for point in _follow(request, HankelFilm(film, rings))[1]]
+        try:
+            states = [point.state for point in _follow(request, HankelFilm(film, rings))[1]]
+        except ConvergenceError:
+            # A contact that has run off the rings may not settle.
+            if reach > _WIDEST * film.thickness:
+                raise
+            reach *= 2
+            continue
         filled = max(int(np.flatnonzero(state.pressure > 0)[-1]) for state in states)
         if filled >= _COARSE - 4:
             reach *= 2
@@ -246,7 +254,7 @@ def _stick_radius(
     last = int(sticking[-1])
     if last + 1 >= rings.size or not state.touching[last + 1]:
         return contact_radius
-    return float(rings[last] + rings[last + 1]) / 2
+    return min(contact_radius, float(rings[last] + rings[last + 1]) / 2)
 
 
 def _change(fine: Contact, coarse: Contact) -> float:
@@ -255,4 +263,5 @@ def _change(fine: Contact, coarse: Contact) -> float:
     r = np.linspace(0.0, reach, _SAMPLES)
     ours, theirs = fine.base_stress(r), coarse.base_stress(r)
     by_stress = float(np.max(np.abs(ours - theirs)) / np.max(np.abs(ours)))
-    return max(by_stress, abs(coarse.load / fine.load - 1), abs(coarse.depth / fine.depth - 1))
+    by_load, by_depth = abs(coarse.load / fine.load - 1), abs(coarse.depth / fine.depth - 1)
+    return float(max(by_stress, by_load, by_depth))

@@ -183,7 +183,13 @@ def _revised_slip(
         return statuses.slip, False
     if careful:
         changing = np.arange(wrong.size) == np.argmax(wrong)
-    slip = np.where(changing, np.where(sticks, np.sign(q), 0), statuses.slip)
+    # A ring that friction would push on far enough to slip back does so at once (the trial shear
+    # of Alart and Curnier); sticking first, it could go back and forth for ever.
+    stretch = u - statuses.anchor
+    turn = 2 * mu * np.maximum(p, 0.0) * np.diagonal(problem.compliance.radial)
+    turns = np.abs(stretch) > np.maximum(turn, problem.interface.slip_length)
+    turned = np.where(turns, -np.sign(stretch), 0)
+    slip = np.where(changing, np.where(sticks, np.sign(q), turned), statuses.slip)
     return slip.astype(np.int8), True
 
 

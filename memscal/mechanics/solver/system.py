@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from memscal.errors import ConvergenceError
 from memscal.mechanics.solver.problem import ContactProblem, Depth, Goal, Load
 from memscal.model.validation import FloatArray
 
@@ -89,7 +90,14 @@ def solve_system(problem: ContactProblem, statuses: Statuses, goal: Goal) -> Tra
     _add_normal_compliance(problem, statuses, rows, matrix, right)
     if problem.interface.slip_length > 0 and math.isfinite(mu):
         _add_tangential_compliance(problem, statuses, (rows, stuck), matrix, right)
-    found = np.linalg.solve(matrix, right)
+    try:
+        found = np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError as error:
+        raise ConvergenceError(
+            "The equations of the contact have no solution.",
+            why=f"{rows.size} rings press and {stuck.size} of them stick, on the way to {goal}.",
+            cure="Check film, indenter and loads, and their units; try another number of rings.",
+        ) from error
 
     pressure, shear = np.zeros(problem.size), np.zeros(problem.size)
     pressure[rows] = found[: rows.size]

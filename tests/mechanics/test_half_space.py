@@ -1,0 +1,96 @@
+"""The surface of a half-space under rings of traction, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.special import ellipe, ellipk, j0, j1
+
+from memscal.mechanics.half_space import coupling_integrals, singular_integrals
+from memscal.mechanics.rings import RingTraction, hat_transforms
+from memscal.mechanics.rod import solve_rod
+
+FloatArray = NDArray[np.float64]
+
+EVEN = np.linspace(0.0, 1.0, 41)
+CROWDED = 1 - np.linspace(1.0, 0.0, 60) ** 4
+
+
+@pytest.mark.parametrize("rings", [EVEN, CROWDED], ids=["even", "crowded"])
+def test_a_disc_of_pressure_presses_as_love_found(rings: FloatArray) -> None:
+    x = np.array([0.0, 0.1, 0.5, 0.99, 0.999999, 1.0, 1.000001, 1.3, 7.0])
+    found = singular_integrals(x, rings)[0] @ np.ones(rings.size)
+    outside = np.maximum(x, 1.0)
+    t = 1 / outside
+    love = np.where(
+        x <= 1,
+        2 / np.pi * ellipe(np.minimum(x, 1.0) ** 2),
+        2 / np.pi * outside * (ellipe(t**2) - (1 - t**2) * ellipk(np.where(x > 1, t**2, 0.0))),
+    )
+    np.testing.assert_allclose(found, love, rtol=2e-10)
+
+
+@pytest.mark.parametrize("rings", [EVEN, CROWDED], ids=["even", "crowded"])
+def test_a_linear_outward_traction_is_integrated_as_adaptive_quadrature_does(
+    rings: FloatArray,
+) -> None:
+    def kernel(s: float, x: float) -> float:
+        m = min(x, s) / max(x, s)
+        return 2 / np.pi * (ellipk(m**2) - ellipe(m**2)) / min(x, s)
+
+    for x in (0.05, 0.4321, 0.975, 2.0):
+        breaks = [x] if x < 1 else None
+        exact, _ = quad(lambda s: kernel(s, x) * s**2, 0, 1, points=breaks, epsrel=1e-11)  # noqa: B023
+        found = singular_integrals(np.array([x]), rings)[1] @ rings
+        assert found[0] == pytest.approx(exact, rel=1e-8)
+
+
+def test_on_the_axis_nothing_moves_sideways() -> None:
+    assert np.all(singular_integrals(np.zeros(1), EVEN)[1] == 0)
+    assert np.all(coupling_integrals(np.zeros(1), EVEN)[1] == 0)
+
+
+def test_the_coupling_is_elementary() -> None:
+    x = np.array([0.0, 0.013, 0.5, 1.0, 3.0])
+    beyond, within = coupling_integrals(x, EVEN)
+    inside = np.minimum(x, 1.0)
+    np.testing.assert_allclose(beyond @ EVEN, (1 - inside**2) / 2, atol=1e-15)
+    over_x = np.divide(inside**3 / 3, x, out=np.zeros_like(x), where=x > 0)
+    np.testing.assert_allclose(within @ EVEN, over_x, atol=1e-15)
+
+
+def test_the_transforms_of_the_hats_sum_to_those_of_simple_tractions() -> None:
+    k = np.array([0.3, 2.0, 11.0, 40.0])
+    of_pressure, of_shear = hat_transforms(EVEN, k)
+    np.testing.assert_allclose(of_pressure @ np.ones(41), j1(k) / k, rtol=1e-12)
+    j2 = 2 * j1(k) / k - j0(k)
+    np.testing.assert_allclose(of_shear @ EVEN, j2 / k, atol=1e-14)
+
+
+def test_a_ring_traction_transforms_as_the_sum_of_its_hats() -> None:
+    rng = np.random.default_rng()
+    p, q = rng.uniform(size=(2, EVEN.size))
+    traction = RingTraction(EVEN, p, q)
+    k = np.array([[0.0, 1.0], [7.0, 30.0]])
+    of_pressure, of_shear = hat_transforms(EVEN, k.ravel())
+    np.testing.assert_allclose(traction.pressure_transform(k).ravel(), of_pressure @ p, rtol=1e-11)
+    np.testing.assert_allclose(
+        traction.shear_transform(k).ravel(), of_shear @ q, rtol=1e-11, atol=1e-16
+    )
+
+
+@pytest.mark.parametrize("nu", [0.2, 0.5])
+def test_rings_and_spherical_bessel_functions_move_the_surface_alike(nu: float) -> None:
+    # A rod's traction, sampled on rings that crowd to its edge; the last ring carries what the
+    # singular pressure has beyond the last but one.
+    rod = solve_rod(0.25, nu, sticking=True).traction(1.0, 1.0)
+    rings = 1 - np.linspace(1.0, 0.0, 1500) ** 4
+    p, q = rod.pressure(rings), rod.shear(rings)
+    p[-1], q[-1] = 3 * p[-2], 3 * q[-2]
+    x = np.array([0.0, 0.3, 0.9, 1.2, 4.0])
+    ours = rod.half_space_integrals(x)
+    sampled = RingTraction(rings, p, q).half_space_integrals(x)
+    for name, one, other in zip(["w(p)", "w(q)", "u(p)", "u(q)"], ours, sampled, strict=True):
+        np.testing.assert_allclose(one, other, atol=2e-5 * np.abs(ours[0]).max(), err_msg=name)

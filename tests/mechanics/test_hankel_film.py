@@ -1,0 +1,87 @@
+"""The film's surface by Hankel transforms: reciprocity, limits, and the rod's own condition."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from memscal.axisymmetry.quadrature import gauss_between, gauss_panels
+from memscal.mechanics.hankel_film import HankelField, HankelFilm
+from memscal.mechanics.indent import indent
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod
+
+
+def film(nu: float, thickness: float = 2e-3) -> ElasticFilm:
+    return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=thickness)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.495, 0.5])
+def test_the_compliance_is_reciprocal(nu: float) -> None:
+    # Betti: what one pair of tractions does along the other is what the other does along it.
+    rng = np.random.default_rng()
+    rings = np.linspace(0.0, 4e-3, 13)
+    r, weights = gauss_between(rings, order=40)
+    measure = weights * r
+    model = HankelFilm(film(nu), rings)
+    one, other = (model.field(*rng.uniform(size=(2, rings.size))) for _ in range(2))
+
+    def along(forces: HankelField, moved: HankelField) -> float:
+        p, q = forces.traction.pressure(r), forces.traction.shear(r)
+        return float(measure @ (p * moved.depression(r) + q * moved.outward(r)))
+
+    assert along(one, other) == pytest.approx(along(other, one), rel=1e-5)
+    assert along(one, one) > 0
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+def test_the_energy_of_any_traction_is_positive(nu: float) -> None:
+    surface = HankelFilm(film(nu), np.linspace(0.0, 5e-3, 41)).compliance
+    m = surface.areas[:, None]
+    blocks = np.block(
+        [
+            [m * surface.normal, m * surface.normal_by_shear],
+            [m * surface.radial_by_pressure, m * surface.radial],
+        ]
+    )
+    inner = np.delete(np.delete(blocks, 41, axis=0), 41, axis=1)  # no shear on the axis
+    assert np.linalg.eigvalsh((inner + inner.T) / 2).min() > 0
+
+
+@pytest.mark.parametrize("nu", [0.2, 0.5])
+@pytest.mark.parametrize("sticking", [False, True])
+def test_the_surface_meets_a_rod_all_the_way_to_its_edge(nu: float, sticking: bool) -> None:
+    friction = math.inf if sticking else 0.0
+    contact = indent(film(nu), Rod(radius=1e-3), load=1.0, friction=friction)
+    r = np.linspace(0.0, 0.95e-3, 20)
+    np.testing.assert_allclose(contact.surface_depression(r), contact.depth, rtol=2e-4)
+    beside = contact.surface_depression([1.0001e-3, 1.1e-3, 10e-3])
+    assert 0.9 < beside[0] / contact.depth < 1
+    assert beside[1] < beside[0]
+    assert abs(beside[2]) < 0.02 * contact.depth
+    if sticking:
+        assert np.max(np.abs(contact.surface_outward(r))) < 2e-4 * contact.depth
+
+
+def test_an_incompressible_film_keeps_its_volume() -> None:
+    contact = indent(film(0.5), Rod(radius=1e-3), load=1.0)
+    # Inside and outside the edge apart: the surface bends sharply there.
+    inside, w_in = gauss_panels(1e-3, 0.05e-3)
+    s, w_out = gauss_panels(1.0, 0.02)
+    outside = 1e-3 + 60e-3 * s**2
+    volume = np.sum(w_in * inside * contact.surface_depression(inside))
+    sunk = volume
+    volume += np.sum(w_out * 120e-3 * s * outside * contact.surface_depression(outside))
+    assert abs(volume) < 1e-5 * sunk
+
+
+def test_a_thick_film_answers_as_a_half_space() -> None:
+    rings = np.linspace(0.0, 1e-3, 41)
+    thick = HankelFilm(film(0.3, thickness=1.0), rings).compliance
+    twice = HankelFilm(film(0.3, thickness=2.0), rings).compliance
+    # The layer's share falls as 1/h: three thousandths of three thousandths are left.
+    np.testing.assert_allclose(thick.radial, twice.radial, atol=2e-3 * np.abs(twice.radial).max())
+    love = 2 * 1e-3 / film(0.3).contact_modulus  # depression at the centre of a unit disc
+    assert (twice.normal @ np.ones(41))[0] == pytest.approx(love, rel=1e-3)
