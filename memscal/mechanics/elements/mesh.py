@@ -1,0 +1,207 @@
+"""Triangles in the film's cross-section: fitted to the rings, coarser away from the contact.
+
+From the surface, rows of nodes go down to the base.  A row keeps the radii of the row above and
+drops every second node where the triangles may be wider there, so that their number hardly
+depends on how fine the rings are.  Where the surface is finer, a row goes down in smaller steps,
+and there are more of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from memscal.model.validation import FloatArray
+
+__all__ = ["TriangleMesh", "film_triangles"]
+
+# Intervals between rings that one side of a triangle spans: a quartic has as many.
+_INTERVALS = 4
+# ... and fewer at the last rings, where a rod's pressure is singular: one more every so many.
+_AT_THE_EDGE = 4
+# ... where the widest of them is at most so many times the narrowest.
+_UNEVEN = 2.1
+# Widest side at distances from the contact, all in film thicknesses: the field decays ...
+_DISTANCES = (1.0, 5.0, 9.0)
+_WIDEST = (0.25, 0.6, 1.5)
+# ... and beyond, a side may grow by this share of the distance.
+_WIDENING = 0.3
+# Growth of a side from one to the next along the surface, and with depth.
+_GROWTH = 0.6
+_SLOPE = 1.0
+# A node goes down with the row if it comes at most so many times as deep as the first.
+_TOGETHER = 1.5
+# So many steps from the base, a node goes on in even steps.
+_EVEN_STEPS = 3
+# A dropped node stays at least this share of the bridging side above it.
+_ROOM = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Nodes and triangles of a film's cross-section.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Radius and depth below the surface of the nodes, in the unit of the rings.
+    triangles : ndarray of int, shape (m, 3)
+        Indices of the corners.
+    """
+
+    points: FloatArray
+    triangles: NDArray[np.int64]
+
+
+def film_triangles(
+    rings: FloatArray, *, radius: float, thickness: float, refinement: int = 1
+) -> TriangleMesh:
+    """Return a mesh of the film between the axis and its free edge.
+
+    Parameters
+    ----------
+    rings : ndarray, shape (n,)
+        Increasing radii of the rings, from 0; at most ``radius``.
+    radius, thickness : float
+        Of the film, in the same unit.
+    refinement : int
+        How many times shorter than by default all sides are.
+
+    Examples
+    --------
+    >>> mesh = film_triangles(np.linspace(0, 1, 101), radius=12.0, thickness=2.0)
+    >>> mesh.triangles.shape[0] < 1000
+    True
+    """
+    sizes = _Sizes(rings[-1], thickness, refinement)
+    front = _Front(_surface_nodes(rings, radius, sizes), sizes)
+    while not front.is_at_the_base:
+        front.advance()
+    return TriangleMesh(np.array(front.points), np.array(front.triangles, dtype=np.int64))
+
+
+@dataclass(frozen=True)
+class _Sizes:
+    """How long a side of a triangle may be."""
+
+    contact: float
+    thickness: float
+    refinement: int
+
+    def widest(self, r: ArrayLike) -> FloatArray:
+        """Return the longest side allowed at ``r``."""
+        away = (np.asarray(r) - self.contact) / self.thickness
+        widest = np.interp(away, _DISTANCES, _WIDEST)
+        widest += _WIDENING * np.maximum(away - _DISTANCES[-1], 0.0)
+        return np.asarray(widest * self.thickness / self.refinement)
+
+
+def _surface_nodes(rings: FloatArray, radius: float, sizes: _Sizes) -> FloatArray:
+    """Return the corners of triangles on the surface: some of the rings, and others beyond."""
+    inside = _fitted(rings, sizes)
+    beyond = [rings[-1]]
+    step = rings[-1] - inside[-2]
+    while beyond[-1] < radius:
+        longest = float(sizes.widest(beyond[-1]))
+        step = min(step * (1 + _GROWTH / sizes.refinement), longest)
+        left = radius - beyond[-1]
+        beyond.append(radius if left < 1.5 * step else beyond[-1] + step)
+    return np.concatenate([inside, beyond[1:]])
+
+
+def _fitted(rings: FloatArray, sizes: _Sizes) -> FloatArray:
+    """Return corners from the axis to the last ring, from that ring inward."""
+    gaps = np.diff(rings)
+    corners = [rings[-1]]
+    last = gaps.size
+    while last > 0:
+        outward = gaps.size - last
+        span = max(1, min(_INTERVALS, outward // _AT_THE_EDGE + 1) // sizes.refinement)
+        first = last - 1
+        longest = float(sizes.widest(rings[last]))
+        while first > 0 and last - first < span:
+            group = gaps[first - 1 : last]
+            if group.sum() > longest or group.max() > _UNEVEN * group.min():
+                break
+            first -= 1
+        pieces = int(np.ceil(gaps[first:last].sum() / longest))
+        corners.extend(np.linspace(rings[last], rings[first], pieces + 1)[1:])
+        last = first
+    return np.array(corners[::-1])
+
+
+class _Front:
+    """The lowest row of nodes so far, as it advances to the base."""
+
+    def __init__(self, r: FloatArray, sizes: _Sizes) -> None:
+        self.sizes = sizes
+        self.r = r
+        self.depth = np.zeros_like(r)
+        self.node = np.arange(r.size)
+        self.points: list[tuple[float, float]] = [(radius, 0.0) for radius in r]
+        self.triangles: list[tuple[int, int, int]] = []
+
+    @property
+    def is_at_the_base(self) -> bool:
+        return bool(np.all(self.depth == self.sizes.thickness))
+
+    def advance(self) -> None:
+        """Go down where that leads least deep, and fill what lies between with triangles."""
+        above = self.depth < self.sizes.thickness
+        ahead = np.where(above, self._next_depths(), self.sizes.thickness)
+        moving = above & (ahead <= _TOGETHER * ahead.min())
+        lower = np.where(moving, ahead, self.depth)
+        kept = self._kept(moving, lower)
+        node = self.node.copy()
+        for i in np.flatnonzero(moving & kept):
+            node[i] = len(self.points)
+            self.points.append((self.r[i], lower[i]))
+        self._fill(node, np.flatnonzero(kept))
+        self.r, self.depth, self.node = self.r[kept], lower[kept], node[kept]
+
+    def _next_depths(self) -> FloatArray:
+        """Return the depth to which each node would go; the last steps to the base are even."""
+        sides = np.pad((self.r[2:] - self.r[:-2]) / 2, 1, mode="edge")
+        left = self.sizes.thickness - self.depth
+        tallest = self.sizes.thickness / (2 * self.sizes.refinement)
+        step = np.minimum(sides, np.minimum(self.sizes.widest(self.r), tallest))
+        count = np.round(np.maximum(left / step, 1.0))
+        depth = self.depth + np.where(count <= _EVEN_STEPS, left / count, step)
+        return np.where(count == 1, self.sizes.thickness, depth)
+
+    def _kept(self, moving: NDArray[np.bool_], lower: FloatArray) -> NDArray[np.bool_]:
+        """Return which nodes the next row has: never do two neighbours drop out."""
+        width = np.zeros_like(self.r)
+        width[1:-1] = self.r[2:] - self.r[:-2]
+        slope = _SLOPE / self.sizes.refinement
+        longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(self.r))
+        # The side that bridges a dropped node must pass well below it.
+        room = np.zeros_like(self.r)
+        share = (self.r[1:-1] - self.r[:-2]) / np.maximum(width[1:-1], self.r[-1] * 1e-300)
+        bridge = (1 - share) * lower[:-2] + share * lower[2:]
+        room[1:-1] = bridge - self.depth[1:-1]
+        droppable = moving & (width > 0) & (width <= longest) & (room >= _ROOM * width)
+        kept = np.ones(self.r.size, dtype=bool)
+        for i in np.flatnonzero(droppable):
+            kept[i] = not kept[i - 1]
+        return kept
+
+    def _fill(self, node: NDArray[np.int64], kept: NDArray[np.int64]) -> None:
+        """Add the triangles between this row and the next."""
+        for left, right in pairwise(kept):
+            a, b, a_below, b_below = self.node[left], self.node[right], node[left], node[right]
+            if right - left == 2:
+                middle = self.node[left + 1]
+                corners = [(a, a_below, middle), (a_below, b_below, middle), (middle, b_below, b)]
+            elif self._length(a, b_below) <= self._length(a_below, b):
+                corners = [(a, a_below, b_below), (a, b_below, b)]
+            else:
+                corners = [(a, a_below, b), (a_below, b_below, b)]
+            self.triangles.extend(each for each in corners if len(set(each)) == 3)
+
+    def _length(self, one: int, other: int) -> float:
+        (r1, d1), (r2, d2) = self.points[one], self.points[other]
+        return float(np.hypot(r1 - r2, d1 - d2))

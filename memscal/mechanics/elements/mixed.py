@@ -1,0 +1,151 @@
+r"""The mixed finite elements: quartic displacement and cubic mean pressure on triangles.
+
+With the strain :math:`\varepsilon`, its deviator :math:`e` and the mean pressure :math:`P`,
+
+.. math::
+
+    \int \left(2G\,e(u):e(v) - P\,\mathrm{div}\,v\right) r\,dr\,dz = \text{work of the tractions},
+    \qquad
+    \int \left(\mathrm{div}\,u + P/K\right) Q\,r\,dr\,dz = 0,
+
+with the bulk modulus :math:`1/K = 3(1-2\nu)/2G(1+\nu)`, which vanishes where the film is
+incompressible: the same equations hold for every Poisson's ratio.  The pair is Taylor and Hood's
+of fourth order, which does not lock (Boffi, Brezzi and Fortin 2013, chapter 8).
+
+Lengths are in film thicknesses and stresses in shear moduli: in SI units, pressures and
+displacements would differ by 12 orders of magnitude, and the direct solver would lose digits.
+The second coordinate is the depth below the surface, so that the second displacement is the
+depression.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_array, csc_array, csr_array
+
+from memscal.mechanics.elements.line import QuarticLine
+from memscal.mechanics.elements.mesh import TriangleMesh
+from memscal.model.validation import FloatArray
+
+__all__ = ["MixedSystem"]
+
+# Exact for what is polynomial: two gradients and r.  It is so also on the axis, where u/r is.
+_QUADRATURE = 8
+
+
+@dataclass(frozen=True, eq=False)
+class MixedSystem:
+    """The equations of a bonded film with a free edge, and their factorisation.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        In film thicknesses.
+    poisson_ratio : float
+        From 0 to 0.5.
+    """
+
+    mesh: TriangleMesh
+    poisson_ratio: float
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what it is made of; the factorisation cannot be copied, and is soon remade."""
+        return {"mesh": self.mesh, "poisson_ratio": self.poisson_ratio}
+
+    @cached_property
+    def displacement(self) -> Any:
+        """Basis of the displacement, outward and into the film."""
+        import skfem
+
+        mesh = skfem.MeshTri(
+            np.ascontiguousarray(self.mesh.points.T), np.ascontiguousarray(self.mesh.triangles.T)
+        )
+        element = skfem.ElementVector(skfem.ElementTriP4())
+        return skfem.Basis(mesh, element, intorder=_QUADRATURE)
+
+    @cached_property
+    def pressure(self) -> Any:
+        """Basis of the mean pressure."""
+        import skfem
+
+        return self.displacement.with_element(skfem.ElementTriP3())
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """All equations, symmetric: those of the displacement, then those of the pressure."""
+        import skfem
+        from skfem.helpers import ddot, div, sym_grad
+
+        softness = 3 * (1 - 2 * self.poisson_ratio) / (2 * (1 + self.poisson_ratio))
+
+        def dilatation(u: Any, r: Any) -> Any:
+            return div(u) + u[0] / r
+
+        @skfem.BilinearForm  # type: ignore[untyped-decorator]
+        def distortion(u: Any, v: Any, w: Any) -> Any:
+            r = w.x[0]
+            whole = ddot(sym_grad(u), sym_grad(v)) + u[0] * v[0] / r**2
+            return 2 * (whole - dilatation(u, r) * dilatation(v, r) / 3) * r
+
+        @skfem.BilinearForm  # type: ignore[untyped-decorator]
+        def squeeze(u: Any, q: Any, w: Any) -> Any:
+            return -dilatation(u, w.x[0]) * q * w.x[0]
+
+        @skfem.BilinearForm  # type: ignore[untyped-decorator]
+        def compression(p: Any, q: Any, w: Any) -> Any:
+            return -softness * p * q * w.x[0]
+
+        coupled = squeeze.assemble(self.displacement, self.pressure)
+        return csr_array(
+            block_array(
+                [
+                    [distortion.assemble(self.displacement), coupled.T],
+                    [coupled, compression.assemble(self.pressure)],
+                ]
+            )
+        )
+
+    @cached_property
+    def free(self) -> NDArray[np.int64]:
+        """What is solved for: all unknowns but those that are held."""
+        return np.setdiff1d(np.arange(self.matrix.shape[0]), self._held)
+
+    @cached_property
+    def _held(self) -> NDArray[np.int64]:
+        """Nothing moves at the base, and nothing outward on the axis."""
+        deepest = self.mesh.points[:, 1].max()
+        base = self.displacement.get_dofs(lambda x: x[1] == deepest).all()
+        axis = self.displacement.get_dofs(lambda x: x[0] == 0).all(["u^1"])
+        return np.union1d(base, axis)
+
+    def side(self, depth: float) -> tuple[QuarticLine, NDArray[np.int64], NDArray[np.int64]]:
+        """Return the side of the mesh at a depth, with its outward and inward unknowns."""
+        on_it = self.displacement.get_dofs(lambda x: x[1] == depth)
+        outward, inward = on_it.all(["u^1"]), on_it.all(["u^2"])
+        r = self.displacement.doflocs[0]
+        outward, inward = outward[np.argsort(r[outward])], inward[np.argsort(r[inward])]
+        return QuarticLine(r[inward]), outward, inward
+
+    @cached_property
+    def _factors(self) -> Any:
+        from scipy.sparse.linalg import splu
+
+        # SuperLU's defaults.  Its symmetric mode must delay the pivots of the pressures, which are
+        # zero where the film is incompressible: it fills four times as much, for 10 times as long.
+        return splu(csc_array(self.matrix[self.free][:, self.free]))
+
+    def solve(self, unknowns: NDArray[np.int64], loads: FloatArray) -> FloatArray:
+        """Return all displacements and pressures, shape (all, n), under loads on some unknowns.
+
+        Loads have the shape (unknowns.size, n); what is held takes none.
+        """
+        right = np.zeros((self.matrix.shape[0], loads.shape[1]))
+        right[unknowns] = loads
+        right[self.free] = self._factors.solve(right[self.free])
+        right[self._held] = 0.0
+        return right

@@ -1,0 +1,207 @@
+"""The film by finite elements: against Hankel transforms, and against what must hold exactly."""
+
+from __future__ import annotations
+
+import copy
+from functools import cache
+
+import numpy as np
+import pytest
+
+from memscal.errors import DomainError, InputError
+from memscal.mechanics.elements.film import ElementFilm
+from memscal.mechanics.hankel_film import HankelFilm
+from memscal.model.film import ElasticFilm
+
+H = 2e-3
+RATIOS = (0.0, 0.3, 0.495, 0.5)
+
+
+def film_with(nu: float) -> ElasticFilm:
+    return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=H)
+
+
+@cache
+def elements(nu: float, width: float, rings: int = 120, refinement: int = 1) -> ElementFilm:
+    r = np.linspace(0, width * H, rings + 1)
+    return ElementFilm(film_with(nu), r, refinement=refinement)
+
+
+def tractions(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A pressure with Hertz's edge, and a shear that does not look like its field."""
+    x = r / r[-1]
+    return 1e5 * np.sqrt(1 - x**2), 3e4 * x * (1 - x**2)
+
+
+def worst(found: np.ndarray, expected: np.ndarray, scale: np.ndarray) -> float:
+    return float(np.max(np.abs(found - expected)) / np.max(np.abs(scale)))
+
+
+@pytest.mark.parametrize("width", [0.5, 1.7])
+@pytest.mark.parametrize("nu", RATIOS)
+def test_the_surface_moves_as_by_hankel_transforms(nu: float, width: float) -> None:
+    ours = elements(nu, width)
+    hankel = HankelFilm(ours.film, ours.r)
+    p, q = tractions(ours.r)
+    a, b = ours.compliance, hankel.compliance
+    down = b.normal @ p
+    assert worst(a.normal @ p, down, down) < 2e-4
+    assert worst(a.radial_by_pressure @ p, b.radial_by_pressure @ p, down) < 2e-4
+    outward = b.radial @ q
+    assert worst(a.radial @ q, outward, outward) < 1e-4
+    assert worst(a.normal_by_shear @ q, b.normal_by_shear @ q, outward) < 1e-4
+
+
+@pytest.mark.parametrize("width", [0.5, 1.7])
+@pytest.mark.parametrize("nu", RATIOS)
+def test_the_base_is_loaded_as_by_hankel_transforms(nu: float, width: float) -> None:
+    ours = elements(nu, width)
+    traction = tractions(ours.r)
+    a, b = ours.field(*traction), HankelFilm(ours.film, ours.r).field(*traction)
+    r = np.linspace(0, ours.r[-1] + 4 * H, 80)
+    normal = b.base_normal(r)
+    assert worst(a.base_normal(r), normal, normal) < 2e-4
+    assert worst(a.base_shear(r), b.base_shear(r), normal) < 2e-4
+    k = np.array([[0.0, 200.0], [1000.0, 3000.0]])
+    assert worst(a.base_spectrum(k), b.base_spectrum(k), b.base_spectrum(k)) < 1e-4
+
+
+def test_the_field_at_the_rings_is_what_the_compliance_says() -> None:
+    ours = elements(0.5, 1.7)
+    p, q = tractions(ours.r)
+    field, c = ours.field(p, q), ours.compliance
+    w, u = c.normal @ p + c.normal_by_shear @ q, c.radial_by_pressure @ p + c.radial @ q
+    np.testing.assert_allclose(field.depression(ours.r), w, rtol=1e-8, atol=1e-14)
+    np.testing.assert_allclose(field.outward(ours.r), u, rtol=1e-8, atol=1e-14)
+    between = (ours.r[1:] + ours.r[:-1]) / 2
+    np.testing.assert_allclose(
+        field.depression(between), np.interp(between, ours.r, w), atol=1e-3 * w.max()
+    )
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+def test_the_base_carries_the_load(nu: float) -> None:
+    ours = elements(nu, 0.5)
+    p, q = tractions(ours.r)
+    load = ours.compliance.areas @ p
+    spectrum = ours.field(p, q).base_spectrum(np.array([0.0]))
+    assert spectrum[0] == pytest.approx(load, rel=1e-7)
+
+
+def test_tractions_and_displacements_are_reciprocal() -> None:
+    # Betti: the work of one traction on the displacement by another is that of the other on the
+    # displacement by the one.  At the rings it holds to the accuracy of a sum over rings.
+    ours = elements(0.3, 0.5)
+    c, x = ours.compliance, ours.r / ours.r[-1]
+    one, other = (1 - x**2) ** 2, np.cos(3 * x) * (1 - x)
+    areas = c.areas
+    assert areas * one @ (c.normal @ other) == pytest.approx(
+        areas * other @ (c.normal @ one), rel=1e-3
+    )
+    sideways = x * one
+    assert areas * sideways @ (c.radial_by_pressure @ other) == pytest.approx(
+        areas * other @ (c.normal_by_shear @ sideways), rel=2e-3
+    )
+
+
+def test_finer_triangles_agree_better_with_hankel_transforms() -> None:
+    p, q = tractions(elements(0.5, 1.0).r)
+    hankel = HankelFilm(film_with(0.5), elements(0.5, 1.0).r).field(p, q)
+    r = np.linspace(0, 4 * H, 60)
+    change = [
+        worst(
+            elements(0.5, 1.0, refinement=n).field(p, q).depression(r),
+            hankel.depression(r),
+            hankel.depression(r),
+        )
+        for n in (1, 2)
+    ]
+    assert change[1] < change[0] / 2
+
+
+def test_a_compressible_film_under_a_wide_pressure_is_an_oedometer() -> None:
+    film = film_with(0.25)
+    wide = ElementFilm(film, np.linspace(0, 20 * H, 61), radius=30 * H)
+    modulus = film.shear_modulus * 2 * 0.75 / 0.5
+    pressure = np.full(61, 1e4)
+    field = wide.field(pressure, 0 * pressure)
+    r = np.array([0.0, 2 * H, 5 * H])
+    np.testing.assert_allclose(field.depression(r), 1e4 * H / modulus, rtol=1e-6)
+    np.testing.assert_allclose(field.base_normal(r), 1e4, rtol=1e-6)
+
+
+def test_the_edge_is_felt_only_where_it_is_near() -> None:
+    film, r = film_with(0.5), np.linspace(0, H, 61)
+    p, q = tractions(r)
+    at = np.array([0.0, H])
+    far, near, close = (
+        ElementFilm(film, r, radius=radius).field(p, q).depression(at)
+        for radius in (25e-3, 10e-3, 1.5 * H)
+    )
+    assert worst(near, far, far) < 2e-3
+    assert worst(close, far, far) > 2e-2
+
+
+def test_a_graded_rod_edge_is_resolved() -> None:
+    # A rigid flat end on a film 200 times as thick is a half-space: P = 2 E* a d.
+    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=0.2)
+    a = 1e-3
+    r = np.append(a * (1 - np.geomspace(1.0, 1e-5, 80)), a)
+    compliance = ElementFilm(film, r, radius=10.0).compliance
+    p = np.linalg.solve(compliance.normal, np.full(r.size, 1e-6))
+    assert p.min() > 0
+    stiffness = compliance.areas @ p / 1e-6
+    # ... but for the rigid base far below, to first order in a/h: Dimitriadis et al. (2002),
+    # alpha_0 = -1.78 for a bonded incompressible film.
+    half_space = 2 * film.contact_modulus * a
+    base = 1 + 2 / np.pi * 1.78 * a / film.thickness
+    assert stiffness == pytest.approx(half_space * base, rel=3e-4)
+
+
+def test_beyond_the_edge_there_is_neither_stress_nor_surface() -> None:
+    ours = elements(0.5, 0.5)
+    field = ours.field(*tractions(ours.r))
+    assert field.base_normal(np.array([26e-3]))[0] == 0
+    assert field.base_shear(np.array([[26e-3]]))[0, 0] == 0
+    with pytest.raises(DomainError, match=r"no surface at 0\.026 m: the film ends at 0\.025 m"):
+        field.depression(np.array([1e-3, 26e-3]))
+
+
+def test_a_film_model_can_be_copied() -> None:
+    ours = elements(0.5, 0.5)
+    p, q = tractions(ours.r)
+    field = ours.field(p, q)
+    r = np.array([0.0, 1e-3])
+    twin = copy.deepcopy(field)
+    np.testing.assert_array_equal(twin.depression(r), field.depression(r))
+    assert copy.deepcopy(ours).discretisation == ours.discretisation
+
+
+def test_the_discretisation_is_said_in_words() -> None:
+    words = elements(0.5, 0.5).discretisation
+    assert "Taylor-Hood" in words
+    assert "25 mm" in words
+
+
+@pytest.mark.parametrize(
+    ("rings", "options", "message"),
+    [
+        ([0.0, 2e-3, 1e-3], {}, "increase strictly"),
+        ([1e-3, 2e-3], {}, "begin at 0.001 m"),
+        ([0.0], {}, "number 1"),
+        ([0.0, np.nan], {}, "not finite"),
+        ([0.0, 30e-3], {}, "0.03 m, lies beyond the film's edge at 0.025 m"),
+        ([0.0, 1e-3], {"radius": -1.0}, "radius of the film"),
+        ([0.0, 1e-3], {"refinement": 0}, "refinement of the mesh is 0"),
+        ([0.0, 1e-3], {"refinement": 1.5}, "refinement of the mesh is 1.5"),
+    ],
+)
+def test_what_makes_no_film_is_refused(rings: list[float], options: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        ElementFilm(film_with(0.5), np.array(rings), **options)
+
+
+def test_a_traction_of_another_length_than_the_rings_is_refused() -> None:
+    ours = elements(0.5, 0.5)
+    with pytest.raises(InputError, match="pressure has shape"):
+        ours.field(np.zeros(3), np.zeros(ours.r.size))
