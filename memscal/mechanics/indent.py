@@ -159,6 +159,11 @@ def indent(
     30.7 um, 2.83 mm
     """
     _check_request(friction, loading, backend, strain, rings)
+    if film_radius is not None and backend == "hankel" and strain == "linear":
+        raise InputError(
+            f"film_radius is {film_radius * 1e3:g} mm, but by Hankel transforms a film has no end.",
+            cure='Use backend="fem" for a film with a free edge.',
+        )
     targets, several = _targets(load, depth)
     interface = interface or Interface()
     contacts: list[Contact]

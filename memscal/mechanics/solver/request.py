@@ -93,7 +93,7 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
     while True:
         edges = [contact.contact_radius for contact in coarse]
         fine = _solve(request, _rings(request, edges, reach, count))
-        changes = [_change(*pair) for pair in zip(fine, coarse, strict=True)]
+        changes = [_change(request, *pair) for pair in zip(fine, coarse, strict=True)]
         if max(changes) < _SETTLED or request.rings or 2 * count > _MOST_RINGS:
             break
         count, coarse = 2 * count, fine
@@ -257,9 +257,13 @@ def _stick_radius(
     return min(contact_radius, float(rings[last] + rings[last + 1]) / 2)
 
 
-def _change(fine: Contact, coarse: Contact) -> float:
+def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
     """Return the largest relative change of base stress, load and depth."""
     reach = fine.contact_radius + 3 * fine.film.thickness
+    if request.film_radius is not None:
+        # In the corner between the base and a free edge the stress is singular.
+        off_the_corner = request.film_radius - fine.film.thickness
+        reach = min(reach, max(off_the_corner, request.film_radius / 2))
     r = np.linspace(0.0, reach, _SAMPLES)
     ours, theirs = fine.base_stress(r), coarse.base_stress(r)
     by_stress = float(np.max(np.abs(ours - theirs)) / np.max(np.abs(ours)))

@@ -1,0 +1,85 @@
+"""Two methods that share nothing but the contact: Hankel transforms and finite elements."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from memscal.errors import DomainError, InputError
+from memscal.mechanics.contact import Contact
+from memscal.mechanics.indent import indent
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter, Rod, Sphere
+
+SPHERE = Sphere(radius=128.8e-3)
+R = np.linspace(0.0, 8e-3, 60)
+# Largest relative difference that the two may have, the same for all that is compared.
+AGREEMENT = 2e-3
+
+
+def film(nu: float) -> ElasticFilm:
+    return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
+
+
+def by_both(
+    nu: float, indenter: Indenter, load: float, friction: float, loading: str = "incremental"
+) -> tuple[Contact, Contact]:
+    ways = [
+        indent(
+            film(nu), indenter, load=load, friction=friction, loading=loading, rings=rings,
+            backend=backend, film_radius=radius,
+        )
+        for backend, radius, rings in (("hankel", None, None), ("fem", 25e-3, 64))
+    ]  # fmt: skip
+    return ways[0], ways[1]
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.5])
+@pytest.mark.parametrize(
+    ("friction", "loading"),
+    [(0.0, "incremental"), (0.3, "incremental"), (math.inf, "incremental"), (0.3, "total")],
+)
+def test_both_find_the_same_sphere(nu: float, friction: float, loading: str) -> None:
+    hankel, fem = by_both(nu, SPHERE, 1.37, friction, loading)
+    assert fem.backend == "fem"
+    assert "triangles" in fem.discretisation
+    for name in ("load", "depth", "contact_radius", "max_interface_stress", "elastic_energy"):
+        assert getattr(fem, name) == pytest.approx(getattr(hankel, name), rel=AGREEMENT), name
+    assert np.max(np.abs(fem.base_stress(R) - hankel.base_stress(R))) < (
+        AGREEMENT * hankel.max_base_stress
+    )
+    shear = hankel.base_shear(R)
+    assert np.max(np.abs(fem.base_shear(R) - shear)) < AGREEMENT * np.max(np.abs(shear))
+    assert np.max(np.abs(fem.surface_depression(R) - hankel.surface_depression(R))) < (
+        AGREEMENT * hankel.depth
+    )
+    # Both say of themselves that they have converged well below what they differ by at most.
+    assert max(fem.convergence, hankel.convergence) < AGREEMENT
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2, math.inf])
+def test_both_find_the_same_rod(friction: float) -> None:
+    hankel, fem = by_both(0.5, Rod(radius=0.25e-3), 1.0, friction)
+    assert fem.depth == pytest.approx(hankel.depth, rel=AGREEMENT)
+    difference = fem.base_stress(R) - hankel.base_stress(R)
+    assert np.max(np.abs(difference)) < AGREEMENT * hankel.max_base_stress
+
+
+def test_a_film_that_ends_near_the_contact_is_softer() -> None:
+    whole, cut = (
+        indent(film(0.5), SPHERE, load=1.37, backend="fem", film_radius=radius, rings=48)
+        for radius in (25e-3, 4e-3)
+    )
+    assert cut.depth > 1.005 * whole.depth
+
+
+def test_a_film_smaller_than_the_contact_is_refused() -> None:
+    with pytest.raises(DomainError):
+        indent(film(0.5), SPHERE, load=1.37, backend="fem", film_radius=1e-3)
+
+
+def test_by_hankel_transforms_a_film_has_no_end() -> None:
+    with pytest.raises(InputError, match="a film has no end"):
+        indent(film(0.5), SPHERE, load=1.37, film_radius=25e-3)
