@@ -43,7 +43,7 @@ class ElementFilm:
     """A bonded film of finite radius, whose surface carries tractions on rings.
 
     The base holds the film in every direction; its outer edge is free.  The mesh is fitted to the
-    rings: on the surface, four intervals between them are one side of a triangle.
+    rings: on the surface, two intervals between even rings are one side of a triangle.
 
     Parameters
     ----------

@@ -50,14 +50,14 @@ def test_corners_on_the_surface_are_rings_and_the_last_ring_is_one(name: str) ->
     inside = surface[surface <= rings[-1]]
     assert np.all(np.isin(inside, rings))
     assert inside[-1] == rings[-1]
-    # A quartic side has four intervals between its nodes, and no more rings than that.
-    assert np.max(np.diff(np.searchsorted(rings, inside))) <= 4
+    # A quartic has four intervals between its nodes: no ring is without a node of its own.
+    assert np.max(np.diff(np.searchsorted(rings, inside))) <= 2
 
 
 @pytest.mark.parametrize("name", ["even", "edge"])
 def test_no_triangle_is_flat_where_the_rings_grade_gently(name: str) -> None:
     mesh = film_triangles(RINGS[name], radius=12.5, thickness=1.0)
-    assert quality(mesh).min() > 0.2
+    assert quality(mesh).min() > 0.1
     assert np.median(quality(mesh)) > 0.7
 
 
@@ -66,7 +66,7 @@ def test_twice_as_many_rings_cost_less_than_twice_as_many_triangles() -> None:
         film_triangles(np.linspace(0, 1, n + 1), radius=12.5, thickness=1.0).triangles.shape[0]
         for n in (200, 400)
     )
-    assert few < 600
+    assert few < 800
     assert many < 1.8 * few
 
 
