@@ -1,0 +1,154 @@
+"""Speed of the contact mechanics, each beside the plain way to the same numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import nnls
+from scipy.special import ellipk
+
+from memscal.mechanics.hankel_film import HankelFilm
+from memscal.mechanics.interface import Interface
+from memscal.mechanics.solver.path import follow
+from memscal.mechanics.solver.problem import ContactProblem, Depth, Load
+from memscal.mechanics.solver.request import RingRequest, solve_on_rings
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Sphere
+from memscal.model.validation import FloatArray
+
+FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+SPHERE = Sphere(radius=128.8e-3)
+LOADS = (0.34, 0.69, 1.37, 2.75)
+
+
+def turns(one: Callable[[], Any], other: Callable[[], Any], rounds: int) -> float:
+    """Median time of one, in units of the other's; they take turns, and each warms up."""
+    one(), other()
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(rounds):
+        for work, record in zip((one, other), times, strict=True):
+            start = perf_counter()
+            work()
+            record.append(perf_counter() - start)
+    return median(times[0]) / median(times[1])
+
+
+def contact_of_200_rings(friction: float) -> ContactProblem:
+    """The paper's sphere: 200 rings up to the contact radius at 2.75 N, and a few beyond."""
+    rings = np.linspace(0.0, 3.6e-3, 210)
+    compliance = HankelFilm(FILM, rings).compliance
+    return ContactProblem(FILM, compliance, SPHERE.height(rings), friction, Interface())
+
+
+@pytest.fixture(scope="module")
+def smooth() -> ContactProblem:
+    return contact_of_200_rings(0.0)
+
+
+def plain_contact(problem: ContactProblem, depth: float) -> FloatArray:
+    """The same contact at a given depth as non-negative least squares, a library's way."""
+    pressing = problem.heights < depth
+    matrix = problem.compliance.normal[np.ix_(pressing, pressing)]
+    scale = matrix[0, 0]
+    pressure, _ = nnls(matrix / scale, (depth - problem.heights[pressing]) / scale)
+    found = np.zeros(problem.size)
+    found[pressing] = pressure
+    return found
+
+
+@pytest.mark.benchmark(group="frictionless sphere, 200 rings")
+def test_a_frictionless_contact(benchmark: Any, smooth: ContactProblem) -> None:
+    point = benchmark.pedantic(
+        follow, (smooth, [Load(2.75)], "incremental", 1), rounds=15, warmup_rounds=1
+    )[0]
+    assert point.state.depth == pytest.approx(43.766e-6, rel=1e-4)
+
+
+@pytest.mark.benchmark(group="frictionless sphere, 200 rings")
+def test_the_same_contact_by_non_negative_least_squares(
+    benchmark: Any, smooth: ContactProblem
+) -> None:
+    depth = follow(smooth, [Load(2.75)], "incremental", 1)[0].state.depth
+    pressure = benchmark.pedantic(plain_contact, (smooth, depth), rounds=3, warmup_rounds=1)
+    # Where the surfaces only just meet, least squares and Signorini differ by a ring.
+    assert smooth.compliance.areas @ pressure == pytest.approx(2.75, rel=5e-3)
+
+
+@pytest.mark.benchmark
+def test_a_contact_costs_a_few_dense_solutions(smooth: ContactProblem) -> None:
+    right = np.ones(smooth.size)
+
+    def contact() -> object:
+        return follow(smooth, [Load(2.75)], "incremental", 1)
+
+    assert turns(contact, lambda: np.linalg.solve(smooth.compliance.normal, right), 15) < 40
+    depth = follow(smooth, [Load(2.75)], "incremental", 1)[0].state.depth
+    found = follow(smooth, [Depth(depth)], "incremental", 1)[0].state
+    assert found.load == pytest.approx(2.75, rel=1e-9)
+
+
+def adaptive_entry(x: float, start: float, end: float) -> float:
+    """One half-space entry of the compliance, by adaptive quadrature."""
+
+    def density(s: float) -> float:
+        m = min(x, s) / max(x, s)
+        return 2 / math.pi / max(x, s) * float(ellipk(m**2)) * s * (s - start) / (end - start)
+
+    return quad(density, start, end, epsrel=1e-8)[0]
+
+
+@pytest.mark.benchmark
+def test_a_compliance_is_built_far_faster_than_entry_by_entry() -> None:
+    rings = np.linspace(0.0, 4e-3, 401)
+
+    def few_entries() -> float:
+        # 100 of the 160,000 entries of one of its four parts.
+        return sum(adaptive_entry(rings[i], rings[390], rings[391]) for i in range(10, 110))
+
+    ratio = turns(lambda: HankelFilm(FILM, rings).compliance, few_entries, rounds=3)
+    assert ratio < 4 * 160_000 / 100 / 20
+
+
+@pytest.mark.benchmark
+def test_friction_along_a_path_costs_a_few_solutions_per_ring() -> None:
+    problem = contact_of_200_rings(0.3)
+    rough, right = problem.compliance, np.ones(2 * problem.size)
+    whole = np.block(
+        [[rough.normal, rough.normal_by_shear], [rough.radial_by_pressure, rough.radial]]
+    )
+    whole[problem.size, :] = np.eye(2 * problem.size)[problem.size]  # no shear on the axis
+
+    def path() -> object:
+        return follow(problem, [Load(load) for load in LOADS], "incremental", 1)
+
+    # 200 steps, most of them on a part of the rings.
+    assert turns(path, lambda: np.linalg.solve(whole, right), rounds=3) < 400
+
+
+@pytest.mark.benchmark
+def test_a_second_call_is_instant() -> None:
+    request = RingRequest(
+        film=FILM, indenter=SPHERE, interface=Interface(), friction=0.2, loading="total",
+        targets=tuple(Load(load) for load in LOADS), backend="hankel", film_radius=None, rings=48,
+    )  # fmt: skip
+
+    def afresh() -> object:
+        solve_on_rings.cache_clear()
+        return solve_on_rings(request)
+
+    afresh()
+    again = min(_once(lambda: solve_on_rings(request)) for _ in range(5))
+    assert _once(afresh) > 300 * again
+
+
+def _once(work: Callable[[], Any]) -> float:
+    start = perf_counter()
+    work()
+    return perf_counter() - start
