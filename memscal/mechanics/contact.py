@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import DomainError, InputError
 from memscal.mechanics.interface import Interface
-from memscal.mechanics.surface import FilmField
+from memscal.mechanics.surface import FilmField, MeshedField
 from memscal.mechanics.traction import InterfaceTraction
+from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.model.stress import StressProfile
@@ -32,6 +33,8 @@ _FAR_REACH = 26.0
 _PROFILE_FLOOR = 1e-9
 # Radii at which the largest interface pressure is sought.
 _PRESSURE_SAMPLES = 2001
+# Radii at which the largest base stress is sought: it is smooth over a film's thickness.
+_BASE_SAMPLES = 128
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,10 +170,11 @@ class Contact:
         r = np.linspace(0.0, self.contact_radius, _PRESSURE_SAMPLES)
         return float(np.max(self.traction.pressure(r)))
 
-    @property
+    @cached_property
     def max_base_stress(self) -> float:
         """Largest normal stress at the base, in Pa."""
-        return float(self._default_profile.sigma_zz.max())
+        r = np.linspace(0.0, self.contact_radius + self.film.thickness, _BASE_SAMPLES)
+        return float(np.max(self.base_stress(r)))
 
     def surface_depression(self, r: ArrayLike) -> FloatArray:
         """Return the normal displacement of the film's surface in m, positive into the film."""
@@ -179,6 +183,21 @@ class Contact:
     def surface_outward(self, r: ArrayLike) -> FloatArray:
         """Return the radial displacement of the film's surface in m, positive outward."""
         return self.inside.outward(_radii(r))
+
+    def mesh(self) -> FieldMesh:
+        """Return displacement and stress in the whole film, on the mesh of its finite elements.
+
+        Raises
+        ------
+        InputError
+            If the contact was solved without a mesh.
+        """
+        if isinstance(self.inside, MeshedField):
+            return self.inside.mesh()
+        raise InputError(
+            f'A contact that was solved with backend="{self.backend}" has no mesh.',
+            cure='Press the indenter with backend="fem".',
+        )
 
     def profile(self, r: ArrayLike | None = None) -> StressProfile:
         """Return the stress at the base as a table, such as a calibration divides by.

@@ -16,14 +16,15 @@ Every way to solve the film, by Hankel transforms or by finite elements, comes d
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.validation import FloatArray
 
-__all__ = ["FilmField", "FilmModel", "SurfaceCompliance"]
+__all__ = ["FilmField", "FilmModel", "MeshedField", "SurfaceCompliance"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +83,14 @@ class FilmField(Protocol):
 
     def outward(self, r: FloatArray) -> FloatArray:
         """Return the radial displacement of the surface in m, positive outward."""
+
+
+@runtime_checkable
+class MeshedField(Protocol):
+    """A field that was solved on a mesh, and can be shown on it."""
+
+    def mesh(self) -> FieldMesh:
+        """Return displacement and stress on the mesh."""
 
 
 class FilmModel(Protocol):

@@ -83,3 +83,16 @@ def test_a_film_smaller_than_the_contact_is_refused() -> None:
 def test_by_hankel_transforms_a_film_has_no_end() -> None:
     with pytest.raises(InputError, match="a film has no end"):
         indent(film(0.5), SPHERE, load=1.37, film_radius=25e-3)
+
+
+def test_only_finite_elements_have_a_mesh_to_show() -> None:
+    hankel, fem = by_both(0.5, SPHERE, 1.37, 0.0)
+    mesh = fem.mesh()
+    on_top = np.isclose(mesh.points[:, 1], 2e-3)
+    r, sunk = mesh.points[on_top, 0], -mesh.displacement[on_top, 1]
+    near = r < 6e-3
+    np.testing.assert_allclose(
+        sunk[near], hankel.surface_depression(r[near]), atol=AGREEMENT * hankel.depth
+    )
+    with pytest.raises(InputError, match="has no mesh"):
+        hankel.mesh()
