@@ -40,7 +40,7 @@ def outside_the_checkout(session: nox.Session, *, requirements: list[str]) -> It
         (wheel,) = wheels.glob("memscal-*.whl")
         session.install(os.fspath(wheel), *requirements)
 
-        for name in ("tests", "notebooks", "calibration_data"):
+        for name in ("tests", "notebooks", "calibration_data", "docs"):
             clutter = shutil.ignore_patterns("__pycache__", ".*")
             if (ROOT / name).is_dir():
                 shutil.copytree(ROOT / name, copy / name, ignore=clutter)
