@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from statistics import median
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -13,6 +10,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import nnls
 from scipy.special import ellipk
+from timing import once, turns
 
 from memscal.mechanics.hankel_film import HankelFilm
 from memscal.mechanics.interface import Interface
@@ -26,18 +24,6 @@ from memscal.model.validation import FloatArray
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = Sphere(radius=128.8e-3)
 LOADS = (0.34, 0.69, 1.37, 2.75)
-
-
-def turns(one: Callable[[], Any], other: Callable[[], Any], rounds: int) -> float:
-    """Median time of one, in units of the other's; they take turns, and each warms up."""
-    one(), other()
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(rounds):
-        for work, record in zip((one, other), times, strict=True):
-            start = perf_counter()
-            work()
-            record.append(perf_counter() - start)
-    return median(times[0]) / median(times[1])
 
 
 def contact_of_200_rings(friction: float) -> ContactProblem:
@@ -144,11 +130,5 @@ def test_a_second_call_is_instant() -> None:
         return solve_on_rings(request)
 
     afresh()
-    again = min(_once(lambda: solve_on_rings(request)) for _ in range(5))
-    assert _once(afresh) > 300 * again
-
-
-def _once(work: Callable[[], Any]) -> float:
-    start = perf_counter()
-    work()
-    return perf_counter() - start
+    again = min(once(lambda: solve_on_rings(request)) for _ in range(5))
+    assert once(afresh) > 300 * again

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from statistics import median
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
+from timing import turns
 
 import memscal
 from memscal.axisymmetry.grids import EvenGrid
@@ -52,18 +50,6 @@ class PlainDivision:
         window = -np.expm1(-(z.real**2 + z.imag**2) / self.noise2)
         quotient = np.fft.fft2(self.voltage) * (window / np.where(z == 0, 1.0, z))
         return np.fft.fftshift(np.fft.ifft2(quotient).real) / self.cell_area
-
-
-def turns(one: Callable[[], Any], other: Callable[[], Any], rounds: int) -> float:
-    """Median time of one, in units of the other's; they take turns, and each warms up."""
-    one(), other()
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(rounds):
-        for work, record in zip((one, other), times, strict=True):
-            start = perf_counter()
-            work()
-            record.append(perf_counter() - start)
-    return median(times[0]) / median(times[1])
 
 
 @pytest.fixture(scope="module")

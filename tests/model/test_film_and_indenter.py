@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from memscal.errors import InputError
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
+from memscal.model.indenter import Cone, Profile, Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 
@@ -79,3 +81,69 @@ def test_films_and_indenters_stay_as_they_were_made() -> None:
         FILM.thickness = 1e-3
     with pytest.raises(FrozenInstanceError):
         Rod(radius=1e-3).radius = 2e-3
+
+
+R = np.linspace(0.0, 2e-3, 50)
+
+
+def test_a_rod_is_flat_to_its_edge_and_ends_there() -> None:
+    height = Rod(radius=1e-3).height([0.0, 1e-3, 1.001e-3])
+    np.testing.assert_array_equal(height, [0.0, 0.0, np.inf])
+
+
+def test_a_sphere_is_round() -> None:
+    sphere = Sphere(radius=5e-3)
+    height = sphere.height(R)
+    np.testing.assert_allclose(R**2 + (5e-3 - height) ** 2, 25e-6, rtol=1e-14)
+    assert sphere.height(5.1e-3) == np.inf
+    # Far from its radius a sphere is a parabola, to the last digit.
+    assert Sphere(radius=1e6).height(1e-3) == pytest.approx(0.5e-12, rel=1e-12)
+
+
+def test_a_cone_rises_by_its_inclination() -> None:
+    cone = Cone(inclination=math.atan(0.25))
+    np.testing.assert_allclose(cone.height(R), R / 4, rtol=1e-14)
+    assert cone.extent == math.inf
+
+
+@pytest.mark.parametrize("inclination", [0.0, -0.1, math.pi / 2, math.nan])
+def test_a_cone_is_neither_flat_nor_a_needle(inclination: float) -> None:
+    with pytest.raises(InputError, match="inclination"):
+        Cone(inclination=inclination)
+
+
+def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
+    profile = Profile(r=[0.0, 1e-3, 2e-3, 3e-3], z=[0.0, 0.0, 4e-6, 9e-6])
+    np.testing.assert_allclose(profile.height(profile.r), profile.z, atol=1e-20)
+    # A flat stays flat: a monotone spline does not swing below it.
+    assert np.all(profile.height(np.linspace(0.0, 1e-3, 20)) == 0)
+    assert profile.height(3.01e-3) == np.inf
+    assert repr(profile) == "<Profile: 4 radii to 3 mm, heights to 9 um>"
+
+
+def test_profiles_of_equal_tables_are_equal() -> None:
+    one, same = (Profile.from_function(lambda r: r**2, extent=1e-3) for _ in range(2))
+    other = Profile.from_function(lambda r: 2 * r**2, extent=1e-3)
+    assert one == same
+    assert hash(one) == hash(same)
+    assert one != other
+
+
+@pytest.mark.parametrize(
+    ("r", "z", "message"),
+    [
+        ([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, 3.0, 4.0], "touches first"),
+        ([0.0, 1.0, 2.0, 3.0], [0.0, -1.0, 3.0, 4.0], "lowest height"),
+        ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0], "press a Rod"),
+        ([0.0, 1.0, 2.0, 3.0], [0.0, math.nan, 3.0, 4.0], "height .* not finite"),
+        ([0.0, 2.0, 1.0, 3.0], [0.0, 1.0, 2.0, 3.0], "increase"),
+        ([0.5, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, 3.0], "first at the axis"),
+        ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], "four or more"),
+        ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0], "3 heights"),
+    ],
+)
+def test_a_profile_that_cannot_touch_is_refused(
+    r: list[float], z: list[float], message: str
+) -> None:
+    with pytest.raises(InputError, match=f"(?i){message}"):
+        Profile(r=r, z=z)
