@@ -19,8 +19,10 @@ from typing import Any
 import numpy as np
 import pytest
 from accuracy.contact_edge import contact_radius, load_beyond
+from timing import once
 
 import memscal
+from memscal.mechanics.solver.request import solve_on_rings
 
 FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 STEP, LAYERS = (0.05, 8) if FULL else (0.1, 5)
@@ -159,3 +161,14 @@ def test_friction_moves_getfem_by_far_more_than_the_two_differ(python: str) -> N
         assert state["base_normal"].max() > 1.2 * highest
         assert state["depth"] * 1e-3 < 0.95 * frictionless.depth
     assert rough["base_normal"].max() > 1.003 * slippery["base_normal"].max()
+
+
+@pytest.mark.skipif(not FULL, reason="takes minutes of GetFEM: set MEMSCAL_FULL_STUDY")
+def test_a_loading_curve_takes_a_hundredth_of_a_general_program_s_time(python: str) -> None:
+    # GetFEM's base stress is then good to 1e-3, ours to 1e-4, its estimate of error included.
+    def ours() -> object:
+        solve_on_rings.cache_clear()
+        return by_memscal.__wrapped__(0.3)
+
+    general = once(lambda: by_getfem.__wrapped__(python, 0.3, 100))
+    assert general > 100 * min(once(ours) for _ in range(3))
