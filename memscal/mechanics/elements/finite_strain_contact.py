@@ -1,0 +1,213 @@
+r"""Contact of the film at finite strain with a rigid face: exact constraints, Newton's method.
+
+A node of the surface that touches lies on the indenter's contour *where it has moved to*,
+
+.. math::
+
+    R + u_r = r(s), \qquad u_z = z(s) - \delta.
+
+Its displacements are no unknowns then, but the arc length s is one, along which it slides without
+friction; where the contact sticks, s stays what it was at first touch.  They are eliminated with
+first and second derivatives, so that the constraint holds exactly (no penalty) and the forces are
+normal to the face where it slides.  The depth :math:`\delta` is one more unknown, whose force is
+the load: load and depth can be prescribed alike.  Which nodes touch is found by an active set: a
+node that is pulled leaves, and one that lies inside the indenter is taken in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from memscal.errors import ConvergenceError
+from memscal.mechanics.elements.finite_strain_faces import Face
+from memscal.mechanics.elements.finite_strain_system import FilmElements, IntArray
+from memscal.model.validation import FloatArray
+
+__all__ = ["Goal", "NewtonError", "Pressed", "Pressing"]
+
+# Newton's method has converged when the last step moved nothing by more than this share of the
+# film's thickness; its convergence is quadratic, so that what is left is the square of it.
+_SETTLED = 1e-7
+# The contact's edge is looked at again when the last step was shorter than this.
+_LOOSE = 1e-3
+_MOST_ITERATIONS = 40
+# A Newton step that moves something farther than so many thicknesses leads nowhere.
+_FARTHEST = 3.0
+# A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
+_INSIDE = 1e-10
+
+
+class NewtonError(ConvergenceError):
+    """Newton's method found no equilibrium from where it started: load in smaller steps."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is prescribed: a load in N, or a depth in mm."""
+
+    value: float
+    is_load: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A film under an indenter.
+
+    Parameters
+    ----------
+    x : ndarray, shape (size,)
+        The unknowns of :class:`FilmElements`.
+    depth : float
+        Indentation depth, in mm.
+    touching : ndarray of int, shape (m,)
+        Nodes that touch, from the axis outward.
+    place : ndarray, shape (m,)
+        Where on the contour they are, in mm of arc length.
+    load : float
+        Load, in N.
+    iterations : int
+        Newton steps that it took.
+    """
+
+    x: FloatArray
+    depth: float
+    touching: IntArray
+    place: FloatArray
+    load: float = 0.0
+    iterations: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Pressing:
+    """A film, an indenter, and whether the surface sticks to it.
+
+    Parameters
+    ----------
+    elements : FilmElements
+        The film.
+    face : Face
+        The indenter.
+    sticking : bool
+        Whether a node stays where it touched; otherwise it slides freely.
+    upright : bool
+        Whether a node that sticks does so at its own undeformed radius (no radial displacement
+        in the contact), and not at the place of the face where it came to touch.
+    """
+
+    elements: FilmElements
+    face: Face
+    sticking: bool
+    upright: bool = False
+
+    def press(self, start: Pressed, goal: Goal) -> Pressed:
+        """Return the equilibrium at a goal, from a state near it.
+
+        Raises
+        ------
+        NewtonError
+            If Newton's method or the active set does not settle.
+        """
+        state = start if goal.is_load else replace(start, depth=goal.value)
+        state = self.placed(state)
+        seen: set[bytes] = set()
+        for iteration in range(1, _MOST_ITERATIONS + 1):
+            state, moved = self._step(state, goal)
+            if not moved < _FARTHEST * self.elements.thickness:
+                break
+            if moved > _LOOSE * self.elements.thickness:
+                continue
+            changed = self._touching(state, seen)
+            if changed is not None:
+                state = self.placed(changed)
+            elif moved < _SETTLED * self.elements.thickness:
+                if self.elements.is_inside_out(state.x):
+                    break
+                forces = self.elements.forces(state.x)
+                load = -float(np.sum(forces[state.touching + self.elements.n]))
+                return replace(state, load=load, iterations=iteration)
+        raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")
+
+    def placed(self, state: Pressed) -> Pressed:
+        """Return the state with its touching nodes on the face."""
+        x, n = state.x.copy(), self.elements.n
+        points, _, _ = self.face.contour(state.place)
+        x[state.touching] = points[0] - self.elements.nodes[0][state.touching]
+        x[state.touching + n] = points[1] - state.depth
+        x[self.elements.held] = 0.0
+        return replace(state, x=x)
+
+    def _touching(self, state: Pressed, seen: set[bytes]) -> Pressed | None:
+        """Return the state with the nodes that should touch, or None if they do already."""
+        n, nodes = self.elements.n, self.elements.surface
+        u, w = state.x[nodes], state.x[nodes + n]
+        place, gap = self.face.nearest(self.elements.nodes[0][nodes] + u, w + state.depth)
+        if self.upright:
+            place = self.place_at(self.elements.nodes[0][nodes])
+        touches = np.isin(nodes, state.touching)
+        place[touches] = state.place
+        _, (along, up), _ = self.face.contour(place)
+        forces = self.elements.forces(state.x)
+        pushed = up * forces[nodes] - along * forces[nodes + n] > 0
+        chosen = np.where(touches, pushed, gap < -_INSIDE * self.elements.thickness)
+        chosen[0] = True
+        if np.array_equal(chosen, touches):
+            return None
+        if (key := chosen.tobytes()) in seen:  # a node that comes and goes stays
+            chosen |= touches
+            if np.array_equal(chosen, touches):
+                return None
+        seen.add(key)
+        return replace(state, touching=nodes[chosen], place=place[chosen])
+
+    def place_at(self, r: FloatArray) -> FloatArray:
+        """Return the arc length at which the face has the radius ``r``."""
+        s = r.copy()
+        for _ in range(3):  # Newton; faces are nearly flat where this is asked
+            points, tangents, _ = self.face.contour(s)
+            s -= (points[0] - r) / np.maximum(tangents[0], 0.1)
+        return s
+
+    def _step(self, state: Pressed, goal: Goal) -> tuple[Pressed, float]:
+        """Take Newton's step; return the state after it and how far it moved something, in mm."""
+        elements, touching = self.elements, state.touching
+        n, size = elements.n, elements.size
+        _, tangents, bends = self.face.contour(state.place)
+        forces, tangent = elements.forces(state.x), elements.tangent(state.x)
+        # Columns: unknowns that are free; the places of sliding nodes, in the columns of their
+        # radial displacement; and the depth, which moves all touching nodes down.
+        free = np.ones(size, dtype=bool)
+        free[np.concatenate([elements.held, touching + n])] = False
+        own = np.ones(size)
+        own[touching] = tangents[0]
+        climbing = sparse.coo_array((tangents[1], (touching + n, touching)), shape=(size, size))
+        if self.sticking:
+            free[touching] = False
+        else:
+            curvature = np.zeros(size)
+            curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
+        columns = [(sparse.diags_array(own) + climbing).tocsc()[:, np.flatnonzero(free)]]
+        if goal.is_load:
+            sinking = np.zeros((size, 1))
+            sinking[touching + n] = -1.0
+            columns.append(sparse.csc_array(sinking))
+        change = sparse.hstack(columns, format="csc")
+        reduced = change.T @ tangent @ change
+        residual = np.asarray(change.T @ forces)
+        if not self.sticking:
+            last = [0.0] if goal.is_load else []
+            reduced = reduced + sparse.diags_array(np.concatenate([curvature[free], last]))
+        if goal.is_load:
+            residual[-1] -= goal.value
+        # The matrix is symmetric, and needs pivots off the diagonal only for the pressures.
+        solution = splu(reduced.tocsc(), diag_pivot_thresh=1e-4).solve(-residual)
+        sunk = float(solution[-1]) if goal.is_load else 0.0
+        steps = np.zeros(size)
+        steps[free] = solution[: np.count_nonzero(free)]
+        place = state.place if self.sticking else state.place + steps[touching]
+        moved = max(float(np.max(np.abs(steps[: 2 * n]))), abs(sunk))
+        ahead = replace(state, x=state.x + steps, depth=state.depth + sunk, place=place)
+        return self.placed(ahead), moved

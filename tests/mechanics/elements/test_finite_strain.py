@@ -1,0 +1,230 @@
+"""The film at finite strain: closed forms, balances, and the linear model where strain is small."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import skfem
+
+from memscal.errors import ConvergenceError, DomainError, InputError
+from memscal.mechanics.elements.finite_strain import solve_finite_strain
+from memscal.mechanics.elements.finite_strain_faces import RodFace, SphereFace
+from memscal.mechanics.elements.finite_strain_material import NeoHookean
+from memscal.mechanics.elements.finite_strain_state import FiniteStrainState
+from memscal.mechanics.elements.finite_strain_system import FilmElements
+from memscal.mechanics.indent import indent
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Cone, Rod, Sphere
+
+FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+ROD = Rod(radius=0.25e-3)
+SPHERE = Sphere(radius=128.8e-3)
+EDGE = 0.05e-3
+RADII = np.array([0.0, 0.5, 1.0, 2.0]) * 1e-3
+
+
+def cylinder(nu: float = 0.5) -> FilmElements:
+    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
+    mesh = skfem.MeshTri.init_tensor(np.linspace(0, 1.5, 5), np.linspace(0, 2, 4))
+    return FilmElements(mesh, NeoHookean.of(film))
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["sliding", "sticking"])
+def pressed_rods(request: pytest.FixtureRequest) -> list[FiniteStrainState]:
+    depths = [0.02e-3, 0.04e-3, 0.12e-3]
+    return solve_finite_strain(
+        FILM, ROD, depths=depths, sticking=request.param, edge=EDGE, refinement=0.6
+    )
+
+
+@pytest.mark.parametrize("stretch", [0.5, 0.8, 1.6])
+def test_a_free_cylinder_is_compressed_as_the_closed_form_says(stretch: float) -> None:
+    elements = cylinder()
+    G = elements.material.shear_modulus
+    R, Z = elements.nodes
+    pressure = np.full(elements.size - 2 * elements.n, G / stretch - G)
+    x = np.concatenate([(stretch**-0.5 - 1) * R, (stretch - 1) * Z, pressure])
+    forces = elements.forces(x)
+    # Neo-Hookean, incompressible: nominal stress G (stretch - 1/stretch^2), and nothing sideways.
+    nominal = G * (stretch - stretch**-2)
+    total = np.sum(forces[elements.n + elements.surface])
+    assert total == pytest.approx(nominal * np.pi * 1.5**2, rel=1e-12)
+    ends = np.concatenate([elements.surface, elements.base]) + elements.n
+    assert np.max(np.abs(np.delete(forces, ends))) < 1e-12
+    energy = G / 2 * (stretch**2 + 2 / stretch - 3) * np.pi * 1.5**2 * 2
+    assert elements.energy(x) == pytest.approx(energy, rel=1e-12)
+    stress = elements.nodal_stress(x)
+    assert stress[..., 1] == pytest.approx(nominal * stretch, rel=1e-12)
+    assert np.max(np.abs(stress[..., [0, 2, 3]])) < 1e-12
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+def test_the_tangent_is_the_derivative_of_the_forces(nu: float) -> None:
+    elements = cylinder(nu)
+    wave = np.sin(np.arange(elements.size) * 1.7)
+    x, direction, step = 0.03 * wave, np.cos(np.arange(elements.size) * 0.9), 1e-6
+    change = (elements.forces(x + step * direction) - elements.forces(x - step * direction)) / 2
+    assert elements.tangent(x) @ direction == pytest.approx(change / step, abs=1e-8)
+
+
+def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film() -> None:
+    elements = cylinder()
+    x = 0.03 * np.sin(np.arange(elements.size) * 1.7)
+    x[2 * elements.n :] = 0.0  # its multiplier does no work in the energy
+    direction, step = np.cos(np.arange(elements.size) * 0.9), 1e-6
+    direction[2 * elements.n :] = 0.0
+    change = elements.energy(x + step * direction) - elements.energy(x - step * direction)
+    assert elements.forces(x) @ direction == pytest.approx(change / (2 * step), rel=1e-7)
+
+
+@pytest.mark.parametrize("face", [RodFace(0.25, 0.05), SphereFace(0.3)])
+def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(
+    face: RodFace | SphereFace,
+) -> None:
+    s = np.linspace(0.0, 0.4, 8001)
+    points, tangents, _ = face.contour(s)
+    assert np.hypot(*tangents) == pytest.approx(1.0)
+    assert np.hypot(*np.diff(points)) == pytest.approx(np.diff(s), rel=1e-6)
+    r, z = np.meshgrid(np.linspace(0.0, 0.29, 24), np.linspace(-0.1, 0.09, 20))
+    _, gap = face.nearest(r.ravel(), z.ravel())
+    distance = np.hypot(r.ravel()[:, None] - points[0], z.ravel()[:, None] - points[1])
+    assert np.abs(gap) == pytest.approx(distance.min(axis=1), abs=3e-5)
+
+
+@pytest.mark.parametrize(("nu", "sticking"), [(0.3, False), (0.5, False), (0.5, True)])
+def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, sticking: bool) -> None:
+    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
+    (state,) = solve_finite_strain(film, SPHERE, loads=[0.1], sticking=sticking, refinement=0.6)
+    friction = np.inf if sticking else 0.0
+    linear = indent(film, SPHERE, load=0.1, friction=friction, loading="total")
+    assert state.load == pytest.approx(0.1, rel=1e-9)
+    assert state.depth == pytest.approx(linear.depth, rel=5e-3)
+    highest = linear.base_stress(0.0)
+    assert state.inside.base_normal(RADII) == pytest.approx(
+        linear.base_stress(RADII), abs=3e-3 * float(highest)
+    )
+    assert state.inside.base_shear(RADII) == pytest.approx(
+        linear.base_shear(RADII), abs=3e-3 * float(highest)
+    )
+
+
+@pytest.mark.parametrize("sticking", [False, True])
+def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool) -> None:
+    # Only the flat part of its end touches then: a rod of that radius.
+    (state,) = solve_finite_strain(FILM, ROD, depths=[1e-10], sticking=sticking, edge=EDGE)
+    linear = indent(
+        FILM,
+        Rod(radius=ROD.radius - EDGE),
+        depth=1e-10,
+        friction=np.inf if sticking else 0.0,
+    )
+    # The stress at the edge of the flat is singular, and the mesh no finer than the rounding's.
+    assert state.load == pytest.approx(linear.load, rel=5e-3)
+    found = state.inside.base_normal(RADII) / state.load
+    expected = linear.base_stress(RADII) / linear.load
+    assert found == pytest.approx(expected, abs=2e-3 * float(expected[0]))
+
+
+def test_the_departure_of_the_base_stress_grows_linearly_at_first(
+    pressed_rods: list[FiniteStrainState],
+) -> None:
+    (hardly,) = solve_finite_strain(
+        FILM,
+        ROD,
+        depths=[1e-8],
+        sticking=pressed_rods[0].sticking,
+        edge=EDGE,
+        refinement=0.6,
+    )
+
+    def departure(state: FiniteStrainState) -> float:
+        r = np.array([1.5e-3])
+        per_load = state.inside.base_spectrum(r * 1e6)[0] / state.load
+        return float(per_load / (hardly.inside.base_spectrum(r * 1e6)[0] / hardly.load) - 1)
+
+    once, twice = departure(pressed_rods[0]), departure(pressed_rods[1])
+    assert twice / once == pytest.approx(2.0, rel=0.25)
+
+
+def test_the_base_carries_the_load(pressed_rods: list[FiniteStrainState]) -> None:
+    for state in pressed_rods:
+        elements = state.inside.pressing.elements
+        forces = elements.forces(state.inside.pressed.x)
+        assert np.sum(forces[elements.base + elements.n]) == pytest.approx(state.load, rel=1e-9)
+        assert state.inside.base_spectrum(np.zeros(1))[0] == pytest.approx(state.load, rel=1e-5)
+
+
+def test_the_work_of_the_rod_is_the_energy_of_the_film(
+    pressed_rods: list[FiniteStrainState],
+) -> None:
+    last = pressed_rods[-1]
+    assert last.work == pytest.approx(last.elastic_energy, rel=1e-3)
+
+
+def test_the_film_drapes_itself_around_the_rod(pressed_rods: list[FiniteStrainState]) -> None:
+    deepest = pressed_rods[-1]
+    r, depression, outward = deepest.inside.surface
+    moved, above = (r + outward) * 1e3, (deepest.depth - depression) * 1e3
+    _, gap = RodFace(0.25, 0.05).nearest(moved, above)
+    assert gap.min() > -1e-9
+    assert deepest.contact_radius == pytest.approx(ROD.radius, rel=0.03)
+    assert np.all(deepest.interface_pressure >= 0)
+
+
+def test_a_mesh_of_the_state_carries_stress_and_displacement(
+    pressed_rods: list[FiniteStrainState],
+) -> None:
+    state = pressed_rods[-1]
+    mesh = state.mesh()
+    a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
+    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert np.all(turn > 0)
+    for side, (start, end) in enumerate([(0, 1), (1, 2), (2, 0)]):
+        middle = mesh.points[mesh.triangles[:, [start, end]]].mean(axis=1)
+        assert mesh.points[mesh.triangles[:, 3 + side]] == pytest.approx(middle)
+    base = mesh.points[:, 1] < 1e-12
+    near = base & (mesh.points[:, 0] < 2e-3)
+    expected = -state.inside.base_normal(mesh.points[near, 0])
+    assert mesh.stress[near, 1] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
+    assert mesh.displacement[:, 1].min() == pytest.approx(-state.depth, rel=1e-6)
+
+
+def test_a_sticking_sphere_moves_nothing_outward_and_a_sliding_one_does() -> None:
+    r = np.linspace(0.0, 1e-3, 11)
+    (slides,) = solve_finite_strain(FILM, SPHERE, depths=[20e-6], refinement=0.5)
+    (sticks,) = solve_finite_strain(FILM, SPHERE, depths=[20e-6], sticking=True, refinement=0.5)
+    assert np.max(np.abs(sticks.inside.outward(r))) < 1e-12
+    assert np.max(np.abs(slides.inside.outward(r))) > 1e-7
+    assert sticks.load > slides.load
+    assert sticks.work is None
+    assert slides.work == pytest.approx(slides.elastic_energy, rel=0.03)
+    assert np.max(np.abs(slides.interface_shear)) < 1e-6 * np.max(slides.interface_pressure)
+
+
+def test_a_frictionless_film_comes_back_the_way_it_went() -> None:
+    there, deeper, back = solve_finite_strain(FILM, SPHERE, loads=[0.34, 0.5, 0.34], refinement=0.5)
+    assert back.depth == pytest.approx(there.depth, rel=1e-6)
+    assert deeper.depth > there.depth
+
+
+def test_a_load_that_cannot_be_reached_gives_the_last_state_that_was() -> None:
+    with pytest.raises(ConvergenceError, match="No equilibrium") as caught:
+        solve_finite_strain(FILM, ROD, depths=[0.02e-3, 1.5e-3], sticking=True, refinement=0.4)
+    last = caught.value.last
+    assert isinstance(last, FiniteStrainState)
+    assert last.depth == pytest.approx(0.02e-3)
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    with pytest.raises(DomainError, match="cone"):
+        solve_finite_strain(FILM, Cone(inclination=0.1), loads=[1.0])
+    with pytest.raises(DomainError, match="through the film"):
+        solve_finite_strain(FILM, ROD, depths=[2.5e-3])
+    with pytest.raises(DomainError, match="contact would be"):
+        solve_finite_strain(FILM, SPHERE, loads=[500.0])
+    with pytest.raises(InputError, match="either"):
+        solve_finite_strain(FILM, ROD, depths=[1e-4], loads=[0.1])
+    with pytest.raises(InputError, match="rounding"):
+        solve_finite_strain(FILM, ROD, loads=[0.1], edge=1e-3)
+    with pytest.raises(InputError, match="finite and above zero"):
+        solve_finite_strain(FILM, ROD, loads=[-0.1])
