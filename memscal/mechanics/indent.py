@@ -10,6 +10,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact, too_deep
+from memscal.mechanics.finite_strain import press_at_finite_strain
 from memscal.mechanics.hankel_film import HankelField
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.rod import solve_rod
@@ -112,7 +113,7 @@ def indent(
         Compliance of the interface; rigid by default.
     strain : str
         ``"linear"`` or ``"finite"``: a neo-Hookean film at finite strain, by finite elements,
-        for a frictionless or sticking rod or sphere.
+        under a rod or a sphere that slides freely or sticks (a sphere with loading ``"total"``).
     film_radius : float, optional
         Radius of the film's free edge in m, for finite elements; by default twelve thicknesses
         away from the contact.
@@ -166,8 +167,17 @@ def indent(
         )
     targets, several = _targets(load, depth)
     interface = interface or Interface()
-    contacts: list[Contact]
-    if _is_plain_rod(indenter, friction, backend, interface):
+    if strain == "finite":
+        contacts = press_at_finite_strain(
+            film,
+            indenter,
+            targets,
+            friction=float(friction),
+            loading=loading,
+            interface=interface,
+            film_radius=film_radius,
+        )
+    elif _is_plain_rod(indenter, friction, backend, interface):
         contacts = [_rod_contact(film, indenter, target, friction) for target in targets]
     else:
         request = RingRequest(
@@ -256,6 +266,11 @@ def _check_request(
             raise InputError(f'{name} is {value!r}, but it is "{known[0]}" or "{known[1]}".')
     if math.isnan(friction) or friction < 0:
         raise InputError(f"friction is {friction:g}, but a friction coefficient is not negative.")
+    if rings is not None and strain == "finite":
+        raise InputError(
+            "rings are given, but at finite strain the surface has none: it moves with its mesh.",
+            cure="Leave them out.",
+        )
     if rings is not None and rings < _FEWEST_RINGS:
         raise InputError(
             f"rings is {rings}, but a contact takes at least {_FEWEST_RINGS}.",
