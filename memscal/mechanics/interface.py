@@ -175,7 +175,9 @@ class Interface:
     Parameters
     ----------
     normal : GreenwoodTripp or ExponentialCompliance, optional
-        Law of pressure against separation.
+        Law of pressure against the separation of the mean planes.  Depths then count from where
+        the mean planes would meet: a light contact, which rests on the highest asperities, has a
+        negative one.
     slip_length : float
         Elastic tangential displacement :math:`\ell` at which the interface slips, in m.
 

@@ -126,6 +126,10 @@ def _step_by_step(
     resume, upward = walk, True
     farthest = max(target.value for target in targets)
     for target in targets:
+        if math.isclose(reached(walk.state, target), target.value, rel_tol=1e-12):
+            # Nothing moves, and nothing that slipped is found to stick.
+            yield walk.point()
+            continue
         rising = target.value > reached(walk.state, target)
         if rising == upward:
             walk = resume

@@ -115,3 +115,12 @@ def test_a_rod_slips_in_proportion_while_it_is_loaded() -> None:
 def test_a_second_call_returns_what_the_first_found() -> None:
     first = indent(FILM, SPHERE, load=0.77, friction=0.25)
     assert indent(FILM, Sphere(radius=128.8e-3), load=0.77, friction=0.25) is first
+
+
+def test_asking_for_the_same_load_again_moves_nothing() -> None:
+    once, again = indent(FILM, SPHERE, load=[1.0, 1.0], friction=0.2)
+    assert (again.depth, again.stick_radius, again.steps) == (
+        once.depth,
+        once.stick_radius,
+        once.steps,
+    )
