@@ -75,17 +75,29 @@ def _method(solution: Solution) -> list[str]:
 def _reference(solution: Solution) -> list[str]:
     stress, scan = solution.stress, solution.scan
     if isinstance(stress, Contact):
-        depth = stress.depth / scan.film.thickness
-        model_form = (
-            "The reference is the frictionless rod on the linear elastic film, indented by "
-            f"{depth:.0%} of its thickness at {stress.load:.3g} N; the error of linear elasticity "
-            "there is not part of the uncertainties."
-        )
-        return [model_form]
+        return [_model_form(stress)]
     messages = _other_set_up(scan, stress)
     if stress.convergence is None:
         messages.append("The reference states no convergence: its own error is not counted.")
     return messages
+
+
+def _model_form(contact: Contact) -> str:
+    """Say what the reference takes for granted."""
+    way = "frictionless" if contact.friction == 0 else "sticking"
+    depth = f"{contact.depth / contact.film.thickness:.0%} of its thickness at {contact.load:.3g} N"
+    if contact.strain == "finite":
+        return (
+            f"The reference is the {way} rod on a neo-Hookean film at finite strain, indented by "
+            f"{depth}; it is used in proportion to the load, and how far the film's own law "
+            "departs from it is not part of the uncertainties."
+        )
+    return (
+        f"The reference is the {way} rod on the linear elastic film, indented by {depth}; the "
+        "error of linear elasticity there is not part of the uncertainties. A reference at finite "
+        'strain (indent(..., strain="finite"); memscal reference rod --strain finite) shows what '
+        "it changes."
+    )
 
 
 def _other_set_up(scan: Scan, stress: StressProfile) -> list[str]:
