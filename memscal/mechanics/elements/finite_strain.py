@@ -39,7 +39,7 @@ _COARSER = 1.5
 _EDGE = 0.1
 # Sides of triangles at the edge, as a share of its rounding: a frictionless film is drawn around
 # the edge and stretched, and needs them finer.
-_FINEST_STICKING = 1 / 6
+_FINEST_STICKING = 1 / 5
 _FINEST_SLIDING = 1 / 8
 # Undeformed radii between which the surface folds around the edge, in radii of the rod.
 _FOLD_STICKING = (0.8, 1.9)

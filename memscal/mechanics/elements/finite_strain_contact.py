@@ -32,8 +32,10 @@ __all__ = ["Goal", "NewtonError", "Pressed", "Pressing"]
 # Newton's method has converged when the last step moved nothing by more than this share of the
 # film's thickness; its convergence is quadratic, so that what is left is the square of it.
 _SETTLED = 1e-7
-# The contact's edge is looked at again when the last step was shorter than this.
-_LOOSE = 1e-3
+# The contact's edge is looked at again when the last step was shorter than this; a node that
+# sticks stays for good where it is then, and that must be where it touched.
+_LOOSE_SLIDING = 1e-3
+_LOOSE_STICKING = 1e-6
 _MOST_ITERATIONS = 40
 # A Newton step that moves something farther than so many thicknesses leads nowhere.
 _FARTHEST = 3.0
@@ -114,11 +116,12 @@ class Pressing:
         state = start if goal.is_load else replace(start, depth=goal.value)
         state = self.placed(state)
         seen: set[bytes] = set()
+        loose = _LOOSE_STICKING if self.sticking and not self.upright else _LOOSE_SLIDING
         for iteration in range(1, _MOST_ITERATIONS + 1):
             state, moved = self._step(state, goal)
             if not moved < _FARTHEST * self.elements.thickness:
                 break
-            if moved > _LOOSE * self.elements.thickness:
+            if moved > loose * self.elements.thickness:
                 continue
             changed = self._touching(state, seen)
             if changed is not None:

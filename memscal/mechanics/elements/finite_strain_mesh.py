@@ -16,12 +16,12 @@ _SHARE_OF_CONTACT = 0.025
 # ... growing from one to the next away from it by this share, up to this many thicknesses near
 # the contact and far from it.
 _GROWTH = 0.3
-_WIDEST_BELOW_A_ROD = 0.05
+_WIDEST_BELOW_A_ROD = 0.06
 _WIDEST_BELOW_A_SPHERE = 0.08
 _WIDEST_FAR = 0.6
 _NEAR = 4.0
 # Growth of the sides with the distance from where the surface is folded around the rod's edge.
-_SLOPE = 0.35
+_SLOPE = 0.7
 
 
 def mesh_below_a_rod(

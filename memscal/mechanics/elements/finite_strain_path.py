@@ -60,7 +60,7 @@ class _Path:
         return Step(self.states[-1], len(self.states), self._work())
 
     def _work(self) -> float:
-        """Return the integral of load over depth: Simpson's, or a spline's, over uneven steps."""
+        """Return the integral of load over depth, by splines through the steps where there are enough."""
         from scipy.interpolate import CubicSpline
 
         depths = np.array([0.0] + [state.depth for state in self.states])
