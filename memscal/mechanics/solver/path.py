@@ -168,10 +168,11 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
 def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
     """Go to a target under an indenter with no more rings to touch, such as a rod.
 
-    The first loading is one step, because everything grows in proportion.  An edge that sticks
-    may pull at the film.
+    On a rigid interface the first loading is one step, because everything grows in proportion.
+    An edge that sticks may pull at the film.
     """
-    count = _STEPS_OF_A_FIXED_CONTACT if walk.state.load > 0 else 1
+    proportional = walk.state.load == 0 and walk.problem.interface.rigid
+    count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
     begin = reached(walk.state, target)
     for share in np.arange(1, count + 1) / count:
         value = begin + (target.value - begin) * float(share)
