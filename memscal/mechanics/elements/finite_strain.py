@@ -92,7 +92,8 @@ def solve_finite_strain(
     DomainError
         If the indenter is of another shape, or the contact outgrows the film.
     ConvergenceError
-        If no equilibrium is found, even in small steps; ``last`` is the last state found.
+        If no equilibrium is found, even in small steps; ``last`` is the last state on the way,
+        whose convergence is not known (``inf``).
 
     Examples
     --------
@@ -173,7 +174,8 @@ class _Request:
                 why="The film folds around the indenter more sharply than its elements can follow.",
                 cure="Ask for less, or give a higher refinement, or a rod a rounder edge.",
             )
-            error.last = states[-1] if states else None
+            if isinstance(problem.last, Step):
+                error.last = self._state(pressing, problem.last, None)
             raise error from problem
         return states
 

@@ -38,11 +38,15 @@ def follow(pressing: Pressing, start: Pressed, goals: list[Goal]) -> Iterator[St
     Raises
     ------
     NewtonError
-        If a goal is out of reach, however short the steps.
+        If a goal is out of reach, however short the steps; ``last`` is the last step.
     """
     path = _Path(pressing, start)
     for goal in goals:
-        path.reach(goal)
+        try:
+            path.reach(goal)
+        except NewtonError as problem:
+            problem.last = path.step if path.states else None
+            raise
         yield path.step
 
 
@@ -60,7 +64,7 @@ class _Path:
         return Step(self.states[-1], len(self.states), self._work())
 
     def _work(self) -> float:
-        """Return the integral of load over depth, by splines through the steps where there are enough."""
+        """Return the integral of load over depth, by splines through four points or more."""
         from scipy.interpolate import CubicSpline
 
         depths = np.array([0.0] + [state.depth for state in self.states])

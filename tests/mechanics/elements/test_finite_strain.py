@@ -212,7 +212,9 @@ def test_a_load_that_cannot_be_reached_gives_the_last_state_that_was() -> None:
         solve_finite_strain(FILM, ROD, depths=[0.02e-3, 1.5e-3], sticking=True, refinement=0.4)
     last = caught.value.last
     assert isinstance(last, FiniteStrainState)
-    assert last.depth == pytest.approx(0.02e-3)
+    assert 0.02e-3 < last.depth < 1.5e-3
+    assert last.elastic_energy > 0
+    assert np.isinf(last.convergence)
 
 
 def test_what_makes_no_sense_is_refused() -> None:
