@@ -1,4 +1,4 @@
-"""``memscal import``: a table of numbers to a scan or a reference."""
+"""``memscal import``: a table of numbers to a scan or a reference, or a mesh to a reference."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import import_reference
 from memscal.cli.failures import DONE, debug_option
+from memscal.cli.import_reference import reference_options
 from memscal.cli.options import (
     FILE,
-    FILM,
     Quantity,
     film_from,
     film_options,
@@ -24,7 +25,8 @@ from memscal.cli.output import emit, emit_json, message, readable, warn
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
-    from memscal.formats.table import ImportedProfile, ImportedScan
+    from memscal.formats.reference_profile import ImportedProfile
+    from memscal.formats.table import ImportedScan
 
 __all__ = ["command"]
 
@@ -40,9 +42,12 @@ Examples:
       --radius 0.5 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
   memscal import fem.csv -o rod.h5 --format reference --r r --r-unit mm
       --sigma S33 --sigma-unit MPa --sign -1 --load 1
+  memscal import fem.vtu -o rod.h5 --format reference --r-unit mm
+      --sigma S --sigma-unit MPa --load 1
 
 \b
 Columns are given by their names in the header, or by their numbers counted from 1.
+Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
 _SCAN_NAMES = [
@@ -50,18 +55,14 @@ _SCAN_NAMES = [
     *("load_column", "load_unit", "load_uncertainty", "grid_tolerance", "repeats", "title"),
 ]
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
-_PROFILE_NAMES = ["r", "r_unit", "sigma", "sigma_unit", "shear", "solver"]
 _SIGNS = ("u_sign", "sign", "shear_sign")
 _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
     "scan": [*_SCAN_NAMES, *_SENSOR_NAMES.values()],
-    "reference": [*_PROFILE_NAMES, "sign", "shear_sign"],
+    "reference": import_reference.NAMES,
 }
-_NEEDED = {
-    "scan": ("x", "x_unit", "u", "u_unit"),
-    "reference": ("r", "r_unit", "sigma", "sigma_unit", "load"),
-}
+_NEEDED = ("x", "x_unit", "u", "u_unit")
 
 
 @click.command("import", epilog=EXAMPLES)
@@ -75,7 +76,7 @@ _NEEDED = {
     type=click.Choice(["scan", "reference"]),
     default="scan",
     show_default=True,
-    help="What the table holds: measured points, or the base stress of a FEM calculation.",
+    help="What it holds: measured points, or the base stress of a FEM calculation.",
 )
 @click.option("--x", metavar="COLUMN", help="Scan: column of the position.")
 @click.option("--x-unit", metavar="UNIT", help="Scan: unit of the positions, such as mm.")
@@ -123,25 +124,7 @@ _NEEDED = {
 @click.option("--sensor-model", metavar="TEXT", help="Scan: model of the sensor.")
 @click.option("--channel", metavar="TEXT", help="Scan: name of the channel.  [default: zz]")
 @click.option("--title", metavar="TEXT", help="Scan: title.")
-@click.option("--r", metavar="COLUMN", help="Reference: column of the radius.")
-@click.option("--r-unit", metavar="UNIT", help="Reference: unit of the radius, such as mm.")
-@click.option(
-    "--sigma", metavar="COLUMN", help="Reference: column of the normal stress at the base."
-)
-@click.option("--sigma-unit", metavar="UNIT", help="Reference: unit of the stresses, such as MPa.")
-@click.option("--shear", metavar="COLUMN", help="Reference: column of the radial shear stress.")
-@click.option(
-    "--sign",
-    type=click.Choice(["1", "-1"]),
-    help="Reference: -1 where compression is negative in the table.  [default: 1]",
-)
-@click.option(
-    "--shear-sign",
-    type=click.Choice(["1", "-1"]),
-    help="Reference: -1 where the shear is the stress component S13 with axis 3 from the base to "
-    "the surface; 1 where it is the base's traction on the film, positive outward.  [default: 1]",
-)
-@click.option("--solver", metavar="TEXT", help="Reference: the program that calculated it.")
+@reference_options
 @click.option(
     "--indenter",
     type=click.Choice(["rod", "sphere"]),
@@ -163,16 +146,16 @@ _NEEDED = {
 @force_option
 @debug_option
 def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **given: Any) -> int:
-    """Convert a TABLE (CSV) to a scan or to a reference.
+    """Convert a TABLE (CSV) to a scan or to a reference, or a mesh (VTU, VTK, XDMF) to a reference.
 
     A table says neither its units nor what was pressed on what: the options do. What was done to
     the readings (places found, points missing, repeats averaged) is printed, and kept in the
     notes of the file.
     """
-    _check_usage(kind, given)
+    _check_usage(table, kind, given)
     given |= {name: int(given[name]) for name in _SIGNS if given[name] is not None}
     prove_writable([output], force=force, inputs=[table])
-    found = _scan(table, given) if kind == "scan" else _reference(table, given)
+    found = _scan(table, given) if kind == "scan" else import_reference.read(table, given)
     _write(found, output, force)
     if as_json:
         emit_json(
@@ -192,9 +175,10 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
     return DONE
 
 
-def _check_usage(kind: str, given: dict[str, Any]) -> None:
-    """Name every option that is missing, or that belongs to the other format, at once."""
-    missing = [name for name in _NEEDED[kind] if given[name] is None]
+def _check_usage(path: Path, kind: str, given: dict[str, Any]) -> None:
+    """Name every option that is missing, or that belongs to something else, at once."""
+    names = _NEEDED if kind == "scan" else import_reference.needed(path)
+    missing = [name for name in names if given[name] is None]
     if missing:
         raise click.UsageError(
             f"A {kind} needs more: add {_named(missing)}. See the examples of "
@@ -206,6 +190,10 @@ def _check_usage(kind: str, given: dict[str, Any]) -> None:
     strange = [name for name in _ONLY[other] if given[name] is not None]
     if strange:
         raise click.UsageError(f"{_named(strange)} belong to --format {other}.")
+    if kind == "reference":
+        what, unused = import_reference.strange(path, given)
+        if unused:
+            raise click.UsageError(f"{_named(unused)} mean nothing for a {what}.")
 
 
 def _named(names: Sequence[str]) -> str:
@@ -229,17 +217,6 @@ def _scan(path: Path, given: dict[str, Any]) -> ImportedScan:
         film=film,
         indenter=indenter,
         sensor=StressSensor(**labels),
-    )
-
-
-def _reference(path: Path, given: dict[str, Any]) -> ImportedProfile:
-    from memscal.formats.reference_table import read_reference_table
-
-    return read_reference_table(
-        path,
-        **_given(given, [*_ONLY["reference"], *_TABLE_NAMES]),
-        film=None if all(given[name] is None for name in FILM) else film_from(given),
-        indenter=None if given["radius"] is None else indenter_from(given["indenter"], given),
     )
 
 

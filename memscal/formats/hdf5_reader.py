@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.errors import FormatError, InputError, UnsafeFileError
+from memscal.formats.damage import damage_named
 from memscal.formats.file_bytes import read_bytes
 from memscal.formats.hdf5_lengths import attribute_text_lengths, text_length
 from memscal.formats.hdf5_limits import (
@@ -58,7 +59,7 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
             cure="Convert a table with `memscal import`.",
         )
     source = SourceFile(name, hashlib.sha256(data).hexdigest())
-    with _damage_named(f"{name} cannot be opened as HDF5"):
+    with damage_named(f"{name} cannot be opened as HDF5"):
         file = h5py.File(BytesIO(data), "r")
     try:
         yield SafeFile(file, name, source, data)
@@ -70,23 +71,6 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     finally:
         with contextlib.suppress(Exception):
             file.close()
-
-
-@contextlib.contextmanager
-def _damage_named(problem: str) -> Iterator[None]:
-    """Turn whatever HDF5 raises on damaged bytes into one kind of error."""
-    try:
-        yield
-    except MemscalError:
-        raise
-    except MemoryError as error:
-        raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
-    except Exception as error:
-        raise FormatError(
-            f"{problem}.",
-            why=f"The file is damaged or incomplete ({printable(str(error), 200)}).",
-            cure="Get the file again from where it came from.",
-        ) from error
 
 
 class SafeFile:
@@ -119,27 +103,27 @@ class SafeFile:
 
     def has(self, path: str) -> bool:
         """Return whether a path exists; a link that is not a hard link is refused."""
-        with _damage_named(f"{self.where(path)} cannot be opened"):
+        with damage_named(f"{self.where(path)} cannot be opened"):
             return self._open(path) is not None
 
     def is_group(self, path: str) -> bool:
         """Return whether a path exists and is a group."""
         from memscal.formats.hdf5_library import h5py
 
-        with _damage_named(f"{self.where(path)} cannot be opened"):
+        with damage_named(f"{self.where(path)} cannot be opened"):
             return isinstance(self._open(path), h5py.h5g.GroupID)
 
     def array(self, path: str) -> np.ndarray[Any, Any]:
         """Return the numbers at a path: 64-bit floats, or 64-bit integers where stored so."""
         if path not in self._arrays:
-            with _damage_named(f"{self.where(path)} cannot be read"):
+            with damage_named(f"{self.where(path)} cannot be read"):
                 self._arrays[path] = self._read_array(path)
         return self._arrays[path]
 
     def text(self, path: str) -> str:
         """Return the text at a path, without characters that do not print."""
         if path not in self._texts:
-            with _damage_named(f"{self.where(path)} cannot be read"):
+            with damage_named(f"{self.where(path)} cannot be read"):
                 self._texts[path] = self._read_text(path)
         return self._texts[path]
 
@@ -147,12 +131,12 @@ class SafeFile:
         """Return whether a path holds a string and not a number."""
         from memscal.formats.hdf5_library import h5py
 
-        with _damage_named(f"{self.where(path)} cannot be read"):
+        with damage_named(f"{self.where(path)} cannot be read"):
             return bool(self._dataset(path).get_type().get_class() == h5py.h5t.STRING)
 
     def attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
         """Return an attribute: text, a number, a few texts, or ``None`` where there is none."""
-        with _damage_named(f"{self.where(path)}@{name} cannot be read"):
+        with damage_named(f"{self.where(path)}@{name} cannot be read"):
             return self._read_attribute(path, name)
 
     def _open(self, path: str) -> Any:

@@ -10,7 +10,8 @@ import numpy as np
 from memscal.errors import InputError, UnitError
 from memscal.formats.csv_table import Table, read_table
 from memscal.formats.placement import place_readings
-from memscal.formats.reference_table import ImportedProfile, read_reference_table
+from memscal.formats.reference_profile import ImportedProfile
+from memscal.formats.reference_table import read_reference_table
 from memscal.formats.units import to_si
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter

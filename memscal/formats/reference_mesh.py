@@ -1,0 +1,200 @@
+"""Import of a stress profile from the mesh of any FEM program."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.formats.mesh_base import Base, Frame, find_base, find_frame
+from memscal.formats.mesh_circles import average_over_circles
+from memscal.formats.mesh_reader import Mesh, read_mesh
+from memscal.formats.mesh_stress import Component, find_normal, find_shear
+from memscal.formats.reference_profile import (
+    ImportedProfile,
+    Samples,
+    profile_of,
+    require_numbers,
+    require_sign,
+)
+from memscal.formats.units import to_si
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+from memscal.model.validation import FloatArray
+
+__all__ = ["read_reference_mesh"]
+
+
+def read_reference_mesh(
+    path: str | os.PathLike[str],
+    *,
+    sigma: str,
+    r_unit: str,
+    sigma_unit: str,
+    load: float,
+    sign: int = -1,
+    shear: str | None = None,
+    shear_sign: int | None = None,
+    vertical: str | None = None,
+    base: float | None = None,
+    centre: tuple[float, float] | None = None,
+    film: ElasticFilm | None = None,
+    indenter: Indenter | None = None,
+    solver: str = "",
+) -> ImportedProfile:
+    r"""Read the stress at the base of the film from a mesh with a stress field.
+
+    Parameters
+    ----------
+    path : path
+        A VTU (.vtu), legacy VTK (.vtk) or XDMF (.xdmf) file: an axisymmetric section with the
+        axis at radius 0, or a film in 3-D, which is averaged over circles.
+    sigma : str
+        The field: one value (the normal stress), or a stress tensor of 4 components (radial,
+        vertical, hoop, shear), 6 (xx, yy, zz, xy, yz, xz) or 9; ``"name:2"`` is component 2.
+    r_unit, sigma_unit : str
+        Units of the coordinates and of the stress; a mesh states neither.
+    load : float
+        Normal load of the calculation, in N.
+    sign : {-1, 1}
+        -1 where compression is negative, as in practically every FEM program.
+    shear : str, optional
+        The field of the radial shear stress, for sections only; a tensor's own by default.
+    shear_sign : {1, -1}, optional
+        1 where the field is the radial traction of the base on the film, positive outward; by
+        default it is taken for the stress component :math:`\sigma_{rz}`.
+    vertical : {"x", "y", "z"}, optional
+        The axis across the film: by default the second of a section's two, and z in 3-D.
+    base : float, optional
+        Position of the base on that axis, in m; the lowest by default.
+    centre : tuple of float, optional
+        Where the indenter's axis meets the base of a film in 3-D, in m; (0, 0) by default.
+    film, indenter : optional
+        What was pressed on what.
+    solver : str
+        The program.
+
+    Returns
+    -------
+    ImportedProfile
+        The profile, and what was taken for what: also recorded in ``profile.notes``.
+
+    Raises
+    ------
+    InputError
+        If meshio is not installed, the field or the base is not there, a value is missing, or
+        force and load differ by more than a factor of two.
+    """
+    require_sign("sign", sign)
+    if shear_sign is not None:
+        require_sign("shear sign", shear_sign)
+    mesh = read_mesh(path)
+    name = mesh.source.file_name
+    frame = find_frame(mesh, to_si(mesh.points, r_unit, "length", name), vertical)
+    normal = find_normal(mesh, frame, sigma)
+    section = len(frame.radial) == 1
+    _require_meaning(name, section, shear, centre)
+    tangential = _shear_component(mesh, frame, normal, shear) if section else None
+    footing = find_base(mesh, frame, base)
+    places, values = _at_base(mesh, frame, footing, normal)
+    columns = {"sigma_zz": sign * to_si(values, sigma_unit, "stress", f"{name}: {sigma}")}
+    notes = [
+        f"Imported from {name} (sha256 {mesh.source.sha256}).",
+        *mesh.notes,
+        *frame.notes,
+        *footing.notes,
+        _told(normal, "Normal stress", "compression negative" if sign < 0 else "as it is"),
+    ]
+    if tangential is not None:
+        turned = footing.outward if shear_sign is None else shear_sign
+        values = _at_base(mesh, frame, footing, tangential)[1]
+        columns["sigma_rz"] = turned * to_si(values, sigma_unit, "stress", name)
+        notes.append(_told(tangential, "Radial shear", f"times {turned}"))
+    samples = Samples(
+        columns=columns,
+        source=mesh.source,
+        notes=notes,
+        kind="mesh",
+        item="base node" if normal.at_points else "base cell",
+        units=(r_unit, sigma_unit),
+        sign=sign,
+        spacing=frame.tolerance,
+        discretisation=f"{mesh.size}, {len(footing.nodes)} nodes on the base",
+    )
+    samples = _along_radius(samples, frame, places, centre or (0.0, 0.0))
+    return profile_of(samples, load=load, film=film, indenter=indenter, solver=solver)
+
+
+def _along_radius(
+    samples: Samples, frame: Frame, places: FloatArray, centre: tuple[float, float]
+) -> Samples:
+    """Give samples their radii: those of a section as they are, those of a plane by circles."""
+    if len(frame.radial) == 1:
+        r = np.where(np.abs(places[:, 0]) <= frame.tolerance, 0.0, places[:, 0])
+        return replace(samples, columns={"r": r, **samples.columns})
+    require_numbers(samples)  # a mean would leave out what is missing
+    columns, note = average_over_circles(places - np.array(centre), samples.columns)
+    return replace(samples, columns=columns, notes=[*samples.notes, note])
+
+
+def _require_meaning(
+    name: str, section: bool, shear: str | None, centre: tuple[float, float] | None
+) -> None:
+    """Refuse an option that the mesh gives no meaning to."""
+    if section and centre is not None:
+        raise InputError(
+            f"A centre was given, but the mesh in {name} is a section.",
+            why="The axis of a section is at radius 0.",
+            cure="Leave out the centre (--centre), or shift the mesh.",
+        )
+    if not section and shear is not None:
+        raise InputError(
+            f"A shear field was given, but the mesh in {name} is a body in 3-D.",
+            why="The radial shear is read from sections only.",
+            cure="Leave it out (shear; --shear), or give a section of the film.",
+        )
+
+
+def _shear_component(
+    mesh: Mesh, frame: Frame, normal: Component, shear: str | None
+) -> Component | None:
+    """Return the shear that is asked for, or the one that comes with a stress tensor."""
+    if shear is not None:
+        found = find_shear(mesh, frame, shear)
+        if found.at_points != normal.at_points:
+            raise InputError(
+                f"In {mesh.source.file_name}, one of {normal.field!r} and {found.field!r} is "
+                "given at the nodes and the other in the cells.",
+                cure="Give both in the same way.",
+            )
+        return found
+    return find_shear(mesh, frame, normal.field) if normal.tensor else None
+
+
+def _at_base(
+    mesh: Mesh, frame: Frame, base: Base, wanted: Component
+) -> tuple[FloatArray, FloatArray]:
+    """Return places in the base and the values there: at nodes, or at the middles of sides."""
+    radial = list(frame.radial)
+    if wanted.at_points:
+        places = frame.points[base.nodes][:, radial]
+        return places, mesh.point_data[wanted.field][base.nodes, wanted.column]
+    here = [part for part in base.cells if wanted.field in part[0].data]
+    if not sum(len(cells) for _, cells, _ in here):
+        raise InputError(
+            f"No cell with a value of {wanted.field!r} has a side on the base in "
+            f"{mesh.source.file_name}.",
+            cure="Name the position of the base (base; --base), or save the stress at the nodes.",
+        )
+    places = np.concatenate([middles for _, _, middles in here])[:, radial]
+    values = [block.data[wanted.field][cells, wanted.column] for block, cells, _ in here]
+    return places, np.concatenate(values)
+
+
+def _told(component: Component, what: str, how: str) -> str:
+    note = f"{what}: {component}, {how}"
+    if not component.at_points:
+        return f"{note}; each value is taken at the middle of its cell's side on the base."
+    return f"{note}."
