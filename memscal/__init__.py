@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from memscal.formats.scan import read_scan, write_scan
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.indent import indent
+    from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
     from memscal.model.film import ElasticFilm
-    from memscal.model.indenter import Rod, Sphere
+    from memscal.model.indenter import Cone, Profile, Rod, Sphere
     from memscal.model.scan import Scan, StressSensor
     from memscal.model.stress import StressProfile
     from memscal.simulation import GaussianMixture, simulate
@@ -27,10 +28,15 @@ if TYPE_CHECKING:
 _HOMES = {
     "ApparatusFunction": "memscal.apparatus",
     "Calibration": "memscal.calibration.procedure",
+    "Cone": "memscal.model.indenter",
     "Contact": "memscal.mechanics.contact",
     "ElasticFilm": "memscal.model.film",
+    "ExponentialCompliance": "memscal.mechanics.interface",
     "GaussianMixture": "memscal.simulation",
+    "GreenwoodTripp": "memscal.mechanics.interface",
+    "Interface": "memscal.mechanics.interface",
     "MemscalError": "memscal.errors",
+    "Profile": "memscal.model.indenter",
     "Rod": "memscal.model.indenter",
     "Scan": "memscal.model.scan",
     "Sphere": "memscal.model.indenter",
@@ -49,10 +55,15 @@ _HOMES = {
 __all__ = [
     "ApparatusFunction",
     "Calibration",
+    "Cone",
     "Contact",
     "ElasticFilm",
+    "ExponentialCompliance",
     "GaussianMixture",
+    "GreenwoodTripp",
+    "Interface",
     "MemscalError",
+    "Profile",
     "Rod",
     "Scan",
     "Sphere",

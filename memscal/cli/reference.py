@@ -1,9 +1,7 @@
-"""``memscal reference``: the stress at the base of a film under an indenter."""
+"""``memscal reference``: a contact with the film, and the stress at its base."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,48 +14,44 @@ from memscal.cli.options import (
     film_from,
     film_options,
     force_option,
-    indenter_from,
     json_option,
     radius_options,
     si,
 )
-from memscal.cli.output import emit_json, finite, message, note
-from memscal.cli.targets import prove_writable
+from memscal.cli.output import message
+from memscal.cli.reference_setup import SHAPES, indenter_of, interface_of, interface_options
+from memscal.cli.targets import FigurePath, prove_writable
 
 if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
 
 __all__ = ["command"]
 
-#: The paper's rod and sphere, in mm, and its film.
-RADIUS = {"rod": 0.25, "sphere": 128.8}
+#: The paper's film.
 FILM = {"young-modulus": 2.2, "poisson-ratio": 0.5, "thickness": 2.0}
-
-#: Share of the film's thickness up to which linear elasticity is taken at its word.
-_SHALLOW = 0.1
-
-_SINGULAR = (
-    "The pressure under a flat rod grows without bound towards its edge: "
-    "there is no largest interface stress."
-)
 
 EXAMPLES = """\b
 Examples:
   memscal reference rod
   memscal reference rod --load 0.5 --load 1 --load 2
-  memscal reference rod --depth 100 --thickness 3 --json
-  memscal reference rod --radius 0.5 --friction inf -o sticking_rod.h5
+  memscal reference rod --strain finite --friction inf -o finite.h5
+  memscal reference sphere --load 0.34 --load 1.37 --load 2.75 --friction 0.3 --figure sphere.png
+  memscal reference sphere --depth 20 --friction inf --loading total --backend fem --json
+  memscal reference sphere --friction 1.6 --slip-length 1.82
+  memscal reference cone --inclination 2 --load 0.5
+  memscal reference profile --profile-table tip.csv --load 1
 """
 
 
 @click.command("reference", epilog=EXAMPLES)
-@click.argument("indenter", type=click.Choice(["rod", "sphere"]))
+@click.argument("indenter", type=click.Choice(SHAPES))
 @click.option(
     "--load",
     "loads",
     type=Quantity("N"),
     multiple=True,
-    help="Normal load, in N. May be repeated.  [default: 1, without --depth]",
+    help="Normal load, in N. Repeated, a path: visited in the order given.  [default: 1, without "
+    "--depth]",
 )
 @click.option(
     "--depth",
@@ -68,28 +62,60 @@ Examples:
 )
 @radius_options(uncertainties=False)
 @click.option(
+    "--inclination",
+    type=Quantity("deg", high=89.0),
+    help="Cone: angle between its face and the film, in degrees.",
+)
+@click.option(
+    "--profile-table",
+    type=FILE,
+    metavar="TABLE",
+    help="Profile: a delimited table of radius and height, from the axis outward.",
+)
+@click.option("--r-unit", default="mm", show_default=True, help="Profile: unit of the radii.")
+@click.option("--z-unit", default="um", show_default=True, help="Profile: unit of the heights.")
+@click.option(
     "--friction",
     type=Quantity("ratio", open_low=False, infinite=True),
     default=0.0,
     show_default=True,
     metavar="MU",
-    help="Friction coefficient between indenter and film; inf: it sticks. Under a rod: 0 or inf.",
+    help="Friction coefficient between indenter and film; inf: it sticks wherever it touches.",
 )
-@film_options(defaults=FILM, uncertainties=False)
 @click.option(
     "--loading",
     type=click.Choice(["incremental", "total"]),
     default="incremental",
     show_default=True,
-    help="Where a point sticks: where it first touched, or as if loaded in one step. The same "
-    "under a rod.",
+    help="A point sticks where it first touched, or as if loaded in one step. The same under a "
+    "rod.",
 )
+@interface_options
+@film_options(defaults=FILM, uncertainties=False)
 @click.option(
     "--backend",
     type=click.Choice(["hankel", "fem"]),
     default="hankel",
     show_default=True,
-    help="How it is solved. This version has hankel: linear elasticity by Hankel transforms.",
+    help="Hankel transforms on an infinite film, or finite elements on one with a free edge.",
+)
+@click.option(
+    "--strain",
+    type=click.Choice(["linear", "finite"]),
+    default="linear",
+    show_default=True,
+    help="finite: a neo-Hookean film, by finite elements; friction 0 or inf.",
+)
+@click.option(
+    "--film-radius",
+    type=Quantity("mm"),
+    help="Radius of the film's free edge, in mm, for finite elements.  [default: 12 thicknesses "
+    "from the contact]",
+)
+@click.option(
+    "--rings",
+    type=click.IntRange(min=16),
+    help="Rings from the axis to the largest contact.  [default: as many as it takes]",
 )
 @click.option(
     "-o",
@@ -98,6 +124,21 @@ Examples:
     metavar="OUT",
     help="Reference file to write (memscal-reference); for one load or depth.",
 )
+@click.option(
+    "--figure",
+    "figures",
+    type=FigurePath(),
+    multiple=True,
+    metavar="FILE",
+    help="Figure of the contacts (.png, .svg or .pdf). May be repeated.",
+)
+@click.option(
+    "--mesh",
+    type=FILE,
+    metavar="FILE.vtu",
+    help="Displacement and stress in the film, for ParaView (needs meshio); for finite elements "
+    "and one load or depth.",
+)
 @json_option
 @force_option
 @debug_option
@@ -105,119 +146,96 @@ def command(
     indenter: str,
     loads: tuple[float, ...],
     depths: tuple[float, ...],
-    friction: float,
-    loading: str,
-    backend: str,
     output: Path | None,
+    figures: tuple[Path, ...],
+    mesh: Path | None,
     as_json: bool,
     force: bool,
     **given: Any,
 ) -> int:
-    """Solve the stress at the base of a bonded film under a rigid INDENTER.
+    """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
-    The film is linear elastic and bonded to a rigid base. What the options do not say is the
-    paper's: E = 2.2 MPa, Poisson's ratio 0.5, thickness 2 mm; a rod of radius 0.25 mm.
+    What the options do not say is the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and
+    2 mm; a rod of radius 0.25 mm, a sphere of radius 128.8 mm.
     """
+    _check_usage(loads, depths, output, mesh, given)
+    files = [path for path in (output, mesh, *figures) if path is not None]
+    table = given["profile_table"]
+    prove_writable(files, force=force, inputs=[table] if table else [])
+    contacts = _pressed(indenter, loads, depths, given)
+    _write(contacts, output, figures, mesh, force=force)
+
+    from memscal.cli.reference_view import tell
+
+    tell(contacts, given["loading"], output, as_json=as_json)
+    for path in files:
+        message(f"Written: {path}")
+    return DONE
+
+
+def _check_usage(
+    loads: tuple[float, ...],
+    depths: tuple[float, ...],
+    output: Path | None,
+    mesh: Path | None,
+    given: dict[str, Any],
+) -> None:
     if loads and depths:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
-    if output is not None and max(len(loads), len(depths)) > 1:
-        raise click.UsageError(
-            "A reference file holds one load: with --output give one --load or one --depth."
-        )
-    given["radius"] = given["radius"] or RADIUS[indenter]
-    if output is not None:
-        prove_writable([output], force=force)
-    film, body = film_from(given), indenter_from(indenter, given)
+    for name, path in (("output", output), ("mesh", mesh)):
+        if path is not None and max(len(loads), len(depths)) > 1:
+            raise click.UsageError(
+                f"A file holds one load: with --{name} give one --load or one --depth."
+            )
+    if mesh is not None and given["backend"] != "fem":
+        raise click.UsageError("--mesh shows finite elements: add --backend fem.")
+    if mesh is not None and mesh.suffix.lower() != ".vtu":
+        raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
+
+
+def _pressed(
+    indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], given: dict[str, Any]
+) -> list[Contact]:
+    film, body, interface = film_from(given), indenter_of(indenter, given), interface_of(given)
 
     from memscal.mechanics.indent import indent
 
-    settings: dict[str, Any] = {"friction": friction, "loading": loading, "backend": backend}
+    settings: dict[str, Any] = {
+        name: given[name] for name in ("friction", "loading", "backend", "strain", "rings")
+    }
+    settings |= {"interface": interface, "film_radius": si(given["film_radius"], -3)}
     if depths:
-        contacts = indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
-    else:
-        contacts = indent(film, body, load=list(loads or (1.0,)), **settings)
+        return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
+    return indent(film, body, load=list(loads or (1.0,)), **settings)
+
+
+def _write(
+    contacts: list[Contact],
+    output: Path | None,
+    figures: tuple[Path, ...],
+    mesh: Path | None,
+    *,
+    force: bool,
+) -> None:
+    """Write the files; what is drawn is drawn before the first of them is there."""
+    rendered: dict[Path, bytes] = {}
+    if figures:
+        from memscal.figures.contact import contact_figure
+        from memscal.figures.render import figure_format, render_figure
+
+        figure = contact_figure(contacts)
+        for path in figures:
+            rendered[path] = render_figure(figure, figure_format(path.suffix))
     if output is not None:
         from memscal.formats.reference import write_reference
 
         write_reference(contacts[0].profile(), output, overwrite=force)
-    _tell(contacts, loading, output, as_json)
-    return DONE
+    if mesh is not None:
+        from memscal.formats.mesh_writer import write_mesh
 
+        write_mesh(contacts[0].mesh(), mesh, overwrite=force)
+    if rendered:
+        from memscal.formats.atomic import atomic_write_bytes
 
-def _tell(contacts: Sequence[Contact], loading: str, output: Path | None, as_json: bool) -> None:
-    solutions = [_solution(contact, loading) for contact in contacts]
-    deep = [text for contact in contacts if (text := _deep(contact))]
-    if as_json:
-        head = {"schema_version": "1", "output": None if output is None else str(output)}
-        emit_json({**head, "solutions": solutions, "warnings": [_SINGULAR, *deep]})
-    else:
-        from memscal.cli.tables import emit_tables
-
-        emit_tables(_table(contacts[0], solutions))
-    for text in deep:
-        note(text)
-    if output is not None:
-        message(f"Written: {output}")
-
-
-def _deep(contact: Contact) -> str:
-    """Say where linear elasticity is formal."""
-    share = contact.depth / contact.film.thickness
-    if share <= _SHALLOW:
-        return ""
-    return (
-        f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the film's "
-        "thickness: linear elasticity is formal there, and its error is not part of the "
-        "convergence."
-    )
-
-
-def _solution(contact: Contact, loading: str) -> dict[str, Any]:
-    """Return one solution in the contract's names and units."""
-
-    def quantity(value: float, unit: str) -> dict[str, Any]:
-        return {"value": finite(value), "unit": unit}
-
-    return {
-        "load": quantity(contact.load, "N"),
-        "depth": quantity(contact.depth * 1e6, "um"),
-        "contact_radius": quantity(contact.contact_radius * 1e3, "mm"),
-        "stick_radius": quantity(contact.stick_radius * 1e3, "mm"),
-        "max_interface_stress": quantity(math.inf, "Pa"),
-        "max_base_stress": quantity(float(contact.profile().sigma_zz.max()), "Pa"),
-        "friction_coefficient": quantity(contact.friction, "1"),
-        "sticking": math.isinf(contact.friction),
-        "loading": loading,
-        "backend": contact.backend,
-        "convergence": quantity(contact.convergence, "1"),
-    }
-
-
-def _table(contact: Contact, solutions: Sequence[dict[str, Any]]) -> Any:
-    from memscal.cli.tables import Table
-
-    film = contact.film
-    friction = "sticking" if math.isinf(contact.friction) else "frictionless"
-    title = (
-        f"A {friction} {contact.indenter.shape} of radius {contact.contact_radius * 1e3:.4g} mm "
-        f"on a film of {film.thickness * 1e3:.4g} mm, E = {film.young_modulus * 1e-6:.4g} MPa, "
-        f"Poisson's ratio {film.poisson_ratio:.4g} ({contact.backend})"
-    )
-    head = (
-        "load (N)",
-        "depth (um)",
-        "load/depth (N/mm)",
-        "largest base stress (Pa)",
-        "convergence",
-    )
-    rows = [
-        (
-            f"{s['load']['value']:.4g}",
-            f"{s['depth']['value']:.4g}",
-            f"{1e3 * s['load']['value'] / s['depth']['value']:.4g}",
-            f"{s['max_base_stress']['value']:.6g}",
-            f"{s['convergence']['value']:.1g}",
-        )
-        for s in solutions
-    ]
-    return Table(title, head, rows)
+        for path, data in rendered.items():
+            atomic_write_bytes(path, data, overwrite=force)

@@ -234,6 +234,7 @@ class Contact:
             solver=f"memscal, {self.backend} backend, {self.strain} strain",
             discretisation=self.discretisation,
             convergence=self.convergence,
+            notes=f"Interface: {self.interface.description}." if not self.interface.rigid else "",
         )
 
     def _default_radii(self) -> FloatArray:

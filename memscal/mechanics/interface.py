@@ -204,6 +204,25 @@ class Interface:
         return self.normal if self.normal is not None and self.normal.length > 0 else None
 
     @property
+    def description(self) -> str:
+        """What yields, in words; empty for a rigid interface."""
+        parts = []
+        if isinstance(self.normal, GreenwoodTripp) and self.normal.roughness > 0:
+            parts.append(
+                f"Greenwood-Tripp law (roughness {self.normal.roughness * 1e6:.4g} um, "
+                f"{self.normal.asperity_density * 1e-6:.4g} asperities per mm^2 of radius "
+                f"{self.normal.asperity_radius * 1e6:.4g} um)"
+            )
+        if isinstance(self.normal, ExponentialCompliance) and self.normal.decay_length > 0:
+            parts.append(
+                f"exponential law (length {self.normal.decay_length * 1e6:.4g} um, "
+                f"{self.normal.reference_pressure * 1e-6:.4g} MPa where mean planes meet)"
+            )
+        if self.slip_length > 0:
+            parts.append(f"slip length {self.slip_length * 1e6:.4g} um")
+        return ", ".join(parts)
+
+    @property
     def rigid(self) -> bool:
         """Whether nothing yields."""
         return self.normal_law is None and self.slip_length == 0

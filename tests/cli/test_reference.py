@@ -57,7 +57,8 @@ def test_a_sticking_rod_says_so_without_writing_infinity(run: Run) -> None:
 
 def test_the_table_shows_every_load(run: Run) -> None:
     lines = run("reference", "rod", "--load", 0.25, "--load", 0.75).out.splitlines()
-    assert "frictionless rod of radius 0.25 mm" in lines[0]
+    assert "rod of radius 0.25 mm" in lines[0]
+    assert "frictionless" in lines[0]
     assert [line.split()[0] for line in lines[3:]] == ["0.25", "0.75"]
 
 
@@ -93,13 +94,15 @@ def test_load_and_depth_exclude_each_other(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["sphere"], "sphere"),
-        (["rod", "--friction", "0.3"], "friction is 0.3"),
-        (["rod", "--backend", "fem"], "fem"),
         (["rod", "--depth", "3000"], "would sink 3000 um"),
+        (["sphere", "--load", "1e9"], "times as wide as the film is thick"),
+        (["sphere", "--strain", "finite", "--friction", "0.3"], "slides freely (friction 0) or"),
+        (["sphere", "--film-radius", "25"], "a film has no end"),
+        (["sphere", "--backend", "fem", "--film-radius", "1"], "1 mm"),
+        (["profile", "--profile-table", "absent.csv"], "absent.csv"),
     ],
 )
-def test_what_this_version_cannot_solve_is_refused_plainly(
+def test_what_cannot_be_solved_is_refused_plainly(
     run: Run, folder: Path, arguments: list[str], word: str
 ) -> None:
     refused = run("reference", *arguments, "-o", "out.h5")
@@ -119,3 +122,114 @@ def test_a_reference_is_not_replaced_unless_forced(run: Run, folder: Path) -> No
 def test_a_depth_beyond_linear_elasticity_is_pointed_out(run: Run) -> None:
     assert "29% of the film's thickness" in run("reference", "rod").err
     assert run("reference", "rod", "--depth", 100).err == ""
+
+
+def test_the_papers_sphere_along_a_loading(run: Run) -> None:
+    loads = ["--load", 0.34, "--load", 1.37, "--load", 2.75]
+    found = run("reference", "sphere", *loads, "--friction", 0.3, "--json").json["solutions"]
+    expected = memscal.indent(
+        memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3),
+        memscal.Sphere(radius=128.8e-3), load=[0.34, 1.37, 2.75], friction=0.3,
+    )  # fmt: skip
+    assert [s["load"]["value"] for s in found] == [0.34, 1.37, 2.75]
+    for solution, contact in zip(found, expected, strict=True):
+        for name, scale in (("depth", 1e6), ("contact_radius", 1e3), ("stick_radius", 1e3)):
+            assert solution[name]["value"] == pytest.approx(getattr(contact, name) * scale)
+        assert solution["max_interface_stress"]["value"] == contact.max_interface_stress
+        assert 0 < solution["dissipated_energy"]["value"] < solution["work"]["value"]
+
+
+def test_a_sphere_s_table_has_its_radii_and_its_largest_stresses(run: Run) -> None:
+    done = run("reference", "sphere", "--load", 1.37, "--friction", 0.3)
+    title, head, _, row = done.out.splitlines()
+    assert title.startswith("A sphere of radius 128.8 mm on a film of 2 mm")
+    assert "friction 0.3, incremental loading (hankel)" in title
+    assert "stick radius (mm)" in head
+    assert row.split()[:4] == ["1.37", "30.66", "2.832", row.split()[3]]
+    assert done.err == ""
+
+
+def test_a_rough_interface_is_named(run: Run) -> None:
+    rough = ["--greenwood-tripp", 1.82, 5000, 20, "--slip-length", 1.82]
+    done = run("reference", "sphere", "--load", 0.5, "--friction", 0.5, *rough, "--rings", 32)
+    assert "interface: Greenwood-Tripp law (roughness 1.82 um" in done.out
+    assert "slip length 1.82 um" in done.out
+    exponential = run("reference", "sphere", "--exponential", 0.8, 0.5, "--rings", 32)
+    assert "exponential law (length 0.8 um" in exponential.out
+
+
+def test_a_cone_and_a_measured_tip_go_to_a_file_and_come_back(run: Run, folder: Path) -> None:
+    assert run("reference", "cone", "--inclination", 2, "-o", "cone.h5").code == 0
+    cone = memscal.read_reference("cone.h5").indenter
+    assert isinstance(cone, memscal.Cone)
+    assert np.degrees(cone.inclination) == pytest.approx(2)
+    r = np.linspace(0, 8, 81)
+    rows = "".join(f"{x:g};{x**2 / 0.2576 + 3:g}\n" for x in r)
+    Path("tip.csv").write_text("r;z\n" + rows, encoding="utf-8")
+    tip = ["profile", "--profile-table", "tip.csv", "--load", 1]
+    assert run("reference", *tip, "--friction", 0.2, "-o", "tip.h5").code == 0
+    profile = memscal.read_reference("tip.h5")
+    assert isinstance(profile.indenter, memscal.Profile)
+    assert profile.indenter.extent == pytest.approx(8e-3)
+    sphere = run("reference", "sphere", "--load", 1, "--friction", 0.2, "--json").json
+    assert profile.sigma_zz.max() == pytest.approx(
+        sphere["solutions"][0]["max_base_stress"]["value"], rel=1e-3
+    )
+    for name in ("cone.h5", "tip.h5"):
+        assert run("check", name).code == 0
+        assert "shape" in run("inspect", name).out
+
+
+def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path) -> None:
+    Path("tip.csv").write_text("r,z\n0,0\n1,nan\n2,4\n3,9\n", encoding="utf-8")
+    refused = run("reference", "profile", "--profile-table", "tip.csv")
+    assert refused.code == 3
+    assert "tip.csv" in refused.err
+    Path("tip.csv").write_text("r,z\n1,0\n2,1\n3,4\n4,9\n", encoding="utf-8")
+    assert "first at the axis" in run("reference", "profile", "--profile-table", "tip.csv").err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["cone"], "needs --inclination"),
+        (["profile"], "needs --profile-table"),
+        (["cone", "--inclination", "5", "--radius", "1"], "--radius does not describe a cone"),
+        (["rod", "--inclination", "5"], "--inclination does not describe a rod"),
+        (["sphere", "--friction", "-0.1"], "-0.1"),
+        (["sphere", "--poisson-ratio", "0.6"], "0.6"),
+        (["sphere", "--thickness", "-2"], "-2"),
+        (["sphere", "--rings", "4"], "4"),
+        (["sphere", "--mesh", "film.vtu"], "--backend fem"),
+        (["sphere", "--backend", "fem", "--mesh", "film.png"], ".vtu"),
+        (["sphere", "--figure", "film.txt"], ".png"),
+        (
+            ["sphere", "--exponential", "1", "1", "--greenwood-tripp", "1", "1", "1"],
+            "one normal law",
+        ),
+    ],
+)
+def test_options_that_make_no_sense_are_a_matter_of_usage(
+    run: Run, folder: Path, arguments: list[str], word: str
+) -> None:
+    refused = run("reference", *arguments)
+    assert refused.code == 2
+    assert word in refused.err
+    assert names(folder) == []
+
+
+def test_a_figure_of_the_contacts_is_written(run: Run, folder: Path) -> None:
+    done = run("reference", "sphere", "--load", 0.5, "--load", 1, "--figure", "contacts.svg")
+    assert done.code == 0
+    assert "Written: contacts.svg" in done.err
+    assert Path("contacts.svg").read_bytes().startswith(b"<?xml")
+
+
+def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path) -> None:
+    sticking = ["--friction", "inf", "--load", 0.02, "--strain", "finite"]
+    done = run("reference", "rod", *sticking, "-o", "finite.h5")
+    assert done.code == 0
+    assert "sticking (fem, finite strain)" in done.out
+    profile = memscal.read_reference("finite.h5")
+    assert profile.solver == "memscal, fem backend, finite strain"
+    assert profile.force == pytest.approx(0.02, rel=1e-3)

@@ -16,7 +16,7 @@ from memscal.mechanics.interface import Interface
 from memscal.mechanics.rings import RingTraction
 from memscal.mechanics.solver.path import PathPoint, follow
 from memscal.mechanics.solver.placing import even_rings, rings_around, rings_under_a_rod
-from memscal.mechanics.solver.problem import ContactProblem, ContactState, Target
+from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target
 from memscal.mechanics.surface import FilmModel
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
@@ -191,7 +191,14 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
         if isinstance(error.last, PathPoint):
             error.last = _contact(request, model, error.last)
         raise
-    return [_contact(request, model, point) for point in points]
+    contacts = [_contact(request, model, point) for point in points]
+    # What was asked for is met to rounding; it is given back as it was asked for.
+    return [
+        replace(contact, load=target.value)
+        if isinstance(target, Load)
+        else replace(contact, depth=target.value)
+        for contact, target in zip(contacts, request.targets, strict=True)
+    ]
 
 
 def _contact(request: RingRequest, model: FilmModel, point: PathPoint) -> Contact:
