@@ -101,7 +101,7 @@ def test_a_shell_gets_its_completion_script(run: Run, shell: str) -> None:
         (["memscal", "ca"], {"calibrate"}),
         (["memscal", "calibrate", "--met"], {"--method"}),
         (["memscal", "calibrate", "--method", "white"], {"white-noise", "white-noise-draw"}),
-        (["memscal", "reference", ""], {"rod", "sphere"}),
+        (["memscal", "reference", ""], {"rod", "sphere", "cone", "profile"}),
     ],
 )
 def test_words_are_completed(

@@ -98,7 +98,7 @@ def test_load_and_depth_exclude_each_other(run: Run) -> None:
         (["sphere", "--load", "1e9"], "times as wide as the film is thick"),
         (["sphere", "--strain", "finite", "--friction", "0.3"], "slides freely (friction 0) or"),
         (["sphere", "--film-radius", "25"], "a film has no end"),
-        (["sphere", "--backend", "fem", "--film-radius", "1"], "1 mm"),
+        (["sphere", "--backend", "fem", "--film-radius", "1"], "the film's edge at 1 mm"),
         (["profile", "--profile-table", "absent.csv"], "absent.csv"),
     ],
 )
@@ -136,7 +136,7 @@ def test_the_papers_sphere_along_a_loading(run: Run) -> None:
         for name, scale in (("depth", 1e6), ("contact_radius", 1e3), ("stick_radius", 1e3)):
             assert solution[name]["value"] == pytest.approx(getattr(contact, name) * scale)
         assert solution["max_interface_stress"]["value"] == contact.max_interface_stress
-        assert 0 < solution["dissipated_energy"]["value"] < solution["work"]["value"]
+        assert 0 <= solution["dissipated_energy"]["value"] < solution["work"]["value"]
 
 
 def test_a_sphere_s_table_has_its_radii_and_its_largest_stresses(run: Run) -> None:
@@ -145,7 +145,7 @@ def test_a_sphere_s_table_has_its_radii_and_its_largest_stresses(run: Run) -> No
     assert title.startswith("A sphere of radius 128.8 mm on a film of 2 mm")
     assert "friction 0.3, incremental loading (hankel)" in title
     assert "stick radius (mm)" in head
-    assert row.split()[:4] == ["1.37", "30.66", "2.832", row.split()[3]]
+    assert [float(cell) for cell in row.split()[:3]] == pytest.approx([1.37, 30.66, 2.832], rel=1e-3)
     assert done.err == ""
 
 

@@ -92,8 +92,8 @@ class ElementFilm:
             )
         if self.r[-1] > self.radius:
             raise DomainError(
-                f"The outermost ring, at {self.r[-1]:g} m, lies beyond the film's edge at "
-                f"{self.radius:g} m.",
+                f"The outermost ring, at {self.r[-1] * 1e3:.4g} mm, lies beyond the film's edge at "
+                f"{self.radius * 1e3:.4g} mm.",
                 cure="Give a wider film, or a smaller contact.",
             )
         if self.refinement < 1 or self.refinement != int(self.refinement):
