@@ -27,7 +27,7 @@ def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_set_up_takes_exactly_two_commands() -> None:
-    assert [block.count("\n") for block in COMMANDS] == [1, 1]
+    assert [block.count("\n") for block in COMMANDS[:2]] == [1, 1]
 
 
 def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> None:
@@ -41,6 +41,23 @@ def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> No
     assert (fresh_folder / "rod_scan_65.apparatus.h5").is_file()
     assert (fresh_folder / "calibration.png").is_file()
     assert run.stdout.strip()
+
+
+def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
+    _, *arguments = shlex.split(COMMANDS[2])
+    installed = Path(sys.executable).with_name("memscal")
+    run = subprocess.run(
+        [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert (fresh_folder / "sphere.png").is_file()
+    shown = README.split(COMMANDS[2])[1].split("```text\n")[1].split("```")[0]
+    printed, expected = run.stdout.splitlines(), shown.splitlines()
+    assert printed[:2] == expected[:2]
+    for ours, theirs in zip(printed[3:], expected[3:], strict=True):
+        # Depths, radii and stresses; the last digit of another machine may differ.
+        numbers = [[float(cell) for cell in line.split()[:6]] for line in (ours, theirs)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=2e-3)
 
 
 @pytest.mark.usefixtures("fresh_folder")
