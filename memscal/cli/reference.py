@@ -187,7 +187,7 @@ def _check_usage(
             raise click.UsageError(
                 f"A file holds one load: with --{name} give one --load or one --depth."
             )
-    if mesh is not None and given["backend"] != "fem":
+    if mesh is not None and given["backend"] != "fem" and given["strain"] != "finite":
         raise click.UsageError("--mesh shows finite elements: add --backend fem.")
     if mesh is not None and mesh.suffix.lower() != ".vtu":
         raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")

@@ -233,3 +233,17 @@ def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path) -> 
     profile = memscal.read_reference("finite.h5")
     assert profile.solver == "memscal, fem backend, finite strain"
     assert profile.force == pytest.approx(0.02, rel=1e-3)
+
+
+@pytest.mark.parametrize("way", [["--backend", "fem"], ["--strain", "finite"]])
+def test_the_field_in_the_film_goes_to_a_mesh_that_can_be_imported_again(
+    run: Run, folder: Path, way: list[str]
+) -> None:
+    done = run("reference", "sphere", "--load", 0.34, *way, "--mesh", "film.vtu", "-o", "film.h5")
+    assert done.code == 0
+    units = ["--r-unit", "mm", "--sigma", "stress_Pa", "--sigma-unit", "Pa", "--load", 0.34]
+    back = run("import", "film.vtu", "-o", "back.h5", "--format", "reference", *units)
+    assert back.code == 0
+    written, imported = memscal.read_reference("film.h5"), memscal.read_reference("back.h5")
+    direct = np.interp(imported.r, written.r, written.sigma_zz)
+    assert np.max(np.abs(imported.sigma_zz - direct)) < 5e-3 * written.sigma_zz.max()

@@ -95,6 +95,23 @@ class FiniteStrainField:
         radii, _, u = self.surface
         return _interpolated(radii, u, r, parity=0)
 
+    def mesh(self) -> FieldMesh:
+        """Return displacement and Cauchy stress on the undeformed mesh."""
+        elements, x = self.pressing.elements, self.pressed.x
+        basis = elements.bases[0]
+        corners = basis.doflocs[:, basis.element_dofs[:3]]
+        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        turned = one[0] * other[1] < one[1] * other[0]
+        triangles = basis.element_dofs.T.copy()
+        triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
+        return FieldMesh(
+            points=elements.nodes.T * _MM,
+            triangles=triangles,
+            displacement=x[: 2 * elements.n].reshape(2, -1).T * _MM,
+            stress=elements.nodal_stress(x) * _MPA,
+            notes=f"neo-Hookean film at finite strain under {self.pressed.load:.6g} N",
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FiniteStrainState:
@@ -145,20 +162,7 @@ class FiniteStrainState:
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
-        elements, x = self.inside.pressing.elements, self.inside.pressed.x
-        basis = elements.bases[0]
-        corners = basis.doflocs[:, basis.element_dofs[:3]]
-        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        turned = one[0] * other[1] < one[1] * other[0]
-        triangles = basis.element_dofs.T.copy()
-        triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
-        return FieldMesh(
-            points=elements.nodes.T * _MM,
-            triangles=triangles,
-            displacement=x[: 2 * elements.n].reshape(2, -1).T * _MM,
-            stress=elements.nodal_stress(x) * _MPA,
-            notes=f"{self.indenter.shape}, {self.load:.6g} N, {self.discretisation}",
-        )
+        return self.inside.mesh()
 
 
 def interface_tractions(
