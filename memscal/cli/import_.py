@@ -193,7 +193,7 @@ def _check_usage(path: Path, kind: str, given: dict[str, Any]) -> None:
     if kind == "reference":
         what, unused = import_reference.strange(path, given)
         if unused:
-            raise click.UsageError(f"{_named(unused)} mean nothing for a {what}.")
+            raise click.UsageError(f"A {what} has no use for {_named(unused)}.")
 
 
 def _named(names: Sequence[str]) -> str:

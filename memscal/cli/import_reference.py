@@ -71,13 +71,15 @@ def reference_options(command: _Command) -> _Command:
             help="Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]",
         ),
         click.option(
-            "--base", type=_POSITION, help="Mesh: where the base lies on it.  [default: lowest]"
+            "--base",
+            type=_POSITION,
+            help="Mesh: position of the base on that axis, in mm.  [default: the lowest]",
         ),
         click.option(
             "--centre",
             type=(_POSITION, _POSITION),
             metavar="MM MM",
-            help="Mesh in 3-D: where the indenter's axis meets the base.  [default: 0 0]",
+            help="Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]",
         ),
     ]
     for option in reversed(options):

@@ -51,7 +51,8 @@ class ArrayDecoder:
         if order not in _ORDERS or header not in ("UInt32", "UInt64"):
             raise FormatError(
                 f"{name} has the byte order {printable(order, 40)!r} and headers of type "
-                f"{printable(header, 40)!r}, which VTK does not know."
+                f"{printable(header, 40)!r}, which VTK does not know.",
+                cure="Save the mesh again.",
             )
         self.name = name
         self._compressor = compressor

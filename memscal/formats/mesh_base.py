@@ -105,10 +105,19 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
             cure="Name the axis that points across the film, from base to surface.",
         )
     radial = tuple(i for i in varying if i != up)
-    shape = "section" if len(radial) == 1 else "body in 3-D"
-    across = f"{AXES[radial[0]]} as the radius" if len(radial) == 1 else f"{_listed(radial)} along"
-    note = f"The mesh is a {shape}: {across} and {AXES[up]} across the film were taken."
-    return Frame(points, radial, up, tolerance, (note,))
+    across = f"{AXES[up]} across the film"
+    if len(radial) > 1:
+        notes = [f"The mesh is a body in 3-D: {across} was taken, and its base in the other two."]
+    else:
+        notes = [f"The mesh is a section: {AXES[radial[0]]} as the radius and {across} were taken."]
+    wide, high = (float(np.ptp(inside[:, i])) * 1e3 for i in (radial[0], up))
+    if high > wide:
+        notes.append(
+            f"Warning: the mesh extends {high:.4g} mm along {AXES[up]} but {wide:.4g} mm along "
+            f"{AXES[radial[0]]}. A film is wider than thick: if the axis across it is "
+            f"{AXES[radial[0]]}, say so (vertical; --vertical)."
+        )
+    return Frame(points, radial, up, tolerance, tuple(notes))
 
 
 def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:

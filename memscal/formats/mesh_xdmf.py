@@ -44,7 +44,10 @@ def plain_xdmf(data: bytes, path: str) -> tuple[bytes, tuple[str, ...]]:
     name = os.path.basename(path)
     root = parse_xml(data, name)
     if root.tag != "Xdmf":
-        raise FormatError(f"{name} is not an XDMF file: it holds {printable(root.tag, 80)!r}.")
+        raise FormatError(
+            f"{name} is not an XDMF file: it holds {printable(root.tag, 80)!r}.",
+            cure="Save the mesh again, or as an unstructured grid (.vtu).",
+        )
     grid = _only_grid(root, name)
     plain = Element("Xdmf", Version=root.get("Version", "3.0"))
     kept = SubElement(SubElement(plain, "Domain"), "Grid", GridType="Uniform")
@@ -161,7 +164,10 @@ class _Numbers:
     def _require_as_many_as_claimed(self, item: Element, text: str) -> None:
         sizes = item.get("Dimensions", "").split()
         if not sizes or not all(each.isdecimal() and len(each) < 20 for each in sizes):
-            raise FormatError(f"{self._name} has a data item without dimensions.")
+            raise FormatError(
+                f"{self._name} has a data item without dimensions.",
+                cure="Save the mesh again, or as an unstructured grid (.vtu).",
+            )
         claimed = math.prod(int(each) for each in sizes)
         if claimed > len(text):
             raise UnsafeFileError(

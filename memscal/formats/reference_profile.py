@@ -21,6 +21,8 @@ _WARNED = 0.03
 _REFUSED = 2.0
 # Samples whose stress has not decayed to this share of its maximum end early.
 _DECAYED = 0.01
+# In SI; a force calculated from larger numbers would overflow.
+_ABSURD = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ class Samples:
     item: str
     units: tuple[str, str]
     sign: int
-    spacing: float = 0.0
+    spacing: float
     discretisation: str = ""
 
     @property
@@ -78,18 +80,19 @@ def require_sign(name: str, value: int) -> None:
 
 
 def require_numbers(samples: Samples) -> None:
-    """Refuse samples of which one is not a number.
+    """Refuse samples of which one is not a number that can be worked with.
 
     Raises
     ------
     InputError
-        If a value is missing or infinite.
+        If a value is missing, infinite or absurd.
     """
     for quantity, values in samples.columns.items():
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~(np.abs(values) < _ABSURD))
         if bad.size:
+            wrong = "is too large" if np.isfinite(values[bad[0]]) else "is not a number"
             raise InputError(
-                f"{samples.source.file_name}: {quantity} is not a number in {samples.item} "
+                f"{samples.source.file_name}: {quantity} {wrong} in {samples.item} "
                 f"{bad[0] + 1}" + (f" and {bad.size - 1} more." if bad.size > 1 else "."),
                 cure=f"Remove these {samples.plural}, or calculate them.",
             )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
+
 from memscal.formats.csv_table import read_table
 from memscal.formats.reference_profile import (
     ImportedProfile,
@@ -18,6 +20,9 @@ from memscal.model.indenter import Indenter
 __all__ = ["read_reference_table"]
 
 Column = str | int
+
+# Radii that differ by less than this share of the largest are the same, but for rounding.
+_SAME = 1e-9
 
 
 def read_reference_table(
@@ -97,5 +102,6 @@ def read_reference_table(
         item="data row",
         units=(r_unit, sigma_unit),
         sign=sign,
+        spacing=_SAME * float(np.nanmax(np.abs(columns["r"]), initial=0.0)),
     )
     return profile_of(samples, load=load, film=film, indenter=indenter, solver=solver)

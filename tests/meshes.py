@@ -1,0 +1,88 @@
+"""Meshes as finite-element programs leave them, with a stress in closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import meshio
+import numpy as np
+
+RADII = np.linspace(0.0, 8.0, 41)
+HEIGHTS = np.linspace(0.0, 2.0, 4)
+
+
+def pressure(r: Any) -> Any:
+    """Normal stress at the base in MPa, r in mm, that carries 1 N."""
+    return np.exp(-np.square(r) / 2) / (2 * np.pi)
+
+
+def tensor(r: Any, z: Any) -> np.ndarray:
+    """Components rr, zz, hoop, rz of a stress in MPa, tension positive; not in equilibrium."""
+    s = pressure(r)
+    return np.stack([-s / 3, -s * (1 + z), -s / 5, r * s / 4], axis=-1)
+
+
+def grid(*axes: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a grid, and the corners of its quadrilaterals or hexahedra."""
+    points = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")], axis=-1)
+    index = np.arange(len(points)).reshape([len(axis) for axis in axes])
+    a, b = slice(None, -1), slice(1, None)
+    if len(axes) == 2:
+        corners = [(a, a), (b, a), (b, b), (a, b)]
+    else:
+        bottom = [(a, a), (b, a), (b, b), (a, b)]
+        corners = [(*each, end) for end in (a, b) for each in bottom]
+    return points, np.stack([index[each].ravel() for each in corners], axis=-1)
+
+
+def section(plane: str = "xy", *, radii: Any = RADII, heights: Any = HEIGHTS) -> meshio.Mesh:
+    """A section of the film in a plane, radius first, with its stress in many shapes."""
+    flat, cells = grid(radii, heights)
+    r, z = flat.T
+    across = ["xyz".index(axis) for axis in plane]
+    points = np.zeros((len(flat), 3))
+    points[:, across] = flat
+    rr, zz, hoop, rz = tensor(r, z).T
+    full = np.zeros((len(flat), 3, 3))
+    i, j = across
+    (k,) = {0, 1, 2} - set(across)
+    full[:, i, i], full[:, j, j], full[:, k, k] = rr, zz, hoop
+    full[:, i, j] = full[:, j, i] = rz
+    six = np.stack([full[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], 1)
+    middle = flat[cells].mean(axis=1)
+    return meshio.Mesh(
+        points,
+        [("quad", cells)],
+        point_data={
+            "S4": np.stack([rr, zz, hoop, rz], axis=1),
+            "S6": six,
+            "S9": full.reshape(-1, 9),
+            "S33": zz,
+            "S13": rz,
+            "u": points,
+        },
+        cell_data={
+            "C33": [-pressure(middle[:, 0])],
+            "C4": [tensor(middle[:, 0], 0 * middle[:, 0])],
+        },
+    )
+
+
+def block(x: Any, y: Any, *, centre: tuple[float, float] = (0.0, 0.0)) -> meshio.Mesh:
+    """A film in 3-D, z across it, with the same stress about the axis through the centre."""
+    points, cells = grid(x, y, np.linspace(0.0, 2.0, 3))
+    dx, dy = points[:, 0] - centre[0], points[:, 1] - centre[1]
+    rr, zz, hoop, rz = tensor(np.hypot(dx, dy), points[:, 2]).T
+    angle = np.arctan2(dy, dx)
+    c, s = np.cos(angle), np.sin(angle)
+    six = [
+        rr * c**2 + hoop * s**2,
+        rr * s**2 + hoop * c**2,
+        zz,
+        (rr - hoop) * c * s,
+        rz * s,
+        rz * c,
+    ]
+    return meshio.Mesh(
+        points, [("hexahedron", cells)], point_data={"S6": np.stack(six, axis=1), "S33": zz}
+    )
