@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -69,29 +67,29 @@ def messy_scan(path: Path) -> None:
 def finite_element_reference(path: Path) -> None:
     """Write the stress at the base of the film under 1 N, as a FEM program lists it.
 
-    The solution is that of tests/accuracy/test_rod_fem.py: scikit-fem, P4 displacement and P3
-    pressure on triangles.  It shares nothing with memscal's own solver.
+    The solution is that of the finite elements, which share nothing with the Hankel transforms
+    that a calibration uses by default.
     """
-    from accuracy.test_rod_fem import solve_with_elements
-
-    rod = solve_with_elements(0.5, sticking=False)
-    order = np.argsort(rod.r)
-    kept: list[int] = []
-    for i in order:
-        # The elements under the rod's edge are far finer than the stress at the base needs.
-        if not kept or rod.r[i] - rod.r[kept[-1]] >= 0.02:
-            kept.append(i)
-    rows = [(f"{rod.r[i]:.6f}", f"{-rod.sigma_zz[i]:.8e}", f"{rod.sigma_rz[i]:.8e}") for i in kept]
+    film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    rod = memscal.indent(
+        film, memscal.Rod(radius=0.25e-3), load=1.0, backend="fem", film_radius=25e-3
+    )
+    points = rod.mesh().points
+    r = np.sort(points[points[:, 1] == 0, 0])
+    stress, shear = rod.base_stress(r) * 1e-6, rod.base_shear(r) * 1e-6
+    rows = [
+        (f"{radius * 1e3:.6f}", f"{-normal:.8e}", f"{-along:.8e}")
+        for radius, normal, along in zip(r, stress, shear, strict=True)
+    ]
     comments = (
         "SYNTHETIC: a calculation, not a measurement. " + READ_ME,
         "Base of an incompressible film (E = 2.2 MPa, h = 2 mm) bonded to a rigid support, under",
-        "a rigid frictionless rod of radius 0.25 mm pressed with 1 N. Stresses at the integration",
-        "points of the elements' lower edges; tension is positive, as in most FEM programs.",
+        "a rigid frictionless rod of radius 0.25 mm pressed with 1 N. Stresses at the nodes of the",
+        "base; tension is positive, as in most FEM programs.",
     )
     write_table(path, comments, ("r (mm)", "S33 (MPa)", "S13 (MPa)"), rows)
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, os.fspath(HERE.parent / "tests"))
     messy_scan(HERE / "rod_scan_messy.csv")
     finite_element_reference(HERE / "rod_reference_fem.csv")

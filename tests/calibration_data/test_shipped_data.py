@@ -218,8 +218,7 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
     For a weighted linear estimate of a parameter, with gains c_i and noise s_i, that is
     |sum c_i e_i| <= sqrt(sum c_i^2 s_i^2) sqrt(sum e_i^2 / s_i^2) by Cauchy and Schwarz: at most
     the parameter's uncertainty from noise times the root of a chi-square.  As G has unit
-    integral, e_i is at most A times the largest error of the table, 5e-4 of the maximum by
-    tests/accuracy/test_rod_fem.py.
+    integral, e_i is at most A times the largest error of the table, 5e-4 of the maximum.
     """
     ours = calibrations["rod_scan_65.h5"].apparatus
     theirs = memscal.load_apparatus(imported / "fem.apparatus.h5")
