@@ -188,7 +188,7 @@ def test_the_discretisation_is_said_in_words() -> None:
         ([1e-3, 2e-3], {}, "begin at 0.001 m"),
         ([0.0], {}, "number 1"),
         ([0.0, np.nan], {}, "not finite"),
-        ([0.0, 30e-3], {}, "0.03 m, lies beyond the film's edge at 0.025 m"),
+        ([0.0, 30e-3], {}, "30 mm, lies beyond the film's edge at 25 mm"),
         ([0.0, 1e-3], {"radius": -1.0}, "radius of the film"),
         ([0.0, 1e-3], {"refinement": 0}, "refinement of the mesh is 0"),
         ([0.0, 1e-3], {"refinement": 1.5}, "refinement of the mesh is 1.5"),
