@@ -72,7 +72,9 @@ def _drawn(tables: Sequence[Table]) -> str:
             padding=(0, 1),
         )
         for name in table.head:
-            drawn.add_column(Text(readable(name)), overflow="fold")
+            # A narrow terminal breaks names between words, not within.
+            longest = max((len(word) for word in name.split()), default=0)
+            drawn.add_column(Text(readable(name)), overflow="fold", min_width=longest)
         for k, row in enumerate(table.rows):
             # Text, not markup: a cell may hold what stood in a file.
             cells = (Text(readable(cell)) for cell in row)
