@@ -127,10 +127,10 @@ def _columns(contacts: Sequence[Contact]) -> tuple[list[str], list[list[str]]]:
     if frictional:
         columns.append(("stick radius (mm)", [f"{c.stick_radius * 1e3:.4g}" for c in contacts]))
     if not rod:
-        peaks = [f"{c.max_interface_stress:.6g}" for c in contacts]
-        columns.append(("largest interface stress (Pa)", peaks))
+        peaks = [f"{c.max_interface_stress * 1e-3:.5g}" for c in contacts]
+        columns.append(("interface peak (kPa)", peaks))
     columns += [
-        ("largest base stress (Pa)", [f"{c.max_base_stress:.6g}" for c in contacts]),
+        ("base peak (kPa)", [f"{c.max_base_stress * 1e-3:.5g}" for c in contacts]),
         ("steps", [f"{c.steps}" for c in contacts]),
         ("convergence", [f"{c.convergence:.1g}" for c in contacts]),
     ]
