@@ -132,7 +132,7 @@ def _columns(contacts: Sequence[Contact]) -> tuple[list[str], list[list[str]]]:
     columns += [
         ("base peak (kPa)", [f"{c.max_base_stress * 1e-3:.5g}" for c in contacts]),
         ("steps", [f"{c.steps}" for c in contacts]),
-        ("convergence", [f"{c.convergence:.1g}" for c in contacts]),
+        ("change", [f"{c.convergence:.1g}" for c in contacts]),
     ]
     rows = [list(row) for row in zip(*(cells for _, cells in columns), strict=True)]
     return [name for name, _ in columns], rows
