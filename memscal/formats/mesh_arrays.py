@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import lzma
 import re
+import warnings
 import zlib
 from typing import Any
 
@@ -59,6 +60,17 @@ class ArrayDecoder:
         self._header = np.dtype(_ORDERS[order] + NUMBER_TYPES[header])
         self._order = _ORDERS[order]
         self._budget = _MAX_DECODED_BYTES
+
+    def from_text(self, text: str, kind: str) -> np.ndarray[Any, Any]:
+        """Return the numbers of an array that is written in digits."""
+        dtype = np.dtype(NUMBER_TYPES[kind])
+        if not text.strip():
+            return np.empty(0, dtype)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # numpy only warns of what is no number
+            values = np.fromstring(text, dtype, sep=" ")
+        self._spend(values.nbytes)
+        return values
 
     def from_base64(self, text: bytes, kind: str) -> np.ndarray[Any, Any]:
         """Return the numbers of an array in base64."""

@@ -187,8 +187,6 @@ def _checked(found: Any, source: SourceFile, notes: tuple[str, ...], kind: str) 
         raise _unusable(source, "a point whose coordinates are not finite")
     blocks = []
     for i, block in enumerate(found.cells):
-        if block.type.startswith("polyhedron"):
-            raise _unusable(source, "polyhedra for cells")
         nodes = np.asarray(block.data, dtype=np.int64)
         if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points):
             raise _unusable(source, "a cell with a node that is not there")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Iterable
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
@@ -24,6 +25,9 @@ _SECTIONS = ("Points", "Cells", "PointData", "CellData")
 # Bytes that are no XML follow a raw section's first underscore.
 _RAW = re.compile(rb"""<AppendedData[^>]*encoding\s*=\s*["']raw["'][^>]*>\s*_""")
 _RAW_END = b"</AppendedData>"
+# VTK's own limit is a hexahedron of order ten.
+_MOST_NODES = 1331
+_POLYHEDRA = (41, 42)
 
 
 def plain_vtu(data: bytes, name: str) -> bytes:
@@ -68,9 +72,13 @@ def plain_vtu(data: bytes, name: str) -> bytes:
     for section in _SECTIONS:
         found = pieces[0].find(section)
         kept = SubElement(piece, section)
+        arrays = {}
         for array in [] if found is None else found.findall("DataArray"):
             if array.get("type") in NUMBER_TYPES:
-                _add_plain(kept, array, decoder, appended)
+                arrays[array.get("Name", "")] = values = _numbers(array, decoder, appended)
+                _add_plain(kept, array, values)
+        if section == "Cells":
+            _require_sound_cells(arrays, name)
     return tostring(plain)
 
 
@@ -110,31 +118,49 @@ def _without_raw(data: bytes, name: str) -> tuple[bytes, bytes | None]:
     return data[: begin.end()] + data[end:], data[begin.end() : end]
 
 
-def _add_plain(
-    section: Element, array: Element, decoder: ArrayDecoder, appended: _Appended
-) -> None:
-    """Add a copy of an array that needs neither decompression nor an appended section."""
+def _numbers(array: Element, decoder: ArrayDecoder, appended: _Appended) -> np.ndarray[Any, Any]:
+    """Return the numbers of an array, wherever and however they are kept."""
     kind, text = array.get("type", ""), array.text or ""
-    copy = SubElement(section, "DataArray", type=kind)
+    how = array.get("format", "ascii")
+    if how == "ascii":
+        return decoder.from_text(text, kind)
+    if how != "appended":
+        return decoder.from_base64(text.encode(), kind)
+    offset = array.get("offset", "").strip()
+    place = appended.at(int(offset) if offset.isdecimal() else len(appended.data))
+    if appended.raw:
+        return decoder.from_bytes(place, kind)
+    return decoder.from_base64(bytes(place), kind)
+
+
+def _add_plain(section: Element, array: Element, values: np.ndarray[Any, Any]) -> None:
+    """Add a copy of an array that needs neither decompression nor an appended section."""
+    copy = SubElement(section, "DataArray", type=array.get("type", ""), format="binary")
     for key in ("Name", "NumberOfComponents"):
         if array.get(key):
             copy.set(key, array.get(key, ""))
-    how = array.get("format", "ascii")
-    if how == "ascii":
-        copy.set("format", "ascii")
-        copy.text = text + " "
-        return
-    if how == "appended":
-        offset = array.get("offset", "").strip()
-        place = appended.at(int(offset) if offset.isdecimal() else len(appended.data))
-        values = (
-            decoder.from_bytes(place, kind)
-            if appended.raw
-            else decoder.from_base64(bytes(place), kind)
-        )
-    else:
-        values = decoder.from_base64(text.encode(), kind)
-    copy.set("format", "binary")
     content = values.tobytes()
-    header = np.uint64(len(content)).tobytes()
-    copy.text = base64.b64encode(header + content).decode()
+    copy.text = base64.b64encode(np.uint64(len(content)).tobytes() + content).decode()
+
+
+def _require_sound_cells(arrays: dict[str, np.ndarray[Any, Any]], name: str) -> None:
+    """Refuse cells with absurd numbers of nodes, for which meshio would take memory unasked."""
+    offsets, types, nodes = (
+        arrays.get(key, np.empty(0)).ravel() for key in ("offsets", "types", "connectivity")
+    )
+    sizes = np.diff(offsets.astype(np.int64), prepend=0)
+    if sizes.size and not (
+        {each.dtype.kind for each in (offsets, types, nodes)} <= {"i", "u"}
+        and 1 <= sizes.min() <= sizes.max() <= _MOST_NODES
+        and sizes.sum() <= nodes.size
+    ):
+        raise FormatError(
+            f"{name} has cells whose numbers of nodes cannot be.",
+            why="The file is damaged or incomplete.",
+            cure="Get the file again from where it came from.",
+        )
+    if np.isin(types, _POLYHEDRA).any():
+        raise FormatError(
+            f"{name} has polyhedra for cells, which are not read.",
+            cure="Cut them into tetrahedra (in ParaView: the filter Tetrahedralize).",
+        )

@@ -26,6 +26,8 @@ from memscal.model.validation import FloatArray
 
 __all__ = ["read_reference_mesh"]
 
+_FEWEST_RADII = 3
+
 
 def read_reference_mesh(
     path: str | os.PathLike[str],
@@ -133,6 +135,12 @@ def _along_radius(
     """Give samples their radii: those of a section as they are, those of a plane by circles."""
     if len(frame.radial) == 1:
         r = np.where(np.abs(places[:, 0]) <= frame.tolerance, 0.0, places[:, 0])
+        distinct = 1 + np.count_nonzero(np.diff(np.sort(r)) > frame.tolerance)
+        if distinct < _FEWEST_RADII:
+            raise InputError(
+                f"The base in {samples.source.file_name} has values at {distinct} radii only.",
+                cure="Name the axis across the film (vertical; --vertical), or give a finer mesh.",
+            )
         return replace(samples, columns={"r": r, **samples.columns})
     require_numbers(samples)  # a mean would leave out what is missing
     columns, note = average_over_circles(places - np.array(centre), samples.columns)

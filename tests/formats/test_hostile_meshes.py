@@ -174,6 +174,7 @@ def test_a_count_beyond_the_files_size_is_refused(
         "DATA\u017fET STRUCTURED_POINT\u017f",
         "DATASET\tRECTILINEAR_GRID",
         "0 0 0 DATASET STRUCTURED_GRID",
+        "DATASET\u2003structured_points",
     ],
 )
 def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path: Path, line: str):
@@ -183,6 +184,47 @@ def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path: Path,
         "DIMENSIONS 2000 2000 2000\nORIGIN 0 0 0\nSPACING 1 1 1\n"
     )
     refused_cheaply(path, "structured grid")
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("polygon", "the type 7"), ("VTK_LAGRANGE_TRIANGLE", "the type 69"), ("triangle", "")],
+)
+@pytest.mark.parametrize("binary", [True, False])
+def test_cells_that_state_their_own_size_are_read_from_vtu_files_only(
+    tmp_path: Path, binary: bool, kind: str, words: str
+):
+    mesh = meshio.Mesh(SMALL.points, [(kind, SMALL.cells[0].data[:, :3])])
+    meshio.vtk.write(tmp_path / "film.vtk", mesh, binary=binary)
+    meshio.vtu.write(tmp_path / "film.vtu", mesh, binary=binary)
+    assert len(read_mesh(tmp_path / "film.vtu").solid[0].nodes) == 4
+    if words:
+        with pytest.raises(FormatError, match=words):
+            read_mesh(tmp_path / "film.vtk")
+    else:
+        assert len(read_mesh(tmp_path / "film.vtk").solid[0].nodes) == 4
+
+
+@pytest.mark.parametrize("offsets", ["3000000000 4", "-4 4", "0 4", "4 9", "4.0 8.0"])
+def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets: str):
+    mesh = meshio.Mesh(SMALL.points, [("polygon", SMALL.cells[0].data[:2])])
+    path = tmp_path / "film.vtu"
+    meshio.vtu.write(path, mesh, binary=False)
+    text = path.read_text()
+    numbers = text.partition('Name="offsets"')[2].partition(">")[2].partition("<")[0]
+    text = text.replace(numbers, offsets)
+    if "." in offsets:
+        text = text.replace('type="Int64" Name="offsets"', 'type="Float64" Name="offsets"')
+    path.write_text(text)
+    refused_cheaply(path, "cannot be", FormatError)
+
+
+def test_polyhedra_are_refused(tmp_path: Path):
+    path = small(tmp_path / "film.vtu", binary=False)
+    text = path.read_text()
+    types = text.partition('Name="types"')[2].partition(">")[2].partition("<")[0]
+    path.write_text(text.replace(types, types.replace("9", "42", 1)))
+    refused_cheaply(path, "polyhedra", FormatError)
 
 
 @pytest.mark.parametrize(
@@ -271,7 +313,7 @@ def test_a_time_series_of_one_step_is_read_as_fenics_writes_it(tmp_path: Path):
         ('Name="Points" NumberOfComponents="3"', 'Name="Points" NumberOfComponents="5"', "mesh"),
         ('byte_order="LittleEndian"', 'byte_order="Middle"', "Middle"),
         ('NumberOfPoints="10"', 'NumberOfPoints="11"', "cannot be read as a mesh"),
-        ('Name="connectivity"', 'Name="connexion"', "cannot be read as a mesh"),
+        ('Name="connectivity"', 'Name="joints"', "numbers of nodes cannot be"),
     ],
 )
 def test_a_vtu_file_of_another_shape_is_refused(tmp_path: Path, old: str, new: str, words: str):
