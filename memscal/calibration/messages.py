@@ -95,8 +95,7 @@ def _model_form(contact: Contact) -> str:
     return (
         f"The reference is the {way} rod on the linear elastic film, indented by {depth}; the "
         "error of linear elasticity there is not part of the uncertainties. A reference at finite "
-        'strain (indent(..., strain="finite"); memscal reference rod --strain finite) shows what '
-        "it changes."
+        "strain (memscal reference rod --strain finite --friction inf) shows what it changes."
     )
 
 

@@ -172,7 +172,7 @@ class _Request:
             error = ConvergenceError(
                 problem.problem,
                 why="The film folds around the indenter more sharply than its elements can follow.",
-                cure="Ask for less, or give a higher refinement, or a rod a rounder edge.",
+                cure="Ask for less; or let the film stick (friction inf), which goes further.",
             )
             if isinstance(problem.last, Step):
                 error.last = self._state(pressing, problem.last, None)
