@@ -177,6 +177,8 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
 
 def _check_usage(path: Path, kind: str, given: dict[str, Any]) -> None:
     """Name every option that is missing, or that belongs to something else, at once."""
+    if kind == "scan" and import_reference.is_mesh(path):
+        raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
     names = _NEEDED if kind == "scan" else import_reference.needed(path)
     missing = [name for name in names if given[name] is None]
     if missing:

@@ -13,7 +13,7 @@ from memscal.cli.options import FILM, Quantity, film_from, indenter_from, si
 if TYPE_CHECKING:
     from memscal.formats.reference_profile import ImportedProfile
 
-__all__ = ["NAMES", "needed", "read", "reference_options", "strange"]
+__all__ = ["NAMES", "is_mesh", "needed", "read", "reference_options", "strange"]
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -89,12 +89,12 @@ def reference_options(command: _Command) -> _Command:
 
 def needed(path: Path) -> tuple[str, ...]:
     """Return the options without which a reference cannot be read."""
-    return (*(() if _is_mesh(path) else _OF_TABLES), "r_unit", "sigma", "sigma_unit", "load")
+    return (*(() if is_mesh(path) else _OF_TABLES), "r_unit", "sigma", "sigma_unit", "load")
 
 
 def strange(path: Path, given: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
     """Return the options given that a mesh, or a table, has no use for, and which it is."""
-    kind, names = ("mesh", (*_OF_TABLES, *_READING)) if _is_mesh(path) else ("table", _OF_MESHES)
+    kind, names = ("mesh", (*_OF_TABLES, *_READING)) if is_mesh(path) else ("table", _OF_MESHES)
     return kind, tuple(name for name in names if given[name] is not None)
 
 
@@ -104,7 +104,7 @@ def read(path: Path, given: dict[str, Any]) -> ImportedProfile:
         "film": None if all(given[name] is None for name in FILM) else film_from(given),
         "indenter": None if given["radius"] is None else indenter_from(given["indenter"], given),
     }
-    if not _is_mesh(path):
+    if not is_mesh(path):
         from memscal.formats.reference_table import read_reference_table
 
         return read_reference_table(
@@ -126,7 +126,8 @@ def _given(values: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     return {name: values[name] for name in names if values[name] is not None}
 
 
-def _is_mesh(path: Path) -> bool:
-    from memscal.formats.mesh_names import is_mesh
+def is_mesh(path: Path) -> bool:
+    """Return whether a file's name says that it is a mesh."""
+    from memscal.formats import mesh_names
 
-    return is_mesh(path)
+    return mesh_names.is_mesh(path)

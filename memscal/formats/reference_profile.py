@@ -145,7 +145,7 @@ def _sorted_by_radius(samples: Samples, notes: list[str]) -> dict[str, FloatArra
     columns = samples.columns
     order = np.argsort(columns["r"], kind="stable")
     columns = {name: values[order] for name, values in columns.items()}
-    if np.any(np.diff(order) < 0):
+    if samples.kind == "table" and np.any(np.diff(order) < 0):  # nodes of a mesh have no order
         notes.append(f"The {samples.plural} were sorted by radius.")
     r = columns["r"]
     index = np.concatenate([[0], np.cumsum(np.diff(r) > samples.spacing)])

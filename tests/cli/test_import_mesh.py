@@ -74,7 +74,7 @@ def test_lengths_on_the_command_line_are_in_mm(run: Run, folder: Path) -> None:
         ([*MESH, "--sigma", "S", "--vertical", "z"], 3, ["x and y"]),
         ([*MESH, "--sigma", "S", "--r", "x"], 2, ["A mesh has no use for --r"]),
         (["--format", "reference"], 2, ["--r-unit", "--sigma", "--sigma-unit", "--load"]),
-        (["--vertical", "z"], 2, ["--x"]),
+        ([], 2, ["film.vtu is a mesh", "--format reference"]),
     ],
 )
 def test_what_is_wrong_with_a_mesh_or_its_options_is_said(
