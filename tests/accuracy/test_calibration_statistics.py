@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from peers import tuned_wiener
 from scans import CONVERSION, SIGMA, plane_error, simulated
 from scipy.stats import chi2
 
@@ -138,39 +139,12 @@ def test_a_beats_a_wiener_filter_tuned_on_the_truth_and_g_meets_it() -> None:
         apparatus = memscal.calibrate(scan).apparatus
         g = plane_error(R, apparatus.radial(R), kernel.radial(R))
         ours.append((g, apparatus.conversion_constant / CONVERSION - 1))
-        theirs.append(tuned_wiener(scan))
+        g, a = tuned_wiener(scan, kernel)
+        theirs.append((plane_error(R, g, kernel.radial(R)), a / CONVERSION - 1))
     g_ours, a_ours = np.array(ours).T
     g_theirs, a_theirs = np.array(theirs).T
     assert np.median(g_ours) < 1.1 * np.median(g_theirs)
     assert np.sqrt(np.mean(a_ours**2)) < np.sqrt(np.mean(a_theirs**2))
-
-
-def tuned_wiener(scan: memscal.Scan) -> tuple[float, float]:
-    """scikit-image's Wiener filter on the plainly lifted scan, its balance chosen on the truth.
-
-    It is given the true centre, baseline and drift, and the best of 25 balances for G.
-    """
-    from skimage.restoration import wiener
-
-    step, half = 0.125e-3, 8e-3
-    axis = np.arange(-half, half + step / 2, step)
-    radius = np.hypot.outer(axis, axis)
-    truth = scan.synthetic
-    clean = scan.u_zz - truth["baseline"] - 0.5 * truth["drift"] * scan.x / half
-    distance = np.abs(scan.x - truth["centre"])
-    order = np.argsort(distance)
-    image = np.interp(radius, distance[order], clean[order], right=0.0)
-    stress = memscal.indent(scan.film, scan.indenter, load=1.0).base_stress(radius)
-    middle = axis.size // 2
-    r = axis[middle:][axis[middle:] <= R[-1]]
-    wanted = memscal.GaussianMixture().radial(r)
-    best = (np.inf, np.inf)
-    for balance in np.logspace(-9, 1, 25):
-        restored = wiener(image, stress / stress.sum(), balance, clip=False)
-        g = restored[middle, middle:][: r.size] / (restored.sum() * step**2)
-        a = restored.sum() / stress.sum() / CONVERSION - 1
-        best = min(best, (plane_error(r, g, wanted), a))
-    return best
 
 
 def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
