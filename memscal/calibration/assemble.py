@@ -10,9 +10,9 @@ import numpy as np
 import scipy
 
 from memscal.apparatus import ApparatusFunction
-from memscal.calibration.normalise import unit_gaussian
 from memscal.calibration.solution import Solution
 from memscal.calibration.uncertainty import Results
+from memscal.estimation.forward import unit_gaussian
 from memscal.formats.timestamp import timestamp
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -82,6 +82,10 @@ class Fields(Protocol):
         """Taper on the grid that confines a kernel to its support."""
         ...
 
+    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """A radial function about a kernel's zero, on the grid."""
+        ...
+
     def at_points(self, field: FloatArray) -> FloatArray:
         """Values of a field at the measured points."""
         ...
@@ -128,10 +132,15 @@ def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
     return _LineFields.lift(estimate, choice)
 
 
-def division_problem(fields: Fields, band: Band) -> DivisionProblem:
+def division_problem(estimate: ProfileEstimate, band: Band, fields: Fields) -> DivisionProblem:
     """Return what a regulariser is given."""
     return DivisionProblem(
-        fields.grid, fields.voltage, fields.reference, band.weakest_voltage, band.weakest_reference
+        fields.grid,
+        fields.voltage,
+        fields.reference,
+        band.weakest_voltage,
+        band.weakest_reference,
+        posterior=lambda: fields.kernel(estimate.radial),
     )
 
 
@@ -170,6 +179,9 @@ class _LineFields:
     def confinement(self) -> FloatArray:
         return _taper(self.grid.radius, self.support * self.grid.spacing)
 
+    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        return lift(profile, self.grid, self.grid.spacing / 2)
+
     def at_points(self, field: FloatArray) -> FloatArray:
         return cut(field, self.grid, self.radius)
 
@@ -194,6 +206,7 @@ class _RasterFields:
     voltage: FloatArray
     reference: FloatArray
     support: float
+    step: float
     index: tuple[FloatArray, FloatArray]
 
     @classmethod
@@ -208,14 +221,20 @@ class _RasterFields:
         departure = estimate.weighed.residual / points.load * estimate.outlier_weight
         voltage[rows, columns] += departure
         reference = lift(estimate.model.reference.at, grid, step)
-        return cls(grid, voltage, reference, choice.support, (rows, columns))
+        return cls(grid, voltage, reference, choice.support, step, (rows, columns))
 
     @property
     def confinement(self) -> FloatArray:
+        return _taper(self._about_zero.radius, self.support)
+
+    @property
+    def _about_zero(self) -> Lattice:
         # A kernel's zero is the central point of the lattice, wherever the sensor is.
-        x = self.grid.x - self.grid.x[self.grid.x.size // 2]
-        y = self.grid.y - self.grid.y[self.grid.y.size // 2]
-        return _taper(np.hypot.outer(y, x), self.support)
+        x, y = self.grid.x, self.grid.y
+        return Lattice(x - x[x.size // 2], y - y[y.size // 2])
+
+    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        return lift(profile, self._about_zero, self.step)
 
     def at_points(self, field: FloatArray) -> FloatArray:
         return np.asarray(field[self.index])

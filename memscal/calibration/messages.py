@@ -12,8 +12,8 @@ from memscal.model.stress import StressProfile
 
 __all__ = ["calibration_messages"]
 
-#: Methods that are a fixed window, whose uncertainties are therefore complete to first order.
-_WINDOWS = ("white-noise", "tikhonov")
+#: Methods that are a fixed window or none: their uncertainties are complete to first order.
+_WINDOWS = ("white-noise", "tikhonov", "evidence")
 #: Relative difference below which two lengths or ratios are the same.
 _SAME = 1e-6
 

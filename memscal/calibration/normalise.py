@@ -8,6 +8,7 @@ import numpy as np
 
 from memscal.calibration.fields import KernelView
 from memscal.errors import FitError
+from memscal.estimation.forward import unit_gaussian, unit_gaussian_slope
 from memscal.model.validation import FloatArray
 
 __all__ = ["NormalisedKernel", "fit_gaussian_to_kernel", "normalise"]
@@ -86,13 +87,3 @@ def fit_gaussian_to_kernel(r: FloatArray, g: FloatArray, start: float) -> float:
         gtol=1e-14,
     )
     return float(found.x[0] * start)
-
-
-def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
-    """Gaussian of unit integral over the plane, in 1/m^2."""
-    return np.asarray(np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2))
-
-
-def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
-    """Derivative of :func:`unit_gaussian` by its width, in 1/m^3."""
-    return np.asarray(unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma)

@@ -138,7 +138,7 @@ def divide(
     estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
 ) -> Quotient:
     """Divide the fields, normalise the quotient, and convolve it back."""
-    raw = regulariser.divide(division_problem(fields, band))
+    raw = regulariser.divide(division_problem(estimate, band, fields))
     division = Division(raw.field * fields.confinement, raw.window)
     kernel = normalise(fields.view(division.field), estimate.gaussian.sigma)
     back = fields.grid.convolve(division.field, fields.reference)

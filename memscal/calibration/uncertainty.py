@@ -17,7 +17,8 @@ import numpy as np
 from scipy.special import j0
 
 from memscal.calibration.field_noise import FieldNoise
-from memscal.calibration.normalise import NormalisedKernel, unit_gaussian_slope
+from memscal.calibration.functionals import Functional, kernel_functionals
+from memscal.calibration.normalise import NormalisedKernel
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.apparatus import ParameterSet
 from memscal.model.validation import FloatArray
@@ -48,7 +49,13 @@ class Results:
 
 
 #: Parameters whose uncertainty is broken down by source.
-_BUDGETED = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
+_BUDGETED = (
+    "conversion_constant",
+    "gaussian_sigma",
+    "gaussian_sigma_deconvolved",
+    "fwhm",
+    "noise_equivalent_area",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,20 +144,22 @@ def _rows(
     fitted = estimate.gaussian.jacobian.shape[1]
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
     synthesis = j0(np.multiply.outer(r, k)) * estimate.model.reference.wavenumbers.weights
-    normalised = (basis.kernels - np.outer(estimate.kernel / a, basis.integrals)) / a
+    normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
+    radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
     transfer = np.stack([np.interp(wavenumbers, k, column) for column in normalised.T], axis=1)
     hidden = (1 - window) * estimate.kernel / a
-    width = _width_row(kernel)
-    open_rows = width @ (synthesis @ (window[:, None] * normalised))
-    scalars, names, values = _scalar_rows(estimate, kernel, open_rows)
+    opened = radial - synthesis @ ((1 - window)[:, None] * normalised)
+    functionals = kernel_functionals(kernel)
+    scalars, names, values = _scalar_rows(estimate, kernel, functionals, opened)
     hidden_scalars = np.zeros(len(names))
-    hidden_scalars[names.index("gaussian_sigma_deconvolved")] = width @ (synthesis @ hidden)
+    for functional in functionals:
+        hidden_scalars[names.index(functional.name)] = functional.row @ (synthesis @ hidden)
     pad = np.zeros((1, fitted))
     return _Rows(
         names=names,
         values=values,
         scalars=scalars,
-        radial=np.hstack([synthesis @ normalised, np.repeat(pad, r.size, axis=0)]),
+        radial=np.hstack([radial, np.repeat(pad, r.size, axis=0)]),
         transfer=np.hstack([transfer, np.repeat(pad, wavenumbers.size, axis=0)]),
         hidden_scalars=hidden_scalars,
         hidden_radial=synthesis @ hidden,
@@ -159,14 +168,17 @@ def _rows(
 
 
 def _scalar_rows(
-    estimate: ProfileEstimate, kernel: NormalisedKernel, width: FloatArray
+    estimate: ProfileEstimate,
+    kernel: NormalisedKernel,
+    functionals: tuple[Functional, ...],
+    opened: FloatArray,
 ) -> tuple[FloatArray, tuple[str, ...], FloatArray]:
     count, fitted = estimate.basis.integrals.size, estimate.gaussian.jacobian.shape[1]
     planar = estimate.points.planar
     entries: list[tuple[str, float, FloatArray, int]] = [
         ("conversion_constant", kernel.conversion_constant, estimate.basis.integrals, 0),
         ("gaussian_sigma", estimate.gaussian.sigma, _unit(fitted, 1), count),
-        ("gaussian_sigma_deconvolved", kernel.gaussian_sigma, width, 0),
+        *((f.name, f.value, f.row @ opened, 0) for f in functionals),
         ("centre", float(estimate.centre[0]), _unit(count, 2), 0),
         ("baseline", float(estimate.drift[0]), _unit(count, 4 if planar else 3), 0),
         # The drift is stated across the whole range; its coefficient spans half of it.
@@ -191,10 +203,11 @@ def _scalar_rows(
 def _raster_columns(
     names: tuple[str, ...], kernel: NormalisedKernel, raster: FieldNoise
 ) -> FloatArray:
-    """Columns of the scalars for the noise of a measured field: A first, then the width."""
+    """Columns of the scalars for the noise of a measured field: A first, then those of G."""
     columns = np.zeros((len(names), 1 + raster.radial.shape[1]))
     columns[names.index("conversion_constant"), 0] = raster.conversion_constant
-    columns[names.index("gaussian_sigma_deconvolved"), 1:] = _width_row(kernel) @ raster.radial
+    for functional in kernel_functionals(kernel):
+        columns[names.index(functional.name), 1:] = functional.row @ raster.radial
     return columns
 
 
@@ -202,13 +215,6 @@ def _unit(count: int, index: int) -> FloatArray:
     row = np.zeros(count)
     row[index] = 1.0
     return row
-
-
-def _width_row(kernel: NormalisedKernel) -> FloatArray:
-    """Change of the Gaussian nearest to G by a change of G(r): its normal equation."""
-    r = kernel.view.r
-    slope = unit_gaussian_slope(r, kernel.gaussian_sigma)
-    return np.asarray(r * slope / np.sum(r * slope**2))
 
 
 def _joint_covariance(estimate: ProfileEstimate) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral, Real
@@ -45,6 +46,9 @@ class DivisionProblem:
     weakest_voltage, weakest_reference : float
         Moduli of the weakest relevant spectral components: the fields' transforms where the
         voltage's stands ten times above its noise, in V m^2/N and 1.
+    posterior : callable, optional
+        Returns A G on the grid, in V/Pa/m^2, as the scan's points give it without any division:
+        the mean of its posterior.
     """
 
     grid: FieldGrid
@@ -52,6 +56,7 @@ class DivisionProblem:
     reference: FloatArray
     weakest_voltage: float
     weakest_reference: float
+    posterior: Callable[[], FloatArray] | None = None
 
     @cached_property
     def voltage_spectrum(self) -> FloatArray:

@@ -19,6 +19,7 @@ ENTRY_POINT_GROUP = "memscal.regularisers"
 
 _OWN = {
     "white-noise": "memscal.deconvolution.white_noise:WhiteNoise",
+    "evidence": "memscal.deconvolution.evidence:Evidence",
     "white-noise-draw": "memscal.deconvolution.white_noise:WhiteNoiseDraw",
     "tikhonov": "memscal.deconvolution.tikhonov:Tikhonov",
     "wiener": "memscal.deconvolution.wiener:Wiener",

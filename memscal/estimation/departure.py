@@ -1,188 +1,188 @@
-r"""How far the scan departs from the Gaussian: a weighing by evidence.
+r"""How an apparatus function may depart from a Gaussian: shapes of a few components each.
 
-The apparatus function is written as the best Gaussian plus rings of several radii, each
-blurred by half the Gaussian's width,
+Every component is a ring of radius q, blurred by a Gaussian of width b, which has a closed form
+on both sides of the Hankel transform,
 
 .. math::
 
-    A\,G(r) = A_0\,g_s(r) + \sum_j c_j\,(\delta_{q_j} \otimes g_{s/2})(r), \qquad
-    \delta_q \to J_0(kq),
+    a\,(\delta_q \otimes g_b)(r) = \frac{a}{2\pi b^2}\,e^{-(r^2+q^2)/2b^2} I_0(rq/b^2),
+    \qquad a\,J_0(kq)\,e^{-b^2k^2/2} .
 
-with :math:`c_j \sim N(0, \rho\,\sigma^2 e_j^2)` and an envelope :math:`e_j` that ends at
-three widths.  The strength :math:`\rho` is not chosen but averaged over, weighted by its
-restricted likelihood (Patterson and Thompson, Biometrika 58, 1971), half of the prior
-belonging to :math:`\rho = 0`: no departure.  The rest of the parameters (A, width, centre,
-baseline, drift) are flat, so that a Gaussian sensor costs almost nothing.
+Components with random amplitudes make a random radial field: of correlation length
+:math:`\sqrt2\,b` within an extent w, or, for rings of radius zero and many widths, one that
+varies fast at the axis and slowly far from it.  Lengths are in units of the width of the best
+Gaussian; a shape's strength is its expected size over the Gaussian's, both as root of the
+integral of the square over the plane.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from scipy.special import j0
+from scipy.special import i0e, j0
 
-from memscal.estimation.forward import ForwardModel, gaussian_transfer
+from memscal.estimation.forward import (
+    ForwardModel,
+    gaussian_transfer,
+    unit_gaussian,
+    unit_gaussian_slope,
+)
 from memscal.estimation.gaussian_fit import GaussianFit
 from memscal.model.validation import FloatArray
 
-__all__ = ["DepartureBasis", "WeighedFit", "departure_basis", "weigh_departures"]
+__all__ = ["SHAPES", "DepartureBasis", "Rings", "Shape", "departure_basis"]
 
-_RINGS = 14
-_SUPPORT_IN_WIDTHS = 3.0
-_BLUR = 0.5
 #: A width below the sampling is not seen: rings are never narrower than this many steps.
 _SMALLEST_WIDTH_IN_STEPS = 0.5
-_NEGLIGIBLE = 1e-4
-_STRENGTHS = np.concatenate([[0.0], np.logspace(-2, 7, 37)])
+#: Neighbouring rings overlap: this share of their blur apart.
+_SPACING = 0.7
+_FEWEST_RINGS = 6
+#: A field is cut at this multiple of its extent, where its envelope has fallen to 1e-5.
+_REACH = 2.2
+_SCALES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """Blurred rings: ``radius`` and ``blur`` in m, ``amplitude`` in V/Pa; each of shape (m,)."""
+
+    radius: FloatArray
+    blur: FloatArray
+    amplitude: FloatArray
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Hankel transforms at ``k`` (rad/m), shape (k, m)."""
+        blurred = np.exp(-0.5 * np.multiply.outer(k, self.blur) ** 2)
+        return np.asarray(self.amplitude * blurred * j0(np.multiply.outer(k, self.radius)))
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """Values at radii ``r`` (m), shape (r, m), in V/Pa/m^2."""
+        square = self.blur**2
+        # The scaled Bessel function carries exp(-rq/b^2), which completes the square.
+        near = np.exp(-0.5 * np.subtract.outer(r, self.radius) ** 2 / square)
+        bessel = i0e(np.multiply.outer(r, self.radius / square))
+        return np.asarray(self.amplitude / (2 * np.pi * square) * near * bessel)
+
+    @property
+    def size(self) -> float:
+        """Expected L2 norm over the plane of the sum with random signs, in V/Pa/m."""
+        square = i0e(self.radius**2 / (2 * self.blur**2)) / (4 * np.pi * self.blur**2)
+        return float(np.sqrt(np.sum(self.amplitude**2 * square)))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A kind of departure, in units of the Gaussian's width.
+
+    Parameters
+    ----------
+    name : str
+        What it looks like.
+    blur : float
+        Finest width of its components.
+    extent : float
+        How far it reaches: of a field, the radius where its envelope falls; of scales, the
+        largest width.
+    scales : bool
+        Gaussians of all widths from ``blur`` to ``extent`` about the axis, in place of rings of
+        one blur.
+    """
+
+    name: str
+    blur: float
+    extent: float
+    scales: bool = False
+
+    def rings(self, width: float, amplitude: float) -> Rings:
+        """Return its components about a Gaussian of a width (m) and an amplitude (V/Pa).
+
+        They are scaled to the Gaussian's own L2 norm, so that a strength of one is as large.
+        """
+        if self.scales:
+            blur = width * np.geomspace(self.blur, self.extent, _SCALES)
+            plain = Rings(np.zeros(_SCALES), blur, np.ones(_SCALES))
+        else:
+            reach = _REACH * self.extent
+            count = max(_FEWEST_RINGS, math.ceil(reach / (_SPACING * self.blur)))
+            q = (np.arange(count) + 0.5) * reach / count
+            envelope = np.sqrt(q) * np.exp(-0.5 * (q / self.extent) ** 4)
+            plain = Rings(width * q, np.full(count, width * self.blur), envelope)
+        gaussian = amplitude / (2 * np.sqrt(np.pi) * width)
+        return Rings(plain.radius, plain.blur, plain.amplitude * gaussian / plain.size)
+
+
+#: Edges (a disc, a plateau), a core of its own (a ring, a spike), and tails.
+SHAPES = (
+    Shape("edge", 0.65, 0.8),
+    Shape("edge", 0.65, 1.2),
+    Shape("rough edge", 0.4, 0.8),
+    Shape("rough edge", 0.4, 1.2),
+    Shape("rough edge", 0.5, 0.8),
+    Shape("rough edge", 0.5, 1.2),
+    Shape("core", 0.3, 2.0, scales=True),
+    Shape("tail", 0.85, 1.8),
+    Shape("tail", 0.85, 3.0),
+)
 
 
 @dataclass(frozen=True, eq=False)
 class DepartureBasis:
-    """Transforms of the kernels that the fit is a combination of, and their integrals.
-
-    ``kernels`` (nodes, p): derivatives of the transform of A G by the Gaussian's A and width
-    (further columns of the Jacobian move no kernel and hold zeros), then the rings;
-    ``integrals`` (p,): their values at k = 0; ``flat``: how many have no prior.
-    """
-
-    kernels: FloatArray
-    integrals: FloatArray
-    flat: int
-
-
-@dataclass(frozen=True, eq=False)
-class WeighedFit:
-    """Posterior of corrections to the Gaussian fit, averaged over the departure's strength.
+    """The kernels that an estimate is a combination of, about the best Gaussian.
 
     Parameters
     ----------
-    mean : ndarray, shape (p,)
-        Corrections to the Gaussian fit's parameters, then ring amplitudes (V/Pa).
-    covariance : ndarray, shape (p, p)
-        Their posterior covariance, the spread over strengths included.
-    noise : float
-        Noise of a point of weight one: in V, or a factor on the stated uncertainties.
-    gaussian_probability : float
-        Posterior probability that there is no departure, from a prior of one half.
-    gain : ndarray, shape (p, n)
-        Derivative of ``mean`` by the voltages.
-    residual : ndarray, shape (n,)
-        Voltages that are not explained, in V.
+    conversion_constant, sigma : float
+        The Gaussian, in V/Pa and m.
+    flat : int
+        How many parameters have no prior: A, width, centre, baseline and drift.
+    rings : tuple of Rings
+        The components of each of :data:`SHAPES`.
     """
 
-    mean: FloatArray
-    covariance: FloatArray
-    gain: FloatArray
-    noise: float
-    gaussian_probability: float
-    residual: FloatArray
+    conversion_constant: float
+    sigma: float
+    flat: int
+    rings: tuple[Rings, ...]
+
+    @property
+    def blocks(self) -> tuple[slice, ...]:
+        """Columns of each shape."""
+        ends = self.flat + np.cumsum([0, *(ring.radius.size for ring in self.rings)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def kernels(self, k: FloatArray) -> FloatArray:
+        """Transforms of all columns at ``k`` (rad/m), shape (k, p).
+
+        The first two are the derivatives of the Gaussian's by A and width; the other parameters
+        without prior move no kernel and hold zeros.
+        """
+        gaussian = gaussian_transfer(k, self.sigma)
+        widening = -self.conversion_constant * self.sigma * k**2 * gaussian
+        return self._columns(gaussian, widening, [ring.transform(k) for ring in self.rings])
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """Values of all columns at radii ``r`` (m), shape (r, p)."""
+        gaussian = unit_gaussian(r, self.sigma)
+        widening = self.conversion_constant * unit_gaussian_slope(r, self.sigma)
+        return self._columns(gaussian, widening, [ring.radial(r) for ring in self.rings])
+
+    @property
+    def integrals(self) -> FloatArray:
+        """Integrals of all columns over the plane, shape (p,)."""
+        return np.asarray(self.kernels(np.zeros(1))[0])
+
+    def _columns(
+        self, gaussian: FloatArray, widening: FloatArray, rings: list[FloatArray]
+    ) -> FloatArray:
+        unmoved = np.zeros((gaussian.size, self.flat - 2))
+        return np.hstack([gaussian[:, None], widening[:, None], unmoved, *rings])
 
 
 def departure_basis(model: ForwardModel, fit: GaussianFit) -> DepartureBasis:
-    """Return the kernels of the fit's own parameters and of the rings about it."""
-    k, sigma = model.k, fit.sigma
-    blur = max(sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
-    reach = 1.5 * _SUPPORT_IN_WIDTHS * blur
-    q = (np.arange(_RINGS) + 0.5) * reach / _RINGS
-    envelope = np.sqrt(q / blur) * np.exp(-0.5 * (q / (_SUPPORT_IN_WIDTHS * blur)) ** 4)
-    rings = j0(np.multiply.outer(k, q)) * envelope
-    rings *= gaussian_transfer(k, _BLUR * blur)[:, None]
-    gaussian = gaussian_transfer(k, sigma)
-    own = np.zeros((k.size, fit.jacobian.shape[1]))
-    own[:, 0] = gaussian
-    own[:, 1] = -fit.conversion_constant * sigma * k**2 * gaussian
-    integrals = np.concatenate([[1.0], np.zeros(own.shape[1] - 1), envelope])
-    return DepartureBasis(np.hstack([own, rings]), integrals, own.shape[1])
-
-
-def weigh_departures(
-    model: ForwardModel,
-    fit: GaussianFit,
-    basis: DepartureBasis,
-    weights: FloatArray,
-    effective_count: float,
-) -> WeighedFit:
-    """Weigh departures from a Gaussian fit by evidence.
-
-    Parameters
-    ----------
-    model, fit, basis
-        The forward model, the best Gaussian, and the kernels about it.
-    weights : ndarray, shape (n,)
-        Relative weights of the points.
-    effective_count : float
-        How many points the data are worth, outliers down-weighted.
-
-    Returns
-    -------
-    WeighedFit
-        Posterior mean and covariance of all corrections, and the noise.
-    """
-    root = np.sqrt(weights)
-    rings = model.signal(fit.geometry, basis.kernels[:, basis.flat :])
-    design = np.hstack([fit.jacobian, rings]) * root[:, None]
-    scale = np.linalg.norm(design, axis=0)
-    scale[basis.flat :] = scale[basis.flat :].max()
-    design = design / scale
-    data = root * (model.points.u - fit.predicted)
-    probability, variance = _evidence(design, data, basis.flat, effective_count)
-    information, projected = design.T @ design, design.T @ data
-    average = np.zeros_like(information)
-    second = np.zeros_like(information)
-    for strength, p, v in zip(_STRENGTHS, probability, variance, strict=True):
-        if p > 0:
-            inverse = _posterior_inverse(information, basis.flat, strength)
-            centre = inverse @ projected
-            average += p * inverse
-            second += p * (v * inverse + np.outer(centre, centre))
-    gain = average @ design.T
-    mean = average @ projected
-    covariance = (second - np.outer(mean, mean)) / np.outer(scale, scale)
-    return WeighedFit(
-        mean=mean / scale,
-        covariance=covariance,
-        gain=gain * root / scale[:, None],
-        noise=float(np.sqrt(probability @ variance)),
-        gaussian_probability=float(probability[0]),
-        residual=np.divide(data - design @ mean, root),
-    )
-
-
-def _evidence(
-    design: FloatArray, data: FloatArray, flat: int, effective_count: float
-) -> tuple[FloatArray, FloatArray]:
-    """Posterior probability and noise variance for each departure strength.
-
-    The flat columns are projected out (restricted likelihood); in the singular basis of
-    what is left every strength costs one sum.
-    """
-    flat_part = np.linalg.qr(design[:, :flat])[0]
-    rings = design[:, flat:] - flat_part @ (flat_part.T @ design[:, flat:])
-    rest = data - flat_part @ (flat_part.T @ data)
-    left, singular, _ = np.linalg.svd(rings, full_matrices=False)
-    squared = singular**2
-    power = (left.T @ rest) ** 2
-    beyond = max(float(rest @ rest - power.sum()), 0.0)
-    # Down-weighted points carry no full degree of freedom.
-    freedom = effective_count - flat
-    inflation = 1 + np.multiply.outer(_STRENGTHS, squared)
-    variance = (beyond + (power / inflation).sum(axis=1)) / freedom
-    variance = np.maximum(variance, np.finfo(float).tiny)
-    log_evidence = -0.5 * (freedom * np.log(variance) + np.log(inflation).sum(axis=1))
-    prior = np.full(_STRENGTHS.size, 0.5 / (_STRENGTHS.size - 1))
-    prior[0] = 0.5
-    posterior = prior * np.exp(log_evidence - log_evidence.max())
-    posterior[posterior < _NEGLIGIBLE * posterior.sum()] = 0.0
-    return posterior / posterior.sum(), variance
-
-
-def _posterior_inverse(information: FloatArray, flat: int, strength: float) -> FloatArray:
-    """Posterior covariance of all columns at one strength, per unit noise variance."""
-    count = flat if strength == 0 else information.shape[0]
-    precision = information[:count, :count].copy()
-    if strength > 0:
-        precision[range(flat, count), range(flat, count)] += 1 / strength
-    covariance = np.zeros_like(information)
-    covariance[:count, :count] = np.linalg.inv(precision)
-    return covariance
+    """Return the kernels of the fit's own parameters and of every shape about it."""
+    width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
+    rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
+    return DepartureBasis(fit.conversion_constant, fit.sigma, fit.jacobian.shape[1], rings)

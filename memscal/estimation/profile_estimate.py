@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.errors import FitError
-from memscal.estimation.departure import (
-    DepartureBasis,
-    WeighedFit,
-    departure_basis,
-    weigh_departures,
-)
-from memscal.estimation.forward import ForwardModel, gaussian_transfer
+from memscal.estimation.departure import DepartureBasis, departure_basis
+from memscal.estimation.evidence import WeighedFit, weigh_departures
+from memscal.estimation.forward import ForwardModel, gaussian_transfer, unit_gaussian
 from memscal.estimation.gaussian_fit import GaussianFit, fit_gaussian
 from memscal.estimation.points import ScanPoints
 from memscal.model.validation import FloatArray
@@ -91,13 +88,17 @@ class ProfileEstimate:
         """Derivative of the Gaussian fit's parameters by the voltages."""
         return self.gaussian.gain(self.weights)
 
-    @property
+    @cached_property
     def kernel(self) -> FloatArray:
         """Transform of A G at the quadrature nodes, in V/Pa."""
         gaussian = gaussian_transfer(self.model.k, self.gaussian.sigma)
-        return self.gaussian.conversion_constant * gaussian + (
-            self.basis.kernels @ self.weighed.mean
-        )
+        correction = self.basis.kernels(self.model.k) @ self.weighed.mean
+        return np.asarray(self.gaussian.conversion_constant * gaussian + correction)
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """A G at radii ``r`` (m), in V/Pa/m^2."""
+        gaussian = self.gaussian.conversion_constant * unit_gaussian(r, self.gaussian.sigma)
+        return np.asarray(gaussian + self.basis.radial(r) @ self.weighed.mean)
 
     @property
     def spectrum(self) -> RadialSpectrum:

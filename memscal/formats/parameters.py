@@ -26,6 +26,8 @@ __all__ = [
 _DIMENSIONS = {
     "conversion_constant": "voltage per stress",
     "gaussian_sigma": "length",
+    "fwhm": "length",
+    "noise_equivalent_area": "area",
     "centre": "length",
     "baseline": "voltage",
     "baseline_slope": "voltage per length",

@@ -86,7 +86,7 @@ def test_noise_alone_is_no_calibration(seed: int) -> None:
 def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     scan = simulated(kernel=RING, noise=0.002, state_noise=False)
     estimate = estimated(scan)
-    from memscal.estimation.departure import weigh_departures
+    from memscal.estimation.evidence import weigh_departures
 
     change = np.zeros_like(scan.u_zz)
     change[30] = 1e-3 * estimate.weighed.noise
@@ -98,10 +98,11 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
         estimate.weights,
         float(estimate.outlier_weight.sum()),
     )
-    # The posterior over strengths moves too, by second order: compare integrals, not rings.
-    expected = estimate.basis.integrals @ estimate.weighed.gain @ change
-    found = estimate.basis.integrals @ (again.mean - estimate.weighed.mean)
-    assert found == pytest.approx(expected, rel=0.2)
+    profile = estimate.basis.radial(np.linspace(0.0, 3e-3, 31))
+    expected = profile @ (estimate.weighed.gain @ change)
+    found = profile @ (again.mean - estimate.weighed.mean)
+    # The estimated noise moves, too, which the gain leaves out: by a few hundredths of the change.
+    np.testing.assert_allclose(found, expected, atol=0.05 * np.abs(expected).max())
 
 
 def test_the_public_name_of_a_refusal_is_a_memscal_error() -> None:

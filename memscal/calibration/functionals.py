@@ -1,0 +1,75 @@
+r"""Numbers that are read off G(r), and how they follow its changes.
+
+Each is a functional of the radial profile; its derivative is a row that multiplies a change of
+:math:`G` at the radii of the profile.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import radial_spline
+from memscal.calibration.normalise import NormalisedKernel
+from memscal.estimation.forward import unit_gaussian_slope
+from memscal.model.validation import FloatArray
+
+__all__ = ["Functional", "kernel_functionals"]
+
+_FINE = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Functional:
+    """A number read off G: its parameter's name, its value, and its derivative by G(r)."""
+
+    name: str
+    value: float
+    row: FloatArray
+
+
+def kernel_functionals(kernel: NormalisedKernel) -> tuple[Functional, ...]:
+    """Return the Gaussian width nearest to G, its full width at half maximum and its area."""
+    r, g = kernel.view.r, kernel.view.radial
+    return (_gaussian_width(kernel, r), _half_width(r, g), _equivalent_area(r, g))
+
+
+def _gaussian_width(kernel: NormalisedKernel, r: FloatArray) -> Functional:
+    """Width of the Gaussian nearest to G over the plane: by its normal equation."""
+    slope = unit_gaussian_slope(r, kernel.gaussian_sigma)
+    row = r * slope / np.sum(r * slope**2)
+    return Functional("gaussian_sigma_deconvolved", kernel.gaussian_sigma, row)
+
+
+def _half_width(r: FloatArray, g: FloatArray) -> Functional:
+    """Diameter of the outermost circle where G is half of its maximum.
+
+    With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
+    """
+    fine = np.linspace(r[0], r[-1], _FINE * r.size)
+    values = radial_spline(r, g)(fine)
+    top = int(np.argmax(values))
+    last = int(np.flatnonzero(values >= values[top] / 2)[-1])
+    last = min(last, fine.size - 2)
+    slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
+    half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
+    row = _at(r, half) - 0.5 * _at(r, float(fine[top]))
+    row = -2 * row / slope if slope else np.zeros_like(row)
+    return Functional("fwhm", float(2 * half), row)
+
+
+def _equivalent_area(r: FloatArray, g: FloatArray) -> Functional:
+    r"""Noise-equivalent area :math:`1/\int G^2\,dA`, in m^2: 4 pi sigma^2 of a Gaussian."""
+    ring = 2 * np.pi * r * np.gradient(r)
+    area = float(1 / np.sum(ring * g**2))
+    return Functional("noise_equivalent_area", area, -2 * area**2 * ring * g)
+
+
+def _at(r: FloatArray, place: float) -> FloatArray:
+    """Row that reads a profile at a radius, by linear interpolation."""
+    row = np.zeros_like(r)
+    i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
+    share = (place - r[i]) / (r[i + 1] - r[i])
+    row[i], row[i + 1] = 1 - share, share
+    return row

@@ -1,0 +1,319 @@
+r"""How far the scan departs from the Gaussian: hypotheses weighed by their evidence.
+
+A hypothesis is a shape of departure and its strength :math:`\tau`: amplitudes
+:math:`c_j \sim N(0, \tau^2)` beside parameters (A, width, centre, baseline, drift) without
+prior.  With the latter projected out (restricted likelihood: Patterson and Thompson, Biometrika
+58, 1971) and singular values :math:`s_j` of what is left of the shape's design,
+
+.. math::
+
+    -2\log p(u \mid \tau) = \nu\log\hat\sigma^2 + \sum_j\log(1+\tau^2 s_j^2/\hat\sigma^2), \qquad
+    \nu\hat\sigma^2 = \rho + \sum_j \frac{p_j^2}{1+\tau^2 s_j^2/\hat\sigma^2},
+
+where :math:`p_j` are the data along the singular vectors and :math:`\rho` the rest.
+
+Two sets of prior weights are in use.  The estimate is the posterior mean under one that believes
+in the Gaussian by a third, so that a Gaussian sensor costs little.  Its uncertainty is the mean
+squared distance from the truth under another that believes in departures only, rougher ones
+among them: what regularisation hides is counted as what such fields have there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.estimation.departure import SHAPES, DepartureBasis, Shape
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian_fit import GaussianFit
+from memscal.model.validation import FloatArray
+
+__all__ = ["HYPOTHESES", "Hypothesis", "WeighedFit", "weigh_departures"]
+
+_NEGLIGIBLE = 1e-4
+_VARIANCE_ROUNDS = 8
+#: The smallest noise, over the largest residual of a Gaussian, that is told from rounding.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A shape at a strength, with its weights in the estimate and in the uncertainty.
+
+    ``shape`` and ``strength`` are ``None`` and zero for the Gaussian itself.
+    """
+
+    shape: Shape | None
+    strength: float
+    estimate: float
+    uncertainty: float
+
+
+def _hypotheses() -> tuple[Hypothesis, ...]:
+    """The prior: weights by kind of departure, shared evenly within one."""
+    kinds: list[tuple[str, tuple[float, ...], float, float]] = [
+        ("edge", (0.4, 0.8), 0.20, 0.0),
+        ("rough edge 0.4", (0.4,), 0.08, 0.30),
+        ("rough edge 0.5", (0.8, 1.6), 0.0, 0.09),
+        ("core", (0.4,), 0.06, 0.44),
+        ("tail", (0.2,), 0.33, 0.17),
+    ]
+    found = [Hypothesis(None, 0.0, 0.33, 0.0)]
+    for kind, strengths, estimate, uncertainty in kinds:
+        shapes = [s for s in SHAPES if kind in (s.name, f"{s.name} {s.blur}")]
+        share = len(shapes) * len(strengths)
+        found += [
+            Hypothesis(shape, strength, estimate / share, uncertainty / share)
+            for shape in shapes
+            for strength in strengths
+        ]
+    return tuple(found)
+
+
+HYPOTHESES = _hypotheses()
+
+
+@dataclass(frozen=True, eq=False)
+class WeighedFit:
+    """Posterior of corrections to the Gaussian fit, averaged over the hypotheses.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (p,)
+        Corrections to the Gaussian fit's parameters, then amplitudes of the shapes' components.
+    covariance : ndarray, shape (p, p)
+        Their expected squared error, the spread over hypotheses included.
+    gain : ndarray, shape (p, n)
+        Derivative of ``mean`` by the voltages.
+    noise : float
+        Noise of a point of weight one: in V, or a factor on the stated uncertainties.
+    probability : ndarray, shape (h,)
+        Posterior probability of each of :data:`HYPOTHESES`.
+    residual : ndarray, shape (n,)
+        Voltages that are not explained, in V.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    gain: FloatArray
+    noise: float
+    probability: FloatArray
+    residual: FloatArray
+
+    @property
+    def gaussian_probability(self) -> float:
+        """Posterior probability that there is no departure, from a prior of a third."""
+        return float(self.probability[0])
+
+
+def weigh_departures(
+    model: ForwardModel,
+    fit: GaussianFit,
+    basis: DepartureBasis,
+    weights: FloatArray,
+    effective_count: float,
+) -> WeighedFit:
+    """Weigh departures from a Gaussian fit by evidence.
+
+    Parameters
+    ----------
+    model, fit, basis
+        The forward model, the best Gaussian, and the kernels about it.
+    weights : ndarray, shape (n,)
+        Relative weights of the points.
+    effective_count : float
+        How many points the data are worth, outliers down-weighted.
+
+    Returns
+    -------
+    WeighedFit
+        Posterior mean and covariance of all corrections, and the noise.
+    """
+    root = np.sqrt(weights)
+    flat = basis.flat
+    kernels = basis.kernels(model.k)[:, flat:]
+    rings = model.signal(fit.geometry, kernels) * root[:, None]
+    data = root * (model.points.u - fit.predicted)
+    # Down-weighted points carry no full degree of freedom.
+    problem = _Projected.from_columns(fit.jacobian * root[:, None], data, effective_count - flat)
+    parts = [problem.part(rings[:, b.start - flat : b.stop - flat], b) for b in basis.blocks]
+    outcomes = [problem.gaussian()]
+    for hypothesis in HYPOTHESES[1:]:
+        assert hypothesis.shape is not None
+        part = parts[SHAPES.index(hypothesis.shape)]
+        outcomes.append(problem.weigh(part, hypothesis.strength))
+    return _average(problem, outcomes, flat + rings.shape[1], root)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One shape's design with the flat columns projected out, by its singular values."""
+
+    block: slice
+    columns: FloatArray
+    left: FloatArray
+    singular: FloatArray
+    right: FloatArray
+    along: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """One hypothesis: log evidence, noise variance, and what gives its posterior.
+
+    ``shrink``: factors from data to amplitudes along the singular vectors; ``reduction``: by how
+    much the data have reduced the prior variance ``strength**2`` there; ``slope``: derivative of
+    the log evidence by the weighted data.
+    """
+
+    log_evidence: float
+    variance: float
+    strength: float
+    part: _Part | None
+    shrink: FloatArray
+    reduction: FloatArray
+    slope: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Projected:
+    """Weighted data and flat columns: what every hypothesis shares."""
+
+    scale: FloatArray
+    q: FloatArray
+    inverse: FloatArray
+    data: FloatArray
+    rest: FloatArray
+    freedom: float
+
+    @classmethod
+    def from_columns(cls, flat: FloatArray, data: FloatArray, freedom: float) -> _Projected:
+        scale = np.linalg.norm(flat, axis=0)
+        q, r = np.linalg.qr(flat / scale)
+        return cls(scale, q, np.linalg.inv(r), data, data - q @ (q.T @ data), freedom)
+
+    def part(self, columns: FloatArray, block: slice) -> _Part:
+        free = columns - self.q @ (self.q.T @ columns)
+        left, singular, right = np.linalg.svd(free, full_matrices=False)
+        return _Part(block, columns, left, singular, right, left.T @ self.rest)
+
+    def gaussian(self) -> _Outcome:
+        variance = self._floor(float(self.rest @ self.rest) / self.freedom)
+        nothing = np.zeros(0)
+        log_evidence = -0.5 * self.freedom * float(np.log(variance))
+        return _Outcome(log_evidence, variance, 0.0, None, nothing, nothing, -self.rest / variance)
+
+    def weigh(self, part: _Part, strength: float) -> _Outcome:
+        beyond = max(float(self.rest @ self.rest - part.along @ part.along), 0.0)
+        signal = (strength * part.singular) ** 2
+        variance = self._floor(float(self.rest @ self.rest) / self.freedom)
+        for _ in range(_VARIANCE_ROUNDS):
+            explained = part.along**2 * variance / (variance + signal)
+            variance = self._floor((beyond + float(explained.sum())) / self.freedom)
+        inflation = 1 + signal / variance
+        log_evidence = -0.5 * (self.freedom * np.log(variance) + float(np.log(inflation).sum()))
+        return _Outcome(
+            log_evidence,
+            variance,
+            strength,
+            part,
+            strength**2 * part.singular / (variance + signal),
+            strength**2 * signal / (variance + signal),
+            (part.left @ (signal / (variance + signal) * part.along) - self.rest) / variance,
+        )
+
+    def _floor(self, variance: float) -> float:
+        return max(variance, (_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
+
+
+def _average(
+    problem: _Projected, outcomes: list[_Outcome], count: int, root: FloatArray
+) -> WeighedFit:
+    """Average mean and gain by one set of weights, squared errors by the other."""
+    evidence = np.array([o.log_evidence for o in outcomes])
+    estimate, uncertainty = (
+        _posterior(evidence, np.array([getattr(h, name) for h in HYPOTHESES]))
+        for name in ("estimate", "uncertainty")
+    )
+    gain = np.zeros((count, problem.data.size))
+    for p, outcome in zip(estimate, outcomes, strict=True):
+        if p > 0:
+            _add_gain(gain, problem, outcome, p)
+    mean = gain @ problem.data
+    # The data move the probabilities, too: d(p m) = (m - mean) p d(log evidence).
+    moving = np.zeros_like(gain)
+    for p, outcome in zip(estimate, outcomes, strict=True):
+        if p > 0:
+            own = np.zeros_like(gain)
+            _add_gain(own, problem, outcome, 1.0)
+            moving += p * np.outer(own @ problem.data - mean, outcome.slope)
+    covariance = np.zeros((count, count))
+    for p, outcome in zip(uncertainty, outcomes, strict=True):
+        if p > 0:
+            own = np.zeros_like(gain)
+            _add_gain(own, problem, outcome, 1.0)
+            off = own @ problem.data - mean
+            covariance += p * np.outer(off, off)
+            _add_covariance(covariance, problem, outcome, p)
+    variance = np.array([o.variance for o in outcomes])
+    residual = problem.data - _predicted(problem, outcomes, mean)
+    return WeighedFit(
+        mean=mean,
+        covariance=covariance,
+        gain=(gain + moving) * root,
+        noise=float(np.sqrt(estimate @ variance)),
+        probability=estimate,
+        residual=np.divide(residual, root),
+    )
+
+
+def _posterior(log_evidence: FloatArray, prior: FloatArray) -> FloatArray:
+    weight = prior * np.exp(log_evidence - log_evidence[prior > 0].max())
+    weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
+    return np.asarray(weight / weight.sum())
+
+
+def _flat_map(problem: _Projected) -> FloatArray:
+    """From weighted data to the flat parameters of a plain fit, shape (flat, n)."""
+    return np.asarray((problem.inverse @ problem.q.T) / problem.scale[:, None])
+
+
+def _add_gain(gain: FloatArray, problem: _Projected, outcome: _Outcome, share: float) -> None:
+    fitted = _flat_map(problem)
+    flat = fitted.shape[0]
+    gain[:flat] += share * fitted
+    part = outcome.part
+    if part is not None:
+        amplitudes = (part.right.T * outcome.shrink) @ part.left.T
+        gain[part.block] += share * amplitudes
+        gain[:flat] -= share * (fitted @ part.columns) @ amplitudes
+
+
+def _add_covariance(
+    covariance: FloatArray, problem: _Projected, outcome: _Outcome, share: float
+) -> None:
+    flat = problem.scale.size
+    plain = problem.inverse @ problem.inverse.T / np.outer(problem.scale, problem.scale)
+    covariance[:flat, :flat] += share * outcome.variance * plain
+    part = outcome.part
+    if part is not None:
+        # Fewer points than components leave the prior as it was along what they do not see.
+        known = (part.right.T * outcome.reduction) @ part.right
+        amplitudes = outcome.strength**2 * np.eye(known.shape[0]) - known
+        carried = _flat_map(problem) @ part.columns
+        covariance[part.block, part.block] += share * amplitudes
+        covariance[:flat, part.block] -= share * carried @ amplitudes
+        covariance[part.block, :flat] -= share * amplitudes @ carried.T
+        covariance[:flat, :flat] += share * carried @ amplitudes @ carried.T
+
+
+def _predicted(problem: _Projected, outcomes: list[_Outcome], mean: FloatArray) -> FloatArray:
+    """Weighted voltages of the mean correction."""
+    flat = problem.scale.size
+    r = np.linalg.inv(problem.inverse)
+    predicted = problem.q @ (r @ (problem.scale * mean[:flat]))
+    parts = {id(o.part): o.part for o in outcomes if o.part is not None}
+    for part in parts.values():
+        predicted = predicted + part.columns @ mean[part.block]
+    return np.asarray(predicted)
