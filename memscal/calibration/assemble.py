@@ -99,8 +99,8 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     estimate = solution.estimate
     points = estimate.points
     # A raster is shown against the distance from the centre: a line has a side, a plane has not.
-    place = np.hypot(*(np.stack([points.x, points.y]) - estimate.centre[:, None]))
-    place = place if points.planar else points.x
+    along = points.x if points.free[0, 0] else points.y
+    place = estimate.distance if points.planar or points.scans > 1 else along
     order = np.argsort(place, kind="stable")
 
     def sorted_(values: FloatArray) -> FloatArray:

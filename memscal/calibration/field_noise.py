@@ -48,7 +48,7 @@ def field_noise(solution: Solution, wavenumbers: FloatArray) -> FieldNoise | Non
         Where the transfer function is stated, in rad/m.
     """
     estimate, kernel = solution.estimate, solution.quotient.kernel
-    if not estimate.points.planar:
+    if not estimate.points.planar or estimate.points.scans > 1:
         return None
     k, weights = estimate.model.k, estimate.model.reference.wavenumbers.weights
     fields = solution.fields

@@ -13,6 +13,7 @@ from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice, cut, lift
 from memscal.deconvolution.problem import NOISE_RATIO, DivisionProblem
 from memscal.errors import InputError
 from memscal.estimation.band import Band
+from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
@@ -110,9 +111,8 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
         Its relevant band, which says where the window closes.
     """
     points = estimate.points
-    distance = np.hypot(points.x - estimate.centre[0], points.y - estimate.centre[1])
-    support = float(distance.max())
-    if points.planar:
+    support = float(estimate.distance.max())
+    if _as_raster(points):
         # A square of this half width lies within the raster's longer side.
         support = float(np.abs(points.x - estimate.centre[0]).max())
     reference = np.abs(estimate.model.reference.values)
@@ -121,13 +121,14 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = support / np.ceil(support / spacing)
-    extent = max(float(np.ptp(points.x)), float(np.ptp(points.y)), 1.25 * support)
+    span = max(float(np.ptp(offset)) for offset in estimate.offset)
+    extent = max(span, 1.25 * support)
     return GridChoice(spacing=float(spacing), support=support, extent=extent)
 
 
 def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
-    """Lift a line scan's profile, or place a raster as it was measured."""
-    if estimate.points.planar:
+    """Lift the profile of lines or of several scans, or place a raster as it was measured."""
+    if _as_raster(estimate.points):
         return _RasterFields.place(estimate, choice)
     return _LineFields.lift(estimate, choice)
 
@@ -142,6 +143,11 @@ def division_problem(estimate: ProfileEstimate, band: Band, fields: Fields) -> D
         band.weakest_reference,
         posterior=lambda: fields.kernel(estimate.radial),
     )
+
+
+def _as_raster(points: ScanPoints) -> bool:
+    """Whether the points are one raster, which is used as it is; several scans share a profile."""
+    return points.planar and points.scans == 1
 
 
 def _taper(radius: FloatArray, support: float) -> FloatArray:
@@ -171,9 +177,8 @@ class _LineFields:
         step = choice.spacing / 2
         voltage = lift(estimate.spectrum.at, grid, step)
         reference = lift(estimate.model.reference.at, grid, step)
-        points = estimate.points
-        radius = np.abs(points.x - estimate.centre[0])
-        return cls(grid, voltage, reference, round(choice.support / choice.spacing), radius)
+        support = round(choice.support / choice.spacing)
+        return cls(grid, voltage, reference, support, estimate.distance)
 
     @property
     def confinement(self) -> FloatArray:

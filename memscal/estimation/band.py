@@ -80,7 +80,7 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
 
 def _ring_noise(estimate: ProfileEstimate, k: FloatArray) -> FloatArray:
     points = estimate.points
-    radius = np.abs(points.x - estimate.centre[0])
+    radius = estimate.distance
     signal = (estimate.predicted - estimate.background) / points.load
     noise = estimate.noise / points.load
     share = signal**2 / (signal**2 + noise**2) * estimate.outlier_weight

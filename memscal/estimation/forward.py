@@ -11,8 +11,10 @@ the sensor's centre and per newton,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import RadialSpectrum
@@ -64,32 +66,47 @@ class ForwardModel:
     Parameters
     ----------
     points : ScanPoints
-        Where and at what load.
-    reference : RadialSpectrum
-        Transform of the base stress per newton, dimensionless.
+        Where and at what load, in one scan or several.
+    references : tuple of RadialSpectrum
+        Transform of the base stress per newton, dimensionless, for each scan; on the same nodes.
     """
 
     points: ScanPoints
-    reference: RadialSpectrum
+    references: tuple[RadialSpectrum, ...]
+
+    @property
+    def reference(self) -> RadialSpectrum:
+        """The first scan's reference."""
+        return self.references[0]
+
+    def only(self, scan: int) -> ForwardModel:
+        """Return the model of one of the scans."""
+        return ForwardModel(self.points.only(scan), (self.references[scan],))
 
     @property
     def k(self) -> FloatArray:
         """Quadrature nodes, in rad/m."""
         return self.reference.wavenumbers.k
 
-    @property
+    @cached_property
     def drift_columns(self) -> FloatArray:
-        """Constant baseline and its linear drift across the scan, shape (n, 2 or 3).
+        """Constant baseline and its linear drift along each scan, shape (n, 2 or 3 a scan).
 
         The drift's coordinates run from -1 to 1, so that every coefficient is in V.
         """
-        columns = [np.ones_like(self.points.u), _unit_range(self.points.x)]
-        if self.points.planar:
-            columns.append(_unit_range(self.points.y))
+        columns = []
+        for i, free in enumerate(self.points.free):
+            inside = self.points.scan == i
+            columns.append(inside.astype(np.float64))
+            for along, position in zip(free, (self.points.x, self.points.y), strict=True):
+                if along:
+                    columns.append(np.zeros_like(position))
+                    columns[-1][inside] = _unit_range(position[inside])
         return np.stack(columns, axis=1)
 
-    def geometry(self, centre: FloatArray) -> Geometry:
-        """Return distances and Bessel functions for a trial centre (x0, y0), in m."""
+    def geometry(self, centres: FloatArray) -> Geometry:
+        """Return distances and Bessel functions for trial centres, shape (scans, 2), in m."""
+        centre = np.atleast_2d(centres)[self.points.scan].T
         dx, dy = self.points.x - centre[0], self.points.y - centre[1]
         radius = np.hypot(dx, dy)
         # Repeats share their positions: each Bessel function is computed once.
@@ -101,17 +118,35 @@ class ForwardModel:
 
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
-        measure = self.reference.wavenumbers.weights * self.reference.values
-        spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
-        per_newton = geometry.bessel0 @ spread
+        per_newton = np.empty((geometry.radius.size, *kernel.shape[1:]))
+        for rows, measure in self._measures:
+            spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
+            per_newton[rows] = geometry.bessel0[rows] @ spread
         return self._times_load(per_newton)
 
+    def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
+        """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
+        slope = np.empty_like(geometry.radius)
+        for rows, measure in self._measures:
+            slope[rows] = -(geometry.bessel1[rows] @ (measure * self.k * kernel))
+        return self._times_load(slope)
+
     def centre_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
-        """Derivatives of :meth:`signal` by the centre, shape (n, 1), or (n, 2) in a raster."""
-        measure = self.reference.wavenumbers.weights * self.reference.values
-        slope = -(geometry.bessel1 @ (measure * self.k * kernel))
-        both = (geometry.towards * slope * self.points.load).T
-        return both if self.points.planar else both[:, :1]
+        """Derivatives of :meth:`signal` by the free coordinates of all centres, shape (n, m)."""
+        slope = self.radial_derivative(geometry, kernel)
+        columns = [
+            np.where(self.points.scan == i, geometry.towards[axis] * slope, 0.0)
+            for i, axis in np.argwhere(self.points.free)
+        ]
+        return np.stack(columns, axis=1)
+
+    @property
+    def _measures(self) -> list[tuple[slice | NDArray[np.bool_], FloatArray]]:
+        """Rows of each scan, and the quadrature's weights times its reference."""
+        measures = [ref.wavenumbers.weights * ref.values for ref in self.references]
+        if len(measures) == 1:
+            return [(slice(None), measures[0])]
+        return [(self.points.scan == i, measure) for i, measure in enumerate(measures)]
 
     def _times_load(self, per_newton: FloatArray) -> FloatArray:
         load = self.points.load

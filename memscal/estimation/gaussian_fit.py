@@ -7,13 +7,14 @@ linear drift, by weighted least squares.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel, Geometry, gaussian_transfer
+from memscal.estimation.points import ScanPoints
 from memscal.model.validation import FloatArray
 
 __all__ = ["GaussianFit", "fit_gaussian"]
@@ -34,10 +35,12 @@ class GaussianFit:
         A, in V/Pa.
     sigma : float
         Standard deviation of the Gaussian, in m.
-    centre : ndarray, shape (2,)
-        Centre (x0, y0) of the sensor, in m.
-    drift : ndarray, shape (2,) or (3,)
-        Baseline, and its change over half the scan's range along x (and y), in V.
+    centre : ndarray, shape (scans, 2)
+        Centre (x0, y0) of the sensor in each scan, in m; zero where a line does not tell.
+    drift : ndarray, shape (2 or 3 a scan,)
+        Baseline of each scan, and its change over half the range along x (and y), in V.
+    points : ScanPoints
+        What was fitted.
     geometry : Geometry
         Distances from the centre.
     jacobian : ndarray, shape (n, p)
@@ -50,20 +53,24 @@ class GaussianFit:
     sigma: float
     centre: FloatArray
     drift: FloatArray
+    points: ScanPoints
     geometry: Geometry
     jacobian: FloatArray
     predicted: FloatArray
 
     def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
         """Covariance of the parameters for a noise (V) and relative weights."""
-        information = (self.jacobian * weights[:, None]).T @ self.jacobian
+        standardised = self.points.standardised(self.jacobian, weights)
+        information = standardised.T @ standardised
         scale = np.sqrt(np.diag(information))
         inverse = np.linalg.inv(information / np.outer(scale, scale))
         return np.asarray(noise**2 * inverse / np.outer(scale, scale))
 
     def gain(self, weights: FloatArray) -> FloatArray:
         """Derivative of the parameters by the voltages, shape (p, n)."""
-        return np.asarray(self.covariance(weights, 1.0) @ (self.jacobian * weights[:, None]).T)
+        twice = self.points.standardised(self.jacobian, weights)
+        back = self.points.standardised(np.eye(weights.size), weights)
+        return np.asarray(self.covariance(weights, 1.0) @ twice.T @ back)
 
 
 def fit_gaussian(
@@ -87,20 +94,15 @@ def fit_gaussian(
     """
     if start is None:
         return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
-    theta = np.concatenate(
-        [[start.conversion_constant, start.sigma], start.centre[: _plane(model)], start.drift]
-    )
+    centres = start.centre[model.points.free]
+    theta = np.concatenate([[start.conversion_constant, start.sigma], centres, start.drift])
     return _solve(model, weights, theta, loss="linear")
-
-
-def _plane(model: ForwardModel) -> int:
-    return 2 if model.points.planar else 1
 
 
 def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _Loss) -> GaussianFit:
     from scipy.optimize import least_squares
 
-    root = np.sqrt(weights)
+    standardised = model.points.standardised
     last: dict[bytes, GaussianFit] = {}
 
     def evaluate(scaled: FloatArray) -> GaussianFit:
@@ -112,13 +114,14 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
         return last[key]
 
     scale = _typical(model, start)
-    noise = _robust_scale(root * (model.points.u - _linearise(model, start).predicted))
+    unexplained = model.points.u - _linearise(model, start).predicted
+    noise = _robust_scale(standardised(unexplained, weights))
 
     def residual(scaled: FloatArray) -> FloatArray:
-        return np.asarray(root * (evaluate(scaled).predicted - model.points.u) / noise)
+        return standardised(evaluate(scaled).predicted - model.points.u, weights) / noise
 
     def slope(scaled: FloatArray) -> FloatArray:
-        return np.asarray(root[:, None] * evaluate(scaled).jacobian * scale / noise)
+        return standardised(evaluate(scaled).jacobian, weights) * scale / noise
 
     result = least_squares(
         residual,
@@ -141,17 +144,17 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     """Typical size of each parameter, so that the solver sees numbers near one."""
     width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
     amplitude = np.ptp(model.points.u)
-    plane = _plane(model)
-    drift = np.full(theta.size - 2 - plane, amplitude)
-    return np.concatenate([[abs(theta[0]), width], np.full(plane, width), drift])
+    centres = int(model.points.free.sum())
+    drift = np.full(theta.size - 2 - centres, amplitude)
+    return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift])
 
 
 def _linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
-    plane = _plane(model)
+    free = model.points.free
     amplitude, sigma = float(theta[0]), float(theta[1])
-    centre = np.zeros(2)
-    centre[:plane] = theta[2 : 2 + plane]
-    drift = theta[2 + plane :]
+    centre = np.zeros(free.shape)
+    centre[free] = theta[2 : 2 + free.sum()]
+    drift = theta[2 + free.sum() :]
     geometry = model.geometry(centre)
     kernel = gaussian_transfer(model.k, sigma)
     columns = np.stack([kernel, -sigma * model.k**2 * kernel], axis=1)
@@ -160,7 +163,7 @@ def _linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     baseline = model.drift_columns
     jacobian = np.column_stack([shape, amplitude * widening, shift, baseline])
     predicted = amplitude * shape + baseline @ drift
-    return GaussianFit(amplitude, sigma, centre, drift, geometry, jacobian, predicted)
+    return GaussianFit(amplitude, sigma, centre, drift, model.points, geometry, jacobian, predicted)
 
 
 def _positive_width(fit: GaussianFit) -> GaussianFit:
@@ -169,18 +172,23 @@ def _positive_width(fit: GaussianFit) -> GaussianFit:
         return fit
     jacobian = fit.jacobian.copy()
     jacobian[:, 1] *= -1
-    return GaussianFit(
-        fit.conversion_constant,
-        -fit.sigma,
-        fit.centre,
-        fit.drift,
-        fit.geometry,
-        jacobian,
-        fit.predicted,
-    )
+    return replace(fit, sigma=-fit.sigma, jacobian=jacobian)
 
 
 def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
+    """Start each scan by itself, and A and the width at the medians of all."""
+    points = model.points
+    parts = [
+        _robust_start_of_one(model.only(i), weights[points.scan == i]) for i in range(points.scans)
+    ]
+    shape = np.median([part[:2] for part in parts], axis=0)
+    free = points.free.sum(axis=1)
+    centres = [part[2 : 2 + n] for part, n in zip(parts, free, strict=True)]
+    drifts = [part[2 + n :] for part, n in zip(parts, free, strict=True)]
+    return np.concatenate([shape, *centres, *drifts])
+
+
+def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Best of a grid of centres and widths, by the sum of absolute residuals.
 
     A single outlier can be the largest voltage of a scan: positions are tried, not read off.
@@ -200,7 +208,7 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
             cost = float(np.abs(root * points.u - design @ coefficients).sum())
             if coefficients[0] > 0 and cost < best_cost:
                 drift = coefficients[1:]
-                place = centre[: _plane(model)]
+                place = centre[points.free[0]]
                 best = np.concatenate([[coefficients[0], sigma], place, drift])
                 best_cost = cost
     if not best.size:
@@ -231,9 +239,11 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
         kept = unique[margin : unique.size - margin]
         return kept[:: int(np.ceil(kept.size / (12 if points.planar else 40)))]
 
-    if not points.planar:
-        return np.stack([inner(points.x), np.zeros_like(inner(points.x))], axis=1)
-    mesh = np.meshgrid(inner(points.x), inner(points.y))
+    along = [
+        inner(positions) if free else np.zeros(1)
+        for free, positions in zip(points.free[0], (points.x, points.y), strict=True)
+    ]
+    mesh = np.meshgrid(*along)
     return np.stack([axis.ravel() for axis in mesh], axis=1)
 
 

@@ -57,14 +57,14 @@ def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     widths of the profile.
     """
     points = estimate.points
-    side = points.x - estimate.centre[0]
+    dx, dy = estimate.offset
+    side = np.where(points.free[points.scan, 0], dx, dy)
     return _add(estimate, side[:, None] * _widened(estimate, (0.5, 1.0, 1.5)))
 
 
 def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Ask whether a raster is elliptic: columns that vary as cos 2a and sin 2a."""
-    points = estimate.points
-    dx, dy = points.x - estimate.centre[0], points.y - estimate.centre[1]
+    dx, dy = estimate.offset
     quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy], axis=1)
     shapes = _widened(estimate, (0.5, 1.0))
     columns = [quadrupole * shape[:, None] for shape in shapes.T]

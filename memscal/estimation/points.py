@@ -1,8 +1,10 @@
-"""The measured points of a scan, flattened and proven usable."""
+"""The measured points of one scan or several, flattened and proven usable."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from memscal.errors import FitError, InputError
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
-__all__ = ["ScanPoints", "measured_points"]
+__all__ = ["ScanPoints", "joined_points", "measured_points"]
 
 #: Conversion constant, width, centre, baseline, slope; one more to estimate the noise.
 MINIMUM_POSITIONS = 6
@@ -24,19 +26,25 @@ class ScanPoints:
     Parameters
     ----------
     x, y : ndarray, shape (n,)
-        Position of the indenter, in m; ``y`` is zero in a line scan.
+        Position of the indenter, in m; zero across a line scan.
     u : ndarray, shape (n,)
         Voltage, in V.
     load : ndarray, shape (n,)
         Load, in N.
     u_errors : ndarray, shape (n,), or None
         Stated standard uncertainty of each voltage, in V.
+    x_errors : ndarray, shape (n,)
+        Standard uncertainty of each position along the scan, in m.
     repeat : ndarray of int, shape (n,)
-        Which repeat each point belongs to.
-    planar : bool
-        Whether the positions spread over two dimensions (a raster).
+        Which repeat each point belongs to, counted through all scans.
+    scan : ndarray of int, shape (n,)
+        Which scan each point belongs to.
+    free : ndarray of bool, shape (scans, 2)
+        Along which of x and y each scan spreads: where its centre is to be found.
     missing : int
-        How many points of the scan were missing.
+        How many points were missing.
+    decorrelation : ndarray, shape (n, n), or None
+        Takes noise of unit variance and the stated correlation to independent noise.
     """
 
     x: FloatArray
@@ -44,14 +52,66 @@ class ScanPoints:
     u: FloatArray
     load: FloatArray
     u_errors: FloatArray | None
+    x_errors: FloatArray
     repeat: NDArray[np.intp]
-    planar: bool
+    scan: NDArray[np.intp]
+    free: NDArray[np.bool_]
     missing: int
+    decorrelation: FloatArray | None = None
 
     @property
+    def scans(self) -> int:
+        """How many scans there are."""
+        return len(self.free)
+
+    @property
+    def planar(self) -> bool:
+        """Whether a scan spreads over two dimensions (a raster)."""
+        return bool(self.free.all(axis=1).any())
+
+    @cached_property
     def step(self) -> float:
-        """Median distance of neighbouring positions along x, in m."""
-        return float(np.median(np.diff(np.unique(self.x))))
+        """Median distance of neighbouring positions, in m; of several scans the smallest."""
+        return min(self._step(i) for i in range(self.scans))
+
+    def _step(self, scan: int) -> float:
+        along = self.x if self.free[scan, 0] else self.y
+        return float(np.median(np.diff(np.unique(along[self.scan == scan]))))
+
+    def only(self, scan: int) -> ScanPoints:
+        """Return one of the scans."""
+        if self.scans == 1:
+            return self
+        keep = self.scan == scan
+        columns = {
+            item.name: value[keep]
+            for item in fields(self)
+            if item.name not in ("free", "decorrelation")
+            and isinstance(value := getattr(self, item.name), np.ndarray)
+        }
+        return replace(
+            self,
+            **columns
+            | {
+                "scan": np.zeros(int(keep.sum()), dtype=np.intp),
+                "free": self.free[scan : scan + 1],
+                "decorrelation": None,
+            },
+        )
+
+    def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:
+        """Scale rows by the root of their weights, and make their noise independent.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,) or (n, m)
+            Voltages, or columns of their derivatives.
+        weights : ndarray, shape (n,)
+            Inverse noise variances, up to a common factor.
+        """
+        root = np.sqrt(weights)
+        scaled = values * (root if values.ndim == 1 else root[:, None])
+        return scaled if self.decorrelation is None else self.decorrelation @ scaled
 
 
 def measured_points(scan: Scan) -> ScanPoints:
@@ -84,12 +144,75 @@ def measured_points(scan: Scan) -> ScanPoints:
         u=u[keep],
         load=load[keep],
         u_errors=_stated_errors(errors, keep),
+        x_errors=np.zeros(int(keep.sum())) if scan.x_errors is None else _along(scan)[keep],
         repeat=repeat[keep],
-        planar=scan.kind == "raster",
+        scan=np.zeros(int(keep.sum()), dtype=np.intp),
+        free=np.array([[scan.direction == "x", scan.direction == "y" or scan.kind == "raster"]]),
         missing=int(u.size - keep.sum()),
+        decorrelation=_decorrelation(scan, keep),
     )
     _require_usable(points)
     return points
+
+
+def joined_points(parts: Sequence[ScanPoints]) -> ScanPoints:
+    """Join the points of several scans.
+
+    Raises
+    ------
+    InputError
+        If some scans state their noise and others do not.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    if len({part.u_errors is None for part in parts}) > 1:
+        raise InputError(
+            "Some of the scans state their noise (u_zz_errors) and others do not.",
+            why="They are weighed against each other by it.",
+            cure="State it in every scan, or leave it out of every one.",
+        )
+    first_repeat = np.cumsum([0, *(int(part.repeat.max()) + 1 for part in parts)])
+    stated = [part.u_errors for part in parts if part.u_errors is not None]
+    number = [np.full(part.u.size, i, dtype=np.intp) for i, part in enumerate(parts)]
+    return ScanPoints(
+        x=np.concatenate([part.x for part in parts]),
+        y=np.concatenate([part.y for part in parts]),
+        u=np.concatenate([part.u for part in parts]),
+        load=np.concatenate([part.load for part in parts]),
+        u_errors=np.concatenate(stated) if stated else None,
+        x_errors=np.concatenate([part.x_errors for part in parts]),
+        repeat=np.concatenate(
+            [part.repeat + shift for part, shift in zip(parts, first_repeat, strict=False)]
+        ),
+        scan=np.concatenate(number),
+        free=np.concatenate([part.free for part in parts]),
+        missing=sum(part.missing for part in parts),
+        decorrelation=_joined_decorrelation(parts),
+    )
+
+
+def _joined_decorrelation(parts: Sequence[ScanPoints]) -> FloatArray | None:
+    if all(part.decorrelation is None for part in parts):
+        return None
+    from scipy.linalg import block_diag
+
+    blocks = [np.eye(p.u.size) if p.decorrelation is None else p.decorrelation for p in parts]
+    return np.asarray(block_diag(*blocks))
+
+
+def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> FloatArray | None:
+    """Inverse Cholesky factor of the correlation of all kept points, repeat by repeat."""
+    if scan.u_zz_correlation is None:
+        return None
+    repeats = scan.u_zz.size // scan.u_zz_correlation.shape[0]
+    whole = np.kron(np.eye(repeats), scan.u_zz_correlation)
+    kept = keep.ravel()
+    factor = np.linalg.cholesky(whole[np.ix_(kept, kept)])
+    return np.asarray(np.linalg.inv(factor))
+
+
+def _along(scan: Scan) -> FloatArray:
+    return np.broadcast_to(np.asarray(scan.x_errors), scan.u_zz.shape)
 
 
 def _positions(scan: Scan) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
@@ -99,7 +222,8 @@ def _positions(scan: Scan) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
         return x, np.broadcast_to(scan.y[:, None], shape), np.zeros(shape, dtype=np.intp)
     rows = np.arange(shape[0] if scan.kind == "repeats" else 1, dtype=np.intp)
     repeat = np.repeat(rows, scan.x.size).reshape(shape)
-    return x, np.zeros(shape), repeat
+    across = np.zeros(shape)
+    return (across, x, repeat) if scan.direction == "y" else (x, across, repeat)
 
 
 def _stated_errors(errors: FloatArray | None, keep: NDArray[np.bool_]) -> FloatArray | None:

@@ -59,9 +59,12 @@ class ProfileEstimate:
 
     @property
     def noise(self) -> FloatArray:
-        """Standard uncertainty of each voltage, shape (n,), in V; outliers' noise is not raised."""
-        base = np.ones_like(self.points.u) if self.points.u_errors is None else self.points.u_errors
-        return base * self.noise_scale
+        """Standard uncertainty of each voltage, shape (n,), in V; outliers' noise is not raised.
+
+        Uncertain positions count as noise of the voltage.
+        """
+        stated = self.weights / self.outlier_weight
+        return np.asarray(self.noise_scale / np.sqrt(stated))
 
     @property
     def noise_scale(self) -> float:
@@ -112,23 +115,44 @@ class ProfileEstimate:
         return float(self.gaussian.conversion_constant + self.basis.integrals @ self.weighed.mean)
 
     @property
-    def centre(self) -> FloatArray:
-        """Centre of the sensor (x0, y0), in m, with the departures allowed for."""
-        plane = 2 if self.points.planar else 1
+    def centres(self) -> FloatArray:
+        """Centre of the sensor in each scan, shape (scans, 2), in m, departures allowed for."""
         corrected = self.gaussian.centre.copy()
-        corrected[:plane] += self.weighed.mean[2 : 2 + plane]
+        free = self.points.free
+        corrected[free] += self.weighed.mean[2 : 2 + free.sum()]
         return corrected
 
     @property
-    def drift(self) -> FloatArray:
-        """Baseline and its change over half the range along x (and y), in V."""
-        first = 4 if self.points.planar else 3
+    def centre(self) -> FloatArray:
+        """Centre of the sensor (x0, y0) in the first scan, in m."""
+        return np.asarray(self.centres[0])
+
+    @property
+    def drifts(self) -> FloatArray:
+        """Each scan's baseline and its change over half the range along x (and y), in V."""
+        first = 2 + int(self.points.free.sum())
         return np.asarray(self.gaussian.drift + self.weighed.mean[first : self.basis.flat])
+
+    @property
+    def drift(self) -> FloatArray:
+        """The first scan's baseline and its change over half the range along x (and y), in V."""
+        return self.drifts[: 1 + int(self.points.free[0].sum())]
+
+    @property
+    def offset(self) -> FloatArray:
+        """Position of each point from its scan's centre, shape (2, n), in m."""
+        positions = np.stack([self.points.x, self.points.y])
+        return np.asarray(positions - self.centres[self.points.scan].T)
+
+    @property
+    def distance(self) -> FloatArray:
+        """Distance of each point from its scan's centre, shape (n,), in m."""
+        return np.asarray(np.hypot(*self.offset))
 
     @property
     def background(self) -> FloatArray:
         """Baseline and drift at each point, shape (n,), in V."""
-        return np.asarray(self.model.drift_columns @ self.drift)
+        return np.asarray(self.model.drift_columns @ self.drifts)
 
     @property
     def predicted(self) -> FloatArray:
@@ -141,15 +165,15 @@ class ProfileEstimate:
         return float(np.abs(self.predicted - self.background).max())
 
 
-def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEstimate:
-    """Estimate the radial profile of a scan, its centre, baseline, noise and outliers.
+def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> ProfileEstimate:
+    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers.
 
     Parameters
     ----------
     points : ScanPoints
-        The measured points.
-    reference : RadialSpectrum
-        Transform of the base stress per newton.
+        The measured points, of one scan or several.
+    *references : RadialSpectrum
+        Transform of the base stress per newton, for each scan; all on the same nodes.
 
     Returns
     -------
@@ -162,9 +186,9 @@ def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEs
         If the scan does not determine the parameters: no centre within it, or no signal that
         stands clear of zero.
     """
-    model = ForwardModel(points, reference)
-    stated = np.ones_like(points.u) if points.u_errors is None else points.u_errors**-2.0
-    fit = fit_gaussian(model, stated)
+    model = ForwardModel(points, references)
+    fit = fit_gaussian(model, _stated_weights(points))
+    stated = _stated_weights(points, _position_noise(model, fit))
     residual = points.u - fit.predicted
     outlier = _outlier_weight(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
     for _ in range(_WEIGHING_ROUNDS):
@@ -181,10 +205,30 @@ def estimate_profile(points: ScanPoints, reference: RadialSpectrum) -> ProfileEs
     return estimate
 
 
+def _stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0) -> FloatArray:
+    """Inverse variance of each voltage as stated; ones where nothing is."""
+    if points.u_errors is None:
+        return np.ones_like(points.u)
+    return np.asarray(1 / (points.u_errors**2 + position_noise**2))
+
+
+def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
+    """Voltage noise that uncertain positions make, shape (n,): most of it where U is steep."""
+    kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
+    slope = model.radial_derivative(fit.geometry, kernel)
+    # A raster's positions are uncertain along x; how much of that is radial depends on the place.
+    along = fit.geometry.towards[
+        np.argmax(model.points.free[model.points.scan], axis=1), range(slope.size)
+    ]
+    return np.asarray(slope * along * model.points.x_errors)
+
+
 def _require_determined(estimate: ProfileEstimate) -> None:
-    """Refuse a scan that does not cross its sensor, or whose signal is lost in noise."""
+    """Refuse scans that do not cross their sensor, or whose signal is lost in noise."""
     points, integrals = estimate.points, estimate.basis.integrals
-    for name, positions, centre in zip("xy", (points.x, points.y), estimate.centre, strict=True):
+    for scan, axis in np.argwhere(points.free):
+        name, centre = "xy"[axis], estimate.centres[scan, axis]
+        positions = (points.x, points.y)[axis][points.scan == scan]
         if not positions.min() - points.step <= centre <= positions.max() + points.step:
             raise FitError(
                 f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "

@@ -54,6 +54,8 @@ def film_group(film: ElasticFilm) -> Group:
             value = getattr(film, name + attribute)
             if value is not None:
                 children[name + suffix] = si(value, dimension)
+    if film.name:
+        children["name"] = film.name
     return Group("NXcollection", children)
 
 
@@ -68,6 +70,7 @@ def read_film(file: SafeFile, path: str) -> ElasticFilm:
             f"{name}_uncertainty": optional_scalar(file, f"{path}/{name}_errors", dimension)
             for name, dimension in _FILM.items()
         },
+        name=optional_text(file, f"{path}/name"),
     )
 
 

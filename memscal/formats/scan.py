@@ -40,6 +40,9 @@ __all__ = ["read_scan", "write_scan"]
 _CHANNELS = ("u_xz", "u_yz")
 _DATA = "/entry/data"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
+_ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
+# One name for each axis of the correlation: netCDF tools want each dimension once.
+_POINTS = ("point", "point_prime")
 _SYNTHETIC = (
     "The data of this file are synthetic: calculated from the known truth below, not measured."
 )
@@ -87,7 +90,8 @@ def scan_from(file: SafeFile) -> Scan:
     load = require_scalar(file, "/entry/indenter/load", "force")
     film = read_film(file, "/entry/sample/film")
     indenter = read_round_indenter(file, "/entry/indenter")
-    _check_axes(file)
+    along_y = _check_axes(file) in _ALONG_Y.values()
+    along = "y" if along_y else "x"
     channels = {
         name: require_array(file, f"{_DATA}/{name}", "voltage")
         for name in _CHANNELS
@@ -98,10 +102,16 @@ def scan_from(file: SafeFile) -> Scan:
         parts = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
         reference = read_profile(file, *parts, load=load, film=film, indenter=indenter)
     return Scan(
-        x=require_array(file, f"{_DATA}/x", "length", ndim=1),
-        y=optional_array(file, f"{_DATA}/y", "length", ndim=1),
+        x=require_array(file, f"{_DATA}/{along}", "length", ndim=1),
+        y=None if along_y else optional_array(file, f"{_DATA}/y", "length", ndim=1),
+        x_errors=optional_array(file, f"{_DATA}/{along}_errors", "length", ndim=1),
+        direction=along,
+        position_scale_uncertainty=optional_scalar(
+            file, f"{_DATA}/position_scale_errors", "dimensionless"
+        ),
         u_zz=require_array(file, f"{_DATA}/u_zz", "voltage"),
         u_zz_errors=optional_array(file, f"{_DATA}/u_zz_errors", "voltage"),
+        u_zz_correlation=optional_array(file, f"{_DATA}/u_zz_correlation", "dimensionless", ndim=2),
         normal_load=optional_array(file, f"{_DATA}/normal_load", "force"),
         channels=channels,
         load=load,
@@ -159,14 +169,23 @@ def _entry(scan: Scan) -> Group:
 
 
 def _data_group(scan: Scan) -> Group:
-    axes = _AXES[scan.kind]
+    axes = _ALONG_Y[scan.kind] if scan.direction == "y" else _AXES[scan.kind]
+    along = axes[-1]
     data: dict[str, Node] = {}
     if scan.y is not None:
         data["y"] = si(scan.y, "length", ("y",))
     if scan.kind == "repeats":
         data["repeat"] = index_axis("repeat", scan.u_zz.shape[0])
-    data["x"] = si(scan.x, "length", ("x",))
+    data[along] = si(scan.x, "length", (along,))
+    if scan.x_errors is not None:
+        data[f"{along}_errors"] = si(scan.x_errors, "length", (along,))
+    if scan.position_scale_uncertainty is not None:
+        data["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
     data["u_zz"] = si(scan.u_zz, "voltage", axes)
+    if scan.u_zz_correlation is not None:
+        for axis in _POINTS:
+            data[axis] = index_axis(axis, scan.u_zz_correlation.shape[0])
+        data["u_zz_correlation"] = si(scan.u_zz_correlation, "dimensionless", _POINTS)
     if scan.u_zz_errors is not None:
         data["u_zz_errors"] = si(scan.u_zz_errors, "voltage", axes)
     if scan.normal_load is not None:
@@ -176,17 +195,17 @@ def _data_group(scan: Scan) -> Group:
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
-def _check_axes(file: SafeFile) -> None:
-    """A square raster with its axes the other way round would pass every test of shape."""
+def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
+    """Return the axes; a square raster with them the other way round would pass every other test."""
     axes = file.attribute(_DATA, "axes")
     if isinstance(axes, str):
         axes = tuple(axes.replace(":", " ").replace(",", " ").split())
     if axes is None:
-        return
-    if not isinstance(axes, tuple) or axes not in _AXES.values():
+        return None
+    if not isinstance(axes, tuple) or axes not in (*_AXES.values(), *_ALONG_Y.values()):
         raise FormatError(
             f"{file.where(_DATA)}@axes is {axes}.",
-            why="A scan is stored along [x], [repeat, x] or [y, x].",
+            why="A scan is stored along [x], [repeat, x] or [y, x]; along y, as [y] or [repeat, y].",
             cure="Transpose the data, or correct the attribute.",
         )
     if ("y" in axes) != file.has(f"{_DATA}/y"):
@@ -196,6 +215,7 @@ def _check_axes(file: SafeFile) -> None:
             why="Without it a raster and a repeated line scan look the same.",
             cure="Add the missing axis, or correct the attribute.",
         )
+    return axes
 
 
 def _synthetic_group(truth: Mapping[str, float | str]) -> Group:

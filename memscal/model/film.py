@@ -26,6 +26,8 @@ class ElasticFilm:
     young_modulus_uncertainty, poisson_ratio_uncertainty, thickness_uncertainty : float, optional
         Standard uncertainties (k = 1), in the unit of the quantity.  ``None`` means "not
         stated"; a calibration then counts nothing for that source and says so.
+    name : str
+        Which film it is, where there are several; scans that name the same film must agree on it.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class ElasticFilm:
     poisson_ratio_uncertainty: float | None = None
     thickness_uncertainty: float | None = None
     roughness_rms_uncertainty: float | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         require_positive("film young_modulus", self.young_modulus, "Pa")

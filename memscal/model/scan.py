@@ -17,6 +17,9 @@ from memscal.model.validation import FloatArray, finite_vector, frozen_array, re
 
 __all__ = ["Scan", "StressSensor"]
 
+#: A combination of voltages with less of the noise than this would outweigh all others.
+_LEAST_EIGENVALUE = 1e-8
+
 
 @dataclass(frozen=True, kw_only=True)
 class StressSensor:
@@ -47,6 +50,15 @@ class Scan:
         Standard uncertainty of each voltage (electronic noise), in V.
     normal_load : ndarray, shape of ``u_zz``, optional
         Load at each point, in N, where it was recorded.
+    x_errors : ndarray, shape of ``x``, optional
+        Standard uncertainty of each position, independent from point to point, in m.
+    u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
+        Correlation of the noise between the points of one repeat; none where absent.
+    direction : str
+        ``"x"`` or ``"y"``: which way a line scan ran across the sensor.  The positions of a scan
+        along y are given as ``x`` all the same.
+    position_scale_uncertainty : float, optional
+        Relative standard uncertainty of the stage's scale, common to all positions.
     channels : mapping of str to ndarray, shape of ``u_zz``
         Further channels (``u_xz``, ``u_yz``), in V.
     load_uncertainty : float, optional
@@ -84,6 +96,10 @@ class Scan:
     y: FloatArray | None = None
     u_zz_errors: FloatArray | None = None
     normal_load: FloatArray | None = None
+    x_errors: FloatArray | None = None
+    u_zz_correlation: FloatArray | None = None
+    direction: str = "x"
+    position_scale_uncertainty: float | None = None
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     load_uncertainty: float | None = None
     title: str = ""
@@ -106,6 +122,8 @@ class Scan:
         channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
         object.__setattr__(self, "channels", MappingProxyType(channels))
         self._check_values()
+        self._check_positions()
+        self._check_correlation()
 
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
@@ -163,3 +181,52 @@ class Scan:
                 "normal_load holds a load that is infinite or not above zero.",
                 cure="Mark points without contact as missing (NaN).",
             )
+
+    def _check_positions(self) -> None:
+        if self.direction not in ("x", "y") or (self.direction == "y" and self.y is not None):
+            raise InputError(
+                f"The direction of the scan is {self.direction!r}.",
+                cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
+            )
+        if self.position_scale_uncertainty is not None:
+            require_non_negative(
+                "relative standard uncertainty of the stage's scale",
+                self.position_scale_uncertainty,
+            )
+        if self.x_errors is None:
+            return
+        errors = finite_vector("x_errors of the scan", self.x_errors)
+        if errors.shape != self.x.shape or np.any(errors < 0):
+            raise InputError(
+                f"x_errors holds {errors.size} values for {self.x.size} positions, the smallest "
+                f"{errors.min(initial=0.0) * 1e3:.4g} mm.",
+                cure="Give one standard uncertainty for each position, in m, none of them negative.",
+            )
+        object.__setattr__(self, "x_errors", errors)
+
+    def _check_correlation(self) -> None:
+        """Refuse a correlation that no noise can have."""
+        if self.u_zz_correlation is None:
+            return
+        given = frozen_array(self.u_zz_correlation)
+        size = self.u_zz.size if self.kind == "raster" else self.x.size
+        if given.shape != (size, size) or not np.isfinite(given).all():
+            raise InputError(
+                f"u_zz_correlation has shape {given.shape}, but it should be ({size}, {size}) and "
+                "finite.",
+                why="It correlates every point of one repeat with every other.",
+            )
+        if not np.allclose(given, given.T, atol=1e-9) or not np.allclose(np.diag(given), 1.0):
+            raise InputError(
+                "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
+                cure="Divide a covariance by the standard uncertainties of row and column, and "
+                "give those as u_zz_errors.",
+            )
+        least = float(np.linalg.eigvalsh(given)[0])
+        if least <= _LEAST_EIGENVALUE:
+            raise InputError(
+                f"u_zz_correlation is not positive definite: its smallest eigenvalue is {least:.3g}.",
+                why="Some combination of the voltages would have no noise, or less than none.",
+                cure="Add the electronic noise, which is independent from point to point.",
+            )
+        object.__setattr__(self, "u_zz_correlation", given)

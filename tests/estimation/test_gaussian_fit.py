@@ -22,7 +22,7 @@ from memscal.model.scan import Scan
 def forward(scan: Scan) -> ForwardModel:
     points = measured_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=1.0)
-    return ForwardModel(points, reference_spectrum(contact, points, scan.film.thickness))
+    return ForwardModel(points, (reference_spectrum(contact, points, scan.film.thickness),))
 
 
 def fit(scan: Scan):
@@ -49,7 +49,7 @@ def test_without_noise_every_parameter_is_recovered(sigma, centre, baseline, dri
     # The film passes no more than exp(-kh): a width is known to what the fit converges to.
     assert found.sigma == pytest.approx(sigma, rel=1e-5)
     assert found.conversion_constant == pytest.approx(CONVERSION, rel=1e-6)
-    assert found.centre[0] == pytest.approx(centre, abs=1e-9)
+    assert found.centre[0, 0] == pytest.approx(centre, abs=1e-9)
     assert found.drift[0] == pytest.approx(scan.synthetic["baseline"], abs=1e-9)
     assert 2 * found.drift[1] == pytest.approx(scan.synthetic["drift"], abs=1e-9)
 
@@ -63,7 +63,7 @@ def test_uneven_and_unsorted_positions_change_nothing() -> None:
 
 def test_a_raster_s_centre_is_found_in_both_directions() -> None:
     scan = simulated(raster=True, points=17, noise=0.0, centre=(0.4e-3, -0.7e-3))
-    np.testing.assert_allclose(fit(scan).centre, [0.4e-3, -0.7e-3], atol=1e-9)
+    np.testing.assert_allclose(fit(scan).centre[0], [0.4e-3, -0.7e-3], atol=1e-9)
 
 
 def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
@@ -75,7 +75,7 @@ def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
         def predict(shift, found=found, model=model, plane=plane):
             a, s = found.conversion_constant + shift[0], found.sigma + shift[1]
             centre = found.centre.copy()
-            centre[:plane] += shift[2 : 2 + plane]
+            centre[0, :plane] += shift[2 : 2 + plane]
             kernel = a * gaussian_transfer(model.k, s)
             signal = model.signal(model.geometry(centre), kernel)
             return signal + model.drift_columns @ (found.drift + shift[2 + plane :])
@@ -95,7 +95,7 @@ def test_one_gross_outlier_does_not_lead_the_search_astray(place: int) -> None:
     scan = simulated(noise=0.002)
     u = scan.u_zz.copy()
     u[place] += 3 * u.max()
-    assert fit(replace(scan, u_zz=u)).centre[0] == pytest.approx(0.14e-3, abs=0.05e-3)
+    assert fit(replace(scan, u_zz=u)).centre[0, 0] == pytest.approx(0.14e-3, abs=0.05e-3)
 
 
 def test_a_voltage_that_never_falls_again_is_refused() -> None:
