@@ -20,7 +20,7 @@ among them: what regularisation hides is counted as what such fields have there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -130,20 +130,23 @@ def weigh_departures(
     WeighedFit
         Posterior mean and covariance of all corrections, and the noise.
     """
-    root = np.sqrt(weights)
-    flat = basis.flat
-    kernels = basis.kernels(model.k)[:, flat:]
-    rings = model.signal(fit.geometry, kernels) * root[:, None]
-    data = root * (model.points.u - fit.predicted)
+    standardised, flat = model.points.standardised, basis.flat
+    voltages = model.signal(fit.geometry, basis.kernels(model.k)[:, flat:])
+    unexplained = model.points.u - fit.predicted
+    rings, data = standardised(voltages, weights), standardised(unexplained, weights)
     # Down-weighted points carry no full degree of freedom.
-    problem = _Projected.from_columns(fit.jacobian * root[:, None], data, effective_count - flat)
+    jacobian = standardised(fit.jacobian, weights)
+    problem = _Projected.from_columns(jacobian, data, effective_count - flat)
     parts = [problem.part(rings[:, b.start - flat : b.stop - flat], b) for b in basis.blocks]
     outcomes = [problem.gaussian()]
     for hypothesis in HYPOTHESES[1:]:
         assert hypothesis.shape is not None
         part = parts[SHAPES.index(hypothesis.shape)]
         outcomes.append(problem.weigh(part, hypothesis.strength))
-    return _average(problem, outcomes, flat + rings.shape[1], root)
+    found = _average(problem, outcomes, flat + rings.shape[1])
+    explained = fit.jacobian @ found.mean[:flat] + voltages @ found.mean[flat:]
+    gain = found.gain @ standardised(np.eye(data.size), weights)
+    return replace(found, gain=gain, residual=unexplained - explained)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,10 +230,11 @@ class _Projected:
         return max(variance, (_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
 
 
-def _average(
-    problem: _Projected, outcomes: list[_Outcome], count: int, root: FloatArray
-) -> WeighedFit:
-    """Average mean and gain by one set of weights, squared errors by the other."""
+def _average(problem: _Projected, outcomes: list[_Outcome], count: int) -> WeighedFit:
+    """Average mean and gain by one set of weights, squared errors by the other.
+
+    The gain is that of the standardised data, and the residual is left to be found.
+    """
     evidence = np.array([o.log_evidence for o in outcomes])
     estimate, uncertainty = (
         _posterior(evidence, np.array([getattr(h, name) for h in HYPOTHESES]))
@@ -257,14 +261,13 @@ def _average(
             covariance += p * np.outer(off, off)
             _add_covariance(covariance, problem, outcome, p)
     variance = np.array([o.variance for o in outcomes])
-    residual = problem.data - _predicted(problem, outcomes, mean)
     return WeighedFit(
         mean=mean,
         covariance=covariance,
-        gain=(gain + moving) * root,
+        gain=gain + moving,
         noise=float(np.sqrt(estimate @ variance)),
         probability=estimate,
-        residual=np.divide(residual, root),
+        residual=problem.data,
     )
 
 
@@ -306,14 +309,3 @@ def _add_covariance(
         covariance[:flat, part.block] -= share * carried @ amplitudes
         covariance[part.block, :flat] -= share * amplitudes @ carried.T
         covariance[:flat, :flat] += share * carried @ amplitudes @ carried.T
-
-
-def _predicted(problem: _Projected, outcomes: list[_Outcome], mean: FloatArray) -> FloatArray:
-    """Weighted voltages of the mean correction."""
-    flat = problem.scale.size
-    r = np.linalg.inv(problem.inverse)
-    predicted = problem.q @ (r @ (problem.scale * mean[:flat]))
-    parts = {id(o.part): o.part for o in outcomes if o.part is not None}
-    for part in parts.values():
-        predicted = predicted + part.columns @ mean[part.block]
-    return np.asarray(predicted)
