@@ -62,10 +62,13 @@ class Wavenumbers:
         return cls(k, k * dk / (2 * np.pi))
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray) -> FloatArray:
-        """Evaluate the inverse transform at radii ``r`` (m), any shape."""
+        """Evaluate the inverse transform at radii ``r`` (m), any shape.
+
+        Of several spectra, shape (n, m), the values have a last axis of m.
+        """
         radii = np.asarray(r, dtype=np.float64)
         matrix = j0(np.multiply.outer(radii, self.k))
-        return np.asarray(matrix @ (self.weights * spectrum))
+        return np.asarray(matrix @ (spectrum.T * self.weights).T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ import numpy as np
 
 from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel, Geometry, gaussian_transfer
+from memscal.estimation.newton import gauss_newton
 from memscal.estimation.points import ScanPoints
 from memscal.model.validation import FloatArray
 
@@ -23,6 +24,10 @@ _Loss = Literal["linear", "soft_l1"]
 
 #: Widths from which the search starts, in units of the film's smoothing length.
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
+#: Standardised residual from which on the robust fit's loss grows linearly.
+_KNEE = 3.0
+#: A width below this share of its typical size is left to a search with a trust region.
+_NARROWEST = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,19 +128,32 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     def slope(scaled: FloatArray) -> FloatArray:
         return standardised(evaluate(scaled).jacobian, weights) * scale / noise
 
-    result = least_squares(
-        residual,
+    # A robust fit is only where the next one starts.
+    knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
+    found = gauss_newton(
+        lambda scaled: (residual(scaled), slope(scaled)),
         start / scale,
-        jac=slope,
-        loss=loss,
-        f_scale=3.0,
-        xtol=1e-10,
-        ftol=1e-12,
-        gtol=1e-10,
-        max_nfev=100,
+        tolerance=tolerance,
+        knee=knee,
     )
-    fit = _linearise(model, result.x * scale)
-    if not result.success or not 0 < fit.conversion_constant < np.inf:
+    # At a width of zero every slope by the width is zero: steps do not leave it.
+    if found is None or found[1] < _NARROWEST:
+        result = least_squares(
+            residual,
+            start / scale,
+            jac=slope,
+            loss=loss,
+            f_scale=_KNEE,
+            xtol=1e-10,
+            ftol=1e-12,
+            gtol=1e-10,
+            max_nfev=100,
+        )
+        if not result.success:
+            raise _undetermined(model, _linearise(model, result.x * scale))
+        found = np.asarray(result.x)
+    fit = _linearise(model, found * scale)
+    if not 0 < fit.conversion_constant < np.inf:
         raise _undetermined(model, fit)
     return _positive_width(fit)
 
@@ -195,38 +213,40 @@ def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray
     """
     points = model.points
     centres = _trial_centres(model)
+    distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
     radii = np.linspace(0.0, 2 * np.ptp(points.x) + 2 * np.ptp(points.y), 400)
-    baseline = model.drift_columns
+    widths = _smoothing_length(model) * np.array(_STARTING_WIDTHS)
+    kernels = np.stack([gaussian_transfer(model.k, float(width)) for width in widths])
+    # Profiles per newton of every width, on a table for quick trials.
+    spectra = (model.reference.values * kernels).T
+    tables = model.reference.wavenumbers.synthesise(spectra, radii).T
     root = np.sqrt(weights)
+    data, drift = root * points.u, root[:, None] * model.drift_columns
     best, best_cost = np.zeros(0), np.inf
-    for sigma in _smoothing_length(model) * np.array(_STARTING_WIDTHS):
-        profile = RadialTable(radii, model, float(sigma))
-        for centre in centres:
-            shape = profile.at(np.hypot(points.x - centre[0], points.y - centre[1])) * points.load
-            design = np.column_stack([shape, baseline]) * root[:, None]
-            coefficients = np.linalg.lstsq(design, root * points.u, rcond=None)[0]
-            cost = float(np.abs(root * points.u - design @ coefficients).sum())
-            if coefficients[0] > 0 and cost < best_cost:
-                drift = coefficients[1:]
-                place = centre[points.free[0]]
-                best = np.concatenate([[coefficients[0], sigma], place, drift])
-                best_cost = cost
+    for sigma, table in zip(widths, tables, strict=True):
+        shapes = np.interp(distances, radii, table) * (points.load * root)
+        amplitudes, costs = _amplitudes(shapes, data, drift)
+        i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
+        if amplitudes[i] > 0 and costs[i] < best_cost:
+            left = data - amplitudes[i] * shapes[i]
+            baseline = np.linalg.lstsq(drift, left, rcond=None)[0]
+            best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
+            best_cost = float(costs[i])
     if not best.size:
         raise _undetermined(model, None)
     return best
 
 
-class RadialTable:
-    """A per-newton profile of a Gaussian kernel on a table of radii, for quick trials."""
-
-    def __init__(self, radii: FloatArray, model: ForwardModel, sigma: float) -> None:
-        kernel = gaussian_transfer(model.k, sigma) * model.reference.values
-        self.radii = radii
-        self.values = model.reference.wavenumbers.synthesise(kernel, radii)
-
-    def at(self, radius: FloatArray) -> FloatArray:
-        """Interpolate linearly."""
-        return np.interp(radius, self.radii, self.values)
+def _amplitudes(
+    shapes: FloatArray, data: FloatArray, drift: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Fit each row of shapes beside the drift: its amplitude, the sum of absolute residuals."""
+    base = np.linalg.qr(drift)[0]
+    free = shapes - (shapes @ base) @ base.T
+    rest = data - base @ (base.T @ data)
+    square = np.sum(free**2, axis=1)
+    amplitudes = np.divide(free @ rest, square, out=np.zeros_like(square), where=square > 0)
+    return amplitudes, np.abs(rest - amplitudes[:, None] * free).sum(axis=1)
 
 
 def _trial_centres(model: ForwardModel) -> FloatArray:

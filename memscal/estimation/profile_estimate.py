@@ -236,7 +236,9 @@ def _require_determined(estimate: ProfileEstimate) -> None:
                 why="A centre that was not crossed is not determined, nor is anything else.",
                 cure="Scan across the sensor.",
             )
-    uncertainty = float(np.sqrt(integrals @ estimate.covariance @ integrals))
+    # Rounding makes the variance of a scan without noise negative.
+    variance = float(integrals @ estimate.covariance @ integrals)
+    uncertainty = float(np.sqrt(max(variance, 0.0)))
     if not estimate.conversion_constant > LEAST_SIGNIFICANCE * uncertainty:
         raise FitError(
             f"The conversion constant would be ({estimate.conversion_constant * 1e3:.2g} ± "
