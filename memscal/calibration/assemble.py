@@ -59,6 +59,7 @@ def assemble(
                 **configuration,
                 "grid": dict(solution.choice.reasons),
                 "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
+                **_further_scans(solution),
             },
             environment={
                 "python": platform.python_version(),
@@ -71,6 +72,17 @@ def assemble(
         ),
         budget=results.budget,
     )
+
+
+def _further_scans(solution: Solution) -> dict[str, Any]:
+    """Where the scans beside the first came from."""
+    sources = [scan.source for scan in solution.scans[1:]]
+    if not sources:
+        return {}
+    listed = [
+        None if s is None else {"file_name": s.file_name, "sha256": s.sha256} for s in sources
+    ]
+    return {"further_scans": listed}
 
 
 def _field(solution: Solution, results: Results) -> ApparatusField:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, TypeAlias
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
 from memscal.calibration.field_noise import field_noise
+from memscal.calibration.inputs import input_effects
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.quality import quality_checks
 from memscal.calibration.solution import Solution, solve
@@ -20,14 +21,18 @@ from memscal.deconvolution.registry import create_regulariser
 from memscal.errors import InputError
 from memscal.estimation.reference import (
     reference_profile,
-    reference_sensitivities,
+    reference_spectra,
     require_calibration_rod,
+    require_one_sensor,
 )
 from memscal.mechanics.contact import Contact
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = ["Calibration", "calibrate"]
+__all__ = ["Calibration", "Reference", "calibrate"]
+
+Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
+"""A base stress, the path of a file that holds one, or nothing: the rod is solved."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,27 +80,38 @@ class Calibration:
 
 
 def calibrate(
-    scan: Scan,
+    scan: Scan | Sequence[Scan],
     *,
-    reference: StressProfile | Contact | str | PathLike[str] | None = None,
+    reference: Reference | Sequence[Reference] = None,
+    alternative: Reference | Sequence[Reference] = None,
     method: str | Regulariser = "white-noise",
+    correlations: Mapping[tuple[str, str], float] | None = None,
     seed: int = 0,
     **options: Any,
 ) -> Calibration:
-    r"""Find the apparatus function of a sensor from a rod scan.
+    r"""Find the apparatus function of a sensor from a rod scan, or from several.
 
     Solves :math:`U_{zz} = A\,G \otimes \sigma_{zz}` (the paper's Eq. 1) for the conversion
     constant A and the apparatus function G of unit integral.
 
     Parameters
     ----------
-    scan : Scan
-        Voltage against the rod's position.
+    scan : Scan or sequence of Scan
+        Voltage against the rod's position.  Several scans of one sensor, at other loads, with
+        other rods or films, along x or y, are fitted together: A and G are shared, and each has
+        its own centre and baseline.
     reference : StressProfile, Contact or path, optional
-        Stress at the base of the film.  Without it, the one that travels with the scan; without
-        that, the rod is solved on the film.
+        Stress at the base of the film, one for each scan.  Without it, the one that travels with
+        the scan; without that, the rod is solved on the film.
+    alternative : StressProfile, Contact or path, optional
+        The same by another model of the film, such as finite strain.  Its difference from the
+        reference is counted as an uncertainty of the model's form, ``model_form``, rectangular.
     method : str or Regulariser, default "white-noise"
         How the fields are divided; see :func:`memscal.deconvolution.registry.regulariser_names`.
+        ``"evidence"`` divides none: it takes G from the scan's points, and is the most accurate.
+    correlations : mapping of (str, str) to float, optional
+        Correlation coefficients of the inputs' errors, such as
+        ``{("thickness", "poisson_ratio"): 0.5}``.
     seed : int, default 0
         Seed of methods that draw random numbers.
     **options
@@ -120,26 +136,40 @@ def calibrate(
     >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
     True
     """
-    if not isinstance(scan, Scan):
-        raise InputError(
-            f"calibrate() was given a {type(scan).__name__}, not a Scan.",
-            cure="Read a scan file with memscal.read_scan(path).",
-        )
-    require_calibration_rod(scan)
-    stress = reference_profile(scan, _read(reference))
+    scans = require_one_sensor(scan)
+    for each in scans:
+        require_calibration_rod(each)
+    given = _each(reference, scans)
+    stresses = [reference_profile(s, r) for s, r in zip(scans, given, strict=True)]
     regulariser = _regulariser(method, seed, options)
-    solution = solve(scan, stress, regulariser)
-    results = _uncertainties(solution)
+    solution = solve(scans, stresses, regulariser)
+    others = None if alternative is None else _each(alternative, scans)
+    results = _uncertainties(solution, others, correlations or {})
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)
     configuration = {"method": regulariser.name, "seed": seed, **_settings(regulariser)}
+    if correlations:
+        configuration["correlations"] = {" ".join(pair): c for pair, c in correlations.items()}
     apparatus = assemble(solution, results, checks, messages, configuration)
     return Calibration(apparatus, solution)
 
 
-def _read(
-    reference: StressProfile | Contact | str | PathLike[str] | None,
-) -> StressProfile | Contact | None:
+def _each(
+    reference: Reference | Sequence[Reference], scans: Sequence[Scan]
+) -> list[StressProfile | Contact | None]:
+    """Read a reference for each scan; one alone serves all."""
+    if isinstance(reference, Sequence) and not isinstance(reference, str):
+        if len(reference) != len(scans):
+            raise InputError(
+                f"{len(reference)} references were given, but there "
+                f"{'is one scan' if len(scans) == 1 else f'are {len(scans)} scans'}.",
+                cure="Give one for each scan, in their order, or one for all.",
+            )
+        return [_read(each) for each in reference]
+    return [_read(reference)] * len(scans)
+
+
+def _read(reference: Reference) -> StressProfile | Contact | None:
     if isinstance(reference, str | PathLike):
         from memscal.formats.reference import read_reference
 
@@ -175,20 +205,24 @@ def _settings(regulariser: Regulariser) -> Mapping[str, Any]:
     return {"options": asdict(own) if known else {}}
 
 
-def _uncertainties(solution: Solution) -> Results:
-    scan, estimate = solution.scan, solution.estimate
-    relative = {"reference_force": abs(estimate.model.reference.integral - 1.0)}
-    if scan.load_uncertainty is not None:
-        relative["load"] = scan.load_uncertainty / scan.load
-    if solution.stress.convergence is not None:
-        relative["reference_convergence"] = solution.stress.convergence
+def _uncertainties(
+    solution: Solution,
+    alternatives: Sequence[StressProfile | Contact | None] | None,
+    correlations: Mapping[tuple[str, str], float],
+) -> Results:
+    scans, estimate = solution.scans, solution.estimate
     wavenumbers = solution.fields.along_axis(solution.quotient.division.window)[0]
+    spectra = None
+    if alternatives is not None:
+        known = [other for other in alternatives if other is not None]
+        parts = [estimate.points.only(i) for i in range(len(scans))]
+        spectra = reference_spectra(known, parts, [scan.film.thickness for scan in scans])
     return propagate(
         estimate,
         solution.quotient.kernel,
         solution.window_at_nodes,
         wavenumbers,
-        reference_sensitivities(scan, estimate.model.reference),
-        relative,
+        input_effects(scans, solution.stresses, estimate, spectra),
+        correlations,
         field_noise(solution, wavenumbers),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +18,9 @@ from memscal.calibration.fields import (
 from memscal.calibration.normalise import NormalisedKernel, normalise
 from memscal.deconvolution.problem import Division, Regulariser
 from memscal.estimation.band import Band, find_band
-from memscal.estimation.points import measured_points
+from memscal.estimation.points import joined_points, measured_points
 from memscal.estimation.profile_estimate import ProfileEstimate, estimate_profile
-from memscal.estimation.reference import reference_spectrum
+from memscal.estimation.reference import reference_spectra
 from memscal.mechanics.contact import Contact
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -60,10 +61,10 @@ class Solution:
 
     Parameters
     ----------
-    scan : Scan
+    scans : tuple of Scan
         What was measured.
-    stress : StressProfile or Contact
-        The reference.
+    stresses : tuple of StressProfile or Contact
+        The reference of each scan.
     estimate : ProfileEstimate
         Centre, baseline, noise, outliers and profile.
     band : Band
@@ -80,8 +81,8 @@ class Solution:
         The Gaussian fitted in data space against the scan.
     """
 
-    scan: Scan
-    stress: StressProfile | Contact
+    scans: tuple[Scan, ...]
+    stresses: tuple[StressProfile | Contact, ...]
     estimate: ProfileEstimate
     band: Band
     choice: GridChoice
@@ -89,6 +90,16 @@ class Solution:
     regulariser: Regulariser
     quotient: Quotient
     gaussian_misfit: Misfit
+
+    @property
+    def scan(self) -> Scan:
+        """The first scan."""
+        return self.scans[0]
+
+    @property
+    def stress(self) -> StressProfile | Contact:
+        """The reference of the first scan, which the fields are made with."""
+        return self.stresses[0]
 
     @property
     def window_at_nodes(self) -> FloatArray:
@@ -113,17 +124,20 @@ class Solution:
         return abs(1 - inside / spectrum.integral)
 
 
-def solve(scan: Scan, stress: StressProfile | Contact, regulariser: Regulariser) -> Solution:
+def solve(
+    scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], regulariser: Regulariser
+) -> Solution:
     """Go through the paper's steps: profile, lift, transform, divide, normalise, reconvolve."""
-    points = measured_points(scan)
-    reference = reference_spectrum(stress, points, scan.film.thickness)
-    estimate = estimate_profile(points, reference)
+    parts = [measured_points(scan) for scan in scans]
+    thicknesses = [scan.film.thickness for scan in scans]
+    references = reference_spectra(stresses, parts, thicknesses)
+    estimate = estimate_profile(joined_points(parts), *references)
     band = find_band(estimate)
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, choice)
     return Solution(
-        scan=scan,
-        stress=stress,
+        scans=tuple(scans),
+        stresses=tuple(stresses),
         estimate=estimate,
         band=band,
         choice=choice,
@@ -141,9 +155,18 @@ def divide(
     raw = regulariser.divide(division_problem(estimate, band, fields))
     division = Division(raw.field * fields.confinement, raw.window)
     kernel = normalise(fields.view(division.field), estimate.gaussian.sigma)
-    back = fields.grid.convolve(division.field, fields.reference)
-    predicted = fields.at_points(back) * estimate.points.load + estimate.background
+    predicted = _reconvolved(estimate, fields, division) + estimate.background
     return Quotient(division, kernel, predicted, _misfit(estimate, predicted))
+
+
+def _reconvolved(estimate: ProfileEstimate, fields: Fields, division: Division) -> FloatArray:
+    """Signal of the deconvolved A G at the points, in V: each scan through its own reference."""
+    if estimate.points.scans == 1:
+        back = fields.grid.convolve(division.field, fields.reference)
+        return fields.at_points(back) * estimate.points.load
+    k, kernel = fields.along_axis(fields.grid.transfer(division.field).real)
+    spectrum = np.interp(estimate.model.k, k, kernel, right=0.0)
+    return estimate.model.signal(estimate.gaussian.geometry, spectrum)
 
 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:

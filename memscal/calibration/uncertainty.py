@@ -1,11 +1,13 @@
-r"""First-order propagation: noise, what the window hides, and the inputs of the reference.
+r"""First-order propagation: noise, what regularisation hides, and uncertain inputs.
 
 Every result is a linear function of the posterior of the profile's parameters (:math:`w`)
 and of the Gaussian fit's (:math:`f`).  Their joint covariance follows from the linear
 model: :math:`\mathrm{cov}(w, f)` is the Gaussian fit's own covariance in the parameters that
-they share, and zero for the rings.  Inputs add one column each: the change of all results
-by one standard uncertainty.  What the window hides is counted as an error of the size that
-the profile's own continuation has there.
+they share, and zero for the departures'.  Of it, the part that scatters from scan to scan is
+``noise``; the rest, which does not, is ``regularisation``: the expected square of what the
+estimate cannot know.  What a window hides beyond that is counted as an error of the size that the
+profile's own continuation has there.  Inputs add one column each, the change of all results by
+one standard uncertainty, and their correlations combine these.
 """
 
 from __future__ import annotations
@@ -18,12 +20,16 @@ from scipy.special import j0
 
 from memscal.calibration.field_noise import FieldNoise
 from memscal.calibration.functionals import Functional, kernel_functionals
+from memscal.calibration.inputs import InputEffect, correlation_matrix
 from memscal.calibration.normalise import NormalisedKernel
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.apparatus import ParameterSet
 from memscal.model.validation import FloatArray
 
 __all__ = ["Results", "propagate"]
+
+#: What sums of squares lose to rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +44,8 @@ class Results:
         Standard uncertainty of each budgeted parameter by source, in its SI unit.
     radial_covariance : ndarray, shape (n, n)
         Covariance of G(r), in 1/m^4.
+    cross_covariance : ndarray, shape (n, p)
+        Covariance of G(r) with the parameters, in their units.
     transfer_errors : ndarray, shape (m,)
         Standard uncertainty of the transfer function.
     """
@@ -45,6 +53,7 @@ class Results:
     parameters: ParameterSet
     budget: Mapping[str, Mapping[str, float]]
     radial_covariance: FloatArray
+    cross_covariance: FloatArray
     transfer_errors: FloatArray
 
 
@@ -60,16 +69,22 @@ _BUDGETED = (
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Derivatives of the results by (w, f), and what the window hides of each."""
+    """Derivatives of all results by (w, f), and what the window hides of each.
+
+    The results are the parameters, ``names`` with ``values``, then G at its radii, then the
+    transfer function at its wavenumbers: the rows of ``matrix`` and ``hidden``.
+    """
 
     names: tuple[str, ...]
     values: FloatArray
-    scalars: FloatArray
-    radial: FloatArray
-    transfer: FloatArray
-    hidden_scalars: FloatArray
-    hidden_radial: FloatArray
-    hidden_transfer: FloatArray
+    radii: int
+    matrix: FloatArray
+    hidden: FloatArray
+
+    @property
+    def stored(self) -> int:
+        """How many results have a covariance: parameters and G."""
+        return len(self.names) + self.radii
 
 
 def propagate(
@@ -77,8 +92,8 @@ def propagate(
     kernel: NormalisedKernel,
     window: FloatArray,
     wavenumbers: FloatArray,
-    changes: Mapping[str, FloatArray],
-    relative: Mapping[str, float],
+    effects: Mapping[str, InputEffect],
+    correlations: Mapping[tuple[str, str], float],
     raster: FieldNoise | None = None,
 ) -> Results:
     """Propagate all stated uncertainties to the results.
@@ -93,44 +108,60 @@ def propagate(
         The regularisation's window at the quadrature nodes.
     wavenumbers : ndarray, shape (m,)
         Where the transfer function is stated, in rad/m.
-    changes : mapping of str to ndarray
-        Change of the reference's transform by one standard uncertainty of each source.
-    relative : mapping of str to float
-        Relative standard uncertainty of each source that scales A alone (the load).
+    effects : mapping of str to InputEffect
+        What one standard uncertainty of each input does.
+    correlations : mapping
+        Correlation coefficients of pairs of inputs; none where absent.
     raster : FieldNoise, optional
         What the noise of a measured field adds.
     """
     rows = _rows(estimate, kernel, window, wavenumbers)
-    covariance = _joint_covariance(estimate)
-    scalars = {"noise": rows.scalars @ _root(covariance), "window": rows.hidden_scalars[:, None]}
-    radial = [rows.radial @ _root(covariance), rows.hidden_radial[:, None]]
-    transfer = [rows.transfer @ _root(covariance), rows.hidden_transfer[:, None]]
-    for source, change in changes.items():
-        shift = _shift(estimate, change)[:, None]
-        scalars[source] = rows.scalars @ shift
-        radial.append(rows.radial @ shift)
-        transfer.append(rows.transfer @ shift)
-    if raster is not None:
-        scalars["raster_noise"] = _raster_columns(rows.names, kernel, raster)
-        radial.append(raster.radial)
-        transfer.append(raster.transfer[:, None])
-    scales_a = np.array([name.startswith("conversion_constant") for name in rows.names])
-    for source, share in relative.items():
-        scalars[source] = (np.where(scales_a, rows.values, 0.0) * share)[:, None]
-    total = sum(columns @ columns.T for columns in scalars.values())
-    budget = {
-        name: {
-            source: float(np.linalg.norm(columns[rows.names.index(name)]))
-            for source, columns in scalars.items()
-        }
-        for name in _BUDGETED
+    random, fixed = _noise_roots(estimate)
+    columns = {
+        "noise": rows.matrix @ random,
+        "regularisation": rows.matrix @ fixed,
+        "window": rows.hidden[:, None],
     }
+    if raster is not None:
+        columns["raster_noise"] = _raster_columns(rows, kernel, raster)
+    independent = list(columns.values())
+    columns |= {name: _input_column(rows, estimate, effect) for name, effect in effects.items()}
+    if effects:
+        together = np.hstack([columns[name] for name in effects])
+        independent.append(together @ _root(correlation_matrix(list(effects), correlations)))
+    everything = np.hstack(independent)
+    stored = everything[: rows.stored] @ everything[: rows.stored].T
+    count = len(rows.names)
     return Results(
-        parameters=ParameterSet(rows.names, rows.values, np.asarray(total)),
-        budget=budget,
-        radial_covariance=np.asarray(sum(columns @ columns.T for columns in radial)),
-        transfer_errors=np.sqrt(sum((columns**2).sum(axis=1) for columns in transfer)),
+        parameters=ParameterSet(rows.names, rows.values, stored[:count, :count]),
+        budget={name: _budget(rows, columns, stored, name) for name in _BUDGETED},
+        radial_covariance=stored[count:, count:],
+        cross_covariance=stored[count:, :count],
+        transfer_errors=np.linalg.norm(everything[rows.stored :], axis=1),
     )
+
+
+def _budget(
+    rows: _Rows, columns: Mapping[str, FloatArray], covariance: FloatArray, name: str
+) -> dict[str, float]:
+    """Contribution of each source; of correlations with the sign of what they add."""
+    row = rows.names.index(name)
+    parts = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
+    variance = float(covariance[row, row])
+    excess = variance - sum(part**2 for part in parts.values())
+    if abs(excess) > _ROUNDING * variance:
+        parts["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))
+    return parts
+
+
+def _input_column(rows: _Rows, estimate: ProfileEstimate, effect: InputEffect) -> FloatArray:
+    shift = np.concatenate(
+        [estimate.weighed.gain @ effect.voltage, estimate.gaussian_gain @ effect.voltage]
+    )
+    column = rows.matrix @ shift
+    scales = np.array([name.startswith("conversion_constant") for name in rows.names])
+    column[: scales.size] += np.where(scales, rows.values, 0.0) * effect.scaling
+    return np.asarray(column[:, None])
 
 
 def _rows(
@@ -148,22 +179,20 @@ def _rows(
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
     transfer = np.stack([np.interp(wavenumbers, k, column) for column in normalised.T], axis=1)
     hidden = (1 - window) * estimate.kernel / a
+    hidden_radial = synthesis @ hidden
     opened = radial - synthesis @ ((1 - window)[:, None] * normalised)
     functionals = kernel_functionals(kernel)
     scalars, names, values = _scalar_rows(estimate, kernel, functionals, opened)
     hidden_scalars = np.zeros(len(names))
     for functional in functionals:
-        hidden_scalars[names.index(functional.name)] = functional.row @ (synthesis @ hidden)
-    pad = np.zeros((1, fitted))
+        hidden_scalars[names.index(functional.name)] = functional.row @ hidden_radial
+    profiles = np.vstack([radial, transfer])
     return _Rows(
         names=names,
         values=values,
-        scalars=scalars,
-        radial=np.hstack([radial, np.repeat(pad, r.size, axis=0)]),
-        transfer=np.hstack([transfer, np.repeat(pad, wavenumbers.size, axis=0)]),
-        hidden_scalars=hidden_scalars,
-        hidden_radial=synthesis @ hidden,
-        hidden_transfer=np.interp(wavenumbers, k, hidden),
+        radii=r.size,
+        matrix=np.vstack([scalars, np.pad(profiles, ((0, 0), (0, fitted)))]),
+        hidden=np.concatenate([hidden_scalars, hidden_radial, np.interp(wavenumbers, k, hidden)]),
     )
 
 
@@ -174,40 +203,53 @@ def _scalar_rows(
     opened: FloatArray,
 ) -> tuple[FloatArray, tuple[str, ...], FloatArray]:
     count, fitted = estimate.basis.integrals.size, estimate.gaussian.jacobian.shape[1]
-    planar = estimate.points.planar
+    gaussian = estimate.gaussian
     entries: list[tuple[str, float, FloatArray, int]] = [
         ("conversion_constant", kernel.conversion_constant, estimate.basis.integrals, 0),
-        ("gaussian_sigma", estimate.gaussian.sigma, _unit(fitted, 1), count),
+        ("gaussian_sigma", gaussian.sigma, _unit(fitted, 1), count),
         *((f.name, f.value, f.row @ opened, 0) for f in functionals),
-        ("centre", float(estimate.centre[0]), _unit(count, 2), 0),
-        ("baseline", float(estimate.drift[0]), _unit(count, 4 if planar else 3), 0),
-        # The drift is stated across the whole range; its coefficient spans half of it.
-        ("drift", 2 * float(estimate.drift[1]), 2 * _unit(count, 5 if planar else 4), 0),
-        (
-            "conversion_constant_gaussian",
-            estimate.gaussian.conversion_constant,
-            _unit(fitted, 0),
-            count,
-        ),
+        *_nuisances(estimate),
+        ("conversion_constant_gaussian", gaussian.conversion_constant, _unit(fitted, 0), count),
     ]
-    if planar:
-        entries.append(("centre_y", float(estimate.centre[1]), _unit(count, 3), 0))
-        entries.append(("drift_y", 2 * float(estimate.drift[2]), 2 * _unit(count, 6), 0))
     rows = np.zeros((len(entries), count + fitted))
     for row, (_, _, part, first) in zip(rows, entries, strict=True):
         row[first : first + part.size] = part
-    names, values = tuple(e[0] for e in entries), np.array([e[1] for e in entries])
-    return rows, names, values
+    return rows, tuple(e[0] for e in entries), np.array([e[1] for e in entries])
 
 
-def _raster_columns(
-    names: tuple[str, ...], kernel: NormalisedKernel, raster: FieldNoise
-) -> FloatArray:
-    """Columns of the scalars for the noise of a measured field: A first, then those of G."""
-    columns = np.zeros((len(names), 1 + raster.radial.shape[1]))
-    columns[names.index("conversion_constant"), 0] = raster.conversion_constant
+def _nuisances(estimate: ProfileEstimate) -> list[tuple[str, float, FloatArray, int]]:
+    """Centre, baseline and drift of each scan; the second scan's end in ``_2``, and so on."""
+    count, free = estimate.basis.integrals.size, estimate.points.free
+    centres = [("centre", "centre_y")[axis] + _number(scan) for scan, axis in np.argwhere(free)]
+    drifts: list[tuple[str, float]] = []
+    for scan, directions in enumerate(free):
+        # The drift is stated across the whole range; its coefficient spans half of it.
+        along = [("drift", "drift_y")[axis] for axis in np.flatnonzero(directions)]
+        drifts += [("baseline" + _number(scan), 1.0), *((n + _number(scan), 2.0) for n in along)]
+    entries = [
+        (name, float(value), _unit(count, 2 + i), 0)
+        for i, (name, value) in enumerate(zip(centres, estimate.centres[free], strict=True))
+    ]
+    first = 2 + len(centres)
+    for i, ((name, scale), value) in enumerate(zip(drifts, estimate.drifts, strict=True)):
+        entries.append((name, scale * float(value), scale * _unit(count, first + i), 0))
+    return entries
+
+
+def _number(scan: int) -> str:
+    return "" if scan == 0 else f"_{scan + 1}"
+
+
+def _raster_columns(rows: _Rows, kernel: NormalisedKernel, raster: FieldNoise) -> FloatArray:
+    """Noise of a measured field: a column for A, then those of G, then each of the transfer's."""
+    count, components = len(rows.names), raster.transfer.size
+    columns = np.zeros((rows.hidden.size, 1 + raster.radial.shape[1] + components))
+    columns[rows.names.index("conversion_constant"), 0] = raster.conversion_constant
+    inner = slice(1, 1 + raster.radial.shape[1])
     for functional in kernel_functionals(kernel):
-        columns[names.index(functional.name), 1:] = functional.row @ raster.radial
+        columns[rows.names.index(functional.name), inner] = functional.row @ raster.radial
+    columns[count : rows.stored, inner] = raster.radial
+    columns[rows.stored :, inner.stop :] = np.diag(raster.transfer)
     return columns
 
 
@@ -217,7 +259,8 @@ def _unit(count: int, index: int) -> FloatArray:
     return row
 
 
-def _joint_covariance(estimate: ProfileEstimate) -> FloatArray:
+def _noise_roots(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray]:
+    """Square roots of the joint covariance of (w, f): what scatters, and what does not."""
     own, fitted = estimate.covariance, estimate.gaussian_covariance
     count, flat = own.shape[0], fitted.shape[0]
     joint = np.zeros((count + flat,) * 2)
@@ -225,7 +268,9 @@ def _joint_covariance(estimate: ProfileEstimate) -> FloatArray:
     joint[count:, count:] = fitted
     joint[:flat, count:] = fitted
     joint[count:, :flat] = fitted
-    return joint
+    gain = np.vstack([estimate.weighed.gain, estimate.gaussian_gain])
+    random = gain @ estimate.noise_root
+    return random, _root(joint - random @ random.T)
 
 
 def _root(covariance: FloatArray) -> FloatArray:
@@ -234,13 +279,3 @@ def _root(covariance: FloatArray) -> FloatArray:
     safe = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
     return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
-def _shift(estimate: ProfileEstimate, change: FloatArray) -> FloatArray:
-    """Change of (w, f) if the reference's transform is wrong by ``change``."""
-    model = estimate.model
-    relative = np.divide(
-        change, model.reference.values, out=np.zeros_like(change), where=model.reference.values != 0
-    )
-    voltage = model.signal(estimate.gaussian.geometry, estimate.kernel * relative)
-    return np.concatenate([estimate.weighed.gain @ voltage, estimate.gaussian_gain @ voltage])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from memscal.cli.calibration_outputs import Outputs
+from memscal.cli.calibration_setup import chosen_method, correlation
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
 from memscal.cli.options import FILE, force_option, json_option
 from memscal.cli.output import emit_json, message, note, warn
@@ -43,7 +42,7 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
 
 
 @click.command("calibrate", epilog=EXAMPLES)
-@click.argument("scan", type=FILE)
+@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
 @click.option(
     "-o",
     "--output",
@@ -59,12 +58,28 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "else the rod is solved on the film.",
 )
 @click.option(
+    "--alternative",
+    type=FILE,
+    metavar="FILE",
+    help="The same stress by another model of the film (memscal-reference), such as finite strain: "
+    "its difference is counted as an uncertainty of the model's form.",
+)
+@click.option(
+    "--correlation",
+    "correlations",
+    multiple=True,
+    metavar="INPUT,INPUT=R",
+    help="Correlation coefficient, from -1 to 1, of the errors of two inputs, such as "
+    "thickness,poisson_ratio=0.5. May be repeated.",
+)
+@click.option(
     "--method",
     default="white-noise",
     show_default=True,
     metavar="NAME",
     shell_complete=_complete_method,
-    help="How the fields are divided: white-noise (its exact expectation), white-noise-draw (one "
+    help="How G is found: evidence (from the scan's points, the most accurate), or by a division "
+    "of fields: white-noise (its exact expectation), white-noise-draw (one "
     "seeded draw, as published), tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a "
     "plug-in's.",
 )
@@ -109,9 +124,11 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
 )
 @debug_option
 def command(
-    scan: Path,
+    scans: tuple[Path, ...],
     output: Path | None,
     reference: Path | None,
+    alternative: Path | None,
+    correlations: tuple[str, ...],
     method: str,
     options: tuple[str, ...],
     seed: int | None,
@@ -123,18 +140,23 @@ def command(
     force: bool,
     dry_run: bool,
 ) -> int:
-    """Find a sensor's apparatus function from a rod scan.
+    """Find a sensor's apparatus function from a rod scan, or from several of one sensor.
 
     Divides the scan's field by the stress that the rod makes at the base of the film, and writes
     the conversion constant A (mV/Pa), the apparatus function G (1/mm^2, unit integral), both
     Gaussian widths (mm), their standard uncertainties, and quality checks to an artifact.
 
+    Several scans, at other loads, with other rods or films, are fitted together: A and G are
+    shared, and each scan has its own centre and baseline.
+
     A failed quality check is exit code 1: the artifact is written and says so.
     """
-    outputs = Outputs(output or beside(scan, ".apparatus.h5"), report, figures, sweep_figure)
-    regulariser = _regulariser(method, options, seed)
-    data, profile = _read(scan, reference)
-    inputs = [path for path in (scan, reference) if path is not None]
+    outputs = Outputs(output or beside(scans[0], ".apparatus.h5"), report, figures, sweep_figure)
+    regulariser = chosen_method(method, options, seed)
+    correlated = dict(correlation(text) for text in correlations)
+    data, profile = _read(scans, reference)
+    other = None if alternative is None else _read_reference(alternative)
+    inputs = [path for path in (*scans, reference, alternative) if path is not None]
     prove_writable(outputs.paths, force=force, inputs=inputs)
     if dry_run:
         _rehearse(data, profile, regulariser, outputs, as_json)
@@ -143,7 +165,14 @@ def command(
     from memscal.calibration.procedure import calibrate
 
     with working(f"Calibrating by {regulariser.name}"):
-        found = calibrate(data, reference=profile, method=regulariser, seed=seed or 0)
+        found = calibrate(
+            data,
+            reference=profile,
+            alternative=other,
+            method=regulariser,
+            correlations=correlated,
+            seed=seed or 0,
+        )
     swept = None
     if sweeping or sweep_figure:
         with working("Sweeping the noise amplitude"):
@@ -154,60 +183,19 @@ def command(
     return _tell(found, swept, outputs, as_json)
 
 
-def _regulariser(method: str, options: tuple[str, ...], seed: int | None) -> Regulariser:
-    """Set up the method; a wrong name or option is a matter of usage."""
-    from memscal.deconvolution.registry import create_regulariser
-    from memscal.errors import InputError
-
-    given = dict(_option(text) for text in options)
-    if "seed" in given:
-        raise click.UsageError("Give the seed as --seed, not as --option.")
-    try:
-        if given:
-            _check_kinds(given, create_regulariser(method))
-        regulariser = create_regulariser(method, seed=seed or 0, **given)
-    except InputError as failure:
-        raise click.UsageError(f"{failure.problem} {failure.cure}".strip()) from failure
-    if seed is not None and not hasattr(regulariser, "seed"):
-        note(f"--seed changes nothing here: {regulariser.name} draws no random numbers.")
-    return regulariser
-
-
-def _option(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not (equals and name.isidentifier()):
-        raise click.UsageError(f"--option {text!r} is not of the form NAME=VALUE.")
-    try:
-        return name, json.loads(value)
-    except ValueError:
-        return name, value
-
-
-def _check_kinds(given: dict[str, Any], usual: Regulariser) -> None:
-    """Refuse text where the method's own default is a number, or a part where it is a count."""
-    for name, value in given.items():
-        default = getattr(usual, name, None)
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if isinstance(default, float) and not (number and math.isfinite(value)):
-            raise click.UsageError(
-                f"--option {name}={value}: {name} is a number, such as {default}."
-            )
-        if type(default) is int and type(value) is not int:
-            raise click.UsageError(f"--option {name}={value}: {name} is a whole number.")
-
-
-def _read(path: Path, reference: Path | None) -> tuple[Scan, StressProfile | None]:
+def _read(
+    paths: tuple[Path, ...], reference: Path | None
+) -> tuple[list[Scan], StressProfile | None]:
     """Read the inputs, and refuse an indenter that cannot calibrate."""
     from memscal.estimation.reference import require_calibration_rod
     from memscal.formats.scan import read_scan
 
-    scan = read_scan(path)
-    require_calibration_rod(scan)
-    if reference is None:
-        return scan, None
-    if scan.reference is not None:
-        note(f"The reference in {path.name} gives way to {reference.name}.")
-    return scan, _read_reference(reference)
+    scans = [read_scan(path) for path in paths]
+    for scan, path in zip(scans, paths, strict=True):
+        require_calibration_rod(scan)
+        if reference is not None and scan.reference is not None:
+            note(f"The reference in {path.name} gives way to {reference.name}.")
+    return scans, None if reference is None else _read_reference(reference)
 
 
 def _read_reference(path: Path) -> StressProfile:
@@ -226,7 +214,7 @@ def _read_reference(path: Path) -> StressProfile:
 
 
 def _rehearse(
-    scan: Scan,
+    scans: list[Scan],
     profile: StressProfile | None,
     regulariser: Regulariser,
     outputs: Outputs,
@@ -235,16 +223,22 @@ def _rehearse(
     """Go as far as the calibration goes before it computes, and say what it would do."""
     from memscal.cli.calibration_view import rehearsal_json, rehearsal_table
     from memscal.cli.tables import emit_tables
-    from memscal.estimation.points import measured_points
-    from memscal.estimation.reference import reference_profile, reference_spectrum
+    from memscal.estimation.points import joined_points, measured_points
+    from memscal.estimation.reference import (
+        reference_profile,
+        reference_spectra,
+        require_one_sensor,
+    )
 
-    points = measured_points(scan)
-    stress = reference_profile(scan, profile)
-    reference_spectrum(stress, points, scan.film.thickness)
+    require_one_sensor(scans)
+    parts = [measured_points(scan) for scan in scans]
+    stresses = [reference_profile(scan, profile) for scan in scans]
+    reference_spectra(stresses, parts, [scan.film.thickness for scan in scans])
+    points = joined_points(parts)
     if as_json:
-        emit_json(rehearsal_json(stress, regulariser.name, outputs.paths))
+        emit_json(rehearsal_json(stresses[0], regulariser.name, outputs.paths))
     else:
-        emit_tables(rehearsal_table(scan, points, stress, regulariser.name, outputs.paths))
+        emit_tables(rehearsal_table(scans[0], points, stresses[0], regulariser.name, outputs.paths))
     message("Nothing was written (--dry-run).")
 
 

@@ -67,6 +67,13 @@ class ProfileEstimate:
         return np.asarray(self.noise_scale / np.sqrt(stated))
 
     @property
+    def noise_root(self) -> FloatArray:
+        """Square root of the voltages' covariance, shape (n, n), in V."""
+        factor = self.points.decorrelation
+        root = np.diag(self.noise / np.sqrt(self.outlier_weight))
+        return root if factor is None else root @ np.linalg.inv(factor)
+
+    @property
     def noise_scale(self) -> float:
         """Noise of a point (V); or, with stated uncertainties, the factor they must grow by.
 

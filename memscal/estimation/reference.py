@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -19,17 +21,63 @@ from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
 __all__ = [
+    "film_sensitivities",
     "reference_contact",
     "reference_profile",
-    "reference_sensitivities",
+    "reference_spectra",
     "reference_spectrum",
     "require_calibration_rod",
+    "require_one_sensor",
+    "rod_sensitivities",
 ]
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
+
+
+def require_one_sensor(scans: Any) -> tuple[Scan, ...]:
+    """Refuse scans that cannot be fitted together.
+
+    Raises
+    ------
+    InputError
+        If there is none, one of them is no scan, or they contradict each other: other sensors,
+        or one name for films that differ.
+    """
+    scans = scans if isinstance(scans, list | tuple) else [scans]
+    for scan in scans:
+        if not isinstance(scan, Scan):
+            raise InputError(
+                f"calibrate() was given a {type(scan).__name__}, not a Scan.",
+                cure="Read a scan file with memscal.read_scan(path).",
+            )
+    if not scans:
+        raise InputError("calibrate() was given no scan.")
+    sensors = {(scan.sensor.name, scan.sensor.channel): None for scan in scans}
+    if len(sensors) > 1:
+        named = ", ".join(f"{name or 'unnamed'} ({channel})" for name, channel in sensors)
+        raise InputError(
+            f"The scans are of {len(sensors)} sensors: {named}.",
+            why="Scans that are fitted together share one apparatus function.",
+            cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
+        )
+    films: dict[str, ElasticFilm] = {}
+    for scan in scans:
+        film = scan.film
+        known = films.setdefault(film.name, film)
+        if film.name and known != film:
+            raise InputError(
+                f"Two of the scans name their film {film.name!r}, but give it a thickness of "
+                f"{known.thickness * 1e3:.4g} and {film.thickness * 1e3:.4g} mm, a Poisson's ratio "
+                f"of {known.poisson_ratio:.4g} and {film.poisson_ratio:.4g}, and a modulus of "
+                f"{known.young_modulus * 1e-6:.4g} and {film.young_modulus * 1e-6:.4g} MPa, or "
+                "other uncertainties.",
+                why="One film has one set of properties.",
+                cure="Correct /entry/sample/film in one of the files, or its name.",
+            )
+    return tuple(scans)
 
 
 def require_calibration_rod(scan: Scan) -> None:
@@ -58,8 +106,12 @@ def require_calibration_rod(scan: Scan) -> None:
         )
 
 
+@lru_cache(maxsize=64)
 def reference_contact(film: ElasticFilm, indenter: RoundIndenter, load: float) -> Contact:
-    """Solve the rod of a scan, frictionless: friction changes its base stress by about 1e-3."""
+    """Solve the rod of a scan, frictionless: friction changes its base stress by about 1e-3.
+
+    A contact keeps what was computed of it, and the scans of a series share theirs.
+    """
     return indent(film, indenter, load=load)
 
 
@@ -77,37 +129,52 @@ def reference_profile(
 def reference_spectrum(
     reference: StressProfile | Contact, points: ScanPoints, thickness: float
 ) -> RadialSpectrum:
-    """Transform of the reference per newton, on nodes that serve every distance of the scan.
+    """Transform of one scan's reference per newton: :func:`reference_spectra` of one."""
+    return reference_spectra([reference], [points], [thickness])[0]
+
+
+def reference_spectra(
+    references: Sequence[StressProfile | Contact],
+    parts: Sequence[ScanPoints],
+    thicknesses: Sequence[float],
+) -> tuple[RadialSpectrum, ...]:
+    """Transforms of the references per newton, on common nodes that serve every distance.
 
     Parameters
     ----------
-    reference : StressProfile or Contact
-        The base stress.
-    points : ScanPoints
-        Where the scan was measured.
-    thickness : float
-        Film thickness, in m: it bounds the wavenumbers that reach the base.
+    references : sequence of StressProfile or Contact
+        The base stress of each scan.
+    parts : sequence of ScanPoints
+        Where each scan was measured.
+    thicknesses : sequence of float
+        Film thickness of each, in m: it bounds the wavenumbers that reach the base.
 
     Raises
     ------
     InputError
         If a table ends inside the scan before its stress has decayed, or carries no force.
     """
-    span = float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
+    spans = [float(np.hypot(np.ptp(part.x), np.ptp(part.y))) for part in parts]
     # Fields are lifted to squares that reach one span from the centre, to their corners.
-    corner = 1.5 * span
-    wavenumbers = Wavenumbers.covering(_LARGEST_KH / thickness, corner)
+    wavenumbers = Wavenumbers.covering(_LARGEST_KH / min(thicknesses), 1.5 * max(spans))
+    return tuple(
+        RadialSpectrum(wavenumbers, _per_newton(reference, wavenumbers.k, span))
+        for reference, span in zip(references, spans, strict=True)
+    )
+
+
+def _per_newton(reference: StressProfile | Contact, k: FloatArray, span: float) -> FloatArray:
     if isinstance(reference, Contact):
-        return RadialSpectrum(wavenumbers, reference.base_spectrum(wavenumbers.k) / reference.load)
+        return reference.base_spectrum(k) / reference.load
     _require_coverage(reference, span)
-    values = hankel_transform(reference.r, reference.sigma_zz, wavenumbers.k) / reference.load
+    values = hankel_transform(reference.r, reference.sigma_zz, k) / reference.load
     if values[0] <= 0:
         raise InputError(
             "The stress of the reference adds up to a pull, not a push.",
             why="Normal stress is positive in compression.",
             cure="Change the sign of sigma_zz in the reference.",
         )
-    return RadialSpectrum(wavenumbers, values)
+    return values
 
 
 def _require_coverage(profile: StressProfile, span: float) -> None:
@@ -129,41 +196,55 @@ def _require_coverage(profile: StressProfile, span: float) -> None:
         )
 
 
-def reference_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
-    r"""Change of the reference's transform by one standard uncertainty of each source.
+def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+    """Change of the reference's transform by one standard uncertainty of each film property.
 
-    The rod's solution is varied by its thickness, Poisson's ratio and radius, by centred
-    differences (one-sided at nu = 1/2); for a reference from elsewhere, the relative change is
-    taken over.  At a given load the base stress of a linear film does not depend on Young's
-    modulus: its contribution is zero, and is stated.
+    The rod's solution is varied by centred differences (one-sided at nu = 1/2); for a reference
+    from elsewhere, the relative change is taken over.  At a given load the base stress of a
+    linear film does not depend on Young's modulus: its contribution is zero, and is stated.
 
     Returns
     -------
     mapping of str to ndarray, shape of ``reference.values``
         By source, for the sources whose uncertainty is stated.
     """
-    film, rod, k = scan.film, scan.indenter, reference.wavenumbers.k
-
-    def transform(new_film: ElasticFilm, new_rod: RoundIndenter) -> FloatArray:
-        return reference_contact(new_film, new_rod, scan.load).base_spectrum(k)
-
-    centre = transform(film, rod)
+    film = scan.film
     changes: dict[str, FloatArray] = {}
     if film.young_modulus_uncertainty is not None:
-        changes["young_modulus"] = np.zeros_like(k)
+        changes["young_modulus"] = np.zeros_like(reference.values)
     if u := film.thickness_uncertainty:
-        upper = transform(replace(film, thickness=film.thickness + u), rod)
-        lower = transform(replace(film, thickness=film.thickness - u), rod)
-        changes["thickness"] = (upper - lower) / 2
+        thicker = replace(film, thickness=film.thickness + u)
+        thinner = replace(film, thickness=film.thickness - u)
+        changes["thickness"] = _difference(scan, reference, (thicker, thinner), None) / 2
     if u := film.poisson_ratio_uncertainty:
-        nu = film.poisson_ratio
-        above, below = min(nu + u, 0.5), max(nu - u, 0.0)
-        upper = transform(replace(film, poisson_ratio=above), rod)
-        lower = transform(replace(film, poisson_ratio=below), rod)
-        changes["poisson_ratio"] = (upper - lower) * u / (above - below)
-    if u := rod.radius_uncertainty:
-        upper = transform(film, replace(rod, radius=rod.radius + u))
-        lower = transform(film, replace(rod, radius=max(rod.radius - u, rod.radius / 2)))
-        changes["rod_radius"] = (upper - lower) / 2
-    scale = reference.values / centre
-    return {source: change * scale for source, change in changes.items()}
+        above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
+        films = (replace(film, poisson_ratio=above), replace(film, poisson_ratio=below))
+        changes["poisson_ratio"] = _difference(scan, reference, films, None) * u / (above - below)
+    return changes
+
+
+def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+    """Change of the reference's transform by one standard uncertainty of the rod's radius."""
+    rod = scan.indenter
+    if not (u := rod.radius_uncertainty):
+        return {}
+    wider = replace(rod, radius=rod.radius + u)
+    narrower = replace(rod, radius=max(rod.radius - u, rod.radius / 2))
+    return {"rod_radius": _difference(scan, reference, None, (wider, narrower)) / 2}
+
+
+def _difference(
+    scan: Scan,
+    reference: RadialSpectrum,
+    films: tuple[ElasticFilm, ElasticFilm] | None,
+    rods: tuple[RoundIndenter, RoundIndenter] | None,
+) -> FloatArray:
+    """Difference of two rods' solutions, scaled from the rod's own to the reference."""
+    k = reference.wavenumbers.k
+
+    def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
+        return reference_contact(film, rod, scan.load).base_spectrum(k)
+
+    upper, lower = zip(films or (scan.film,) * 2, rods or (scan.indenter,) * 2, strict=True)
+    scale = reference.values / transform(scan.film, scan.indenter)
+    return np.asarray((transform(*upper) - transform(*lower)) * scale)

@@ -157,6 +157,8 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     }
     if profile.sigma_rz is not None:
         data["sigma_rz"] = si(profile.sigma_rz, "stress", axes)
+    if profile.sigma_zz_errors is not None:
+        data["sigma_zz_errors"] = si(profile.sigma_zz_errors, "stress", axes)
     parameters: dict[str, Node] = {"load": si(profile.load, "force")}
     for name, dimension in _PROFILE.items():
         value = getattr(profile, name)
@@ -208,6 +210,7 @@ def read_profile(
         r=require_array(file, f"{data}/r", "length", ndim=1),
         sigma_zz=require_array(file, f"{data}/sigma_zz", "stress", ndim=1),
         sigma_rz=optional_array(file, f"{data}/sigma_rz", "stress", ndim=1),
+        sigma_zz_errors=optional_array(file, f"{data}/sigma_zz_errors", "stress", ndim=1),
         load=load,
         film=film,
         indenter=indenter,

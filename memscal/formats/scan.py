@@ -196,7 +196,7 @@ def _data_group(scan: Scan) -> Group:
 
 
 def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
-    """Return the axes; a square raster with them the other way round would pass every other test."""
+    """Return the axes: a square raster with them swapped would pass every other test."""
     axes = file.attribute(_DATA, "axes")
     if isinstance(axes, str):
         axes = tuple(axes.replace(":", " ").replace(",", " ").split())
@@ -205,7 +205,7 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
     if not isinstance(axes, tuple) or axes not in (*_AXES.values(), *_ALONG_Y.values()):
         raise FormatError(
             f"{file.where(_DATA)}@axes is {axes}.",
-            why="A scan is stored along [x], [repeat, x] or [y, x]; along y, as [y] or [repeat, y].",
+            why="A scan is stored along [x], [repeat, x], [y], [repeat, y] or, a raster, [y, x].",
             cure="Transpose the data, or correct the attribute.",
         )
     if ("y" in axes) != file.has(f"{_DATA}/y"):

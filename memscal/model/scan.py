@@ -200,7 +200,7 @@ class Scan:
             raise InputError(
                 f"x_errors holds {errors.size} values for {self.x.size} positions, the smallest "
                 f"{errors.min(initial=0.0) * 1e3:.4g} mm.",
-                cure="Give one standard uncertainty for each position, in m, none of them negative.",
+                cure="Give one standard uncertainty for each position, in m, none negative.",
             )
         object.__setattr__(self, "x_errors", errors)
 
@@ -225,7 +225,7 @@ class Scan:
         least = float(np.linalg.eigvalsh(given)[0])
         if least <= _LEAST_EIGENVALUE:
             raise InputError(
-                f"u_zz_correlation is not positive definite: its smallest eigenvalue is {least:.3g}.",
+                f"u_zz_correlation is not positive definite: it has the eigenvalue {least:.3g}.",
                 why="Some combination of the voltages would have no noise, or less than none.",
                 cure="Add the electronic noise, which is independent from point to point.",
             )

@@ -34,6 +34,8 @@ class StressProfile:
         The normal load :math:`P` that produces it, in N.
     sigma_rz : ndarray, shape (n,), optional
         Radial traction of the base on the film, in Pa, positive outward.
+    sigma_zz_errors : ndarray, shape (n,), optional
+        Standard uncertainty of ``sigma_zz``, in Pa; a calibration takes it as common to all radii.
     depth, contact_radius, stick_radius : float, optional
         Indentation depth and radii, in m.
     friction_coefficient : float, optional
@@ -67,6 +69,7 @@ class StressProfile:
     sigma_zz: FloatArray
     load: float
     sigma_rz: FloatArray | None = None
+    sigma_zz_errors: FloatArray | None = None
     depth: float | None = None
     contact_radius: float | None = None
     stick_radius: float | None = None
@@ -82,7 +85,7 @@ class StressProfile:
 
     def __post_init__(self) -> None:
         require_positive("load of the stress profile", self.load, "N")
-        for name in ("r", "sigma_zz", "sigma_rz"):
+        for name in ("r", "sigma_zz", "sigma_rz", "sigma_zz_errors"):
             values = getattr(self, name)
             if values is not None:
                 object.__setattr__(
@@ -93,7 +96,7 @@ class StressProfile:
             raise InputError(
                 "r of the stress profile is negative.", cure="Give radii, not positions."
             )
-        for name in ("sigma_zz", "sigma_rz"):
+        for name in ("sigma_zz", "sigma_rz", "sigma_zz_errors"):
             values = getattr(self, name)
             if values is not None and values.shape != self.r.shape:
                 raise InputError(

@@ -209,7 +209,8 @@ def test_the_result_is_the_same_however_often_and_whatever_the_global_random_sta
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"reference": [1, 2]}, "The reference is a list"),
+        ({"reference": {1: 2}}, "The reference is a dict"),
+        ({"reference": [None, None]}, "2 references were given, but there is one scan"),
         ({"method": 3}, "cannot divide"),
         ({"method": Tikhonov}, "that is set up"),
         ({"amplitude": "abc"}, "must be a positive number"),

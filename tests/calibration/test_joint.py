@@ -1,0 +1,201 @@
+"""Several scans of one sensor, fitted together; correlated noise, positions, and inputs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, simulated
+from scipy.stats import chi2
+
+import memscal
+from memscal.errors import InputError
+from memscal.model.scan import Scan, StressSensor
+
+SEEDS = 60
+CHANCE = 1e-5
+
+
+def joint(scans: list[Scan], **options):
+    return memscal.calibrate(scans, method="evidence", **options).apparatus
+
+
+def several(noise: float, seed: int = 0, **options) -> list[Scan]:
+    """Scans at other loads, with another rod, on another film."""
+    thin = replace(EXACT_FILM, thickness=1.5e-3, name="thin")
+    thick = replace(EXACT_FILM, name="thick")
+    wide = replace(EXACT_ROD, radius=0.5e-3)
+    common = {"noise": noise, "state_noise": noise > 0} | options
+    return [
+        simulated(film=thick, load=1.0, centre=(0.14e-3, 0.0), seed=seed, **common),
+        simulated(film=thick, load=0.4, centre=(-0.3e-3, 0.0), seed=seed + 1000, **common),
+        simulated(film=thin, rod=wide, load=0.7, points=45, seed=seed + 2000, **common),
+    ]
+
+
+def test_without_noise_scans_of_other_loads_rods_and_films_give_one_answer() -> None:
+    apparatus = joint(several(0.0))
+    assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=1e-5)
+    assert apparatus.gaussian_sigma == pytest.approx(SIGMA, rel=1e-5)
+    assert apparatus.parameters["centre_2"] == pytest.approx(-0.3e-3, abs=1e-8)
+
+
+def test_a_joint_fit_is_surer_than_each_of_its_scans_and_between_them() -> None:
+    scans = several(0.005)
+    together, alone = joint(scans), [joint([scan]) for scan in scans]
+    for name in ("conversion_constant_gaussian", "gaussian_sigma"):
+        weights = np.array([a.parameters.uncertainty(name) for a in alone]) ** -2
+        values = np.array([a.parameters[name] for a in alone])
+        # With nuisances of its own in every scan, the fits combine as independent measurements.
+        combined = weights.sum() ** -0.5
+        assert together.parameters.uncertainty(name) < 1.1 * min(weights**-0.5)
+        assert abs(together.parameters[name] - weights @ values / weights.sum()) < combined
+
+
+def test_a_scan_along_y_says_what_one_along_x_says() -> None:
+    scan = simulated(noise=0.003)
+    along_x, along_y = joint([scan]), joint([replace(scan, direction="y")])
+    assert along_y.conversion_constant == pytest.approx(along_x.conversion_constant, rel=1e-9)
+    assert along_y.parameters["centre_y"] == pytest.approx(along_x.parameters["centre"], rel=1e-9)
+    both = joint([scan, replace(simulated(noise=0.003, seed=7), direction="y")])
+    assert {"centre", "centre_y_2", "drift", "drift_y_2"} <= set(both.parameters.names)
+
+
+def test_lines_and_a_raster_are_fitted_together() -> None:
+    raster = simulated(raster=True, points=21, noise=0.003, centre=(0.2e-3, -0.1e-3), kernel=TAILS)
+    line = simulated(noise=0.003, kernel=TAILS)
+    apparatus = joint([line, raster])
+    deviation = apparatus.conversion_constant - CONVERSION
+    assert abs(deviation) < 4 * apparatus.parameters.uncertainty("conversion_constant")
+    assert apparatus.parameters["centre_y_2"] == pytest.approx(-0.1e-3, abs=0.02e-3)
+
+
+def test_scans_of_other_sensors_or_of_films_that_contradict_are_refused() -> None:
+    one, two, _ = several(0.003)
+    with pytest.raises(InputError, match="2 sensors: a simulated sensor"):
+        joint([one, replace(two, sensor=StressSensor(name="another"))])
+    other = replace(two, film=replace(two.film, thickness=2.1e-3))
+    with pytest.raises(InputError, match="name their film 'thick', but give it a thickness of 2"):
+        joint([one, other])
+    with pytest.raises(InputError, match="Some of the scans state their noise"):
+        joint([one, replace(two, u_zz_errors=None)])
+    with pytest.raises(InputError, match="no scan"):
+        joint([])
+
+
+def test_films_of_other_names_count_for_themselves_and_a_shared_film_once() -> None:
+    uncertain = [
+        replace(s, film=replace(s.film, thickness_uncertainty=2e-5)) for s in several(0.003)
+    ]
+    budget = joint(uncertain).budget["gaussian_sigma"]
+    assert {"thickness", "thickness_2"} <= set(budget)
+    assert "thickness_3" not in budget
+
+
+def correlated(scan: Scan, seed: int, reach: float = 0.4e-3) -> Scan:
+    """The scan with noise that forgets itself over a distance."""
+    apart = np.abs(np.subtract.outer(scan.x, scan.x))
+    correlation = 0.9 * np.exp(-apart / reach) + 0.1 * np.eye(scan.x.size)
+    draw = np.linalg.cholesky(correlation) @ np.random.default_rng(seed).normal(size=scan.x.size)
+    errors = np.full_like(scan.x, 0.005 * np.ptp(scan.u_zz))
+    u = scan.u_zz + errors * draw
+    return replace(scan, u_zz=u, u_zz_errors=errors, u_zz_correlation=correlation)
+
+
+def test_noise_that_is_correlated_is_weighed_as_such() -> None:
+    clean = simulated(noise=0.0)
+    stated, naive = [], []
+    for seed in range(SEEDS):
+        scan = correlated(clean, seed)
+        for scans, found in ((scan, stated), (replace(scan, u_zz_correlation=None), naive)):
+            p = joint([scans]).parameters
+            name = "gaussian_sigma"
+            found.append(((p[name] - SIGMA) / p.uncertainty(name), p[name] - SIGMA))
+    stated, naive = np.array(stated), np.array(naive)
+    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], SEEDS) / SEEDS)
+    assert low / 1.1 < np.sqrt(np.mean(stated[:, 0] ** 2)) < high * 1.1
+    assert np.std(stated[:, 1]) < np.std(naive[:, 1])
+
+
+@pytest.mark.parametrize(
+    ("correlation", "words"),
+    [
+        (np.ones((65, 65)), "not positive definite"),
+        (np.eye(65) * 2, "not one on its diagonal"),
+        (np.eye(60), r"should be \(65, 65\)"),
+        (np.full((65, 65), np.nan), "finite"),
+    ],
+)
+def test_a_correlation_that_no_noise_can_have_is_refused(correlation, words) -> None:
+    with pytest.raises(InputError, match=words):
+        replace(simulated(), u_zz_correlation=correlation)
+
+
+def test_uncertain_positions_count_as_noise_where_the_voltage_is_steep() -> None:
+    clean, jitter = simulated(noise=0.002, points=65), 0.05e-3
+    deviates = []
+    for seed in range(SEEDS):
+        rng = np.random.default_rng(seed)
+        scan = simulated(noise=0.002, seed=seed)
+        slope = np.gradient(simulated(noise=0.0).u_zz, scan.x)
+        shaken = scan.u_zz + slope * rng.normal(0, jitter, scan.x.size)
+        scan = replace(scan, u_zz=shaken, x_errors=np.full_like(scan.x, jitter))
+        p = joint([scan]).parameters
+        deviates.append((p["gaussian_sigma"] - SIGMA) / p.uncertainty("gaussian_sigma"))
+    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], SEEDS) / SEEDS)
+    assert low / 1.15 < np.sqrt(np.mean(np.square(deviates))) < high * 1.15
+    still = joint([clean]).parameters.uncertainty("gaussian_sigma")
+    assert p.uncertainty("gaussian_sigma") > 1.5 * still
+
+
+def test_the_scale_of_the_stage_moves_the_width_as_it_is_counted() -> None:
+    scan = replace(simulated(noise=0.002), position_scale_uncertainty=0.01)
+    usual, stretched = joint([scan]), joint([replace(scan, x=scan.x * 1.01)])
+    counted = usual.budget["gaussian_sigma"]["position_scale"]
+    moved = abs(stretched.gaussian_sigma - usual.gaussian_sigma)
+    assert counted == pytest.approx(moved, rel=0.1)
+
+
+def test_correlated_inputs_combine_as_their_correlation_says() -> None:
+    film = replace(EXACT_FILM, thickness_uncertainty=2e-5, poisson_ratio_uncertainty=0.005)
+    scan = simulated(film=film, noise=0.002)
+    pair = ("thickness", "poisson_ratio")
+    budgets = {r: joint([scan], correlations={pair: r}) for r in (-1.0, 0.0, 1.0)}
+    u = {r: a.parameters.uncertainty("gaussian_sigma") for r, a in budgets.items()}
+    parts = budgets[0.0].budget["gaussian_sigma"]
+    assert u[1.0] ** 2 + u[-1.0] ** 2 == pytest.approx(2 * u[0.0] ** 2)
+    assert abs(u[1.0] ** 2 - u[0.0] ** 2) == pytest.approx(2 * parts[pair[0]] * parts[pair[1]])
+    for r, apparatus in budgets.items():
+        squares = np.array(list(apparatus.budget["gaussian_sigma"].values()))
+        assert np.sum(np.copysign(squares**2, squares)) == pytest.approx(u[r] ** 2)
+
+
+@pytest.mark.parametrize(
+    ("correlations", "words"),
+    [
+        ({("thickness", "weather"): 0.5}, "'thickness' and 'weather'"),
+        ({("thickness", "poisson_ratio"): 1.5}, "outside -1 to 1"),
+        (
+            {
+                ("thickness", "poisson_ratio"): 0.9,
+                ("thickness", "load"): 0.9,
+                ("poisson_ratio", "load"): -0.9,
+            },
+            "contradict each other",
+        ),
+    ],
+)
+def test_correlations_that_cannot_be_are_refused(correlations, words) -> None:
+    with pytest.raises(InputError, match=words):
+        memscal.calibrate(memscal.simulate(), correlations=correlations)
+
+
+def test_another_model_of_the_film_is_counted_as_a_rectangle_of_their_difference() -> None:
+    scan = simulated(noise=0.002)
+    stiffer = memscal.indent(replace(scan.film, poisson_ratio=0.45), scan.indenter, load=scan.load)
+    usual = memscal.calibrate(scan, method="evidence", alternative=stiffer).apparatus
+    moved = memscal.calibrate(scan, method="evidence", reference=stiffer).apparatus
+    difference = abs(moved.gaussian_sigma - usual.gaussian_sigma)
+    counted = usual.budget["gaussian_sigma"]["model_form"]
+    assert counted == pytest.approx(difference / np.sqrt(3), rel=0.15)
