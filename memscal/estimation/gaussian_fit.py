@@ -18,7 +18,7 @@ from memscal.estimation.newton import gauss_newton
 from memscal.estimation.points import ScanPoints
 from memscal.model.validation import FloatArray
 
-__all__ = ["GaussianFit", "fit_gaussian"]
+__all__ = ["GaussianFit", "fit_gaussian", "linearise"]
 
 _Loss = Literal["linear", "soft_l1"]
 
@@ -115,11 +115,11 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
         key = scaled.tobytes()
         if key not in last:
             last.clear()
-            last[key] = _linearise(model, scaled * scale)
+            last[key] = linearise(model, scaled * scale)
         return last[key]
 
     scale = _typical(model, start)
-    unexplained = model.points.u - _linearise(model, start).predicted
+    unexplained = model.points.u - linearise(model, start).predicted
     noise = _robust_scale(standardised(unexplained, weights))
 
     def residual(scaled: FloatArray) -> FloatArray:
@@ -150,9 +150,9 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
             max_nfev=100,
         )
         if not result.success:
-            raise _undetermined(model, _linearise(model, result.x * scale))
+            raise _undetermined(model, linearise(model, result.x * scale))
         found = np.asarray(result.x)
-    fit = _linearise(model, found * scale)
+    fit = linearise(model, found * scale)
     if not 0 < fit.conversion_constant < np.inf:
         raise _undetermined(model, fit)
     return _positive_width(fit)
@@ -167,7 +167,16 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift])
 
 
-def _linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
+def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
+    """Return the model and its derivatives at given parameters.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Points and reference.
+    theta : ndarray, shape (p,)
+        A, sigma, free coordinates of the centres, and drift, as in :class:`GaussianFit`.
+    """
     free = model.points.free
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)
