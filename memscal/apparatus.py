@@ -7,6 +7,7 @@ from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import j0
 
 from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline
 from memscal.errors import InputError
@@ -85,6 +86,37 @@ class ApparatusFunction(ApparatusData):
         """
         return self.conversion_constant * self.convolve(r, sigma_zz)
 
+    def convolve_uncertainty(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+        r"""Return the standard uncertainty of :meth:`convolve` that G brings, in Pa.
+
+        :math:`\sqrt{K C K^T}` for the operator :math:`K` that takes G(r) to the blurred stress, and
+        the stored covariance :math:`C` of G(r).  Parameters and errors are those of
+        :meth:`convolve`.
+        """
+        operator, _ = self._operator(r, sigma_zz)
+        variance = np.einsum("ij,jk,ik->i", operator, self.radial_profile.g_covariance, operator)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def predict_uncertainty(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
+        r"""Return the standard uncertainty of :meth:`predict` that A and G bring, in V.
+
+        The errors of A and G are correlated: a profile that is too narrow has too small a tail,
+        and with it too small an A.  Artifacts that do not state the correlation count none.
+        """
+        operator, blurred = self._operator(r, sigma_zz)
+        profile, a = self.radial_profile, self.conversion_constant
+        u_a = self.parameters.uncertainty("conversion_constant")
+        variance = (a * self.convolve_uncertainty(r, sigma_zz)) ** 2 + (blurred * u_a) ** 2
+        if profile.conversion_correlation is not None:
+            shared = operator @ (profile.conversion_correlation * profile.g_errors)
+            variance += 2 * a * blurred * u_a * shared
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def stress_uncertainty(self, u_zz: ArrayLike) -> FloatArray:
+        """Return the standard uncertainty of :meth:`stress` that A brings, in Pa."""
+        relative = self.parameters.uncertainty("conversion_constant") / self.conversion_constant
+        return np.abs(self.stress(u_zz)) * relative
+
     def stress(self, u_zz: ArrayLike) -> FloatArray:
         """Return the measured stress S_zz = U_zz / A, in Pa, for voltages in V of any shape.
 
@@ -104,6 +136,19 @@ class ApparatusFunction(ApparatusData):
         from memscal.formats.artifact import write_artifact
 
         write_artifact(self, path, overwrite=overwrite)
+
+    def _operator(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Matrix from G at its radii to the blurred stress at ``r``, and the latter."""
+        radii, stress = self._checked(r, sigma_zz)
+        profile = self.radial_profile
+        reach = float(radii[-1] + profile.r[-1])
+        wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
+        # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
+        ring = 2 * np.pi * profile.r * np.gradient(profile.r)
+        kernel = j0(np.multiply.outer(wavenumbers.k, profile.r)) * ring
+        field = wavenumbers.weights * hankel_transform(radii, stress, wavenumbers.k)
+        operator = (j0(np.multiply.outer(radii, wavenumbers.k)) * field) @ kernel
+        return operator, operator @ profile.g
 
     def _at(self, values: FloatArray, r: ArrayLike) -> FloatArray:
         radii = np.abs(np.asarray(r, dtype=np.float64))

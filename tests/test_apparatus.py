@@ -14,9 +14,11 @@ import pytest
 from builders import CONVERSION, SIGMA, make_artifact
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scans import EXACT_FILM, EXACT_ROD, TAILS
 from scipy.integrate import dblquad
 from scipy.signal import fftconvolve
 
+import memscal
 from memscal import ApparatusFunction, load_apparatus
 from memscal.errors import FormatError, InputError, OutputError, SchemaVersionError
 from memscal.formats.schema import VERSION_ATTRIBUTE
@@ -279,3 +281,30 @@ def test_an_artifact_keeps_its_arrays_and_names_its_parameters():
         apparatus.radial_profile.g[0] = 1.0
     with pytest.raises(InputError, match="There is no parameter conversion"):
         apparatus.parameters["conversion"]
+
+
+def test_the_uncertainty_of_a_prediction_is_that_of_many_calibrations() -> None:
+    """Predicted voltages of a sphere's stress scatter as the artifact's covariances say."""
+    film, rod = EXACT_FILM, EXACT_ROD
+    sphere = memscal.indent(film, memscal.Sphere(radius=20e-3), load=1.0)
+    r = np.linspace(0.0, 12e-3, 241)
+    stress = sphere.base_stress(r)
+    predicted, stated, blurred = [], [], []
+    for seed in range(40):
+        scan = memscal.simulate(
+            film=film, rod=rod, noise=0.005, seed=seed, load_uncertainty=None, kernel=TAILS
+        )
+        apparatus = memscal.calibrate(scan, method="evidence").apparatus
+        predicted.append(apparatus.predict(r, stress)[:60:6])
+        stated.append(apparatus.predict_uncertainty(r, stress)[:60:6])
+        blurred.append(apparatus.convolve_uncertainty(r, stress)[:60:6])
+    scatter, said = np.std(predicted, axis=0, ddof=1), np.sqrt(np.mean(np.square(stated), axis=0))
+    # A standard deviation of 40 is known to 11 %: what is stated also counts what does not scatter.
+    assert np.all(scatter < 1.5 * said)
+    assert np.all(said < 3 * scatter)
+    # A alone, as if it were independent of G, would say more than is true on the axis.
+    u_a = apparatus.parameters.uncertainty("conversion_constant") / apparatus.conversion_constant
+    assert apparatus.stress_uncertainty(predicted[-1]) == pytest.approx(
+        u_a * np.abs(apparatus.stress(predicted[-1]))
+    )
+    assert np.all(np.array(blurred) > 0)

@@ -96,7 +96,11 @@ def _radial(solution: Solution, results: Results) -> ApparatusRadial:
     view = solution.quotient.kernel.view
     covariance = results.radial_covariance
     gaussian = unit_gaussian(view.r, solution.estimate.gaussian.sigma)
-    return ApparatusRadial(view.r, view.radial, np.sqrt(np.diag(covariance)), gaussian, covariance)
+    errors = np.sqrt(np.diag(covariance))
+    with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
+    scale = errors * results.parameters.uncertainty("conversion_constant")
+    correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
+    return ApparatusRadial(view.r, view.radial, errors, gaussian, covariance, correlation)
 
 
 def _transfer(solution: Solution, results: Results) -> TransferFunction:

@@ -175,6 +175,9 @@ def _radial_group(radial: ApparatusRadial) -> Group:
         "g_gaussian": si(radial.g_gaussian, "per area", ("r",)),
         "g_covariance": si(radial.g_covariance, "per area squared", ("r", "r_prime")),
     }
+    if radial.conversion_correlation is not None:
+        correlation = si(radial.conversion_correlation, "dimensionless", ("r",))
+        children["conversion_correlation"] = correlation
     return Group("NXdata", children, {"signal": "g", "axes": ("r",)})
 
 
@@ -186,7 +189,12 @@ def _read_radial(file: SafeFile, path: str) -> ApparatusRadial:
         g_errors=_shaped(file, f"{path}/g_errors", "per area", r.shape),
         g_gaussian=_shaped(file, f"{path}/g_gaussian", "per area", r.shape),
         g_covariance=_shaped(file, f"{path}/g_covariance", "per area squared", (r.size, r.size)),
+        conversion_correlation=_correlation(file, f"{path}/conversion_correlation", r.size),
     )
+
+
+def _correlation(file: SafeFile, path: str, size: int) -> FloatArray | None:
+    return _shaped(file, path, "dimensionless", (size,)) if file.has(path) else None
 
 
 def _transfer_group(transfer: TransferFunction) -> Group:

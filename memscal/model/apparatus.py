@@ -48,7 +48,8 @@ class ApparatusRadial:
     """The radial profile of the apparatus function.
 
     ``r`` (n,) in m; ``g``, ``g_errors`` (k = 1) and ``g_gaussian`` (n,) in 1/m^2;
-    ``g_covariance`` (n, n) in 1/m^4.
+    ``g_covariance`` (n, n) in 1/m^4; ``conversion_correlation`` (n,): correlation of the errors
+    of G and of the conversion constant, ``None`` where it is not known.
     """
 
     r: FloatArray
@@ -56,9 +57,12 @@ class ApparatusRadial:
     g_errors: FloatArray
     g_gaussian: FloatArray
     g_covariance: FloatArray
+    conversion_correlation: FloatArray | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self, "r", "g", "g_errors", "g_gaussian", "g_covariance")
+        if self.conversion_correlation is not None:
+            freeze_arrays(self, "conversion_correlation")
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,13 +166,18 @@ class ParameterSet:
 
 @dataclass(frozen=True)
 class QualityCheck:
-    """One check of a result: what was found, what is allowed, and what a failure means."""
+    """One check of a result: what was found, what is allowed, and what a failure means.
+
+    A check passes while ``value`` is at most ``limit``.  ``p_value``: the chance of such a value,
+    or a larger one, if nothing is wrong; ``None`` where it is not known.
+    """
 
     name: str
     value: float
     limit: float
     passed: bool
     meaning: str
+    p_value: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
