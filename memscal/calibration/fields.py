@@ -13,6 +13,7 @@ from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice, cut, lift
 from memscal.deconvolution.problem import NOISE_RATIO, DivisionProblem
 from memscal.errors import InputError
 from memscal.estimation.band import Band
+from memscal.estimation.constrained import constrained_profile
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
@@ -135,13 +136,18 @@ def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
 
 def division_problem(estimate: ProfileEstimate, band: Band, fields: Fields) -> DivisionProblem:
     """Return what a regulariser is given."""
+
+    def posterior(nonnegative: bool, monotone: bool) -> FloatArray:
+        profile = constrained_profile(estimate, nonnegative=nonnegative, monotone=monotone)
+        return fields.kernel(profile)
+
     return DivisionProblem(
         fields.grid,
         fields.voltage,
         fields.reference,
         band.weakest_voltage,
         band.weakest_reference,
-        posterior=lambda: fields.kernel(estimate.radial),
+        posterior=posterior,
     )
 
 

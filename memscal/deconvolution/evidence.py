@@ -22,8 +22,18 @@ class Evidence:
     (:mod:`memscal.estimation.evidence`).  The fields of the other methods are made of that
     estimate's convolution with the reference; this method takes the estimate itself, so that
     nothing is lost to a window, and beyond the resolved band the prior takes over.
+
+    Parameters
+    ----------
+    nonnegative : bool
+        Take the most credible G that is nowhere negative.
+    monotone : bool
+        Take the most credible G that nowhere rises with the radius.  A ring does: whether a
+        constraint contradicts the scan is what the check ``reconvolution`` tells.
     """
 
+    nonnegative: bool = False
+    monotone: bool = False
     name: ClassVar[str] = "evidence"
     assumes: ClassVar[str] = "G is a Gaussian, or departs from one smoothly."
     fails: ClassVar[str] = (
@@ -37,4 +47,5 @@ class Evidence:
                 "Method evidence was given fields without the scan that they came from.",
                 cure="Use it by memscal.calibrate(scan, method='evidence').",
             )
-        return Division(problem.posterior(), np.ones(problem.voltage_spectrum.shape))
+        field = problem.posterior(self.nonnegative, self.monotone)
+        return Division(field, np.ones(problem.voltage_spectrum.shape))

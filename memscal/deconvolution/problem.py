@@ -48,7 +48,8 @@ class DivisionProblem:
         voltage's stands ten times above its noise, in V m^2/N and 1.
     posterior : callable, optional
         Returns A G on the grid, in V/Pa/m^2, as the scan's points give it without any division:
-        the mean of its posterior.
+        the mean of its posterior, or the most credible that is not negative (first argument) or
+        does not rise with the radius (second).
     """
 
     grid: FieldGrid
@@ -56,7 +57,7 @@ class DivisionProblem:
     reference: FloatArray
     weakest_voltage: float
     weakest_reference: float
-    posterior: Callable[[], FloatArray] | None = None
+    posterior: Callable[[bool, bool], FloatArray] | None = None
 
     @cached_property
     def voltage_spectrum(self) -> FloatArray:
