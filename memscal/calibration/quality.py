@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtrc
 
+from memscal.calibration.model_checks import check, model_checks
 from memscal.calibration.solution import Misfit, Solution
+from memscal.estimation.band import RESOLVED
 from memscal.estimation.forward import gaussian_transfer
-from memscal.estimation.hypotheses import (
-    axisymmetry_test,
-    chi_square_limit,
-    linearity_test,
-    symmetry_test,
-)
-from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.estimation.hypotheses import chi_square_limit
 from memscal.model.apparatus import ParameterSet, QualityCheck
 
 __all__ = ["quality_checks"]
@@ -22,68 +19,112 @@ _TAIL_LIMIT = 0.05
 _BAND_LIMIT = 0.5
 _FORCE_LIMIT = 0.01
 _OUTLIER_LIMIT = 0.10
-_NOISE_LIMIT = 1.5
 _WIDTH_LIMIT = 3.0
 _NEGLIGIBLE_DIFFERENCE = 0.002
 
 
 def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
-    estimate, quotient = solution.estimate, solution.quotient
-    checks = [
+    return (
+        *_reconvolutions(solution),
+        *_agreements(solution, parameters),
+        *_set_up(solution),
+        *model_checks(solution.estimate),
+    )
+
+
+def _reconvolutions(solution: Solution) -> list[QualityCheck]:
+    evidence = solution.regulariser.name == "evidence"
+    removed = (
+        "the posterior mean of G misses something that the scan shows"
+        if evidence
+        else "the regularisation has removed something that the scan shows (see method evidence)"
+    )
+    stated = solution.estimate.points.u_errors is not None
+    return [
         _chi_square(
             "reconvolution",
-            quotient.misfit,
-            "Reduced chi-square of the scan against the deconvolved G convolved with the "
-            "reference. A failure means that the regularisation has removed something that the "
-            "scan shows, or that the scan is no convolution of the reference.",
+            solution.quotient.misfit,
+            "Reduced chi-square of the scan against the found G convolved with the reference. A "
+            f"failure means that {removed}, or that the scan is no convolution of the reference: "
+            "look at chi_square, which does not depend on G.",
         ),
         _chi_square(
             "gaussian_misfit",
             solution.gaussian_misfit,
             "Reduced chi-square of the scan against the fitted Gaussian convolved with the "
-            "reference. A failure means that G is not Gaussian at this noise: use the "
-            "deconvolved G, not gaussian_sigma.",
+            "reference. A failure means that G is not Gaussian at this noise: use the found G, "
+            "not gaussian_sigma.",
+            exact=stated,
         ),
+    ]
+
+
+def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
+    """Compare the found G with the Gaussian; the two are fitted to the same noise."""
+    if solution.regulariser.name == "evidence":
+        found = "of the free G in data space"
+        else_ = ""
+    else:
+        found = "of the G by division of the fields"
+        else_ = ", or that the method of division failed: compare method evidence"
+    return [
         _agreement(
             parameters,
             ("conversion_constant", "conversion_constant_gaussian"),
             "method_agreement",
-            "Difference of the conversion constants by deconvolution and by the Gaussian fit, in "
-            "its standard uncertainty. A failure means that one of them is biased, as when G has "
-            "tails that a Gaussian lacks, or when the method of division failed.",
+            f"Difference of the conversion constant {found} from the Gaussian fit's, in its "
+            "standard uncertainty. A failure means that the Gaussian's is biased, as when G has "
+            f"tails that a Gaussian lacks{else_}.",
         ),
         _agreement(
             parameters,
             ("gaussian_sigma_deconvolved", "gaussian_sigma"),
             "width_agreement",
-            "Difference of the widths fitted to the deconvolved G and to the scan, in its standard "
-            "uncertainty. A failure means that G is not Gaussian, or that the method of division "
-            "failed: look at both reconvolutions.",
+            f"Difference of the width {found} from the one fitted to the scan, in its standard "
+            "uncertainty. A failure means that G is not Gaussian, so that its width depends on how "
+            f"it is read off{else_}. Look at both reconvolutions.",
         ),
-        _check(
+    ]
+
+
+def _set_up(solution: Solution) -> list[QualityCheck]:
+    """Film, band, reach, baseline and reference."""
+    estimate = solution.estimate
+    resolved = solution.band.resolved
+    return [
+        check(
             "width_over_thickness",
             estimate.gaussian.sigma / solution.scan.film.thickness,
             _WIDTH_LIMIT,
             "Width of G over the film's thickness. A failure means that the unit of the positions "
             "or of the film's thickness should be looked at.",
         ),
-        _check(
+        check(
             "resolved_band",
-            float(gaussian_transfer(np.array(solution.band.resolved), estimate.gaussian.sigma)),
+            float(gaussian_transfer(np.array(resolved), estimate.gaussian.sigma)),
             _BAND_LIMIT,
-            "Transfer function of the fitted Gaussian at the resolved wavenumber. A failure means "
-            "that noise hides more than half of G's spectrum: average repeats or raise the load.",
+            "Transfer function of the fitted Gaussian at the resolved wavenumber, here "
+            f"{resolved * 1e-3:.3g} rad/mm: up to there, the posterior standard uncertainty of G's "
+            f"transfer function is less than 1/{RESOLVED:g} of it, whatever the method of "
+            "division; beyond, the prior speaks and not the scan. A failure means that noise hides "
+            "more than half of G's spectrum: average repeats or raise the load.",
         ),
-        _check(
+        check(
             "tail_share",
             solution.tail_share,
             _TAIL_LIMIT,
             "Share of the voltage's integral that lies beyond the scan and is extrapolated. A "
             "failure means that A rests on the extrapolation: scan farther.",
         ),
-        _drift(estimate),
-        _check(
+        check(
+            "baseline_drift",
+            2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal,
+            _BASELINE_DRIFT_LIMIT,
+            "Change of the baseline across the scan over the largest signal. It is fitted and "
+            "removed as a straight line; a failure means that what is left of it may bias A.",
+        ),
+        check(
             "reference_force",
             abs(estimate.model.reference.integral - 1.0),
             _FORCE_LIMIT,
@@ -91,98 +132,29 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
             "that the reference was made for another load, or that its table ends too early; A is "
             "wrong by as much.",
         ),
-        _check(
+        check(
             "outliers",
             float(np.mean(estimate.outlier_weight < 0.5)),
             _OUTLIER_LIMIT,
             "Share of points whose weight was more than halved. A failure means that the noise is "
-            "not what the uncertainties take it for.",
+            "not what the uncertainties take it for: look at the points that the messages name.",
         ),
     ]
-    return tuple(checks + _noise_check(estimate) + _hypotheses(estimate))
 
 
-def _chi_square(name: str, misfit: Misfit, meaning: str) -> QualityCheck:
+def _chi_square(name: str, misfit: Misfit, meaning: str, *, exact: bool = False) -> QualityCheck:
+    """Check a misfit; its p-value is known where the noise is, for a plain fit."""
     limit = chi_square_limit(misfit.degrees) / misfit.degrees
-    return _check(name, misfit.chi2_reduced, limit, meaning)
-
-
-def _check(name: str, value: float, limit: float, meaning: str) -> QualityCheck:
-    return QualityCheck(name, float(value), float(limit), bool(value <= limit), meaning)
+    p_value = float(chdtrc(misfit.degrees, misfit.chi2_reduced * misfit.degrees))
+    return check(name, misfit.chi2_reduced, limit, meaning, p_value if exact else None)
 
 
 def _agreement(
-    parameters: ParameterSet, names: tuple[str, str], check: str, meaning: str
+    parameters: ParameterSet, names: tuple[str, str], name: str, meaning: str
 ) -> QualityCheck:
     i, j = (parameters.names.index(name) for name in names)
     c, values = parameters.covariance, parameters.values
     variance = max(c[i, i] + c[j, j] - 2 * c[i, j], 0.0)
     # Differences below a fifth of a percent matter to nobody, however small their noise.
     allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * values[j])
-    return _check(check, abs(values[i] - values[j]) / allowed, 3.0, meaning)
-
-
-def _drift(estimate: ProfileEstimate) -> QualityCheck:
-    return _check(
-        "baseline_drift",
-        2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal,
-        _BASELINE_DRIFT_LIMIT,
-        "Change of the baseline across the scan over the largest signal. It is fitted and removed "
-        "as a straight line; a failure means that what is left of it may bias A.",
-    )
-
-
-def _noise_check(estimate: ProfileEstimate) -> list[QualityCheck]:
-    if estimate.points.u_errors is None:
-        return []
-    return [
-        _check(
-            "noise_as_stated",
-            estimate.weighed.noise,
-            _NOISE_LIMIT,
-            "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
-            "something besides electronic noise scatters the scan, such as position or load; the "
-            "uncertainties have been raised accordingly.",
-        )
-    ]
-
-
-def _hypotheses(estimate: ProfileEstimate) -> list[QualityCheck]:
-    checks = []
-    if estimate.points.planar:
-        uneven = axisymmetry_test(estimate)
-        checks.append(
-            _check(
-                "axisymmetry",
-                uneven.fall,
-                chi_square_limit(uneven.count),
-                f"Fall of chi-square by {uneven.count} columns of an elliptic sensor, which then "
-                f"make up {uneven.size:.2%} of the largest signal. A failure means that the radial "
-                "profile is only a mean over directions: use the field.",
-            )
-        )
-    else:
-        odd = symmetry_test(estimate)
-        checks.append(
-            _check(
-                "symmetry",
-                odd.fall,
-                chi_square_limit(odd.count),
-                f"Fall of chi-square by {odd.count} odd columns, which then make up {odd.size:.2%} "
-                "of the largest signal. A failure means that the left and right halves differ: a "
-                "tilted rod, an uneven film, or a drifting load.",
-            )
-        )
-    linear = linearity_test(estimate)
-    if linear is not None:
-        checks.append(
-            _check(
-                "load_linearity",
-                linear.fall,
-                chi_square_limit(1),
-                f"Fall of chi-square by a conversion constant that changes with the load, here by "
-                f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the "
-                "output is not linear in the load, and that one A does not serve all loads.",
-            )
-        )
-    return checks
+    return check(name, abs(values[i] - values[j]) / allowed, 3.0, meaning)

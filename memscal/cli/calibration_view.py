@@ -59,6 +59,7 @@ def calibration_json(found: Calibration, artifact: Path) -> dict[str, Any]:
                 "value": finite(check.value),
                 "limit": finite(check.limit),
                 "passed": check.passed,
+                "p_value": None if check.p_value is None else finite(check.p_value),
             }
             for check in apparatus.checks
         ],
@@ -107,18 +108,19 @@ def _misfit(misfit: Misfit) -> str:
 
 
 def checks_table(checks: Sequence[QualityCheck]) -> Table:
-    """Return quality checks with value and limit."""
+    """Return quality checks with value and limit, and the chance of such a value where known."""
     rows = [
         (
             check.name.replace("_", " "),
             f"{check.value:.3g}",
             f"{check.limit:.3g}",
+            "" if check.p_value is None else f"{check.p_value:.2g}",
             "passed" if check.passed else "FAILED",
         )
         for check in checks
     ]
     failed = frozenset(i for i, check in enumerate(checks) if not check.passed)
-    return Table("Quality checks", ("check", "value", "limit", "result"), rows, failed)
+    return Table("Quality checks", ("check", "value", "limit", "p", "result"), rows, failed)
 
 
 def rehearsal_json(

@@ -1,6 +1,18 @@
 r"""Up to which wavenumber the scan determines the apparatus function.
 
-The measured points are rings: the transform of the voltage at :math:`k` is a sum
+It is resolved while the posterior standard uncertainty of its transfer function stays below a
+third of the fitted Gaussian's transfer function,
+
+.. math::
+
+    u[\hat G(k)] < \tfrac13\,e^{-\sigma^2k^2/2}.
+
+The Gaussian's has no zeros, unlike a ring's or a disc's own, and no lobes that a prior could have
+made up: where it has fallen below three times the uncertainty, a shape fitted to smaller
+wavenumbers says more about G than the scan does.
+
+Which components are relevant to a division of fields is told by the voltage itself.  The measured
+points are rings: the transform of the voltage at :math:`k` is a sum
 :math:`\sum_i a_i u_i J_0(kR_i)` with ring areas :math:`a_i`, and its noise is the same sum in
 quadrature.  Points whose signal is lost in noise carry the profile's tail instead, and count
 as :math:`u_i^2/(u_i^2 + s_i^2)`.
@@ -13,20 +25,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0
 
+from memscal.estimation.forward import gaussian_transfer
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
-__all__ = ["Band", "find_band"]
+__all__ = ["Band", "find_band", "transfer_uncertainty"]
 
 #: A spectral component is relevant while it stands this many times above its noise...
 RELEVANT = 10.0
-#: ...and resolved while its relative standard uncertainty is below a third.
+#: ...and resolved while the Gaussian's transfer function is this many standard uncertainties.
 RESOLVED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Signal and noise of the voltage's transform.
+    """Signal and noise of the voltage's transform, and how far G is known.
 
     Parameters
     ----------
@@ -34,9 +47,12 @@ class Band:
         Wavenumbers, in rad/m.
     signal, noise : ndarray, shape (n,)
         Modulus of the voltage's transform and its noise, in V m^2 / N.
-    relevant, resolved : float
-        Wavenumbers beyond which the signal stays below ten and three times the noise, in rad/m;
-        at most the last one that the scan's step samples.
+    relevant : float
+        Wavenumber beyond which the signal stays below ten times the noise, in rad/m; at most the
+        last one that the scan's step samples.
+    resolved : float
+        Wavenumber up to which the transfer function's standard uncertainty stays below a third of
+        the fitted Gaussian's transfer function, in rad/m; at most the last one sampled.
     weakest_voltage, weakest_reference : float
         Moduli of both fields' transforms at ``relevant``.
     """
@@ -59,11 +75,32 @@ def find_band(estimate: ProfileEstimate) -> Band:
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
     sampled = np.pi / estimate.points.step
     relevant = min(_falls_below(k, ratio, RELEVANT), sampled)
-    resolved = min(_falls_below(k, ratio, RESOLVED), sampled)
+    yardstick = gaussian_transfer(k, estimate.gaussian.sigma)
+    error = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny)
+    resolved = min(_first_below(k, yardstick / error, RESOLVED), sampled)
     reference = np.abs(estimate.model.reference.values)
     weakest_voltage = float(np.interp(relevant, k, signal))
     weakest_reference = float(np.interp(relevant, k, reference))
     return Band(k, signal, noise, relevant, resolved, weakest_voltage, weakest_reference)
+
+
+def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
+    r"""Posterior standard uncertainty of the transfer function at the quadrature nodes.
+
+    That of :math:`\hat G(k) = \hat K(k)/\hat K(0)` for the posterior of :math:`K = A\,G`: the
+    noise and what the prior allows; the uncertainty of the reference is not part of it.
+    """
+    basis, a = estimate.basis, estimate.conversion_constant
+    rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
+    variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _first_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
+    """Return where a ratio first falls below a threshold, log-interpolated."""
+    below = ratio < threshold
+    end = int(np.argmax(below)) + 1 if below.any() else k.size
+    return _falls_below(k[:end], ratio[:end], threshold)
 
 
 def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:

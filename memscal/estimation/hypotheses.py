@@ -12,14 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
+from memscal.estimation.evidence import HYPOTHESES
 from memscal.estimation.forward import gaussian_transfer
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
 __all__ = [
+    "Departure",
     "ExtraColumns",
     "axisymmetry_test",
     "chi_square_limit",
+    "departure_evidence",
     "linearity_test",
     "symmetry_test",
 ]
@@ -28,6 +31,8 @@ __all__ = [
 FALSE_ALARM = 1e-3
 #: Loads must differ by this share of their mean before linearity can be tested.
 _LOAD_CONTRAST = 0.05
+#: Probabilities below this are not followed by the evidence.
+_LEAST_PROBABILITY = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +48,34 @@ class ExtraColumns:
     coefficients: FloatArray
     errors: FloatArray
     size: float
+
+
+@dataclass(frozen=True)
+class Departure:
+    """How far the scan speaks for a departure from a Gaussian G.
+
+    ``log_bayes_factor``: natural logarithm of the evidence for departures over that for the
+    Gaussian, the prior odds taken out, within -8.5 and 8.5; ``kind``: the most probable kind of
+    departure, and its ``share`` of all departures' probability (zero where none has any).
+    """
+
+    log_bayes_factor: float
+    kind: str
+    share: float
+
+
+def departure_evidence(estimate: ProfileEstimate) -> Departure:
+    """Weigh departures of any kind against the Gaussian, by their evidence."""
+    prior, weighed = HYPOTHESES[0].estimate, estimate.weighed
+    posterior = np.clip(weighed.gaussian_probability, _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
+    factor = (1 - posterior) / posterior * prior / (1 - prior)
+    kinds: dict[str, float] = {}
+    for hypothesis, probability in zip(HYPOTHESES[1:], weighed.probability[1:], strict=True):
+        if hypothesis.shape is not None and hypothesis.estimate > 0:
+            name = hypothesis.shape.name
+            kinds[name] = kinds.get(name, 0.0) + float(probability)
+    kind = max(kinds, key=lambda name: kinds[name])
+    return Departure(float(np.log(factor)), kind, kinds[kind] / max(sum(kinds.values()), 1e-300))
 
 
 def chi_square_limit(degrees: float) -> float:

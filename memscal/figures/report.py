@@ -102,14 +102,17 @@ def _checks_table(data: ApparatusData) -> str:
             check.name.replace("_", " "),
             f"{check.value:.3g}",
             f"{check.limit:.3g}",
+            "–" if check.p_value is None else f"{check.p_value:.2g}",
             "passed" if check.passed else "FAILED",
             check.meaning,
         )
         for check in data.checks
     ]
     failed = {i for i, check in enumerate(data.checks) if not check.passed}
-    head = ("check", "value", "limit", "result", "meaning")
-    return _table("Each check, its value and its limit", head, rows, marked=failed)
+    head = ("check", "value", "limit", "p-value", "result", "meaning")
+    return _table(
+        "Each check, its value, its limit and the chance of such a value", head, rows, marked=failed
+    )
 
 
 def _budget_table(data: ApparatusData) -> str:

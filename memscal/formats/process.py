@@ -7,7 +7,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from memscal.errors import InputError
-from memscal.formats.fields import json_value, optional_text, require_scalar, require_text
+from memscal.formats.fields import (
+    json_value,
+    optional_scalar,
+    optional_text,
+    require_scalar,
+    require_text,
+)
 from memscal.formats.hdf5_reader import SafeFile
 from memscal.formats.json_text import to_json
 from memscal.formats.tree import Group, Node, count, note, si
@@ -79,16 +85,16 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
         name = re.sub(r"[^a-z0-9_]+", "_", check.name.lower()).strip("_")
         if not name or name in children:
             raise InputError(f'Two quality checks would be stored as "{name}".')
-        children[name] = Group(
-            "NXcollection",
-            {
-                "name": check.name,
-                "value": si(check.value, "dimensionless"),
-                "limit": si(check.limit, "dimensionless"),
-                "passed": count(int(check.passed)),
-                "meaning": check.meaning,
-            },
-        )
+        found: dict[str, Node] = {
+            "name": check.name,
+            "value": si(check.value, "dimensionless"),
+            "limit": si(check.limit, "dimensionless"),
+            "passed": count(int(check.passed)),
+            "meaning": check.meaning,
+        }
+        if check.p_value is not None:
+            found["p_value"] = si(check.p_value, "dimensionless")
+        children[name] = Group("NXcollection", found)
     listed = to_json("quality checks", list(children))
     return Group("NXcollection", {"names": listed, **children})
 
@@ -105,6 +111,7 @@ def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
                 limit=require_scalar(file, f"{group}/limit", "dimensionless"),
                 passed=bool(require_scalar(file, f"{group}/passed", "dimensionless")),
                 meaning=optional_text(file, f"{group}/meaning"),
+                p_value=optional_scalar(file, f"{group}/p_value", "dimensionless"),
             )
         )
     return tuple(checks)

@@ -56,7 +56,7 @@ def test_json_is_one_object_in_the_form_of_the_contract(run: Run, scan: Path) ->
     assert set(found["reconvolution"]) == {
         "relative_rms", "gaussian_relative_rms", "chi2_reduced", "gaussian_chi2_reduced",
     }  # fmt: skip
-    assert all(set(c) == {"name", "value", "limit", "passed"} for c in found["checks"])
+    assert all(set(c) == {"name", "value", "limit", "passed", "p_value"} for c in found["checks"])
 
 
 def test_json_and_artifact_say_the_same_in_their_own_units(run: Run, scan: Path) -> None:

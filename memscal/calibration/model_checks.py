@@ -1,0 +1,221 @@
+"""Checks of the model itself: is the scan a convolution at all, of one G, with such noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from memscal.estimation.hold_out import hold_out, load_groups
+from memscal.estimation.hypotheses import (
+    ExtraColumns,
+    axisymmetry_test,
+    chi_square_limit,
+    departure_evidence,
+    linearity_test,
+    symmetry_test,
+)
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.estimation.residuals import (
+    FEWEST_RESIDUALS,
+    Residuals,
+    chi_square_test,
+    independent_residuals,
+    neighbour_correlation_test,
+    pure_error_test,
+    runs_test,
+)
+from memscal.model.apparatus import QualityCheck
+
+__all__ = ["check", "model_checks"]
+
+_NOISE_LIMIT = 1.5
+#: Evidence exceeds this in less than one Gaussian sensor of a thousand: odds of mean one
+#: exceed a thousand at most once in a thousand (Markov's inequality).
+_EVIDENCE_LIMIT = float(np.log(1000.0))
+_KINDS = {
+    "edge": "an edge: a flat top with steep flanks, as of a disc",
+    "rough edge": "an edge: a flat top with steep flanks, as of a disc",
+    "core": "a core of its own: a ring or a spike in the middle",
+    "tail": "tails that fall more slowly than a Gaussian's",
+}
+
+
+def check(
+    name: str, value: float, limit: float, meaning: str, p_value: float | None = None
+) -> QualityCheck:
+    """Return a check, which passes while its value is at most the limit."""
+    passed = bool(value <= limit)
+    return QualityCheck(name, float(value), float(limit), passed, meaning, p_value)
+
+
+def model_checks(estimate: ProfileEstimate) -> list[QualityCheck]:
+    """Run every check of the model that applies to the scan."""
+    residuals = independent_residuals(estimate)
+    checks = _noise(estimate)
+    if residuals.values.size >= FEWEST_RESIDUALS:
+        checks += _size(estimate, residuals)
+        checks += _order(residuals)
+    checks.append(_evidence(estimate))
+    checks += _symmetry(estimate)
+    checks += _linearity(estimate)
+    return checks + _held_out(estimate)
+
+
+def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
+    if estimate.points.u_errors is None:
+        return []
+    return [
+        check(
+            "noise_as_stated",
+            estimate.weighed.noise,
+            _NOISE_LIMIT,
+            "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
+            "something besides electronic noise scatters the scan, such as position or load; the "
+            "uncertainties have been raised accordingly.",
+        )
+    ]
+
+
+def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
+    """Compare what no G explains with the noise, if there is a noise to compare with."""
+    degrees = residuals.values.size
+    if residuals.stated:
+        found = chi_square_test(residuals)
+        compared = f"with the stated noise: reduced chi-square of {degrees} degrees"
+        noise = "the noise is larger than stated, or "
+    else:
+        pure = pure_error_test(estimate)
+        if pure is None:
+            return []
+        found, noise = pure, ""
+        compared = "with the scatter of repeats, as no noise is stated: an F ratio"
+    meaning = (
+        f"What no radial G can explain of the scan, compared {compared}. A failure means that "
+        f"{noise}the scan is no convolution of this reference with a radial G: check the rod's "
+        "radius, the film's thickness and Poisson's ratio, a baseline that is no straight line, "
+        "and the positions; every uncertainty is doubtful until then."
+    )
+    return [check("chi_square", found.value, found.limit, meaning, found.p_value)]
+
+
+def _order(residuals: Residuals) -> list[QualityCheck]:
+    cause = (
+        "a baseline that steps or bends, a wrong reference, or noise that is correlated from point "
+        "to point (a slow amplifier, creep, temperature). Look at the residual; state a known "
+        "correlation as u_zz_correlation; uncertainties are too small until then."
+    )
+    runs, alike = runs_test(residuals), neighbour_correlation_test(residuals)
+    return [
+        check(
+            "residual_runs",
+            runs.value,
+            runs.limit,
+            "Share of neighbours along the scan whose residuals have the same sign: a half by "
+            f"chance. A failure means that residuals come in runs: {cause}",
+            runs.p_value,
+        ),
+        check(
+            "residual_correlation",
+            alike.value,
+            alike.limit,
+            "Correlation of each residual with its neighbours along the scan, halved for each step "
+            f"farther: none by chance. A failure means that residuals are alike: {cause}",
+            alike.p_value,
+        ),
+    ]
+
+
+def _evidence(estimate: ProfileEstimate) -> QualityCheck:
+    found = departure_evidence(estimate)
+    return check(
+        "gaussian_evidence",
+        found.log_bayes_factor,
+        _EVIDENCE_LIMIT,
+        "Natural logarithm of the odds by which the scan speaks for a departure of G from a "
+        "Gaussian (Bayes factor; within ±8.5); below zero it speaks for the Gaussian, and "
+        "gaussian_sigma may be used. A failure means that G is not Gaussian: use the found G. The "
+        f"likeliest departure is {_KINDS[found.kind]} ({found.share:.0%} of them).",
+    )
+
+
+def _symmetry(estimate: ProfileEstimate) -> list[QualityCheck]:
+    if estimate.points.planar:
+        uneven = axisymmetry_test(estimate)
+        meaning = (
+            f"Fall of chi-square by {uneven.count} columns of an elliptic sensor, which then make "
+            f"up {uneven.size:.2%} of the largest signal. A failure means that the radial profile "
+            "is only a mean over directions: use the field."
+        )
+        return [_added("axisymmetry", uneven, meaning)]
+    odd = symmetry_test(estimate)
+    meaning = (
+        f"Fall of chi-square by {odd.count} odd columns, which then make up {odd.size:.2%} of the "
+        "largest signal. A failure means that the left and right halves differ: a tilted rod, an "
+        "uneven film, or a drifting load."
+    )
+    return [_added("symmetry", odd, meaning)]
+
+
+def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
+    linear = linearity_test(estimate)
+    if linear is None:
+        return []
+    meaning = (
+        "Fall of chi-square by a conversion constant that changes with the load, here by "
+        f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the output is "
+        "not linear in the load, and that one A does not serve all loads."
+    )
+    return [_added("load_linearity", linear, meaning)]
+
+
+def _added(name: str, found: ExtraColumns, meaning: str) -> QualityCheck:
+    p_value = float(chdtrc(found.count, found.fall))
+    return check(name, found.fall, chi_square_limit(found.count), meaning, p_value)
+
+
+def _held_out(estimate: ProfileEstimate) -> list[QualityCheck]:
+    """Predict each repeat, load and scan from the others, whichever there are several of."""
+    points = estimate.points
+    load = load_groups(points.load)
+    several_scans = points.scans > 1
+    # Where every repeat has a load, or a scan, of its own, it is held out under that name.
+    repeat = not _same(points.repeat, load) and not _same(points.repeat, points.scan)
+    checks = [
+        _prediction(estimate, "repeat", points.repeat) if repeat else None,
+        _prediction(estimate, "load", load) if not _same(load, points.scan) else None,
+        _prediction(estimate, "scan", points.scan) if several_scans else None,
+    ]
+    return [found for found in checks if found is not None]
+
+
+def _same(one: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
+    """Whether two groupings of the points are the same but for the groups' names."""
+    pairs = np.unique(np.stack([one, other]), axis=1).shape[1]
+    return bool(pairs == np.unique(one).size == np.unique(other).size)
+
+
+def _prediction(
+    estimate: ProfileEstimate, what: str, group: NDArray[np.intp]
+) -> QualityCheck | None:
+    found = hold_out(estimate, group)
+    if found is None:
+        return None
+    causes = {
+        "repeat": "something changed between repeats: the load, the contact, the sensor; look at "
+        "this repeat, and leave it out if its reason is known",
+        "load": "the signal is not proportional to the load: the film is strained too far for a "
+        "linear reference, or the load cell's scale is wrong; calibrate at the load of use",
+        "scan": "the scans are not of the same sensor, film and reference; calibrate each by "
+        "itself and compare",
+    }
+    stated = estimate.points.u_errors is not None
+    scale = "" if stated else ", over the others' own scatter as no noise is stated"
+    joined = "" if found.alone else f", {what}s taken several at a time"
+    meaning = (
+        f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "
+        f"with the uncertainty of both{scale}; the worst of {found.folds}, number {found.worst + 1}"
+        f"{joined}. Its own baseline, drift and centre are fitted to it. A failure means that "
+        f"{causes[what]}."
+    )
+    return check(f"held_out_{what}", found.value, found.limit, meaning, found.p_value)
