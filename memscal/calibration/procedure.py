@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass, field, is_dataclass
 from os import PathLike
 from typing import Any, TypeAlias
 
 from memscal.apparatus import ApparatusFunction
 from memscal.calibration.assemble import assemble
 from memscal.calibration.field_noise import field_noise
-from memscal.calibration.inputs import input_effects
+from memscal.calibration.inputs import InputEffect, input_effects
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.quality import quality_checks
 from memscal.calibration.solution import Solution, solve
@@ -45,10 +45,16 @@ class Calibration:
         The result, ready to be saved and applied.
     solution : Solution
         The steps: estimate, band, fields, quotient.
+    effects : mapping of str to InputEffect
+        What one standard uncertainty of each stated input does.
+    correlations : mapping of (str, str) to float
+        Correlation coefficients of the inputs' errors.
     """
 
     apparatus: ApparatusFunction
     solution: Solution
+    effects: Mapping[str, InputEffect] = field(default_factory=dict)
+    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the result in place of every step's arrays."""
@@ -144,14 +150,15 @@ def calibrate(
     regulariser = _regulariser(method, seed, options)
     solution = solve(scans, stresses, regulariser)
     others = None if alternative is None else _each(alternative, scans)
-    results = _uncertainties(solution, others, correlations or {})
+    effects = _effects(solution, others)
+    results = _uncertainties(solution, effects, correlations or {})
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)
     configuration = {"method": regulariser.name, "seed": seed, **_settings(regulariser)}
     if correlations:
         configuration["correlations"] = {" ".join(pair): c for pair, c in correlations.items()}
     apparatus = assemble(solution, results, checks, messages, configuration)
-    return Calibration(apparatus, solution)
+    return Calibration(apparatus, solution, effects, dict(correlations or {}))
 
 
 def _each(
@@ -205,24 +212,30 @@ def _settings(regulariser: Regulariser) -> Mapping[str, Any]:
     return {"options": asdict(own) if known else {}}
 
 
-def _uncertainties(
-    solution: Solution,
-    alternatives: Sequence[StressProfile | Contact | None] | None,
-    correlations: Mapping[tuple[str, str], float],
-) -> Results:
+def _effects(
+    solution: Solution, alternatives: Sequence[StressProfile | Contact | None] | None
+) -> Mapping[str, InputEffect]:
     scans, estimate = solution.scans, solution.estimate
-    wavenumbers = solution.fields.along_axis(solution.quotient.division.window)[0]
     spectra = None
     if alternatives is not None:
         known = [other for other in alternatives if other is not None]
         parts = [estimate.points.only(i) for i in range(len(scans))]
         spectra = reference_spectra(known, parts, [scan.film.thickness for scan in scans])
+    return input_effects(scans, solution.stresses, estimate, spectra)
+
+
+def _uncertainties(
+    solution: Solution,
+    effects: Mapping[str, InputEffect],
+    correlations: Mapping[tuple[str, str], float],
+) -> Results:
+    wavenumbers = solution.fields.along_axis(solution.quotient.division.window)[0]
     return propagate(
-        estimate,
+        solution.estimate,
         solution.quotient.kernel,
         solution.window_at_nodes,
         wavenumbers,
-        input_effects(scans, solution.stresses, estimate, spectra),
+        effects,
         correlations,
         field_noise(solution, wavenumbers),
     )
