@@ -12,6 +12,7 @@ from memscal.version import __version__
 
 if TYPE_CHECKING:
     from memscal.apparatus import ApparatusFunction, load_apparatus
+    from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
     from memscal.calibration.procedure import Calibration, calibrate
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from memscal.model.indenter import Cone, Profile, Rod, Sphere
     from memscal.model.scan import Scan, StressSensor
     from memscal.model.stress import StressProfile
-    from memscal.simulation import GaussianMixture, simulate
+    from memscal.simulation import simulate
 
 _HOMES = {
     "ApparatusFunction": "memscal.apparatus",
@@ -32,13 +33,14 @@ _HOMES = {
     "Contact": "memscal.mechanics.contact",
     "ElasticFilm": "memscal.model.film",
     "ExponentialCompliance": "memscal.mechanics.interface",
-    "GaussianMixture": "memscal.simulation",
+    "GaussianMixture": "memscal.axisymmetry.kernels",
     "GreenwoodTripp": "memscal.mechanics.interface",
     "Interface": "memscal.mechanics.interface",
     "MemscalError": "memscal.errors",
     "Profile": "memscal.model.indenter",
     "Rod": "memscal.model.indenter",
     "Scan": "memscal.model.scan",
+    "SmoothedDisc": "memscal.axisymmetry.kernels",
     "Sphere": "memscal.model.indenter",
     "StressProfile": "memscal.model.stress",
     "StressSensor": "memscal.model.scan",
@@ -66,6 +68,7 @@ __all__ = [
     "Profile",
     "Rod",
     "Scan",
+    "SmoothedDisc",
     "Sphere",
     "StressProfile",
     "StressSensor",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
+from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
@@ -20,7 +20,7 @@ from memscal.model.validation import (
     require_range,
 )
 
-__all__ = ["GaussianMixture", "simulate"]
+__all__ = ["simulate"]
 
 #: The paper's film, with its uncertainties where it gives them and modest ones elsewhere.
 PAPER_FILM = ElasticFilm(
@@ -36,57 +36,11 @@ PAPER_FILM = ElasticFilm(
 PAPER_ROD = Rod(radius=0.25e-3, radius_uncertainty=2.5e-6)
 
 
-@dataclass(frozen=True)
-class GaussianMixture:
-    """A radial apparatus function: a sum of Gaussians, of unit integral in all.
-
-    Parameters
-    ----------
-    weights : tuple of float
-        Share of each; they may be negative (a ring), and must add up to one.
-    sigmas : tuple of float
-        Standard deviation of each, in m.
-
-    Examples
-    --------
-    >>> GaussianMixture((0.75, 0.25), (0.5e-3, 1e-3)).transform(np.array([0.0]))
-    array([1.])
-    """
-
-    weights: tuple[float, ...] = (1.0,)
-    sigmas: tuple[float, ...] = (561e-6,)
-
-    def __post_init__(self) -> None:
-        if len(self.weights) != len(self.sigmas) or not self.weights:
-            raise InputError(
-                f"{len(self.weights)} weights do not fit {len(self.sigmas)} widths of Gaussians."
-            )
-        if not abs(sum(self.weights) - 1) <= 1e-9:
-            raise InputError(
-                f"The weights of the Gaussians add up to {sum(self.weights):g}, not to 1.",
-                why="An apparatus function has unit integral.",
-            )
-        for sigma in self.sigmas:
-            require_positive("width of a Gaussian", sigma, "m")
-
-    def transform(self, k: FloatArray) -> FloatArray:
-        """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
-        terms = zip(self.weights, self.sigmas, strict=True)
-        return np.asarray(sum(w * np.exp(-0.5 * (s * k) ** 2) for w, s in terms))
-
-    def radial(self, r: FloatArray) -> FloatArray:
-        """G at radii ``r`` (m), in 1/m^2."""
-        terms = zip(self.weights, self.sigmas, strict=True)
-        return np.asarray(
-            sum(w * np.exp(-0.5 * (r / s) ** 2) / (2 * np.pi * s**2) for w, s in terms)
-        )
-
-
 def simulate(
     *,
     film: ElasticFilm = PAPER_FILM,
     rod: Rod = PAPER_ROD,
-    kernel: GaussianMixture | None = None,
+    kernel: RadialKernel | None = None,
     conversion_constant: float = 1e-7,
     load: float | Sequence[float] = 1.0,
     half_range: float = 8e-3,
@@ -110,8 +64,10 @@ def simulate(
     ----------
     film, rod
         What is pressed on what; the paper's where absent.
-    kernel : GaussianMixture, optional
-        The apparatus function; the paper's Gaussian of 561 um where absent.
+    kernel : RadialKernel, optional
+        The apparatus function; the paper's Gaussian of 561 um where absent.  Besides
+        :class:`memscal.GaussianMixture` and :class:`memscal.SmoothedDisc`, any object of unit
+        integral with their ``transform``, ``radial`` and ``describe``.
     conversion_constant : float
         A, in V/Pa.
     load : float or sequence of float
@@ -141,6 +97,11 @@ def simulate(
     Scan
         With its truth in ``synthetic``.
 
+    Raises
+    ------
+    InputError
+        If a number is out of range, or the kernel is no apparatus function.
+
     Examples
     --------
     >>> scan = simulate(points=33, seed=2)
@@ -153,7 +114,7 @@ def simulate(
             f"The centre is {centre} m and the seed {seed}; the one must be finite, the other not "
             "negative."
         )
-    truth = GaussianMixture() if kernel is None else kernel
+    truth = GaussianMixture() if kernel is None else _apparatus_function(kernel)
     loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
@@ -187,19 +148,36 @@ def simulate(
         sensor=StressSensor(name="a simulated sensor", channel="zz"),
         title="Synthetic rod scan",
         notes="Synthetic data made by memscal simulate; nothing here was measured.",
-        synthetic=_truth(
-            truth,
-            {
-                "conversion_constant": conversion_constant,
-                "centre": centre[0],
-                "centre_y": centre[1],
-                "baseline": baseline * largest,
-                "drift": drift * largest,
-                "noise": noise * largest,
-                "seed": float(seed),
-            },
-        ),
+        synthetic={
+            **truth.describe(),
+            "conversion_constant": conversion_constant,
+            "centre": centre[0],
+            "centre_y": centre[1],
+            "baseline": baseline * largest,
+            "drift": drift * largest,
+            "noise": noise * largest,
+            "seed": float(seed),
+        },
     )
+
+
+def _apparatus_function(kernel: RadialKernel) -> RadialKernel:
+    """Refuse what is no kernel, or has another integral, which would pass for an error of A."""
+    if not isinstance(kernel, RadialKernel):
+        raise InputError(
+            f"The kernel is a {type(kernel).__name__}, which has no transform(), radial() and "
+            "describe().",
+            cure="Give a GaussianMixture, a SmoothedDisc, or an object with these three methods.",
+        )
+    # Not at k = 0 itself, where a closed form such as J1(ka)/ka may divide by zero.
+    integral = float(kernel.transform(np.array([1e-2]))[0])
+    if not abs(integral - 1) <= 1e-6:
+        raise InputError(
+            f"The kernel's transform is {integral:g} at k = 0, not 1.",
+            why="An apparatus function has unit integral.",
+            cure="Divide the kernel by its integral; the conversion constant carries the size.",
+        )
+    return kernel
 
 
 def _require_plausible(
@@ -213,22 +191,10 @@ def _require_plausible(
 
 
 def _blurred(
-    film: ElasticFilm, rod: Rod, kernel: GaussianMixture, radius: FloatArray, load: float
+    film: ElasticFilm, rod: Rod, kernel: RadialKernel, radius: FloatArray, load: float
 ) -> FloatArray:
     """G convolved with the base stress per newton, in 1/m^2, at the given radii."""
     contact = indent(film, rod, load=load)
     wavenumbers = Wavenumbers.covering(40 / film.thickness, float(radius.max()))
     spectrum = contact.base_spectrum(wavenumbers.k) / load * kernel.transform(wavenumbers.k)
     return RadialSpectrum(wavenumbers, spectrum).at(radius)
-
-
-def _truth(kernel: GaussianMixture, values: dict[str, float]) -> dict[str, float | str]:
-    truth: dict[str, float | str] = {
-        "kernel": "sum of Gaussians of unit integral",
-        "kernel_weights": ", ".join(repr(float(w)) for w in kernel.weights),
-        "kernel_sigmas_um": ", ".join(f"{s * 1e6:g}" for s in kernel.sigmas),
-        **values,
-    }
-    if len(kernel.sigmas) == 1:
-        truth["gaussian_sigma"] = kernel.sigmas[0]
-    return truth

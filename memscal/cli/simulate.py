@@ -25,6 +25,7 @@ from memscal.cli.output import emit_json, message, note
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
+    from memscal.axisymmetry.kernels import RadialKernel
     from memscal.model.scan import Scan
 
 __all__ = ["command"]
@@ -50,6 +51,7 @@ Examples:
   memscal simulate -o loads.h5 --load 0.5 --load 1 --load 2 --repeats 3
   memscal simulate -o raster.h5 --raster --points 33 --half-range 6
   memscal simulate -o ring.h5 --sigma 700 --weight 1.5 --sigma 400 --weight -0.5
+  memscal simulate -o disc.h5 --disc-radius 800 --sigma 300
 """
 
 
@@ -79,6 +81,12 @@ Examples:
     type=Quantity("ratio", low=-math.inf),
     multiple=True,
     help="Share of each Gaussian, in the order of --sigma; they add up to 1.",
+)
+@click.option(
+    "--disc-radius",
+    type=Quantity("um"),
+    help="Radius of a uniform disc, in um: the apparatus function is this disc, blurred by a "
+    "Gaussian of --sigma.",
 )
 @click.option(
     "--conversion-constant",
@@ -186,17 +194,11 @@ def command(output: Path, as_json: bool, force: bool, **given: Any) -> int:
     function; noise, an offset and a drift are added. The file is labelled as synthetic and holds
     its truth. What the options do not say is the paper's.
     """
-    sigmas, weights = given["sigmas"], given["weights"]
-    if not weights and len(sigmas) == 1:
-        weights = (1.0,)
-    if len(weights) != len(sigmas):
-        raise click.UsageError(
-            f"There are {len(sigmas)} --sigma and {len(weights)} --weight: give one weight to each."
-        )
+    _require_one_kernel(given["sigmas"], given["weights"], given["disc_radius"])
     if given["raster"] and len(given["loads"]) * given["repeats"] > 1:
         raise click.UsageError("A raster has one repeat at one load.")
     prove_writable([output], force=force)
-    scan = _simulate(sigmas, weights, given)
+    scan = _simulate(given)
 
     from memscal.formats.scan import write_scan
 
@@ -205,11 +207,33 @@ def command(output: Path, as_json: bool, force: bool, **given: Any) -> int:
     return DONE
 
 
-def _simulate(
-    sigmas: tuple[float, ...], weights: tuple[float, ...], given: Mapping[str, Any]
-) -> Scan:
+def _require_one_kernel(
+    sigmas: tuple[float, ...], weights: tuple[float, ...], disc_radius: float | None
+) -> None:
+    if disc_radius is not None:
+        if weights or len(sigmas) > 1:
+            raise click.UsageError(
+                "A disc is blurred by one Gaussian: give --disc-radius and one --sigma, and no "
+                "--weight."
+            )
+    elif len(weights) != len(sigmas) and (weights or len(sigmas) > 1):
+        raise click.UsageError(
+            f"There are {len(sigmas)} --sigma and {len(weights)} --weight: give one weight to each."
+        )
+
+
+def _kernel(given: Mapping[str, Any]) -> RadialKernel:
+    from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
+
+    sigmas = tuple(si(sigma, -6) for sigma in given["sigmas"])
+    if given["disc_radius"] is not None:
+        return SmoothedDisc(radius=si(given["disc_radius"], -6), sigma=sigmas[0])
+    return GaussianMixture(given["weights"] or (1.0,), sigmas)
+
+
+def _simulate(given: Mapping[str, Any]) -> Scan:
     from memscal.model.indenter import Rod
-    from memscal.simulation import GaussianMixture, simulate
+    from memscal.simulation import simulate
 
     film, rod = film_from(given), indenter_from("rod", given)
     assert isinstance(rod, Rod)
@@ -217,7 +241,7 @@ def _simulate(
     return simulate(
         film=film,
         rod=rod,
-        kernel=GaussianMixture(weights, tuple(si(sigma, -6) for sigma in sigmas)),
+        kernel=_kernel(given),
         conversion_constant=si(given["conversion_constant"], -3),
         load=loads[0] if len(loads) == 1 else loads,
         half_range=si(given["half_range"], -3),

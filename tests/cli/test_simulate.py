@@ -74,6 +74,14 @@ def test_a_sum_of_gaussians_is_stored_as_truth(run: Run, folder: Path) -> None:
     assert (truth["kernel_weights"], truth["kernel_sigmas_um"]) == ("1.5, -0.5", "700, 400")
 
 
+def test_a_disc_is_simulated_and_stored_as_truth(run: Run, folder: Path) -> None:
+    assert run("simulate", "-o", "disc.h5", "--disc-radius", 800, "--sigma", 300).code == 0
+    scan = memscal.read_scan("disc.h5")
+    own = memscal.simulate(kernel=memscal.SmoothedDisc(radius=800e-6, sigma=300e-6))
+    assert scan.synthetic == own.synthetic
+    np.testing.assert_allclose(scan.u_zz, own.u_zz, rtol=1e-12)
+
+
 def test_noise_may_be_left_unstated(run: Run, folder: Path) -> None:
     assert run("simulate", "-o", "scan.h5", "--no-state-noise").code == 0
     assert memscal.read_scan("scan.h5").u_zz_errors is None
@@ -83,6 +91,9 @@ def test_noise_may_be_left_unstated(run: Run, folder: Path) -> None:
     ("arguments", "code"),
     [
         (["--sigma", 700, "--sigma", 400], 2),
+        (["--disc-radius", 800, "--sigma", 300, "--sigma", 200], 2),
+        (["--disc-radius", 800, "--sigma", 300, "--weight", 1], 2),
+        (["--disc-radius", 0], 2),
         (["--raster", "--repeats", 2], 2),
         (["--points", 1], 2),
         (["--noise", -1], 2),

@@ -1,0 +1,153 @@
+r"""Radial apparatus functions whose transform is known in closed form.
+
+With the transforms of :mod:`memscal.axisymmetry.hankel`, a kernel :math:`G` of unit integral has
+:math:`\hat G(0) = 1`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from scipy.special import j1
+
+from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.errors import InputError
+from memscal.model.validation import FloatArray, require_positive
+
+__all__ = ["GaussianMixture", "RadialKernel", "SmoothedDisc"]
+
+# exp(-s^2 k^2 / 2) is below the rounding of 1 beyond this value of s k.
+_VANISHED = 8.6
+
+
+@runtime_checkable
+class RadialKernel(Protocol):
+    """A radial apparatus function of unit integral, with its transform."""
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """G at radii ``r`` (m), in 1/m^2."""
+
+    def describe(self) -> Mapping[str, float | str]:
+        """What a simulated scan keeps as its truth: text, or SI numbers by known names."""
+
+
+@dataclass(frozen=True)
+class GaussianMixture:
+    """A radial apparatus function: a sum of Gaussians, of unit integral in all.
+
+    Parameters
+    ----------
+    weights : tuple of float
+        Share of each; they may be negative (a ring), and must add up to one.
+    sigmas : tuple of float
+        Standard deviation of each, in m.
+
+    Examples
+    --------
+    >>> GaussianMixture((0.75, 0.25), (0.5e-3, 1e-3)).transform(np.array([0.0]))
+    array([1.])
+    """
+
+    weights: tuple[float, ...] = (1.0,)
+    sigmas: tuple[float, ...] = (561e-6,)
+
+    def __post_init__(self) -> None:
+        if len(self.weights) != len(self.sigmas) or not self.weights:
+            raise InputError(
+                f"{len(self.weights)} weights do not fit {len(self.sigmas)} widths of Gaussians."
+            )
+        if not abs(sum(self.weights) - 1) <= 1e-9:
+            raise InputError(
+                f"The weights of the Gaussians add up to {sum(self.weights):g}, not to 1.",
+                why="An apparatus function has unit integral.",
+            )
+        for sigma in self.sigmas:
+            require_positive("width of a Gaussian", sigma, "m")
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
+        terms = zip(self.weights, self.sigmas, strict=True)
+        return np.asarray(sum(w * np.exp(-0.5 * (s * k) ** 2) for w, s in terms))
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """G at radii ``r`` (m), in 1/m^2."""
+        terms = zip(self.weights, self.sigmas, strict=True)
+        return np.asarray(
+            sum(w * np.exp(-0.5 * (r / s) ** 2) / (2 * np.pi * s**2) for w, s in terms)
+        )
+
+    def describe(self) -> dict[str, float | str]:
+        """Weights and widths as text; the width of a single Gaussian, in m, as a number."""
+        truth: dict[str, float | str] = {
+            "kernel": "sum of Gaussians of unit integral",
+            "kernel_weights": ", ".join(repr(float(w)) for w in self.weights),
+            "kernel_sigmas_um": ", ".join(f"{s * 1e6:g}" for s in self.sigmas),
+        }
+        if len(self.sigmas) == 1:
+            truth["gaussian_sigma"] = self.sigmas[0]
+        return truth
+
+
+@dataclass(frozen=True)
+class SmoothedDisc:
+    r"""A radial apparatus function: a uniform disc of unit integral, blurred by a Gaussian.
+
+    .. math::
+
+        \hat G(k) = \frac{2 J_1(ka)}{ka}\,e^{-s^2k^2/2}
+
+    Parameters
+    ----------
+    radius : float
+        Radius a of the disc, in m.
+    sigma : float
+        Standard deviation s of the Gaussian, in m.
+
+    Raises
+    ------
+    InputError
+        If one of them is not finite and above zero.
+
+    Examples
+    --------
+    A wide disc is flat inside: its density there is one over its area.
+
+    >>> disc = SmoothedDisc(radius=0.8e-3, sigma=0.1e-3)
+    >>> round(float(disc.radial(np.array([0.0]))[0] * np.pi * disc.radius**2), 6)
+    1.0
+    """
+
+    radius: float
+    sigma: float
+
+    def __post_init__(self) -> None:
+        require_positive("radius of the disc", self.radius, "m")
+        require_positive("width of the Gaussian that blurs the disc", self.sigma, "m")
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
+        phase = np.asarray(k, dtype=np.float64) * self.radius
+        disc = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
+        return np.asarray(disc * np.exp(-0.5 * (self.sigma * k) ** 2))
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """G at radii ``r`` (m), in 1/m^2."""
+        radii = np.abs(np.asarray(r, dtype=np.float64))
+        # The disc's own transform turns as fast as its radius says, J0(kr) as r does.
+        fastest = self.radius + float(radii.max(initial=0.0))
+        wavenumbers = Wavenumbers.covering(_VANISHED / self.sigma, fastest)
+        return wavenumbers.synthesise(self.transform(wavenumbers.k), radii)
+
+    def describe(self) -> dict[str, float | str]:
+        """Radius and blur, as text."""
+        return {
+            "kernel": "uniform disc of unit integral, blurred by a Gaussian",
+            "kernel_radius_um": f"{self.radius * 1e6:g}",
+            "kernel_sigmas_um": f"{self.sigma * 1e6:g}",
+        }
