@@ -1,0 +1,192 @@
+"""Residuals that do not depend on G: exact size, no order, and real causes that break them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scans import RING, TAILS, estimated, simulated
+from scipy.stats import binom, chi2, f
+
+import memscal
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.estimation.residuals import (
+    Residuals,
+    chi_square_test,
+    free_model,
+    independent_residuals,
+    neighbour_correlation_test,
+    pure_error_test,
+    runs_test,
+)
+from memscal.model.scan import Scan
+
+
+def made(values: np.ndarray, passes: int = 1) -> Residuals:
+    n = values.size
+    return Residuals(values, np.arange(n), np.arange(n) * passes // n, stated=True)
+
+
+def rejected_share_bounds(scans: int, level: float) -> tuple[float, float]:
+    return binom.ppf(1e-6, scans, level) / scans, binom.ppf(1 - 1e-6, scans, level) / scans
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"repeats": 3, "points": 33}, {"raster": True, "points": 17}]
+)
+def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options) -> None:
+    estimate = estimated(simulated(**options))
+    model, residuals = free_model(estimate), independent_residuals(estimate)
+    misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]
+    assert residuals.values @ residuals.values == pytest.approx(misfit @ misfit, rel=1e-6)
+    assert residuals.values.size == model.data.size - model.design.shape[1]
+
+
+def with_voltages(estimate: ProfileEstimate, u: np.ndarray) -> ProfileEstimate:
+    """Change the voltages of an estimate and leave the model about its Gaussian as it is."""
+    points = replace(estimate.points, u=u)
+    model = replace(estimate.model, points=points)
+    return replace(estimate, model=model, outlier_weight=np.ones(u.size))
+
+
+def test_residuals_of_many_noises_are_independent_and_of_unit_variance() -> None:
+    estimate = estimated(simulated(noise=0.01, points=33))
+    rng = np.random.default_rng()
+    rows = []
+    for _ in range(1500):
+        noise = rng.normal(0.0, 1.0, estimate.points.u.size) * estimate.points.u_errors
+        noisy = with_voltages(estimate, estimate.gaussian.predicted + noise)
+        rows.append(independent_residuals(noisy).values)
+    covariance = np.cov(np.array(rows).T)
+    assert 20 < covariance.shape[0] < 28
+    # Each entry is known to 1/sqrt(1500); one of some 300 strays by six of those once in 1e6.
+    np.testing.assert_allclose(covariance, np.eye(covariance.shape[0]), atol=0.22)
+
+
+@pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), TAILS, RING])
+def test_what_is_left_does_not_depend_on_g(kernel: memscal.GaussianMixture) -> None:
+    estimate = estimated(simulated(kernel=kernel, noise=0.005))
+    clean = simulated(kernel=kernel, noise=0.0).u_zz
+    residuals = independent_residuals(with_voltages(estimate, clean))
+    # Without noise hardly anything is left over: of each direction a small share of the noise.
+    assert residuals.values @ residuals.values < 0.1
+
+
+def test_an_outlier_is_left_out_of_the_residuals() -> None:
+    scan = simulated(noise=0.005)
+    u = scan.u_zz.copy()
+    u[20] += 0.5 * u.max()
+    residuals = independent_residuals(estimated(replace(scan, u_zz=u)))
+    assert 20 not in residuals.point
+    assert chi_square_test(residuals).p_value > 1e-6
+
+
+def test_each_row_and_each_repeat_is_a_pass_of_its_own_in_the_order_of_the_scan() -> None:
+    repeats = independent_residuals(estimated(simulated(repeats=3, points=33)))
+    assert set(repeats.sequence) == {0, 1, 2}
+    estimate = estimated(simulated(raster=True, points=17))
+    raster = independent_residuals(estimate)
+    assert set(raster.sequence) == set(range(17))
+    assert (np.diff(raster.sequence) >= 0).all()
+    same = np.diff(raster.sequence) == 0
+    assert (np.diff(estimate.points.x[raster.point])[same] > 0).all()
+
+
+def test_the_chi_square_is_that_of_the_distribution() -> None:
+    values = np.array([1.0, -2.0, 0.5, 1.5])
+    found = chi_square_test(made(values))
+    assert found.value == pytest.approx(7.5 / 4)
+    assert found.p_value == pytest.approx(chi2.sf(7.5, 4))
+    assert found.limit == pytest.approx(chi2.isf(1e-3, 4) / 4)
+
+
+def test_the_limit_of_runs_is_what_passes_at_a_thousandth() -> None:
+    for changes in range(20):
+        signs = np.where(np.arange(21) <= changes, (-1.0) ** np.arange(21), (-1.0) ** changes)
+        found = runs_test(made(signs))
+        assert found.value == pytest.approx(1 - changes / 20)
+        assert found.p_value == pytest.approx(binom.cdf(changes, 20, 0.5))
+        assert (found.value > found.limit) == (found.p_value <= 1e-3)
+
+
+def test_neighbours_of_different_passes_are_no_neighbours() -> None:
+    values = np.tile([1.0, 1.0, -1.0, -1.0], 5)
+    assert runs_test(made(values, passes=10)).value == 1.0
+    assert runs_test(made(values, passes=20)).p_value == 1.0
+    assert neighbour_correlation_test(made(values, passes=20)).value == 0.0
+
+
+def test_the_moments_of_the_neighbours_correlation_give_its_tail() -> None:
+    rng = np.random.default_rng()
+    draws, n = 20_000, 40
+    p_values = np.array(
+        [neighbour_correlation_test(made(w)).p_value for w in rng.normal(size=(draws, n))]
+    )
+    for level in (0.5, 0.1, 0.01, 0.001):
+        low, high = rejected_share_bounds(draws, level)
+        # The gamma distribution's own error is a tenth of the level.
+        assert 0.85 * low <= np.mean(p_values < level) <= 1.15 * high
+
+
+def test_the_neighbours_correlation_does_not_depend_on_the_noise_s_size() -> None:
+    values = np.random.default_rng().normal(size=50)
+    one, other = (neighbour_correlation_test(made(values * size)) for size in (1.0, 1e-6))
+    assert other.p_value == pytest.approx(one.p_value)
+
+
+def test_repeats_take_the_place_of_stated_noise() -> None:
+    scans, level = 150, 0.1
+    p_values = []
+    for seed in range(scans):
+        scan = simulated(repeats=3, points=33, state_noise=False, seed=seed)
+        p_values.append(pure_error_test(estimated(scan)).p_value)
+    low, high = rejected_share_bounds(scans, level)
+    assert low <= np.mean(np.array(p_values) < level) <= high
+    assert pure_error_test(estimated(simulated(state_noise=False))) is None
+
+
+def test_the_pure_error_is_the_scatter_of_repeats() -> None:
+    scan = simulated(repeats=3, points=33, state_noise=False)
+    estimate = estimated(scan)
+    found, model = pure_error_test(estimate), free_model(estimate)
+    if model.kept.size == scan.u_zz.size:
+        pure = scan.u_zz.var(axis=0, ddof=1).mean()
+        degrees = 33 - model.design.shape[1]
+        misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]
+        value = (misfit @ misfit - 66 * pure) / degrees / pure
+        assert found.value == pytest.approx(value, rel=1e-6)
+        assert found.p_value == pytest.approx(f.sf(value, degrees, 66), rel=1e-6)
+
+
+def disturbed(cause: str, noise: float = 0.003) -> Scan:
+    """A scan with a fault that happens."""
+    scan = simulated(noise=noise, points=97)
+    largest, place = scan.u_zz.max(), scan.x / scan.x.max()
+    if cause == "a bent baseline":
+        return replace(scan, u_zz=scan.u_zz + 0.02 * largest * np.sin(4 * place))
+    if cause == "a step of the baseline":
+        return replace(scan, u_zz=scan.u_zz + 0.03 * largest * (place > 0.45))
+    if cause == "correlated noise":
+        rng = np.random.default_rng(5)
+        white = rng.normal(size=scan.x.size + 50)
+        slow = np.convolve(white, 0.8 ** np.arange(50))[50 : 50 + scan.x.size]
+        slow *= noise * largest * np.sqrt(1 - 0.8**2)
+        clean = simulated(noise=0.0, points=97)
+        return replace(scan, u_zz=clean.u_zz + slow)
+    return replace(scan, film=replace(scan.film, thickness=2.6e-3))
+
+
+@pytest.mark.parametrize("cause", ["a bent baseline", "a step of the baseline", "correlated noise"])
+def test_faults_leave_runs_and_alike_neighbours(cause: str) -> None:
+    residuals = independent_residuals(estimated(disturbed(cause)))
+    for found in (runs_test(residuals), neighbour_correlation_test(residuals)):
+        assert found.value > found.limit
+        assert found.p_value < 1e-3
+
+
+@pytest.mark.parametrize("cause", ["a bent baseline", "a step of the baseline", "a thicker film"])
+def test_faults_exceed_the_noise(cause: str) -> None:
+    noise = 0.0005 if cause == "a thicker film" else 0.003
+    found = chi_square_test(independent_residuals(estimated(disturbed(cause, noise))))
+    assert found.value > found.limit
