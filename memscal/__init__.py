@@ -13,6 +13,7 @@ from memscal.version import __version__
 if TYPE_CHECKING:
     from memscal.apparatus import ApparatusFunction, load_apparatus
     from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
+    from memscal.calibration.monte_carlo import MonteCarlo, monte_carlo
     from memscal.calibration.procedure import Calibration, calibrate
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
@@ -37,6 +38,7 @@ _HOMES = {
     "GreenwoodTripp": "memscal.mechanics.interface",
     "Interface": "memscal.mechanics.interface",
     "MemscalError": "memscal.errors",
+    "MonteCarlo": "memscal.calibration.monte_carlo",
     "Profile": "memscal.model.indenter",
     "Rod": "memscal.model.indenter",
     "Scan": "memscal.model.scan",
@@ -47,6 +49,7 @@ _HOMES = {
     "calibrate": "memscal.calibration.procedure",
     "indent": "memscal.mechanics.indent",
     "load_apparatus": "memscal.apparatus",
+    "monte_carlo": "memscal.calibration.monte_carlo",
     "read_reference": "memscal.formats.reference",
     "read_scan": "memscal.formats.scan",
     "simulate": "memscal.simulation",
@@ -65,6 +68,7 @@ __all__ = [
     "GreenwoodTripp",
     "Interface",
     "MemscalError",
+    "MonteCarlo",
     "Profile",
     "Rod",
     "Scan",
@@ -76,6 +80,7 @@ __all__ = [
     "calibrate",
     "indent",
     "load_apparatus",
+    "monte_carlo",
     "read_reference",
     "read_scan",
     "simulate",

@@ -45,7 +45,7 @@ def shortest_interval(draws: FloatArray, coverage: float = 0.95) -> FloatArray:
 
     >>> draws = -np.log(1 - (np.arange(10_000) + 0.5) / 10_000)
     >>> [round(float(end), 2) for end in shortest_interval(draws)]
-    [0.0, 2.99]
+    [0.0, 3.0]
     """
     _checked(draws, coverage)
     ordered = np.sort(draws, axis=0)

@@ -82,10 +82,10 @@ class _Input:
         cosine = np.cos(np.pi * np.arange(_NODES - 1, -1, -1) / (_NODES - 1))
         return np.asarray((low + high) / 2 + (high - low) / 2 * cosine)
 
-    def cut_off(self, standard: FloatArray) -> FloatArray:
-        """Normal draws with the tails beyond the bounds left out, by their quantiles."""
+    def quantiles(self, probability: FloatArray) -> FloatArray:
+        """Quantiles of the normal distribution without its tails beyond the bounds."""
         low, high = ndtr((np.array([self.lowest, self.highest]) - self.value) / self.u)
-        return np.asarray(self.value + self.u * ndtri(low + (high - low) * ndtr(standard)))
+        return np.asarray(self.value + self.u * ndtri(low + (high - low) * probability))
 
     def shares(self, values: FloatArray) -> FloatArray:
         """Lagrange's weights of the nodes at the values, shape (nodes, values)."""
@@ -141,17 +141,29 @@ class ReferenceTable:
         solved = np.stack([transform(place) for place in grid])
         return cls(inputs, solved * scale - reference.values)
 
-    def drawn(self, standard: Mapping[str, FloatArray]) -> FloatArray:
-        """Changes of the reference for standardised draws of the inputs, (draws, nodes)."""
-        shares = np.ones((1, next(iter(standard.values())).size))
+    def drawn(self, standard: Mapping[str, FloatArray], count: int) -> FloatArray:
+        """Changes of the reference for standardised draws of the inputs, shape (count, nodes).
+
+        An input without draws keeps its value.
+        """
+        shares = np.ones((1, count))
         for each in self.inputs:
-            own = each.shares(each.cut_off(standard[each.source]))
-            shares = (shares[:, None, :] * own[None]).reshape(-1, own.shape[1])
+            kept = np.full(count, each.value)
+            draws = standard.get(each.source)
+            own = each.shares(kept if draws is None else each.quantiles(ndtr(draws)))
+            shares = (shares[:, None, :] * own[None]).reshape(-1, count)
         return np.asarray(shares.T @ self.changes)
 
-    def values(self, source: str, standard: FloatArray) -> FloatArray:
-        """Draws of one input in its own unit."""
-        return next(each for each in self.inputs if each.source == source).cut_off(standard)
+    def quantiles(self, source: str, probability: FloatArray) -> FloatArray:
+        """Quantiles of one input, in its own unit."""
+        return self._named(source).quantiles(probability)
+
+    def stated(self, source: str) -> float:
+        """Stated standard uncertainty of one input, in its own unit."""
+        return self._named(source).u
+
+    def _named(self, source: str) -> _Input:
+        return next(each for each in self.inputs if each.source == source)
 
 
 def _uncertain_inputs(scan: Scan) -> tuple[_Input, ...]:

@@ -7,6 +7,7 @@ import pytest
 from scans import estimated, simulated
 from timing import turns
 
+import memscal
 from memscal.estimation.profile_estimate import estimate_profile
 from memscal.estimation.replicates import ReplicateEstimator
 
@@ -24,3 +25,14 @@ def test_a_thousand_replicates_cost_a_few_estimates() -> None:
         rounds=7,
     )
     assert ratio < 20
+
+
+def test_a_thousand_draws_of_noise_and_inputs_cost_less_than_a_hundred_calibrations() -> None:
+    scan = memscal.simulate(noise=0.003, seed=4)
+    calibration = memscal.calibrate(scan, method="evidence")
+    ratio = turns(
+        lambda: memscal.monte_carlo(calibration, draws=1000),
+        lambda: memscal.calibrate(scan, method="evidence"),
+        rounds=3,
+    )
+    assert ratio < 100
