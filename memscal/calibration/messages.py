@@ -55,7 +55,7 @@ def _points(estimate: ProfileEstimate) -> list[str]:
         messages.append(
             f"u_zz_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV was estimated "
             "from the scan's scatter, so that chi-square cannot tell noise from misfit of the same "
-            "size."
+            "size, and has no p-value."
         )
     return messages
 

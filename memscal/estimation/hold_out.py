@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri
 
+from memscal.estimation.free_model import FreeModel, free_model
 from memscal.estimation.hypotheses import FALSE_ALARM
 from memscal.estimation.profile_estimate import ProfileEstimate
-from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model
+from memscal.estimation.residuals import FEWEST_RESIDUALS
 from memscal.model.validation import FloatArray
 
 __all__ = ["HeldOut", "hold_out", "load_groups"]
@@ -96,9 +97,11 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     """
     if np.unique(group).size < 2:
         return None
-    model = free_model(estimate)
+    # Many outliers in one group are its fault, and a single one is not: none may count for much.
+    model = free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift, which a held-out group has to itself.
-    own = model.design[:, 2 : model.flat]
+    nuisances = int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
+    own = model.design[:, 2 : 2 + nuisances]
     fold = _folds(group)[model.kept]
     found = {
         int(i): outcome

@@ -21,26 +21,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
 
+from memscal.estimation.free_model import free_model
 from memscal.estimation.hypotheses import FALSE_ALARM, chi_square_limit
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
 __all__ = [
-    "FreeModel",
     "Residuals",
     "TestOutcome",
     "chi_square_test",
-    "free_model",
     "independent_residuals",
     "neighbour_correlation_test",
     "pure_error_test",
     "runs_test",
 ]
 
-#: A departure of the expected size that moves no voltage by more of its noise is left as noise.
-_SHARE_OF_NOISE = 0.1
-#: A point of less weight is an outlier and is left out.
-_OUTLIER = 0.5
 #: Weight of the correlation from one step to the next: half as much for each step farther.
 _DECAY = 0.5
 _FARTHEST = 8
@@ -58,32 +53,6 @@ class TestOutcome:
     value: float
     limit: float
     p_value: float
-
-
-@dataclass(frozen=True, eq=False)
-class FreeModel:
-    """The scan's data and the linear model of every apparatus function it can tell apart.
-
-    Parameters
-    ----------
-    data : ndarray, shape (m,)
-        What the best Gaussian leaves of the voltages, weighted: independent, and of unit variance
-        where the noise is stated.  Outliers are left out.
-    design : ndarray, shape (m, r)
-        Weighted derivatives by the parameters without prior and by the departures that count.
-    flat : int
-        How many parameters have no prior: the first columns.
-    kept : ndarray of int, shape (m,)
-        Which points of the scan they are.
-    stated : bool
-        Whether the noise is stated.
-    """
-
-    data: FloatArray
-    design: FloatArray
-    flat: int
-    kept: NDArray[np.intp]
-    stated: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,34 +75,6 @@ class Residuals:
     point: NDArray[np.intp]
     sequence: NDArray[np.intp]
     stated: bool
-
-
-def free_model(estimate: ProfileEstimate) -> FreeModel:
-    """Linearise the model about the best Gaussian, with every departure that can be seen."""
-    points, basis = estimate.points, estimate.basis
-    ordinary = estimate.outlier_weight >= _OUTLIER
-    weights = np.where(ordinary, estimate.weights / estimate.outlier_weight, estimate.weights)
-    kept = np.flatnonzero(ordinary)
-
-    def standardised(values: FloatArray) -> FloatArray:
-        return points.standardised(values, weights)[kept]
-
-    jacobian = estimate.gaussian.jacobian
-    flat = standardised(jacobian / np.linalg.norm(jacobian, axis=0))
-    kernels = basis.kernels(estimate.model.k)[:, basis.flat :]
-    rings = standardised(estimate.model.signal(estimate.gaussian.geometry, kernels))
-    base = np.linalg.qr(flat)[0]
-    left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
-    stated = points.u_errors is not None
-    noise = 1.0 if stated else estimate.noise_scale
-    seen = singular > _SHARE_OF_NOISE * noise
-    return FreeModel(
-        data=standardised(points.u - estimate.gaussian.predicted),
-        design=np.hstack([flat, left[:, seen] * singular[seen]]),
-        flat=basis.flat,
-        kept=kept,
-        stated=stated,
-    )
 
 
 def independent_residuals(estimate: ProfileEstimate) -> Residuals:

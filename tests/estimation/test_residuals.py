@@ -10,11 +10,11 @@ from scans import RING, TAILS, estimated, simulated
 from scipy.stats import binom, chi2, f
 
 import memscal
+from memscal.estimation.free_model import free_model
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.estimation.residuals import (
     Residuals,
     chi_square_test,
-    free_model,
     independent_residuals,
     neighbour_correlation_test,
     pure_error_test,

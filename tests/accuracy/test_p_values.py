@@ -1,0 +1,124 @@
+"""P-values of the residuals are uniform for scans that are as stated, whatever G.
+
+Set MEMSCAL_FULL_STUDY for 400 seeds in place of 60.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scans import CONVERSION, RING, SIGMA, TAILS, estimated, simulated
+from scipy.special import j0, j1
+from scipy.stats import binom, kstest
+
+import memscal
+from memscal.estimation.residuals import (
+    chi_square_test,
+    independent_residuals,
+    neighbour_correlation_test,
+    runs_test,
+)
+from memscal.model.scan import Scan
+
+pytestmark = pytest.mark.accuracy
+
+SEEDS = 400 if os.environ.get("MEMSCAL_FULL_STUDY") else 60
+CHANCE = 1e-5
+NOISES = (0.003, 0.02)
+
+
+def disc(noise: float, seed: int) -> Scan:
+    """Simulate a sensor that is a disc of 1 mm, sharper than any departure of the model."""
+    scan = simulated(noise=noise, seed=seed)
+    return replace(scan, u_zz=scan.u_zz + disc_beyond_gaussian())
+
+
+@lru_cache
+def disc_beyond_gaussian() -> np.ndarray:
+    """Voltages of the disc less those of the Gaussian."""
+    model = estimated(simulated()).model
+    k, radius = model.k, np.abs(simulated().x - 0.14e-3)
+    difference = 2 * j1(k * 1e-3) / (k * 1e-3) - np.exp(-0.5 * (SIGMA * k) ** 2)
+    measure = model.reference.wavenumbers.weights * model.reference.values
+    return CONVERSION * (j0(np.multiply.outer(radius, k)) @ (measure * difference))
+
+
+def mixture(kernel: memscal.GaussianMixture) -> Callable[[float, int], Scan]:
+    return lambda noise, seed: simulated(kernel=kernel, noise=noise, seed=seed)
+
+
+SENSORS = {
+    "Gaussian": mixture(memscal.GaussianMixture()),
+    "tails": mixture(TAILS),
+    "ring": mixture(RING),
+    "disc": disc,
+}
+
+
+@lru_cache
+def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
+    rows = []
+    rng = np.random.default_rng(20)
+    first = 1000 * list(SENSORS).index(sensor)
+    for seed in range(first, first + SEEDS):
+        residuals = independent_residuals(estimated(SENSORS[sensor](noise, seed)))
+        runs = runs_test(residuals)
+        same = int(np.sum(np.diff(residuals.sequence) == 0))
+        changes = round(same * (1 - runs.value))
+        rows.append(
+            {
+                "size": chi_square_test(residuals).p_value,
+                "runs": runs.p_value,
+                # A count's p-value moves in steps: spread evenly over its own, it is uniform.
+                "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
+                "neighbours": neighbour_correlation_test(residuals).p_value,
+            }
+        )
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+@pytest.mark.parametrize("noise", NOISES)
+@pytest.mark.parametrize("sensor", SENSORS)
+@pytest.mark.parametrize("name", ["size", "spread runs", "neighbours"])
+def test_p_values_are_uniform(name: str, sensor: str, noise: float) -> None:
+    assert kstest(p_values(sensor, noise)[name], "uniform").pvalue > CHANCE
+
+
+@pytest.mark.parametrize("name", ["size", "spread runs", "neighbours"])
+def test_p_values_of_all_sensors_together_are_uniform_in_their_lower_tail(name: str) -> None:
+    # Seeds differ between sensors; the two noises share theirs, and are looked at one by one.
+    for noise in NOISES:
+        found = np.concatenate([p_values(sensor, noise)[name] for sensor in SENSORS])
+        for level in (0.01, 0.1):
+            low, high = binom.ppf([CHANCE, 1 - CHANCE], found.size, level)
+            assert low <= np.sum(found < level) <= high
+
+
+def test_runs_are_rejected_no_more_often_than_their_level() -> None:
+    found = np.concatenate([p_values(sensor, 0.003)["runs"] for sensor in SENSORS])
+    for level in (0.01, 0.05, 0.2):
+        assert np.sum(found < level) <= binom.ppf(1 - CHANCE, found.size, level)
+
+
+def test_clean_scans_hardly_ever_fail_a_check() -> None:
+    settings = [
+        {},
+        {"noise": 0.02},
+        {"noise": 0.001},
+        {"state_noise": False},
+        {"repeats": 3, "points": 33},
+        {"load": [0.5, 1.0, 1.5], "points": 33},
+    ]
+    failed = run = 0
+    for seed in range(SEEDS):
+        scan = simulated(seed=seed, **settings[seed % len(settings)])
+        checks = memscal.calibrate(scan, method="evidence").apparatus.checks
+        failed += sum(not check.passed for check in checks)
+        run += len(checks)
+    # Each fails once in a thousand by chance; some never do.
+    assert failed <= binom.ppf(1 - CHANCE, run, 1e-3)

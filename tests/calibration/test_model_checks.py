@@ -1,0 +1,105 @@
+"""The checks of the model: which there are, what they say, and that good scans pass."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scans import RING, TAILS, simulated
+
+import memscal
+from memscal.model.apparatus import QualityCheck
+
+TABLE = Path(__file__).parent.parent.parent / "docs" / "quality.md"
+
+
+def checks(scan, **options) -> dict[str, QualityCheck]:
+    options = {"method": "evidence"} | options
+    return {check.name: check for check in memscal.calibrate(scan, **options).apparatus.checks}
+
+
+def test_the_table_of_checks_lists_those_that_there_are_and_which_have_p_values() -> None:
+    rows = re.findall(r"^\| `(\w+)` +\|(.*)\|$", TABLE.read_text(encoding="utf-8"), re.MULTILINE)
+    listed = {name: rest.split("|")[2].strip() == "yes" for name, rest in rows}
+    assert len(rows) == len(listed)
+    scans = [
+        simulated(load=[0.5, 1.5], repeats=2, points=33),
+        simulated(raster=True, points=17),
+        [simulated(points=33, seed=1), simulated(points=33, seed=2)],
+    ]
+    found = [check for scan in scans for check in checks(scan).values()]
+    assert {check.name: check.p_value is not None for check in found} == listed
+
+
+@pytest.mark.parametrize(
+    ("options", "there", "absent"),
+    [
+        ({}, {"chi_square"}, {"held_out_repeat", "held_out_load", "held_out_scan"}),
+        ({"state_noise": False}, {"residual_runs"}, {"chi_square", "noise_as_stated"}),
+        ({"state_noise": False, "repeats": 3}, {"chi_square", "held_out_repeat"}, set()),
+        ({"load": [0.5, 1.0, 1.5]}, {"held_out_load"}, {"held_out_repeat"}),
+        ({"load": [0.5, 1.0], "repeats": 2}, {"held_out_load", "held_out_repeat"}, set()),
+    ],
+)
+def test_a_check_is_run_where_the_scan_has_something_to_check(options, there, absent) -> None:
+    found = set(checks(simulated(points=33, **options)))
+    assert there <= found
+    assert not absent & found
+
+
+def test_a_check_passes_just_when_its_p_value_is_above_a_thousandth() -> None:
+    scan = simulated(load=[0.5, 1.0, 1.5], points=33)
+    rng = np.random.default_rng()
+    for size in (0.0, 0.3, 1.0, 3.0):
+        noise = rng.normal(0.0, size, scan.u_zz.shape) * scan.u_zz_errors
+        for check in checks(replace(scan, u_zz=scan.u_zz + noise)).values():
+            if check.p_value is not None:
+                assert check.passed == (check.p_value > 1e-3), check
+
+
+@pytest.mark.parametrize(
+    ("kernel", "words"), [(TAILS, "tails"), (RING, "a core of its own|an edge")]
+)
+def test_a_departure_from_a_gaussian_is_named(kernel, words: str) -> None:
+    found = checks(simulated(kernel=kernel, noise=0.001))["gaussian_evidence"]
+    assert not found.passed
+    assert re.search(f"likeliest departure is ({words})", found.meaning)
+
+
+def test_the_evidence_speaks_for_a_gaussian_that_is_one() -> None:
+    values = [checks(simulated(seed=seed))["gaussian_evidence"].value for seed in range(20)]
+    # A Bayes factor in favour of what is false exceeds ten at most once in ten.
+    assert np.median(values) < 0
+    assert np.mean(np.array(values) > np.log(10)) < 0.4
+
+
+def test_the_chi_square_of_a_sensor_that_is_not_gaussian_passes() -> None:
+    found = checks(simulated(kernel=RING, noise=0.001))
+    assert found["chi_square"].passed
+    assert not found["gaussian_misfit"].passed
+
+
+@pytest.mark.parametrize("method", ["evidence", "white-noise"])
+def test_meanings_speak_of_the_method_that_was_used(method: str) -> None:
+    found = checks(simulated(), method=method)
+    text = " ".join(check.meaning for check in found.values())
+    assert ("division of the fields" in text) == (method == "white-noise")
+    assert ("posterior mean" in text) == (method == "evidence")
+    assert all("failure means" in check.meaning for check in found.values())
+
+
+def test_the_band_s_criterion_stands_in_words_beside_its_number() -> None:
+    apparatus = memscal.calibrate(simulated(), method="evidence").apparatus
+    found = next(check for check in apparatus.checks if check.name == "resolved_band")
+    assert "less than 1/3 of it" in found.meaning
+    assert f"{apparatus.resolved_wavenumber * 1e-3:.3g} rad/mm" in found.meaning
+
+
+def test_p_values_are_kept_in_the_artifact(tmp_path: Path) -> None:
+    made = memscal.calibrate(simulated(repeats=2, points=33)).apparatus
+    path = tmp_path / "a.h5"
+    made.save(path)
+    assert memscal.load_apparatus(path).checks == made.checks
