@@ -13,6 +13,7 @@ from memscal.version import __version__
 if TYPE_CHECKING:
     from memscal.apparatus import ApparatusFunction, load_apparatus
     from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
+    from memscal.calibration.fleet import FleetCalibration, calibrate_many
     from memscal.calibration.monte_carlo import MonteCarlo, monte_carlo
     from memscal.calibration.procedure import Calibration, calibrate
     from memscal.errors import MemscalError
@@ -34,6 +35,7 @@ _HOMES = {
     "Contact": "memscal.mechanics.contact",
     "ElasticFilm": "memscal.model.film",
     "ExponentialCompliance": "memscal.mechanics.interface",
+    "FleetCalibration": "memscal.calibration.fleet",
     "GaussianMixture": "memscal.axisymmetry.kernels",
     "GreenwoodTripp": "memscal.mechanics.interface",
     "Interface": "memscal.mechanics.interface",
@@ -47,6 +49,7 @@ _HOMES = {
     "StressProfile": "memscal.model.stress",
     "StressSensor": "memscal.model.scan",
     "calibrate": "memscal.calibration.procedure",
+    "calibrate_many": "memscal.calibration.fleet",
     "indent": "memscal.mechanics.indent",
     "load_apparatus": "memscal.apparatus",
     "monte_carlo": "memscal.calibration.monte_carlo",
@@ -64,6 +67,7 @@ __all__ = [
     "Contact",
     "ElasticFilm",
     "ExponentialCompliance",
+    "FleetCalibration",
     "GaussianMixture",
     "GreenwoodTripp",
     "Interface",
@@ -78,6 +82,7 @@ __all__ = [
     "StressSensor",
     "__version__",
     "calibrate",
+    "calibrate_many",
     "indent",
     "load_apparatus",
     "monte_carlo",

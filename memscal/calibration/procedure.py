@@ -147,7 +147,7 @@ def calibrate(
         require_calibration_rod(each)
     given = _each(reference, scans)
     stresses = [reference_profile(s, r) for s, r in zip(scans, given, strict=True)]
-    regulariser = _regulariser(method, seed, options)
+    regulariser = chosen_method(method, seed, options)
     solution = solve(scans, stresses, regulariser)
     others = None if alternative is None else _each(alternative, scans)
     effects = _effects(solution, others)
@@ -189,7 +189,8 @@ def _read(reference: Reference) -> StressProfile | Contact | None:
     )
 
 
-def _regulariser(method: str | Regulariser, seed: int, options: Mapping[str, Any]) -> Regulariser:
+def chosen_method(method: str | Regulariser, seed: int, options: Mapping[str, Any]) -> Regulariser:
+    """Set up the method of division, by its name or as it was given."""
     if isinstance(method, str):
         return create_regulariser(method, seed=seed, **options)
     if isinstance(method, type) or not callable(getattr(method, "divide", None)):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -125,6 +126,11 @@ class Scan:
         self._check_positions()
         self._check_correlation()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the fields, and prove them again: a read-only mapping cannot be pickled."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return _rebuilt, ({**values, "channels": dict(self.channels)},)
+
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
         shape = " x ".join(str(n) for n in self.u_zz.shape)
@@ -230,3 +236,7 @@ class Scan:
                 cure="Add the electronic noise, which is independent from point to point.",
             )
         object.__setattr__(self, "u_zz_correlation", given)
+
+
+def _rebuilt(values: Mapping[str, Any]) -> Scan:
+    return Scan(**values)
