@@ -14,6 +14,7 @@ from memscal.deconvolution.problem import NOISE_RATIO, DivisionProblem
 from memscal.errors import InputError
 from memscal.estimation.band import Band
 from memscal.estimation.constrained import constrained_profile
+from memscal.estimation.ellipse import elliptic_departure
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
@@ -181,8 +182,11 @@ class _LineFields:
         cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
         grid = EvenGrid(cells + 1, choice.spacing)
         step = choice.spacing / 2
-        voltage = lift(estimate.spectrum.at, grid, step)
-        reference = lift(estimate.model.reference.at, grid, step)
+        # Both at once: they share the Bessel functions of their transforms.
+        spectra = np.stack([estimate.spectrum.values, estimate.model.reference.values], axis=1)
+        wavenumbers = estimate.model.reference.wavenumbers
+        both = lift(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
+        voltage, reference = np.ascontiguousarray(np.moveaxis(both, -1, 0))
         support = round(choice.support / choice.spacing)
         return cls(grid, voltage, reference, support, estimate.distance)
 
@@ -218,6 +222,7 @@ class _RasterFields:
     reference: FloatArray
     support: float
     step: float
+    oval: FloatArray
     index: tuple[FloatArray, FloatArray]
 
     @classmethod
@@ -229,23 +234,25 @@ class _RasterFields:
         step = choice.spacing / 2
         voltage = lift(estimate.spectrum.at, grid, step)
         # A point that is missing keeps the profile; an outlier keeps most of it.
-        departure = estimate.weighed.residual / points.load * estimate.outlier_weight
-        voltage[rows, columns] += departure
+        departure = estimate.weighed.residual * estimate.outlier_weight + estimate.oval
+        voltage[rows, columns] += departure / points.load
         reference = lift(estimate.model.reference.at, grid, step)
-        return cls(grid, voltage, reference, choice.support, step, (rows, columns))
+        gaussian = estimate.gaussian
+        oval = gaussian.conversion_constant * elliptic_departure(
+            _about_zero(x), _about_zero(y), gaussian.sigma, gaussian.ellipticity
+        )
+        return cls(grid, voltage, reference, choice.support, step, oval, (rows, columns))
 
     @property
     def confinement(self) -> FloatArray:
-        return _taper(self._about_zero.radius, self.support)
+        return _taper(self._kernel_grid.radius, self.support)
 
     @property
-    def _about_zero(self) -> Lattice:
-        # A kernel's zero is the central point of the lattice, wherever the sensor is.
-        x, y = self.grid.x, self.grid.y
-        return Lattice(x - x[x.size // 2], y - y[y.size // 2])
+    def _kernel_grid(self) -> Lattice:
+        return Lattice(_about_zero(self.grid.x), _about_zero(self.grid.y))
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        return lift(profile, self._about_zero, self.step)
+        return lift(profile, self._kernel_grid, self.step) + self.oval
 
     def at_points(self, field: FloatArray) -> FloatArray:
         return np.asarray(field[self.index])
@@ -261,6 +268,11 @@ class _RasterFields:
 
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         return self.grid.wavenumber[0], spectral[0]
+
+
+def _about_zero(axis: FloatArray) -> FloatArray:
+    """A kernel's zero is the central point of the lattice, wherever the sensor is."""
+    return axis - axis[axis.size // 2]
 
 
 def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatArray, FloatArray]:

@@ -177,7 +177,7 @@ def _rows(
     synthesis = j0(np.multiply.outer(r, k)) * estimate.model.reference.wavenumbers.weights
     normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
-    transfer = np.stack([np.interp(wavenumbers, k, column) for column in normalised.T], axis=1)
+    transfer = _interpolated(wavenumbers, k, normalised)
     hidden = (1 - window) * estimate.kernel / a
     hidden_radial = synthesis @ hidden
     opened = radial - synthesis @ ((1 - window)[:, None] * normalised)
@@ -196,6 +196,13 @@ def _rows(
     )
 
 
+def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) -> FloatArray:
+    """Interpolate every column linearly, its ends continued: np.interp for all at once."""
+    left = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
+    share = np.clip((places - nodes[left]) / (nodes[left + 1] - nodes[left]), 0.0, 1.0)[:, None]
+    return np.asarray((1 - share) * columns[left] + share * columns[left + 1])
+
+
 def _scalar_rows(
     estimate: ProfileEstimate,
     kernel: NormalisedKernel,
@@ -207,6 +214,7 @@ def _scalar_rows(
     entries: list[tuple[str, float, FloatArray, int]] = [
         ("conversion_constant", kernel.conversion_constant, estimate.basis.integrals, 0),
         ("gaussian_sigma", gaussian.sigma, _unit(fitted, 1), count),
+        *_ellipse(estimate),
         *((f.name, f.value, f.row @ opened, 0) for f in functionals),
         *_nuisances(estimate),
         ("conversion_constant_gaussian", gaussian.conversion_constant, _unit(fitted, 0), count),
@@ -234,6 +242,17 @@ def _nuisances(estimate: ProfileEstimate) -> list[tuple[str, float, FloatArray, 
     for i, ((name, scale), value) in enumerate(zip(drifts, estimate.drifts, strict=True)):
         entries.append((name, scale * float(value), scale * _unit(count, first + i), 0))
     return entries
+
+
+def _ellipse(estimate: ProfileEstimate) -> list[tuple[str, float, FloatArray, int]]:
+    """The Gaussian's ellipticity: a round departure beside it would be read as less of both."""
+    count, fitted = estimate.basis.integrals.size, estimate.basis.flat
+    names, values = ("ellipticity", "ellipticity_diagonal"), estimate.gaussian.ellipticity
+    first = fitted - estimate.points.ellipse
+    return [
+        (names[i], float(values[i]), _unit(fitted, first + i), count)
+        for i in range(estimate.points.ellipse)
+    ]
 
 
 def _number(scan: int) -> str:

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from memscal.errors import FitError
+from memscal.estimation.ellipse import elliptic_columns
 from memscal.estimation.forward import ForwardModel, Geometry, gaussian_transfer
 from memscal.estimation.newton import gauss_newton
 from memscal.estimation.points import ScanPoints
@@ -22,6 +23,8 @@ __all__ = ["GaussianFit", "fit_gaussian", "linearise"]
 
 _Loss = Literal["linear", "soft_l1"]
 
+#: A step in the ellipticity that the solver takes for one.
+_TYPICAL_ELLIPTICITY = 0.2
 #: Widths from which the search starts, in units of the film's smoothing length.
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
 #: Standardised residual from which on the robust fit's loss grows linearly.
@@ -44,6 +47,8 @@ class GaussianFit:
         Centre (x0, y0) of the sensor in each scan, in m; zero where a line does not tell.
     drift : ndarray, shape (2 or 3 a scan,)
         Baseline of each scan, and its change over half the range along x (and y), in V.
+    ellipticity : ndarray, shape (2,)
+        e1 (along x against y) and e2 (along the diagonals), where the points spread over a plane.
     points : ScanPoints
         What was fitted.
     geometry : Geometry
@@ -58,6 +63,7 @@ class GaussianFit:
     sigma: float
     centre: FloatArray
     drift: FloatArray
+    ellipticity: FloatArray
     points: ScanPoints
     geometry: Geometry
     jacobian: FloatArray
@@ -100,7 +106,9 @@ def fit_gaussian(
     if start is None:
         return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
-    theta = np.concatenate([[start.conversion_constant, start.sigma], centres, start.drift])
+    shape = [start.conversion_constant, start.sigma]
+    ellipse = start.ellipticity[: model.points.ellipse]
+    theta = np.concatenate([shape, centres, start.drift, ellipse])
     return _solve(model, weights, theta, loss="linear")
 
 
@@ -119,7 +127,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
         return last[key]
 
     scale = _typical(model, start)
-    unexplained = model.points.u - linearise(model, start).predicted
+    unexplained = model.points.u - evaluate(start / scale).predicted
     noise = _robust_scale(standardised(unexplained, weights))
 
     def residual(scaled: FloatArray) -> FloatArray:
@@ -163,8 +171,9 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
     amplitude = np.ptp(model.points.u)
     centres = int(model.points.free.sum())
-    drift = np.full(theta.size - 2 - centres, amplitude)
-    return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift])
+    ellipse = np.full(model.points.ellipse, _TYPICAL_ELLIPTICITY)
+    drift = np.full(theta.size - 2 - centres - ellipse.size, amplitude)
+    return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift, ellipse])
 
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
@@ -175,22 +184,32 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     model : ForwardModel
         Points and reference.
     theta : ndarray, shape (p,)
-        A, sigma, free coordinates of the centres, and drift, as in :class:`GaussianFit`.
+        A, sigma, free coordinates of the centres, drift, and in a plane the ellipticity, as in
+        :class:`GaussianFit`.
     """
-    free = model.points.free
+    free, elliptic = model.points.free, model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)
     centre[free] = theta[2 : 2 + free.sum()]
-    drift = theta[2 + free.sum() :]
+    drift = theta[2 + free.sum() : theta.size - elliptic]
+    ellipticity = np.zeros(2)
+    ellipticity[:elliptic] = theta[theta.size - elliptic :]
     geometry = model.geometry(centre)
     kernel = gaussian_transfer(model.k, sigma)
     columns = np.stack([kernel, -sigma * model.k**2 * kernel], axis=1)
-    shape, widening = model.signal(geometry, columns).T
+    shape, widening, *ovals = (
+        elliptic_columns(model, geometry, sigma, ellipticity).T
+        if elliptic
+        else model.signal(geometry, columns).T
+    )
     shift = model.centre_derivative(geometry, amplitude * kernel)
     baseline = model.drift_columns
-    jacobian = np.column_stack([shape, amplitude * widening, shift, baseline])
+    oval = [amplitude * column for column in ovals[:elliptic]]
+    jacobian = np.column_stack([shape, amplitude * widening, shift, baseline, *oval])
     predicted = amplitude * shape + baseline @ drift
-    return GaussianFit(amplitude, sigma, centre, drift, model.points, geometry, jacobian, predicted)
+    return GaussianFit(
+        amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
+    )
 
 
 def _positive_width(fit: GaussianFit) -> GaussianFit:
@@ -211,8 +230,8 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
     shape = np.median([part[:2] for part in parts], axis=0)
     free = points.free.sum(axis=1)
     centres = [part[2 : 2 + n] for part, n in zip(parts, free, strict=True)]
-    drifts = [part[2 + n :] for part, n in zip(parts, free, strict=True)]
-    return np.concatenate([shape, *centres, *drifts])
+    drifts = [part[2 + n : 3 + 2 * n] for part, n in zip(parts, free, strict=True)]
+    return np.concatenate([shape, *centres, *drifts, np.zeros(points.ellipse)])
 
 
 def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray:

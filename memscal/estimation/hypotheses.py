@@ -129,17 +129,18 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
 
 
 def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
-    """Fit the columns together with the rest of the model to what the model left over.
+    """Fit the columns together with a round model to what that leaves over.
 
     The departures enter as explained: they are even, and absorb nothing odd or uneven.
     """
     root = np.sqrt(estimate.weights) / estimate.noise_scale
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
-    jacobian = estimate.gaussian.jacobian / np.linalg.norm(estimate.gaussian.jacobian, axis=0)
+    round_ = estimate.gaussian.jacobian[:, : estimate.basis.flat - estimate.points.ellipse]
+    jacobian = round_ / np.linalg.norm(round_, axis=0)
     base = np.linalg.qr(jacobian * root[:, None])[0]
     scaled = columns * root[:, None]
-    residual = estimate.weighed.residual * root
+    residual = (estimate.weighed.residual + estimate.oval) * root
     residual = residual - base @ (base.T @ residual)
     free = scaled - base @ (base.T @ scaled)
     information = np.linalg.pinv(free.T @ free, hermitian=True)

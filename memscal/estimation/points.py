@@ -69,6 +69,11 @@ class ScanPoints:
         """Whether a scan spreads over two dimensions (a raster)."""
         return bool(self.free.all(axis=1).any())
 
+    @property
+    def ellipse(self) -> int:
+        """How many numbers of an ellipse the points tell: crossed lines do not see diagonals."""
+        return 2 if self.planar else int(self.free.any(axis=0).all())
+
     @cached_property
     def step(self) -> float:
         """Median distance of neighbouring positions, in m; of several scans the smallest."""

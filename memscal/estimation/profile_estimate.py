@@ -138,12 +138,21 @@ class ProfileEstimate:
     def drifts(self) -> FloatArray:
         """Each scan's baseline and its change over half the range along x (and y), in V."""
         first = 2 + int(self.points.free.sum())
-        return np.asarray(self.gaussian.drift + self.weighed.mean[first : self.basis.flat])
+        last = self.basis.flat - self.points.ellipse
+        return np.asarray(self.gaussian.drift + self.weighed.mean[first:last])
 
     @property
     def drift(self) -> FloatArray:
         """The first scan's baseline and its change over half the range along x (and y), in V."""
         return self.drifts[: 1 + int(self.points.free[0].sum())]
+
+    @property
+    def oval(self) -> FloatArray:
+        """What an elliptic sensor adds to the radial profile's voltages, shape (n,), in V."""
+        if not self.points.ellipse:
+            return np.zeros_like(self.points.u)
+        radial = self.model.signal(self.model.geometry(self.centres), self.kernel)
+        return np.asarray(self.predicted - self.background - radial)
 
     @property
     def offset(self) -> FloatArray:

@@ -28,6 +28,7 @@ _DIMENSIONS = {
     "gaussian_sigma": "length",
     "fwhm": "length",
     "noise_equivalent_area": "area",
+    "ellipticity": "dimensionless",
     "centre": "length",
     "baseline": "voltage",
     "baseline_slope": "voltage per length",

@@ -1,0 +1,98 @@
+"""An elliptic apparatus function: its response by harmonics, and its estimate from a raster."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scans import CONVERSION, SIGMA, estimated, simulated
+from scipy.signal import fftconvolve
+from scipy.stats import chi2
+
+import memscal
+from memscal.estimation.ellipse import elliptic_columns, elliptic_departure
+from memscal.estimation.forward import unit_gaussian
+from memscal.model.scan import Scan
+
+SEEDS = 20
+
+
+@lru_cache
+def clean_scan(e: tuple[float, float]) -> Scan:
+    """A raster through an elliptic Gaussian, convolved on a fine grid: not by harmonics."""
+    base = simulated(raster=True, points=17, half_range=4e-3, noise=0.0, baseline=0.0, drift=0.0)
+    step = 0.05e-3
+    axis = np.arange(-240, 241) * step
+    contact = memscal.indent(base.film, base.indenter, load=base.load)
+    stress = contact.base_stress(np.hypot.outer(axis, axis))
+    kernel = elliptic_departure(axis, axis, SIGMA, np.array(e))
+    kernel = kernel + unit_gaussian(np.hypot.outer(axis, axis), SIGMA)
+    field = CONVERSION * fftconvolve(stress, kernel, mode="same") * step**2
+    # The raster's points lie on the fine grid, but for the centre: 0.15 mm, three of its steps.
+    places = np.rint((base.x - 0.15e-3) / step).astype(int) + 240
+    return replace(base, u_zz=field[np.ix_(places, places)], synthetic=None)
+
+
+def elliptic_scan(e: tuple[float, float], noise: float, seed: int = 0) -> Scan:
+    """The same with noise."""
+    base = clean_scan(e)
+    clean = base.u_zz
+    errors = np.full(clean.shape, noise * clean.max())
+    u = clean + np.random.default_rng(seed).normal(size=clean.shape) * errors
+    return replace(base, u_zz=u, u_zz_errors=errors if noise else None)
+
+
+def test_the_harmonics_are_the_convolution_with_an_elliptic_gaussian() -> None:
+    e = (0.3, 0.2)
+    scan = elliptic_scan(e, noise=0.0)
+    estimate = estimated(simulated(raster=True, points=17, half_range=4e-3))
+    geometry = estimate.model.geometry(np.array([0.15e-3, 0.15e-3]))
+    found = CONVERSION * elliptic_columns(estimate.model, geometry, SIGMA, np.array(e))[:, 0]
+    np.testing.assert_allclose(found, scan.u_zz.ravel(), atol=2e-4 * scan.u_zz.max())
+
+
+def test_the_columns_are_the_derivatives_of_the_response() -> None:
+    estimate = estimated(simulated(raster=True, points=13))
+    geometry, here = estimate.gaussian.geometry, np.array([0.2, -0.1])
+    columns = elliptic_columns(estimate.model, geometry, SIGMA, here)
+    for i, step in ((2, np.array([1e-3, 0.0])), (3, np.array([0.0, 1e-3]))):
+        above = elliptic_columns(estimate.model, geometry, SIGMA, here + step)[:, 0]
+        below = elliptic_columns(estimate.model, geometry, SIGMA, here - step)[:, 0]
+        slope = (above - below) / 2e-3
+        np.testing.assert_allclose(columns[:, i], slope, atol=1e-4 * np.abs(slope).max())
+
+
+def test_an_ellipse_is_found_with_an_uncertainty_that_is_true() -> None:
+    truth, deviates = (0.25, -0.15), []
+    for seed in range(SEEDS):
+        p = memscal.calibrate(
+            elliptic_scan(truth, 0.01, seed), method="evidence"
+        ).apparatus.parameters
+        names = ("ellipticity", "ellipticity_diagonal", "gaussian_sigma")
+        wanted = (*truth, SIGMA)
+        deviates.append([(p[n] - w) / p.uncertainty(n) for n, w in zip(names, wanted, strict=True)])
+    low, high = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], SEEDS) / SEEDS)
+    scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
+    assert np.all(scatter < 1.1 * high)
+    assert np.all(scatter[:2] > low / 1.2)
+
+
+def test_the_field_of_an_elliptic_sensor_is_elliptic() -> None:
+    field = memscal.calibrate(elliptic_scan((0.4, 0.0), 0.003), method="evidence").apparatus.field
+    plane_x, plane_y = np.meshgrid(field.x, field.y)
+    near = np.hypot(plane_x, plane_y) < 2.5e-3
+    along_x = np.sum((field.g * plane_x**2)[near])
+    along_y = np.sum((field.g * plane_y**2)[near])
+    assert along_x / along_y == pytest.approx(1.4 / 0.6, rel=0.08)
+
+
+def test_two_lines_across_each_other_tell_along_from_across() -> None:
+    raster = elliptic_scan((0.3, 0.0), noise=0.0)
+    middle = 8
+    x_line = replace(raster, y=None, u_zz=raster.u_zz[middle])
+    y_line = replace(raster, y=None, u_zz=raster.u_zz[:, middle], direction="y")
+    found = memscal.calibrate([x_line, y_line], method="evidence").apparatus.parameters
+    # Neither line passes through the centre itself: 0.15 mm beside it, a quarter of the width.
+    assert found["ellipticity"] == pytest.approx(0.3, abs=0.05)
