@@ -20,9 +20,9 @@ from memscal.estimation.residuals import (
     FEWEST_RESIDUALS,
     Residuals,
     chi_square_test,
-    independent_residuals,
     neighbour_correlation_test,
     pure_error_test,
+    residuals_of,
     runs_test,
 )
 from memscal.model.apparatus import QualityCheck
@@ -51,9 +51,9 @@ def check(
 
 def model_checks(estimate: ProfileEstimate) -> list[QualityCheck]:
     """Run every check of the model that applies to the scan."""
-    residuals = independent_residuals(estimate)
+    residuals = residuals_of(estimate)
     checks = _noise(estimate)
-    if residuals.values.size >= FEWEST_RESIDUALS:
+    if residuals.degrees >= FEWEST_RESIDUALS:
         checks += _size(estimate, residuals)
         checks += _order(residuals)
     checks.append(_evidence(estimate))
@@ -79,7 +79,7 @@ def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
 
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
     """Compare what no G explains with the noise, if there is a noise to compare with."""
-    degrees = residuals.values.size
+    degrees = residuals.degrees
     if residuals.stated:
         found = chi_square_test(residuals)
         compared = f"with the stated noise: reduced chi-square of {degrees} degrees"

@@ -16,6 +16,8 @@ Theil, J. Am. Stat. Assoc. 60, 1965),
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,19 +28,23 @@ from memscal.estimation.hypotheses import FALSE_ALARM, chi_square_limit
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
 __all__ = [
     "Residuals",
     "TestOutcome",
     "chi_square_test",
-    "independent_residuals",
     "neighbour_correlation_test",
     "pure_error_test",
+    "residuals_of",
     "runs_test",
 ]
 
 #: Weight of the correlation from one step to the next: half as much for each step farther.
 _DECAY = 0.5
 _FARTHEST = 8
+_LEAST_SKEWNESS = 1e-3
 #: With fewer independent residuals there is nothing to test.
 FEWEST_RESIDUALS = 3
 
@@ -57,28 +63,54 @@ class TestOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Independent residuals of unit variance, in the order of the scan.
+    """What no apparatus function explains, in the order of the scan.
 
     Parameters
     ----------
-    values : ndarray, shape (m,)
-        Standard normal deviates if the noise is as stated; else up to a common factor.
-    point : ndarray of int, shape (m,)
-        The point of the scan that each is nearest to.
-    sequence : ndarray of int, shape (m,)
+    values : ndarray, shape (n,)
+        Weighted residuals of all points but outliers; of unit variance, before the projection,
+        if the noise is as stated.
+    basis : ndarray, shape (n, r)
+        Orthonormal basis of what was projected out.
+    point : ndarray of int, shape (n,)
+        The point of the scan that each belongs to.
+    place : ndarray of int, shape (n,)
+        Its place along the scan, outliers counted.
+    sequence : ndarray of int, shape (n,)
         Which pass over the sensor it belongs to: a repeat, or a row of a raster.
     stated : bool
         Whether the noise is stated.
     """
 
     values: FloatArray
+    basis: FloatArray
     point: NDArray[np.intp]
+    place: NDArray[np.intp]
     sequence: NDArray[np.intp]
     stated: bool
 
+    @property
+    def degrees(self) -> int:
+        """How many of them are independent."""
+        return int(self.basis.shape[0] - self.basis.shape[1])
 
-def independent_residuals(estimate: ProfileEstimate) -> Residuals:
-    """Return residuals that are independent of each other and of G.
+    @cached_property
+    def independent(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        """Independent residuals of the same sum of squares, and which of the points they are.
+
+        Of equal variance and in the order of the scan: one for each degree of freedom.
+        """
+        from scipy.linalg import qr
+
+        # The points that determine the parameters best are dropped: what is left of the others
+        # is then nearest to their own residuals.
+        dropped = qr(self.basis.T, mode="r", pivoting=True)[1][: self.basis.shape[1]]
+        rest = np.delete(np.arange(self.values.size), dropped)
+        return _whitened(self.basis[rest], self.values[rest]), rest
+
+
+def residuals_of(estimate: ProfileEstimate) -> Residuals:
+    """Project a scan off everything that an apparatus function may do.
 
     Parameters
     ----------
@@ -88,36 +120,27 @@ def independent_residuals(estimate: ProfileEstimate) -> Residuals:
     Returns
     -------
     Residuals
-        As many as there are points less columns of the model.
+        One for each point that is no outlier.
 
     Examples
     --------
     >>> import memscal
-    >>> residuals = independent_residuals(memscal.calibrate(memscal.simulate()).solution.estimate)
-    >>> 0.5 < residuals.values.std() < 1.5
-    True
+    >>> residuals = residuals_of(memscal.calibrate(memscal.simulate()).solution.estimate)
+    >>> residuals.values.size, 50 < residuals.degrees < 60
+    (65, True)
     """
-    from scipy.linalg import qr
-
     model = free_model(estimate)
-    basis = _orthonormal(model.design)
-    left_over = model.data - basis @ (basis.T @ model.data)
-    # The points that determine the parameters best are dropped: what is left of the others is
-    # then nearest to their own residuals.
-    dropped = qr(basis.T, mode="r", pivoting=True)[1][: basis.shape[1]]
-    rest = np.delete(np.arange(model.data.size), dropped)
-    values = _whitened(basis[rest], left_over[rest])
-    order, sequence = _passes(estimate)
-    place = np.empty_like(order)
-    place[order] = np.arange(order.size)
-    point = model.kept[rest]
-    along = np.argsort(place[point])
-    return Residuals(values[along], point[along], sequence[point[along]], model.stated)
+    place, sequence = _passes(estimate)
+    order = np.argsort(place[model.kept])
+    point = model.kept[order]
+    basis, data = _orthonormal(model.design[order]), model.data[order]
+    left_over = data - basis @ (basis.T @ data)
+    return Residuals(left_over, basis, point, place[point], sequence[point], model.stated)
 
 
 def chi_square_test(residuals: Residuals) -> TestOutcome:
     """Test the residuals' size against the stated noise: chi-square per degree of freedom."""
-    degrees = residuals.values.size
+    degrees = residuals.degrees
     total = float(residuals.values @ residuals.values)
     p_value = float(chdtrc(degrees, total))
     return TestOutcome(total / degrees, chi_square_limit(degrees) / degrees, p_value)
@@ -163,8 +186,9 @@ def runs_test(residuals: Residuals) -> TestOutcome:
     zero, and the number of changes is binomial.)  The p-value is one-sided, for too few runs, and
     as coarse as a count: at most as often below a level as that level says.
     """
-    same_pass = np.diff(residuals.sequence) == 0
-    changed = np.diff(residuals.values > 0) & same_pass
+    values, rest = residuals.independent
+    same_pass = np.diff(residuals.sequence[rest]) == 0
+    changed = np.diff(values > 0) & same_pass
     pairs, changes = int(same_pass.sum()), int(changed.sum())
     # The fewest changes that chance allows.
     fewest = int(np.argmax(bdtr(np.arange(pairs + 1.0), pairs, 0.5) > FALSE_ALARM))
@@ -177,27 +201,59 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     r"""Test whether neighbouring residuals are alike, whatever the size of the noise.
 
     The statistic, near one for residuals that are smooth along the scan, is
-    :math:`T = \sum_{l \ge 1} 2^{-l} \sum_i w_i w_{i+l} / \sum_i w_i^2 = w^T M w / w^T w`.  For
-    :math:`n` independent normal residuals its mean is zero, and its second and third moments are
-    :math:`2\,\mathrm{tr} M^2/n(n+2)` and :math:`8\,\mathrm{tr} M^3/n(n+2)(n+4)`; the p-value is
-    that of the gamma distribution (Pearson's type III) with these moments.  One-sided.
+    :math:`T = \sum_{l \ge 1} 2^{-l} \sum_i e_i e_{i+l} / \sum_i e_i^2 = e^T W e / e^T e`, as
+    Durbin and Watson's (Biometrika 37, 1950) with more than one lag.  With
+    :math:`S_p = \mathrm{tr}\,[(1 - QQ^T) W]^p` about the mean :math:`S_1/\nu`, its second and
+    third moments for independent normal noise are :math:`2 S_2/\nu(\nu+2)` and
+    :math:`8 S_3/\nu(\nu+2)(\nu+4)`; the p-value is that of the gamma distribution (Pearson's
+    type III) with these moments.  One-sided.
     """
-    from scipy.sparse import diags
-
-    values, sequence = residuals.values, residuals.sequence
-    n, steps = values.size, range(1, min(_FARTHEST, values.size - 1) + 1)
-    bands = [0.5 * _DECAY**i * (sequence[i:] == sequence[:-i]) for i in steps]
-    matrix = diags([*bands, *bands], [*steps, *(-i for i in steps)]).tocsr()
-    value = float(values @ (matrix @ values) / (values @ values))
-    squared = matrix @ matrix
-    deviation = np.sqrt(2 * squared.trace() / (n * (n + 2)))
-    third = 8 * matrix.multiply(squared).sum() / (n * (n + 2) * (n + 4))
-    if not deviation > 0:
+    nu, values = residuals.degrees, residuals.values
+    neighbours = _neighbours(residuals)
+    first, second, third = _traces(neighbours, residuals.basis)
+    mean = first / nu
+    third += 2 * nu * mean**3 - 3 * mean * second
+    second -= nu * mean**2
+    if not second > 0:
         return TestOutcome(0.0, 1.0, 1.0)
-    shape = 4 * deviation**6 / third**2
-    limit = deviation * (gammainccinv(shape, FALSE_ALARM) - shape) / np.sqrt(shape)
-    p_value = gammaincc(shape, max(shape + np.sqrt(shape) * value / deviation, 0.0))
+    deviation = np.sqrt(2 * second / (nu * (nu + 2)))
+    skewness = max(8 * third / (nu * (nu + 2) * (nu + 4)) / deviation**3, _LEAST_SKEWNESS)
+    shape = 4 / skewness**2
+    value = float(values @ (neighbours @ values) / (values @ values))
+    limit = mean + deviation * (gammainccinv(shape, FALSE_ALARM) - shape) / np.sqrt(shape)
+    p_value = gammaincc(shape, max(shape + np.sqrt(shape) * (value - mean) / deviation, 0.0))
     return TestOutcome(value, float(limit), float(p_value))
+
+
+def _neighbours(residuals: Residuals) -> csr_array:
+    """Weights of the pairs of residuals that follow each other in one pass, shape (n, n)."""
+    from scipy.sparse import coo_array
+
+    place, sequence, n = residuals.place, residuals.sequence, residuals.place.size
+    matrix = coo_array((n, n)).tocsr()
+    for apart in range(1, min(_FARTHEST, n - 1) + 1):
+        first = np.flatnonzero(sequence[apart:] == sequence[:-apart])
+        steps = place[first + apart] - place[first]
+        weight = 0.5 * _DECAY**steps
+        pairs = coo_array((weight, (first, first + apart)), shape=(n, n))
+        matrix = matrix + pairs + pairs.T
+    return matrix
+
+
+def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
+    """Traces of the first three powers of (1 - QQ') W, for a W without diagonal."""
+    moved = matrix @ basis
+    within = basis.T @ moved
+    squared = matrix @ matrix
+    first = -np.trace(within)
+    second = squared.trace() - 2 * np.sum(moved**2) + np.trace(within @ within)
+    third = (
+        (matrix * squared).sum()
+        - 3 * np.sum(moved * (matrix @ moved))
+        + 3 * np.sum(within * (moved.T @ moved))
+        - np.trace(within @ within @ within)
+    )
+    return float(first), float(second), float(third)
 
 
 def _orthonormal(design: FloatArray) -> FloatArray:
@@ -215,7 +271,7 @@ def _whitened(basis: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _passes(estimate: ProfileEstimate) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Order of the points along the scan, and which pass over the sensor each belongs to."""
+    """Place of each point along the scan, and which pass over the sensor it belongs to."""
     points = estimate.points
     runs_along_x = points.free[points.scan, 0]
     along = np.where(runs_along_x, points.x, points.y)
@@ -223,6 +279,7 @@ def _passes(estimate: ProfileEstimate) -> tuple[NDArray[np.intp], NDArray[np.int
     order = np.lexsort((along, across, points.repeat, points.scan))
     keys = np.stack([points.scan, points.repeat, across])[:, order]
     new = np.concatenate([[0], np.any(np.diff(keys, axis=1) != 0, axis=0)])
-    sequence = np.empty(order.size, dtype=np.intp)
+    place, sequence = np.empty_like(order), np.empty_like(order)
+    place[order] = np.arange(order.size)
     sequence[order] = np.cumsum(new)
-    return order, sequence
+    return place, sequence

@@ -19,8 +19,8 @@ from scipy.stats import binom, kstest
 import memscal
 from memscal.estimation.residuals import (
     chi_square_test,
-    independent_residuals,
     neighbour_correlation_test,
+    residuals_of,
     runs_test,
 )
 from memscal.model.scan import Scan
@@ -66,9 +66,10 @@ def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(20)
     first = 1000 * list(SENSORS).index(sensor)
     for seed in range(first, first + SEEDS):
-        residuals = independent_residuals(estimated(SENSORS[sensor](noise, seed)))
+        residuals = residuals_of(estimated(SENSORS[sensor](noise, seed)))
         runs = runs_test(residuals)
-        same = int(np.sum(np.diff(residuals.sequence) == 0))
+        kept = residuals.independent[1]
+        same = int(np.sum(np.diff(residuals.sequence[kept]) == 0))
         changes = round(same * (1 - runs.value))
         rows.append(
             {

@@ -14,18 +14,24 @@ from memscal.estimation.free_model import free_model
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.estimation.residuals import (
     Residuals,
+    _neighbours,
+    _traces,
     chi_square_test,
-    independent_residuals,
     neighbour_correlation_test,
     pure_error_test,
+    residuals_of,
     runs_test,
 )
 from memscal.model.scan import Scan
 
 
 def made(values: np.ndarray, passes: int = 1) -> Residuals:
+    """Residuals that are independent already, but for a last point that takes one parameter."""
     n = values.size
-    return Residuals(values, np.arange(n), np.arange(n) * passes // n, stated=True)
+    place = np.arange(n + 1)
+    sequence = np.append(np.arange(n) * passes // n, passes)
+    basis = (place == n)[:, None].astype(float)
+    return Residuals(np.append(values, 0.0), basis, place, place, sequence, stated=True)
 
 
 def rejected_share_bounds(scans: int, level: float) -> tuple[float, float]:
@@ -37,10 +43,13 @@ def rejected_share_bounds(scans: int, level: float) -> tuple[float, float]:
 )
 def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options) -> None:
     estimate = estimated(simulated(**options))
-    model, residuals = free_model(estimate), independent_residuals(estimate)
+    model, residuals = free_model(estimate), residuals_of(estimate)
     misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]
     assert residuals.values @ residuals.values == pytest.approx(misfit @ misfit, rel=1e-6)
-    assert residuals.values.size == model.data.size - model.design.shape[1]
+    assert residuals.degrees == model.data.size - model.design.shape[1]
+    independent, kept = residuals.independent
+    assert independent @ independent == pytest.approx(misfit @ misfit, rel=1e-6)
+    assert independent.size == kept.size == residuals.degrees
 
 
 def with_voltages(estimate: ProfileEstimate, u: np.ndarray) -> ProfileEstimate:
@@ -57,7 +66,7 @@ def test_residuals_of_many_noises_are_independent_and_of_unit_variance() -> None
     for _ in range(1500):
         noise = rng.normal(0.0, 1.0, estimate.points.u.size) * estimate.points.u_errors
         noisy = with_voltages(estimate, estimate.gaussian.predicted + noise)
-        rows.append(independent_residuals(noisy).values)
+        rows.append(residuals_of(noisy).independent[0])
     covariance = np.cov(np.array(rows).T)
     assert 20 < covariance.shape[0] < 28
     # Each entry is known to 1/sqrt(1500); one of some 300 strays by six of those once in 1e6.
@@ -68,7 +77,7 @@ def test_residuals_of_many_noises_are_independent_and_of_unit_variance() -> None
 def test_what_is_left_does_not_depend_on_g(kernel: memscal.GaussianMixture) -> None:
     estimate = estimated(simulated(kernel=kernel, noise=0.005))
     clean = simulated(kernel=kernel, noise=0.0).u_zz
-    residuals = independent_residuals(with_voltages(estimate, clean))
+    residuals = residuals_of(with_voltages(estimate, clean))
     # Without noise hardly anything is left over: of each direction a small share of the noise.
     assert residuals.values @ residuals.values < 0.1
 
@@ -77,16 +86,16 @@ def test_an_outlier_is_left_out_of_the_residuals() -> None:
     scan = simulated(noise=0.005)
     u = scan.u_zz.copy()
     u[20] += 0.5 * u.max()
-    residuals = independent_residuals(estimated(replace(scan, u_zz=u)))
+    residuals = residuals_of(estimated(replace(scan, u_zz=u)))
     assert 20 not in residuals.point
     assert chi_square_test(residuals).p_value > 1e-6
 
 
 def test_each_row_and_each_repeat_is_a_pass_of_its_own_in_the_order_of_the_scan() -> None:
-    repeats = independent_residuals(estimated(simulated(repeats=3, points=33)))
+    repeats = residuals_of(estimated(simulated(repeats=3, points=33)))
     assert set(repeats.sequence) == {0, 1, 2}
     estimate = estimated(simulated(raster=True, points=17))
-    raster = independent_residuals(estimate)
+    raster = residuals_of(estimate)
     assert set(raster.sequence) == set(range(17))
     assert (np.diff(raster.sequence) >= 0).all()
     same = np.diff(raster.sequence) == 0
@@ -117,12 +126,28 @@ def test_neighbours_of_different_passes_are_no_neighbours() -> None:
     assert neighbour_correlation_test(made(values, passes=20)).value == 0.0
 
 
+def test_the_traces_are_those_of_the_matrices() -> None:
+    residuals = residuals_of(estimated(simulated(repeats=2, points=21)))
+    neighbours = _neighbours(residuals)
+    apart = np.abs(np.subtract.outer(residuals.place, residuals.place))
+    weights = np.where((apart > 0) & (apart <= 8), 0.5 * 0.5**apart, 0.0)
+    weights[np.not_equal.outer(residuals.sequence, residuals.sequence)] = 0.0
+    np.testing.assert_allclose(neighbours.toarray(), weights)
+    moved = (np.eye(apart.shape[0]) - residuals.basis @ residuals.basis.T) @ weights
+    wanted = [np.trace(np.linalg.matrix_power(moved, p)) for p in (1, 2, 3)]
+    np.testing.assert_allclose(_traces(neighbours, residuals.basis), wanted, rtol=1e-9)
+
+
 def test_the_moments_of_the_neighbours_correlation_give_its_tail() -> None:
     rng = np.random.default_rng()
-    draws, n = 20_000, 40
-    p_values = np.array(
-        [neighbour_correlation_test(made(w)).p_value for w in rng.normal(size=(draws, n))]
-    )
+    draws = 2500
+    estimate = estimated(simulated(points=49))
+    residuals = residuals_of(estimate)
+    basis = residuals.basis
+    p_values = np.empty(draws)
+    for i, noise in enumerate(rng.normal(size=(draws, basis.shape[0]))):
+        left = replace(residuals, values=noise - basis @ (basis.T @ noise))
+        p_values[i] = neighbour_correlation_test(left).p_value
     for level in (0.5, 0.1, 0.01, 0.001):
         low, high = rejected_share_bounds(draws, level)
         # The gamma distribution's own error is a tenth of the level.
@@ -132,6 +157,7 @@ def test_the_moments_of_the_neighbours_correlation_give_its_tail() -> None:
 def test_the_neighbours_correlation_does_not_depend_on_the_noise_s_size() -> None:
     values = np.random.default_rng().normal(size=50)
     one, other = (neighbour_correlation_test(made(values * size)) for size in (1.0, 1e-6))
+    assert one.limit == other.limit
     assert other.p_value == pytest.approx(one.p_value)
 
 
@@ -179,7 +205,7 @@ def disturbed(cause: str, noise: float = 0.003) -> Scan:
 
 @pytest.mark.parametrize("cause", ["a bent baseline", "a step of the baseline", "correlated noise"])
 def test_faults_leave_runs_and_alike_neighbours(cause: str) -> None:
-    residuals = independent_residuals(estimated(disturbed(cause)))
+    residuals = residuals_of(estimated(disturbed(cause)))
     for found in (runs_test(residuals), neighbour_correlation_test(residuals)):
         assert found.value > found.limit
         assert found.p_value < 1e-3
@@ -188,5 +214,5 @@ def test_faults_leave_runs_and_alike_neighbours(cause: str) -> None:
 @pytest.mark.parametrize("cause", ["a bent baseline", "a step of the baseline", "a thicker film"])
 def test_faults_exceed_the_noise(cause: str) -> None:
     noise = 0.0005 if cause == "a thicker film" else 0.003
-    found = chi_square_test(independent_residuals(estimated(disturbed(cause, noise))))
+    found = chi_square_test(residuals_of(estimated(disturbed(cause, noise))))
     assert found.value > found.limit
