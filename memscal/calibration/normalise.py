@@ -9,6 +9,7 @@ import numpy as np
 from memscal.calibration.fields import KernelView
 from memscal.errors import FitError
 from memscal.estimation.forward import unit_gaussian, unit_gaussian_slope
+from memscal.estimation.newton import gauss_newton
 from memscal.model.validation import FloatArray
 
 __all__ = ["NormalisedKernel", "fit_gaussian_to_kernel", "normalise"]
@@ -65,8 +66,6 @@ def fit_gaussian_to_kernel(r: FloatArray, g: FloatArray, start: float) -> float:
     Minimises the integral of the squared difference, with weight r: the paper's fit.  No width
     below half a step of the radial grid is told apart from a point.
     """
-    from scipy.optimize import least_squares
-
     root = np.sqrt(r)
 
     def misfit(scaled: FloatArray) -> FloatArray:
@@ -76,10 +75,21 @@ def fit_gaussian_to_kernel(r: FloatArray, g: FloatArray, start: float) -> float:
         return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
 
     narrowest = 0.5 * float(r[1] - r[0])
-    begin = max(start, 2 * narrowest) / start
+    begin = np.array([max(start, 2 * narrowest) / start])
+
+    def linearise(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+        # A step may lead beyond the narrowest width, where the search with a bound takes over.
+        inside = np.maximum(scaled, narrowest / start)
+        return misfit(inside), slope(inside)
+
+    near = gauss_newton(linearise, begin, tolerance=1e-10)
+    if near is not None and near[0] * start > 2 * narrowest:
+        return float(near[0] * start)
+    from scipy.optimize import least_squares
+
     found = least_squares(
         misfit,
-        [begin],
+        begin,
         jac=slope,
         bounds=(narrowest / start, np.inf),
         xtol=1e-12,

@@ -165,7 +165,7 @@ def reference_spectra(
 
 def _per_newton(reference: StressProfile | Contact, k: FloatArray, span: float) -> FloatArray:
     if isinstance(reference, Contact):
-        return reference.base_spectrum(k) / reference.load
+        return _base_spectrum(reference, k.tobytes()) / reference.load
     _require_coverage(reference, span)
     values = hankel_transform(reference.r, reference.sigma_zz, k) / reference.load
     if values[0] <= 0:
@@ -175,6 +175,14 @@ def _per_newton(reference: StressProfile | Contact, k: FloatArray, span: float) 
             cure="Change the sign of sigma_zz in the reference.",
         )
     return values
+
+
+@lru_cache(maxsize=256)
+def _base_spectrum(contact: Contact, nodes: bytes) -> FloatArray:
+    """Transform of a contact's stress at wavenumbers, kept for scans over the same positions."""
+    found = contact.base_spectrum(np.frombuffer(nodes))
+    found.flags.writeable = False
+    return found
 
 
 def _require_coverage(profile: StressProfile, span: float) -> None:
@@ -243,7 +251,7 @@ def _difference(
     k = reference.wavenumbers.k
 
     def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
-        return reference_contact(film, rod, scan.load).base_spectrum(k)
+        return _base_spectrum(reference_contact(film, rod, scan.load), k.tobytes())
 
     upper, lower = zip(films or (scan.film,) * 2, rods or (scan.indenter,) * 2, strict=True)
     scale = reference.values / transform(scan.film, scan.indenter)
