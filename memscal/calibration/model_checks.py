@@ -120,7 +120,7 @@ def _order(residuals: Residuals) -> list[QualityCheck]:
             alike.value,
             alike.limit,
             "Correlation of each residual with its neighbours along the scan, halved for each step "
-            f"farther: none by chance. A failure means that residuals are alike: {cause}",
+            f"farther, over what chance gives on average. A failure means that residuals are alike: {cause}",
             alike.p_value,
         ),
     ]

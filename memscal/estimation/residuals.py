@@ -202,11 +202,12 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
 
     The statistic, near one for residuals that are smooth along the scan, is
     :math:`T = \sum_{l \ge 1} 2^{-l} \sum_i e_i e_{i+l} / \sum_i e_i^2 = e^T W e / e^T e`, as
-    Durbin and Watson's (Biometrika 37, 1950) with more than one lag.  With
-    :math:`S_p = \mathrm{tr}\,[(1 - QQ^T) W]^p` about the mean :math:`S_1/\nu`, its second and
-    third moments for independent normal noise are :math:`2 S_2/\nu(\nu+2)` and
-    :math:`8 S_3/\nu(\nu+2)(\nu+4)`; the p-value is that of the gamma distribution (Pearson's
-    type III) with these moments.  One-sided.
+    Durbin and Watson's (Biometrika 37, 1950) with more than one lag; what is returned is its
+    excess over its mean.  With :math:`S_1 = \mathrm{tr}\,(1 - QQ^T) W` and
+    :math:`S_p = \mathrm{tr}\,[(1 - QQ^T)(W - S_1/\nu)]^p`, independent normal noise gives it the
+    mean :math:`S_1/\nu` and the moments :math:`2 S_2/\nu(\nu+2)` and
+    :math:`8 S_3/\nu(\nu+2)(\nu+4)` about it; the p-value is that of the gamma distribution
+    (Pearson's type III) with these moments.  One-sided.
     """
     nu, values = residuals.degrees, residuals.values
     neighbours = _neighbours(residuals)
@@ -219,9 +220,9 @@ def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
     deviation = np.sqrt(2 * second / (nu * (nu + 2)))
     skewness = max(8 * third / (nu * (nu + 2) * (nu + 4)) / deviation**3, _LEAST_SKEWNESS)
     shape = 4 / skewness**2
-    value = float(values @ (neighbours @ values) / (values @ values))
-    limit = mean + deviation * (gammainccinv(shape, FALSE_ALARM) - shape) / np.sqrt(shape)
-    p_value = gammaincc(shape, max(shape + np.sqrt(shape) * (value - mean) / deviation, 0.0))
+    value = float(values @ (neighbours @ values) / (values @ values)) - mean
+    limit = deviation * (gammainccinv(shape, FALSE_ALARM) - shape) / np.sqrt(shape)
+    p_value = gammaincc(shape, max(shape + np.sqrt(shape) * value / deviation, 0.0))
     return TestOutcome(value, float(limit), float(p_value))
 
 

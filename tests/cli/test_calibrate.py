@@ -59,6 +59,14 @@ def test_json_is_one_object_in_the_form_of_the_contract(run: Run, scan: Path) ->
     assert all(set(c) == {"name", "value", "limit", "passed", "p_value"} for c in found["checks"])
 
 
+def test_the_table_of_checks_fits_a_terminal_and_shows_p_values(run: Run, scan: Path) -> None:
+    table = run("calibrate", scan).out.split("Quality checks\n")[1].splitlines()
+    assert table[0].split() == ["check", "value", "limit", "p", "result"]
+    assert max(len(line) for line in table) < 80
+    row = next(line for line in table if line.strip().startswith("chi square"))
+    assert 0.0 <= float(row.split()[4]) <= 1.0
+
+
 def test_json_and_artifact_say_the_same_in_their_own_units(run: Run, scan: Path) -> None:
     found = run("calibrate", scan, "--json").json
     apparatus = memscal.load_apparatus(found["artifact"])
