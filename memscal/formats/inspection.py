@@ -35,13 +35,14 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
 }
 _ARRAYS = {
     SCAN_SCHEMA: {
-        "/entry/data": "x y repeat u_zz u_zz_errors normal_load u_xz u_yz",
-        "/entry/reference": "r sigma_zz sigma_rz",
+        "/entry/data": "x y repeat x_errors y_errors u_zz u_zz_errors u_zz_correlation "
+        "normal_load u_xz u_yz",
+        "/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz",
     },
-    REFERENCE_SCHEMA: {"/entry/reference": "r sigma_zz sigma_rz"},
+    REFERENCE_SCHEMA: {"/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz"},
     ARTIFACT_SCHEMA: {
         "/entry/apparatus_function": "x y g g_errors",
-        "/entry/radial_profile": "r g g_errors g_gaussian g_covariance",
+        "/entry/radial_profile": "r g g_errors g_gaussian g_covariance conversion_correlation",
         "/entry/transfer_function": "k modulus modulus_errors window",
         "/entry/reconvolution": "x u_zz u_zz_errors u_zz_predicted u_zz_gaussian residual",
     },

@@ -62,6 +62,25 @@ def test_a_scan_comes_back_with_its_source_named(tmp_path: Path, kind: str):
     assert found.source == SourceFile("scan.h5", digest)
 
 
+@pytest.mark.parametrize("direction", ["x", "y"])
+@pytest.mark.parametrize("kind", ["line", "repeats"])
+def test_errors_of_positions_and_correlated_noise_come_back(
+    tmp_path: Path, kind: str, direction: str
+):
+    apart = np.abs(np.subtract.outer(np.arange(33), np.arange(33)))
+    extra = {
+        "direction": direction,
+        "x_errors": np.linspace(1e-6, 2e-6, 33),
+        "position_scale_uncertainty": 2e-3,
+        "u_zz_correlation": 0.5**apart,
+        "film": dataclasses.replace(make_scan().film, name="film A"),
+    }
+    write_scan(make_scan(kind, **extra), tmp_path / "scan.h5")
+    # The reference's own film has no name of its own: it is the scan's.
+    found = read_scan(tmp_path / "scan.h5")
+    assert_same(found, make_scan(kind, **extra), but=("source", "reference"))
+
+
 def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):
     bare: dict[str, Any] = dict.fromkeys(
         ("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")
