@@ -1,16 +1,7 @@
 r"""How far the scan departs from the Gaussian: hypotheses weighed by their evidence.
 
-A hypothesis is a shape of departure and its strength :math:`\tau`: amplitudes
-:math:`c_j \sim N(0, \tau^2)` beside parameters (A, width, centre, baseline, drift) without
-prior.  With the latter projected out (restricted likelihood: Patterson and Thompson, Biometrika
-58, 1971) and singular values :math:`s_j` of what is left of the shape's design,
-
-.. math::
-
-    -2\log p(u \mid \tau) = \nu\log\hat\sigma^2 + \sum_j\log(1+\tau^2 s_j^2/\hat\sigma^2), \qquad
-    \nu\hat\sigma^2 = \rho + \sum_j \frac{p_j^2}{1+\tau^2 s_j^2/\hat\sigma^2},
-
-where :math:`p_j` are the data along the singular vectors and :math:`\rho` the rest.
+A hypothesis is a shape of departure and its strength; its evidence and its posterior are those of
+:mod:`memscal.estimation.restricted_likelihood`.
 
 Two sets of prior weights are in use.  The estimate is the posterior mean under one that believes
 in the Gaussian by a third, so that a Gaussian sensor costs little.  Its uncertainty is the mean
@@ -27,14 +18,12 @@ import numpy as np
 from memscal.estimation.departure import SHAPES, DepartureBasis, Shape
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian_fit import GaussianFit
+from memscal.estimation.restricted_likelihood import Outcome, Projected
 from memscal.model.validation import FloatArray
 
 __all__ = ["HYPOTHESES", "Hypothesis", "WeighedFit", "weigh_departures"]
 
 _NEGLIGIBLE = 1e-4
-_VARIANCE_ROUNDS = 8
-#: The smallest noise, over the largest residual of a Gaussian, that is told from rounding.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -92,6 +81,8 @@ class WeighedFit:
         Posterior probability of each of :data:`HYPOTHESES`.
     residual : ndarray, shape (n,)
         Voltages that are not explained, in V.
+    log_evidence : float
+        Of all hypotheses together, up to a constant of the scan.
     """
 
     mean: FloatArray
@@ -100,6 +91,7 @@ class WeighedFit:
     noise: float
     probability: FloatArray
     residual: FloatArray
+    log_evidence: float = 0.0
 
     @property
     def gaussian_probability(self) -> float:
@@ -113,6 +105,7 @@ def weigh_departures(
     basis: DepartureBasis,
     weights: FloatArray,
     effective_count: float,
+    expected_noise: float = 0.0,
 ) -> WeighedFit:
     """Weigh departures from a Gaussian fit by evidence.
 
@@ -123,7 +116,11 @@ def weigh_departures(
     weights : ndarray, shape (n,)
         Relative weights of the points.
     effective_count : float
-        How many points the data are worth, outliers down-weighted.
+        How many points the data are worth, outliers down-weighted; more than there are if each
+        stands for the mean of several repeats to come.
+    expected_noise : float
+        Standard deviation of the noise of a point of weight one that is to be expected, for
+        voltages that have none; zero for data.
 
     Returns
     -------
@@ -136,7 +133,7 @@ def weigh_departures(
     rings, data = standardised(voltages, weights), standardised(unexplained, weights)
     # Down-weighted points carry no full degree of freedom.
     jacobian = standardised(fit.jacobian, weights)
-    problem = _Projected.from_columns(jacobian, data, effective_count - flat)
+    problem = Projected.from_columns(jacobian, data, effective_count - flat, expected_noise**2)
     parts = [problem.part(rings[:, b.start - flat : b.stop - flat], b) for b in basis.blocks]
     outcomes = [problem.gaussian()]
     for hypothesis in HYPOTHESES[1:]:
@@ -149,88 +146,7 @@ def weigh_departures(
     return replace(found, gain=gain, residual=unexplained - explained)
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """One shape's design with the flat columns projected out, by its singular values."""
-
-    block: slice
-    columns: FloatArray
-    left: FloatArray
-    singular: FloatArray
-    right: FloatArray
-    along: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class _Outcome:
-    """One hypothesis: log evidence, noise variance, and what gives its posterior.
-
-    ``shrink``: factors from data to amplitudes along the singular vectors; ``reduction``: by how
-    much the data have reduced the prior variance ``strength**2`` there; ``slope``: derivative of
-    the log evidence by the weighted data.
-    """
-
-    log_evidence: float
-    variance: float
-    strength: float
-    part: _Part | None
-    shrink: FloatArray
-    reduction: FloatArray
-    slope: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class _Projected:
-    """Weighted data and flat columns: what every hypothesis shares."""
-
-    scale: FloatArray
-    q: FloatArray
-    inverse: FloatArray
-    data: FloatArray
-    rest: FloatArray
-    freedom: float
-
-    @classmethod
-    def from_columns(cls, flat: FloatArray, data: FloatArray, freedom: float) -> _Projected:
-        scale = np.linalg.norm(flat, axis=0)
-        q, r = np.linalg.qr(flat / scale)
-        return cls(scale, q, np.linalg.inv(r), data, data - q @ (q.T @ data), freedom)
-
-    def part(self, columns: FloatArray, block: slice) -> _Part:
-        free = columns - self.q @ (self.q.T @ columns)
-        left, singular, right = np.linalg.svd(free, full_matrices=False)
-        return _Part(block, columns, left, singular, right, left.T @ self.rest)
-
-    def gaussian(self) -> _Outcome:
-        variance = self._floor(float(self.rest @ self.rest) / self.freedom)
-        nothing = np.zeros(0)
-        log_evidence = -0.5 * self.freedom * float(np.log(variance))
-        return _Outcome(log_evidence, variance, 0.0, None, nothing, nothing, -self.rest / variance)
-
-    def weigh(self, part: _Part, strength: float) -> _Outcome:
-        beyond = max(float(self.rest @ self.rest - part.along @ part.along), 0.0)
-        signal = (strength * part.singular) ** 2
-        variance = self._floor(float(self.rest @ self.rest) / self.freedom)
-        for _ in range(_VARIANCE_ROUNDS):
-            explained = part.along**2 * variance / (variance + signal)
-            variance = self._floor((beyond + float(explained.sum())) / self.freedom)
-        inflation = 1 + signal / variance
-        log_evidence = -0.5 * (self.freedom * np.log(variance) + float(np.log(inflation).sum()))
-        return _Outcome(
-            log_evidence,
-            variance,
-            strength,
-            part,
-            strength**2 * part.singular / (variance + signal),
-            strength**2 * signal / (variance + signal),
-            (part.left @ (signal / (variance + signal) * part.along) - self.rest) / variance,
-        )
-
-    def _floor(self, variance: float) -> float:
-        return max(variance, (_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
-
-
-def _average(problem: _Projected, outcomes: list[_Outcome], count: int) -> WeighedFit:
+def _average(problem: Projected, outcomes: list[Outcome], count: int) -> WeighedFit:
     """Average mean and gain by one set of weights, squared errors by the other.
 
     The gain is that of the standardised data, and the residual is left to be found.
@@ -259,8 +175,13 @@ def _average(problem: _Projected, outcomes: list[_Outcome], count: int) -> Weigh
             _add_gain(own, problem, outcome, 1.0)
             off = own @ problem.data - mean
             covariance += p * np.outer(off, off)
+            if problem.added:
+                apart = own - gain
+                covariance += p * problem.added * (apart @ apart.T)
             _add_covariance(covariance, problem, outcome, p)
     variance = np.array([o.variance for o in outcomes])
+    prior = np.array([h.estimate for h in HYPOTHESES])
+    believed = prior > 0
     return WeighedFit(
         mean=mean,
         covariance=covariance,
@@ -268,6 +189,7 @@ def _average(problem: _Projected, outcomes: list[_Outcome], count: int) -> Weigh
         noise=float(np.sqrt(estimate @ variance)),
         probability=estimate,
         residual=problem.data,
+        log_evidence=float(np.logaddexp.reduce(evidence[believed] + np.log(prior[believed]))),
     )
 
 
@@ -277,12 +199,12 @@ def _posterior(log_evidence: FloatArray, prior: FloatArray) -> FloatArray:
     return np.asarray(weight / weight.sum())
 
 
-def _flat_map(problem: _Projected) -> FloatArray:
+def _flat_map(problem: Projected) -> FloatArray:
     """From weighted data to the flat parameters of a plain fit, shape (flat, n)."""
     return np.asarray((problem.inverse @ problem.q.T) / problem.scale[:, None])
 
 
-def _add_gain(gain: FloatArray, problem: _Projected, outcome: _Outcome, share: float) -> None:
+def _add_gain(gain: FloatArray, problem: Projected, outcome: Outcome, share: float) -> None:
     fitted = _flat_map(problem)
     flat = fitted.shape[0]
     gain[:flat] += share * fitted
@@ -294,7 +216,7 @@ def _add_gain(gain: FloatArray, problem: _Projected, outcome: _Outcome, share: f
 
 
 def _add_covariance(
-    covariance: FloatArray, problem: _Projected, outcome: _Outcome, share: float
+    covariance: FloatArray, problem: Projected, outcome: Outcome, share: float
 ) -> None:
     flat = problem.scale.size
     plain = problem.inverse @ problem.inverse.T / np.outer(problem.scale, problem.scale)
