@@ -1,6 +1,6 @@
 r"""The Gaussian fit expanded about itself, to fit thousands of replicates of a scan at once.
 
-The voltages of a Gaussian are linear in A and the drift.  In width and centre, by
+The voltages of a Gaussian are linear in A and the drift.  In width, centre and ellipticity, by
 :math:`\delta`, they are expanded to third order,
 
 .. math::
@@ -40,7 +40,7 @@ class GaussianFits:
     Parameters
     ----------
     parameters : ndarray, shape (replicates, p)
-        A, sigma, centres and drift of each, in the order of the Jacobian's columns.
+        A, sigma, centres, drift and ellipticity of each, in the order of the Jacobian's columns.
     residual : ndarray, shape (replicates, n)
         Standardised data less the fit.
     """
@@ -59,8 +59,10 @@ class GaussianExpansion:
         The best parameters.
     scale : ndarray, shape (p,)
         Their typical sizes.
+    bent, straight : ndarray of int, shape (q,) and (p - 1 - q,)
+        Which parameters the voltages are expanded in, and which are the drift's.
     exponents : ndarray of int, shape (m, q)
-        Powers of width and centres in each term of the expansion.
+        Powers of the former in each term of the expansion.
     terms : ndarray, shape (n, m)
         Standardised voltages of each term, divided by its factorials.
     drift : ndarray, shape (n, p - 1 - q)
@@ -69,6 +71,8 @@ class GaussianExpansion:
 
     start: FloatArray
     scale: FloatArray
+    bent: NDArray[np.intp]
+    straight: NDArray[np.intp]
     exponents: NDArray[np.intp]
     terms: FloatArray
     drift: FloatArray
@@ -88,27 +92,29 @@ class GaussianExpansion:
         noise : float
             Noise of a point of weight one.
         """
-        theta = np.concatenate(
-            [[fit.conversion_constant, fit.sigma], fit.centre[model.points.free], fit.drift]
-        )
-        bent = slice(1, 2 + int(model.points.free.sum()))
-        errors = np.sqrt(np.diag(fit.covariance(weights, noise)))
-        steps = np.clip(_SPREAD * errors[bent], _LEAST_SHARE * fit.sigma, _MOST_SHARE * fit.sigma)
+        points = model.points
+        centres = fit.centre[points.free]
+        ellipse = fit.ellipticity[: points.ellipse]
+        shape = [fit.conversion_constant, fit.sigma]
+        theta = np.concatenate([shape, centres, fit.drift, ellipse])
+        last = theta.size - ellipse.size
+        bent = np.r_[1 : 2 + centres.size, last : theta.size]
+        lengths = np.full(1 + centres.size, fit.sigma)
+        sizes = np.concatenate([lengths, np.ones(ellipse.size)])
+        errors = np.sqrt(np.diag(fit.covariance(weights, noise)))[bent]
+        steps = np.clip(_SPREAD * errors, _LEAST_SHARE * sizes, _MOST_SHARE * sizes)
         columns = _derivatives(model, theta, bent, steps)
-        exponents = np.array(list(columns), dtype=np.intp)
         factorials = np.array([math.prod(map(math.factorial, e)) for e in columns])
         terms = np.stack(list(columns.values()), axis=1) / factorials
-        size = float(np.abs(fit.predicted).max())
-        scale = np.concatenate(
-            [theta[:1], np.full(steps.size, fit.sigma), np.full(fit.drift.size, size)]
-        )
-        standardised = model.points.standardised
+        largest = np.full(fit.drift.size, float(np.abs(fit.predicted).max()))
         return cls(
-            theta,
-            scale,
-            exponents,
-            standardised(terms, weights),
-            standardised(model.drift_columns, weights),
+            start=theta,
+            scale=np.concatenate([theta[:1], lengths, largest, np.ones(ellipse.size)]),
+            bent=bent,
+            straight=np.r_[2 + centres.size : last],
+            exponents=np.array(list(columns), dtype=np.intp),
+            terms=points.standardised(terms, weights),
+            drift=points.standardised(model.drift_columns, weights),
         )
 
     def fit(self, data: FloatArray) -> GaussianFits:
@@ -116,25 +122,25 @@ class GaussianExpansion:
         basis, triangle = np.linalg.qr(np.hstack([self.terms, self.drift]))
         terms, drift = np.hsplit(triangle, [self.terms.shape[1]])
         along = data @ basis
-        theta = np.tile(self.start, (data.shape[0], 1))
-        bent = slice(1, 1 + self.exponents.shape[1])
+        theta = np.tile(self.start, (len(data), 1))
+        jacobian = np.empty((len(data), theta.shape[1], len(triangle)))
+        jacobian[:, self.straight] = drift.T
         for _ in range(_STEPS):
-            moved = theta[:, bent] - self.start[bent]
-            value, slopes = self._monomials(moved)
-            amplitude = theta[:, :1]
-            predicted = amplitude * value @ terms.T + theta[:, bent.stop :] @ drift.T
-            shape = np.concatenate([value[:, None], amplitude[:, None] * slopes], axis=1) @ terms.T
-            baseline = np.broadcast_to(drift.T, (len(theta), *drift.T.shape))
-            jacobian = np.concatenate([shape, baseline], axis=1) * self.scale[:, None]
-            right = jacobian @ (along - predicted)[:, :, None]
-            step = np.linalg.solve(jacobian @ jacobian.transpose(0, 2, 1), right)[:, :, 0]
+            value, slopes = self._monomials(theta)
+            jacobian[:, 0] = value @ terms.T
+            jacobian[:, self.bent] = theta[:, :1, None] * (slopes @ terms.T)
+            predicted = theta[:, :1] * jacobian[:, 0] + theta[:, self.straight] @ drift.T
+            scaled = jacobian * self.scale[:, None]
+            right = scaled @ (along - predicted)[:, :, None]
+            step = np.linalg.solve(scaled @ scaled.transpose(0, 2, 1), right)[:, :, 0]
             theta = theta + step * self.scale
-        value, _ = self._monomials(theta[:, bent] - self.start[bent])
-        predicted = theta[:, :1] * value @ self.terms.T + theta[:, bent.stop :] @ self.drift.T
+        shape = self._monomials(theta)[0] @ self.terms.T
+        predicted = theta[:, :1] * shape + theta[:, self.straight] @ self.drift.T
         return GaussianFits(theta, data - predicted)
 
-    def _monomials(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _monomials(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Powers of the moved parameters, (replicates, m), and their slopes, (..., q, m)."""
+        moved = theta[:, self.bent] - self.start[self.bent]
         powers = moved[:, None, :] ** self.exponents
         value = powers.prod(axis=2)
         slopes = []
@@ -146,9 +152,9 @@ class GaussianExpansion:
 
 
 def _derivatives(
-    model: ForwardModel, theta: FloatArray, bent: slice, steps: FloatArray
+    model: ForwardModel, theta: FloatArray, bent: NDArray[np.intp], steps: FloatArray
 ) -> dict[tuple[int, ...], FloatArray]:
-    """Derivatives of the voltages by width and centres at A = 1, by differences of Jacobians.
+    """Derivatives of the voltages by bent parameters at A = 1, by differences of Jacobians.
 
     Mixed ones of three different parameters, which are tiny, are left out.
     """
