@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.special import j0
 
 from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline
+from memscal.axisymmetry.quadrature import ring_areas
 from memscal.errors import InputError
 from memscal.model.apparatus import ApparatusData
 from memscal.model.validation import FloatArray, finite_vector, require_increasing
@@ -144,8 +145,7 @@ class ApparatusFunction(ApparatusData):
         reach = float(radii[-1] + profile.r[-1])
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
-        ring = 2 * np.pi * profile.r * np.gradient(profile.r)
-        kernel = j0(np.multiply.outer(wavenumbers.k, profile.r)) * ring
+        kernel = j0(np.multiply.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
         field = wavenumbers.weights * hankel_transform(radii, stress, wavenumbers.k)
         operator = (j0(np.multiply.outer(radii, wavenumbers.k)) * field) @ kernel
         return operator, operator @ profile.g

@@ -9,7 +9,7 @@ import numpy as np
 
 from memscal.model.validation import FloatArray
 
-__all__ = ["gauss_between", "gauss_panels"]
+__all__ = ["gauss_between", "gauss_panels", "ring_areas"]
 
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
@@ -58,6 +58,16 @@ def gauss_between(edges: FloatArray, order: int) -> tuple[FloatArray, FloatArray
     nodes, weights = _legendre(order)
     half = np.diff(edges)[:, None] / 2
     return (edges[:-1, None] + half * (nodes + 1)).ravel(), (half * weights).ravel()
+
+
+def ring_areas(r: FloatArray) -> FloatArray:
+    """Weights that integrate a radial function over the plane, on even radii from zero.
+
+    The trapezoidal rule with the Euler-Maclaurin correction of its end on the axis.
+    """
+    weights = 2 * np.pi * r * np.gradient(r)
+    weights[0] += np.pi * (r[1] - r[0]) ** 2 / 6
+    return np.asarray(weights)
 
 
 @lru_cache(maxsize=8)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.axisymmetry.hankel import radial_spline
+from memscal.axisymmetry.quadrature import ring_areas
 from memscal.calibration.normalise import NormalisedKernel
-from memscal.estimation.forward import unit_gaussian_slope
+from memscal.estimation.forward import unit_gaussian, unit_gaussian_slope
 from memscal.model.validation import FloatArray
 
 __all__ = ["Functional", "kernel_functionals"]
@@ -36,9 +37,15 @@ def kernel_functionals(kernel: NormalisedKernel) -> tuple[Functional, ...]:
 
 
 def _gaussian_width(kernel: NormalisedKernel, r: FloatArray) -> Functional:
-    """Width of the Gaussian nearest to G over the plane: by its normal equation."""
-    slope = unit_gaussian_slope(r, kernel.gaussian_sigma)
-    row = r * slope / np.sum(r * slope**2)
+    """Width of the Gaussian u nearest to G over the plane.
+
+    Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
+    """
+    sigma = kernel.gaussian_sigma
+    slope, step = unit_gaussian_slope(r, sigma), 1e-4 * sigma
+    bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
+    left = unit_gaussian(r, sigma) - kernel.view.radial
+    row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
     return Functional("gaussian_sigma_deconvolved", kernel.gaussian_sigma, row)
 
 
@@ -61,7 +68,7 @@ def _half_width(r: FloatArray, g: FloatArray) -> Functional:
 
 def _equivalent_area(r: FloatArray, g: FloatArray) -> Functional:
     r"""Noise-equivalent area :math:`1/\int G^2\,dA`, in m^2: 4 pi sigma^2 of a Gaussian."""
-    ring = 2 * np.pi * r * np.gradient(r)
+    ring = ring_areas(r)
     area = float(1 / np.sum(ring * g**2))
     return Functional("noise_equivalent_area", area, -2 * area**2 * ring * g)
 
