@@ -272,7 +272,7 @@ class _RasterFields:
 
 def _about_zero(axis: FloatArray) -> FloatArray:
     """A kernel's zero is the central point of the lattice, wherever the sensor is."""
-    return axis - axis[axis.size // 2]
+    return np.asarray(axis - axis[axis.size // 2])
 
 
 def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatArray, FloatArray]:

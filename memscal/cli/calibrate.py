@@ -16,6 +16,7 @@ from memscal.cli.progress import working
 from memscal.cli.targets import FigurePath, beside, prove_writable
 
 if TYPE_CHECKING:
+    from memscal.calibration.monte_carlo import MonteCarlo
     from memscal.calibration.procedure import Calibration
     from memscal.calibration.sweep import Sweep
     from memscal.cli.tables import Table
@@ -32,6 +33,7 @@ Examples:
   memscal calibrate scan.h5 --reference fem.h5 --json
   memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
   memscal calibrate scan.h5 --sweep --sweep-figure sweep.pdf
+  memscal calibrate scan.h5 --method evidence --monte-carlo 1000
 """
 
 
@@ -116,6 +118,14 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     metavar="FILE.png|svg|pdf",
     help="Draw the sweep; implies --sweep.",
 )
+@click.option(
+    "--monte-carlo",
+    "draws",
+    type=click.IntRange(min=2),
+    metavar="DRAWS",
+    help="Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
+    "scatters with the budget of uncertainties. For methods evidence, white-noise and tikhonov.",
+)
 @force_option
 @click.option(
     "--dry-run",
@@ -137,6 +147,7 @@ def command(
     figures: tuple[Path, ...],
     sweeping: bool,
     sweep_figure: Path | None,
+    draws: int | None,
     force: bool,
     dry_run: bool,
 ) -> int:
@@ -177,10 +188,11 @@ def command(
     if sweeping or sweep_figure:
         with working("Sweeping the noise amplitude"):
             swept = found.sweep(seed=seed or 0)
+    drawn = None if draws is None else _drawn(found, draws, seed or 0)
     with working("Drawing"):
         ready = outputs.rendered(found, swept)
     outputs.write(found, ready, force=force)
-    return _tell(found, swept, outputs, as_json)
+    return _tell(found, swept, drawn, outputs, as_json)
 
 
 def _read(
@@ -242,15 +254,32 @@ def _rehearse(
     message("Nothing was written (--dry-run).")
 
 
-def _tell(found: Calibration, swept: Sweep | None, outputs: Outputs, as_json: bool) -> int:
+def _drawn(found: Calibration, draws: int, seed: int) -> MonteCarlo:
+    from memscal.calibration.monte_carlo import monte_carlo
+    from memscal.cli.monte_carlo_view import monte_carlo_notes
+
+    with working(f"Drawing {draws} scans"):
+        drawn = monte_carlo(found, draws=draws, seed=seed)
+    for text in monte_carlo_notes(drawn):
+        note(text)
+    return drawn
+
+
+def _tell(
+    found: Calibration,
+    swept: Sweep | None,
+    drawn: MonteCarlo | None,
+    outputs: Outputs,
+    as_json: bool,
+) -> int:
     """Print the results and the messages; return the exit code."""
     from memscal.cli.calibration_view import calibration_json, calibration_tables
     from memscal.cli.tables import emit_tables
 
     if as_json:
-        emit_json({**calibration_json(found, outputs.artifact), **_swept_json(swept)})
+        emit_json(calibration_json(found, outputs.artifact) | _further_json(swept, drawn))
     else:
-        emit_tables(*calibration_tables(found), *_swept_tables(swept))
+        emit_tables(*calibration_tables(found), *_further_tables(swept, drawn))
     failed = [check.name for check in found.apparatus.checks if not check.passed]
     for text in found.apparatus.process.messages:
         (warn if text.startswith("Quality check") else note)(text)
@@ -264,17 +293,17 @@ def _tell(found: Calibration, swept: Sweep | None, outputs: Outputs, as_json: bo
     return CHECK_FAILED
 
 
-def _swept_json(swept: Sweep | None) -> dict[str, Any]:
-    if swept is None:
-        return {}
+def _further_json(swept: Sweep | None, drawn: MonteCarlo | None) -> dict[str, Any]:
+    from memscal.cli.monte_carlo_view import monte_carlo_json
     from memscal.cli.sweep_view import sweep_json
 
-    return {"sweep": sweep_json(swept)}
+    found: dict[str, Any] = {} if swept is None else {"sweep": sweep_json(swept)}
+    return found if drawn is None else found | {"monte_carlo": monte_carlo_json(drawn)}
 
 
-def _swept_tables(swept: Sweep | None) -> list[Table]:
-    if swept is None:
-        return []
+def _further_tables(swept: Sweep | None, drawn: MonteCarlo | None) -> list[Table]:
+    from memscal.cli.monte_carlo_view import monte_carlo_table
     from memscal.cli.sweep_view import sweep_table
 
-    return [sweep_table(swept)]
+    tables = [] if swept is None else [sweep_table(swept)]
+    return tables if drawn is None else [*tables, monte_carlo_table(drawn)]
