@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
+    from memscal.measurement.restoration import Restoration, restore
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.indent import indent
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
@@ -42,6 +43,7 @@ _HOMES = {
     "MemscalError": "memscal.errors",
     "MonteCarlo": "memscal.calibration.monte_carlo",
     "Profile": "memscal.model.indenter",
+    "Restoration": "memscal.measurement.restoration",
     "Rod": "memscal.model.indenter",
     "Scan": "memscal.model.scan",
     "SmoothedDisc": "memscal.axisymmetry.kernels",
@@ -55,6 +57,7 @@ _HOMES = {
     "monte_carlo": "memscal.calibration.monte_carlo",
     "read_reference": "memscal.formats.reference",
     "read_scan": "memscal.formats.scan",
+    "restore": "memscal.measurement.restoration",
     "simulate": "memscal.simulation",
     "write_reference": "memscal.formats.reference",
     "write_scan": "memscal.formats.scan",
@@ -74,6 +77,7 @@ __all__ = [
     "MemscalError",
     "MonteCarlo",
     "Profile",
+    "Restoration",
     "Rod",
     "Scan",
     "SmoothedDisc",
@@ -88,6 +92,7 @@ __all__ = [
     "monte_carlo",
     "read_reference",
     "read_scan",
+    "restore",
     "simulate",
     "write_reference",
     "write_scan",

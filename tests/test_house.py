@@ -18,11 +18,11 @@ MODULES = {
 
 FLOW = [
     "version", "errors", "model", "axisymmetry", "mechanics", "deconvolution", "estimation",
-    "apparatus", "calibration", "simulation", "figures", "cli", "__main__",
+    "apparatus", "calibration", "simulation", "measurement", "figures", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 
-USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli"}
+USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli", "measurement"}
 
 ONLY_IN = {
     "h5py": {"formats"},

@@ -1,0 +1,212 @@
+r"""The restored stress as a posterior over shapes of pressure, their departures, and the inputs.
+
+The base stress is :math:`\hat\sigma_{zz}(k) = P\,T(kh)\,\hat p(k)`: whatever presses on the
+film, its own transfer function :math:`T` gives the stress at the base its long tail.  The shapes
+are averaged by their evidence, and their spread counts as uncertainty.
+
+Inputs that are wrong act twice.  The scan is read with the wrong :math:`A\,\hat G\,T`, as if its
+voltages were wrong by :math:`-\delta(A\hat G T) \otimes p`; and the film turns pressure into
+stress by the wrong :math:`T`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from memscal.apparatus import ApparatusFunction
+from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
+from memscal.estimation.forward import gaussian_transfer
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.measurement.pressure import film_transfer, pressure_shapes
+from memscal.measurement.shape_fit import ShapeFit, believed_noise, fit_shape
+from memscal.model.film import ElasticFilm
+from memscal.model.scan import Scan
+from memscal.model.validation import FloatArray
+
+__all__ = ["Posterior", "restore_posterior"]
+
+#: A shape of less probability is left out.
+_NEGLIGIBLE = 1e-4
+#: Directions in which A G is known better than this share of its worst are exact.
+_EXACT = 1e-10
+_RESOLVED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Base stress, centre and baseline as one state with its covariance.
+
+    Parameters
+    ----------
+    estimate : ProfileEstimate
+        The best Gaussian pressure, the noise and the outliers.
+    state : ndarray, shape (s,)
+        Transform of the base stress at the model's nodes (N), then free coordinates of the
+        centre (m), then baseline and drift (V).
+    covariances : mapping of str to ndarray, shape (s, s)
+        Their covariance by source; the sources are independent.
+    shifts : mapping of str to ndarray, shape (n, q)
+        What each input's standard uncertainties do to the predicted voltages, in V.
+    residual : ndarray, shape (n,)
+        Voltages that are not explained, in V.
+    found_noise : float
+        Noise of a point of weight one that was found: in V, or over the stated uncertainties.
+    shares : mapping of (float, float) to float
+        Posterior probability of each shape, by its exponent and shear.
+    resolved_wavenumber : float
+        Where the transform's standard uncertainty reaches a third of the best Gaussian pressure's,
+        in rad/m.
+    """
+
+    estimate: ProfileEstimate
+    state: FloatArray
+    covariances: Mapping[str, FloatArray]
+    shifts: Mapping[str, FloatArray]
+    residual: FloatArray
+    found_noise: float
+    shares: Mapping[tuple[float, float], float]
+    resolved_wavenumber: float
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the state, all sources together."""
+        return np.asarray(np.sum(list(self.covariances.values()), axis=0))
+
+    @property
+    def noise_ratio(self) -> float:
+        """Noise that is believed over the Gaussian estimate's."""
+        return believed_noise(self.estimate, self.found_noise) / self.estimate.noise_scale
+
+    @property
+    def nodes(self) -> int:
+        """How many entries of the state are the transform."""
+        return self.estimate.model.k.size
+
+
+def restore_posterior(
+    scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
+) -> Posterior:
+    """Average the shapes of pressure by their evidence, and propagate the inputs.
+
+    Parameters
+    ----------
+    scan, apparatus
+        What was measured, and with what.
+    estimate : ProfileEstimate
+        The best Gaussian pressure.
+    transfer : ndarray, shape of ``estimate.model.k``
+        Transform of A G, in V/Pa.
+    """
+    found = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.film)]
+    shares = _shares(found)
+    mean = _sum_of(shares, [fit.state for fit in found])
+    gain = _sum_of(shares, [fit.gain for fit in found])
+    within = _sum_of(shares, [fit.covariance for fit in found])
+    apart = np.stack([fit.state - mean for fit in found], axis=1) * np.sqrt(shares)
+    model, nodes = estimate.model, estimate.model.k.size
+    film = film_transfer(scan.film, model.k)
+    scale = np.concatenate([scan.load * film, np.ones(mean.size - nodes)])
+    changes = {"film": _film_changes(scan.film, model.k)}
+    of_sensor = _apparatus_changes(apparatus, model.k)
+    shifts = {
+        "apparatus": _signals(estimate, mean, of_sensor * film[:, None]),
+        "film": _signals(estimate, mean, changes["film"] * transfer[:, None]),
+        "position_scale": _position_shift(scan, estimate, mean),
+    }
+    covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
+    for source, shift in shifts.items():
+        columns = -scale[:, None] * (gain @ shift)
+        if source in changes:
+            columns[:nodes] += scan.load * changes[source] * mean[:nodes, None]
+        covariances[source] = columns @ columns.T
+    posterior = Posterior(
+        estimate=estimate,
+        state=scale * mean,
+        covariances=covariances,
+        shifts=shifts,
+        residual=_sum_of(shares, [fit.residual for fit in found]),
+        found_noise=float(np.dot(shares, [fit.noise for fit in found])),
+        shares={
+            (fit.shape.exponent, fit.shape.shear): float(p)
+            for fit, p in zip(found, shares, strict=True)
+        },
+        resolved_wavenumber=0.0,
+    )
+    return replace(posterior, resolved_wavenumber=_resolved(posterior, scan.load * film))
+
+
+def _sum_of(shares: FloatArray, parts: Sequence[FloatArray]) -> FloatArray:
+    """Average arrays by their shares."""
+    return np.asarray(sum(share * part for share, part in zip(shares, parts, strict=True)))
+
+
+def _shares(fits: Sequence[ShapeFit]) -> FloatArray:
+    evidence = np.array([fit.log_evidence for fit in fits])
+    weight = np.exp(evidence - evidence.max())
+    weight[weight < _NEGLIGIBLE] = 0.0
+    return np.asarray(weight / weight.sum())
+
+
+def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:
+    """Voltages of the pressure through changed references, shape (n, q), in V."""
+    model, kernel = estimate.model, state[: estimate.model.k.size]
+    known = model.reference.wavenumbers
+    columns = [
+        replace(model, references=(RadialSpectrum(known, change),)).signal(
+            estimate.gaussian.geometry, kernel
+        )
+        for change in changes.T
+    ]
+    return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
+
+
+def _apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
+    """Independent changes of the transform of A G by one standard uncertainty, shape (k, q)."""
+    profile, a = apparatus.radial_profile, apparatus.conversion_constant
+    u_a = apparatus.parameters.uncertainty("conversion_constant")
+    covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2
+    if profile.conversion_correlation is not None:
+        shared = a * u_a * profile.conversion_correlation * profile.g_errors
+        covariance = covariance + np.outer(shared, profile.g) + np.outer(profile.g, shared)
+    # Rings far out count by their area.
+    ring = np.sqrt(profile.r + profile.r[1])
+    values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
+    kept = values > max(_EXACT * float(values[-1]), 0.0)
+    roots = vectors[:, kept] * np.sqrt(values[kept]) / ring[:, None]
+    columns = [hankel_transform(profile.r, root, k) for root in roots.T]
+    return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
+
+
+def _film_changes(film: ElasticFilm, k: FloatArray) -> FloatArray:
+    """Change of the film's transfer function by one standard uncertainty of each property."""
+    columns = []
+    if u := film.thickness_uncertainty:
+        thicker, thinner = (replace(film, thickness=film.thickness + s * u) for s in (1, -1))
+        columns.append((film_transfer(thicker, k) - film_transfer(thinner, k)) / 2)
+    if u := film.poisson_ratio_uncertainty:
+        # One-sided at nu = 1/2.
+        above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
+        upper, lower = (replace(film, poisson_ratio=nu) for nu in (above, below))
+        difference = film_transfer(upper, k) - film_transfer(lower, k)
+        columns.append(difference * u / (above - below))
+    return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
+
+
+def _position_shift(scan: Scan, estimate: ProfileEstimate, state: FloatArray) -> FloatArray:
+    model = estimate.model
+    slope = model.radial_derivative(estimate.gaussian.geometry, state[: model.k.size])
+    share = scan.position_scale_uncertainty or 0.0
+    return np.asarray((slope * estimate.distance * share)[:, None])
+
+
+def _resolved(posterior: Posterior, per_pressure: FloatArray) -> float:
+    estimate, nodes = posterior.estimate, posterior.nodes
+    k = estimate.model.k
+    errors = np.sqrt(np.maximum(np.diag(posterior.covariance)[:nodes], 0.0))
+    yardstick = per_pressure * gaussian_transfer(k, estimate.gaussian.sigma)
+    lost = errors * _RESOLVED > yardstick
+    first = int(np.argmax(lost)) if lost.any() else k.size - 1
+    return float(min(k[first], np.pi / estimate.points.step))

@@ -1,0 +1,194 @@
+"""The quality checks of a restoration, and what it tells its user."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtrc
+
+from memscal.calibration.model_checks import check
+from memscal.estimation.hypotheses import (
+    ExtraColumns,
+    axisymmetry_test,
+    chi_square_limit,
+    symmetry_test,
+)
+from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
+from memscal.model.apparatus import QualityCheck
+
+if TYPE_CHECKING:
+    from memscal.measurement.restoration import Restoration
+
+__all__ = ["restoration_checks", "restoration_messages"]
+
+_FORCE_LIMIT = 3.0
+_NEGLIGIBLE_FORCE = 0.002
+_SAME_FILM = 0.02
+_NOISE_LIMIT = 1.5
+_OUTLIER_LIMIT = 0.10
+_OUTLIER = 0.5
+
+
+def restoration_checks(found: Restoration) -> tuple[QualityCheck, ...]:
+    """Run every check that applies to the scan."""
+    checks = [_reconvolution(found), _force(found), _film(found)]
+    checks += _noise(found)
+    checks.append(_symmetry(found))
+    checks.append(_outliers(found))
+    if found.comparison is not None:
+        checks.append(_expected(found))
+    return tuple(checks)
+
+
+def _reconvolution(found: Restoration) -> QualityCheck:
+    degrees = found.degrees
+    return check(
+        "reconvolution",
+        found.chi_square / degrees,
+        chi_square_limit(degrees) / degrees,
+        "Reduced chi-square of the scan against the restored stress blurred again by A G. A "
+        "failure means that no radial stress at the base of this film explains the scan through "
+        "this apparatus function.",
+    )
+
+
+def _force(found: Restoration) -> QualityCheck:
+    load = found.scan.load
+    allowed = np.hypot(found.force_uncertainty, found.scan.load_uncertainty or 0.0)
+    allowed = float(np.hypot(allowed, _NEGLIGIBLE_FORCE * load))
+    return check(
+        "restored_force",
+        abs(found.force - load) / allowed,
+        _FORCE_LIMIT,
+        f"Difference of the restored stress's total force, {found.force:.4g} N, from the load of "
+        f"{load:.4g} N, in their standard uncertainty. A failure means that A, the load or the "
+        "unit of one of them is wrong, or that the film's Poisson's ratio, which decides how much "
+        "lies beyond the scan, is.",
+    )
+
+
+def _film(found: Restoration) -> QualityCheck:
+    ours, theirs = found.scan.film, found.apparatus.film
+    spread = np.hypot(ours.thickness_uncertainty or 0.0, theirs.thickness_uncertainty or 0.0)
+    limit = max(_SAME_FILM, 2 * float(spread) / theirs.thickness)
+    return check(
+        "film_agreement",
+        abs(ours.thickness / theirs.thickness - 1),
+        limit,
+        f"Relative difference of the film's thickness, {ours.thickness * 1e3:.4g} mm, from that of "
+        f"the calibration, {theirs.thickness * 1e3:.4g} mm. A failure means that the sensor was "
+        "calibrated under another film; G may not be the same under this one.",
+    )
+
+
+def _noise(found: Restoration) -> list[QualityCheck]:
+    if found.points.u_errors is None:
+        return []
+    checks = [
+        check(
+            "noise_as_stated",
+            found.posterior.found_noise,
+            _NOISE_LIMIT,
+            "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
+            "something besides electronic noise scatters the scan, such as position or load; the "
+            "uncertainties have been raised accordingly.",
+        )
+    ]
+    residuals = residuals_of(found.posterior.estimate)
+    if residuals.degrees >= FEWEST_RESIDUALS:
+        size = chi_square_test(residuals)
+        meaning = (
+            "What no radial pressure on the film can explain of the scan, compared with the stated "
+            f"noise: reduced chi-square of {residuals.degrees} degrees. A failure means that "
+            "the noise is larger than stated, the contact is not round, or the baseline is no "
+            "straight line."
+        )
+        checks.append(check("chi_square", size.value, size.limit, meaning, size.p_value))
+    return checks
+
+
+def _symmetry(found: Restoration) -> QualityCheck:
+    estimate = found.posterior.estimate
+    if found.points.planar:
+        name, uneven = "axisymmetry", axisymmetry_test(estimate)
+        meaning = "elliptic columns. A failure means that the contact, or the sensor, is not round."
+    else:
+        name, uneven = "symmetry", symmetry_test(estimate)
+        meaning = (
+            "odd columns. A failure means that the left and right halves differ: a tilted "
+            "indenter, an uneven film, or a drifting load."
+        )
+    return _added(name, uneven, meaning)
+
+
+def _added(name: str, found: ExtraColumns, meaning: str) -> QualityCheck:
+    about = f"Fall of chi-square by {found.count} {meaning}"
+    p_value = float(chdtrc(found.count, found.fall))
+    return check(name, found.fall, chi_square_limit(found.count), about, p_value)
+
+
+def _outliers(found: Restoration) -> QualityCheck:
+    return check(
+        "outliers",
+        float(np.mean(found.posterior.estimate.outlier_weight < _OUTLIER)),
+        _OUTLIER_LIMIT,
+        "Share of points whose weight was more than halved. A failure means that the noise is not "
+        "what the uncertainties take it for: look at the residuals.",
+    )
+
+
+def _expected(found: Restoration) -> QualityCheck:
+    compared = found.comparison
+    assert compared is not None
+    return check(
+        "expected_stress",
+        compared.chi_square,
+        compared.limit,
+        "Reduced chi-square of the scan against the expected stress blurred by A G, whose "
+        "uncertainty counts, with centre and baseline fitted. The restored stress differs from the "
+        f"expected one by up to {compared.difference:.1%} of the largest, and agrees within 95 % "
+        f"bounds at {compared.within:.0%} of the radii. A failure means that the contact is not as "
+        "it was calculated: friction, shape, film, or load.",
+        compared.p_value,
+    )
+
+
+def restoration_messages(found: Restoration, checks: tuple[QualityCheck, ...]) -> tuple[str, ...]:
+    """Return the messages that accompany a result, the gravest first."""
+    estimate, points = found.posterior.estimate, found.points
+    messages = [
+        f"Quality check {check.name} failed: {check.value:.3g} exceeds {check.limit:.3g}. "
+        f"{check.meaning}"
+        for check in checks
+        if not check.passed
+    ]
+    if not found.apparatus.passed:
+        messages.append("A quality check of the calibration itself had failed: see its artifact.")
+    if points.missing:
+        messages.append(f"{points.missing} points of the scan are missing and were left out.")
+    messages += [
+        f"Outlier {found.distance[i] * 1e3:.4g} mm from the centre: {points.u[i] * 1e3:.4g} mV "
+        f"instead of {found.predicted[i] * 1e3:.4g} mV."
+        for i in (estimate.outlier_weight < _OUTLIER).nonzero()[0]
+    ]
+    if points.u_errors is None:
+        noise = float(found.noise.min()) * 1e3
+        messages.append(
+            f"u_zz_errors is absent: a noise of {noise:.3g} mV was estimated from the scatter."
+        )
+    if not found.apparatus.radial_profile.g_errors.any():
+        messages.append("The artifact states no uncertainty of G: nothing is counted for it.")
+    film = found.scan.film
+    unstated = {
+        "film thickness": film.thickness_uncertainty,
+        "Poisson's ratio": film.poisson_ratio_uncertainty,
+        "load": found.scan.load_uncertainty,
+    }
+    names = [name for name, value in unstated.items() if value is None]
+    if names:
+        messages.append(
+            f"No uncertainty is stated for {', '.join(names)}: nothing is counted for "
+            f"{'it' if len(names) == 1 else 'them'}."
+        )
+    return tuple(messages)
