@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from accuracy.bounds import cramer_rao, root_mean_square_limit
 from peers import tuned_wiener
 from scans import CONVERSION, SIGMA, plane_error, simulated
 from scipy.stats import chi2
@@ -22,11 +23,6 @@ SEEDS = 200 if os.environ.get("MEMSCAL_FULL_STUDY") else 40
 CHANCE = 1e-5
 NOISES = (0.001, 0.005, 0.02)
 R = np.linspace(0, 3e-3, 121)
-
-
-def root_mean_square_limit(ratio: float) -> float:
-    """Largest RMS of SEEDS normal deviates of this RMS that chance allows once in 1e5."""
-    return ratio * float(np.sqrt(chi2.isf(CHANCE, SEEDS) / SEEDS))
 
 
 @lru_cache
@@ -56,42 +52,11 @@ def study(noise: float) -> dict[str, np.ndarray]:
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-@lru_cache
-def cramer_rao(noise: float) -> tuple[float, float]:
-    """Cramer-Rao bounds of A and sigma, relative; A, sigma, centre and baseline unknown.
-
-    By finite differences of simulated, noise-free scans: not by the estimator's own Jacobian.
-    """
-
-    def voltage(a: float = CONVERSION, s: float = SIGMA, x: float = 0.14e-3) -> np.ndarray:
-        kernel = memscal.GaussianMixture((1.0,), (s,))
-        return simulated(
-            noise=0.0,
-            conversion_constant=a,
-            kernel=kernel,
-            centre=(x, 0.0),
-            baseline=0.0,
-            drift=0.0,
-        ).u_zz
-
-    step = 1e-4
-    columns = [
-        (voltage(a=CONVERSION * (1 + step)) - voltage(a=CONVERSION * (1 - step))) / (2 * step),
-        (voltage(s=SIGMA * (1 + step)) - voltage(s=SIGMA * (1 - step))) / (2 * step),
-        (voltage(x=0.15e-3) - voltage(x=0.13e-3)) / 0.02,
-        np.ones(65),
-    ]
-    jacobian = np.stack(columns, axis=1)
-    deviation = noise * voltage().max()
-    bound = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian))) * deviation
-    return float(bound[0]), float(bound[1])
-
-
 @pytest.mark.parametrize("noise", NOISES)
 def test_data_space_a_and_sigma_reach_the_cramer_rao_bound(noise: float) -> None:
     found = study(noise)
     for error, bound in zip((found["a_gaussian"], found["sigma"]), cramer_rao(noise), strict=True):
-        assert np.sqrt(np.mean(error**2)) < root_mean_square_limit(1.1) * bound
+        assert np.sqrt(np.mean(error**2)) < root_mean_square_limit(1.1, SEEDS, CHANCE) * bound
 
 
 @pytest.mark.parametrize("noise", NOISES)
@@ -112,7 +77,7 @@ def test_stated_uncertainties_are_right_to_fifteen_percent(noise: float) -> None
 def test_centre_and_baseline_scatter_by_no_more_than_is_stated(noise: float) -> None:
     found = study(noise)
     for name in ("centre", "baseline"):
-        assert np.sqrt(np.mean(found[name] ** 2)) < root_mean_square_limit(1.15)
+        assert np.sqrt(np.mean(found[name] ** 2)) < root_mean_square_limit(1.15, SEEDS, CHANCE)
 
 
 @pytest.mark.parametrize(
@@ -155,4 +120,4 @@ def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
         truths = {"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "centre_y": -0.2e-3}
         deviates.append([(p[n] - truth) / p.uncertainty(n) for n, truth in truths.items()])
     scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
-    assert (scatter < root_mean_square_limit(1.15)).all()
+    assert (scatter < root_mean_square_limit(1.15, SEEDS, CHANCE)).all()
