@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import j0
 
 from memscal.axisymmetry.hankel import radial_spline
+from memscal.axisymmetry.quadrature import ring_areas
 from memscal.calibration.solution import Solution
 from memscal.estimation.forward import unit_gaussian
 from memscal.estimation.replicates import Replicates
@@ -66,7 +67,7 @@ class ReplicateResults:
             )
         support = solution.choice.support
         phase = np.clip(2 * r / support - 1, 0.0, 1.0)
-        ring = 2 * np.pi * r * np.gradient(r)
+        ring = ring_areas(r)
         # Rings miss a share of the plane that does not change from replicate to replicate.
         ring = ring / float(ring @ kernel.view.radial)
         return cls(r, (1 + np.cos(np.pi * phase)) / 2, synthesis, model.k, ring)
@@ -102,7 +103,7 @@ class ReplicateResults:
             replicates.sigma,
             _nearest_width(self.r, g, replicates.sigma),
             _full_width(self.r, g),
-            1 / ((g**2) @ (2 * np.pi * self.r * np.gradient(self.r))),
+            1 / ((g**2) @ ring_areas(self.r)),
         ]
         return np.stack(columns, axis=1), g
 

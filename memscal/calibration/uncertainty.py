@@ -1,13 +1,12 @@
 r"""First-order propagation: noise, what regularisation hides, and uncertain inputs.
 
 Every result is a linear function of the posterior of the profile's parameters (:math:`w`)
-and of the Gaussian fit's (:math:`f`).  Their joint covariance follows from the linear
-model: :math:`\mathrm{cov}(w, f)` is the Gaussian fit's own covariance in the parameters that
-they share, and zero for the departures'.  Of it, the part that scatters from scan to scan is
-``noise``; the rest, which does not, is ``regularisation``: the expected square of what the
-estimate cannot know.  What a window hides beyond that is counted as an error of the size that the
-profile's own continuation has there.  Inputs add one column each, the change of all results by
-one standard uncertainty, and their correlations combine these.
+and of the Gaussian fit's (:math:`f`).  What scatters of them from scan to scan, by their
+derivatives by the voltages, is ``noise``; the rest of the expected squared error of :math:`w`,
+which does not scatter, is ``regularisation``: what the estimate cannot know.  What a window hides
+beyond that is counted as an error of the size that the profile's own continuation has there.
+Inputs add one column each, the change of all results by one standard uncertainty, and their
+correlations combine these.
 """
 
 from __future__ import annotations
@@ -279,22 +278,20 @@ def _unit(count: int, index: int) -> FloatArray:
 
 
 def _noise_roots(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray]:
-    """Square roots of the joint covariance of (w, f): what scatters, and what does not."""
-    own, fitted = estimate.covariance, estimate.gaussian_covariance
-    count, flat = own.shape[0], fitted.shape[0]
-    joint = np.zeros((count + flat,) * 2)
-    joint[:count, :count] = own
-    joint[count:, count:] = fitted
-    joint[:flat, count:] = fitted
-    joint[count:, :flat] = fitted
-    gain = np.vstack([estimate.weighed.gain, estimate.gaussian_gain])
-    random = gain @ estimate.noise_root
-    return random, _root(joint - random @ random.T)
+    """Square roots of the joint covariance of (w, f): what scatters, and what does not.
+
+    A Gaussian fit has no prior: all of its error scatters.
+    """
+    own, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
+    fitted = estimate.gaussian_gain @ estimate.noise_root
+    fixed = _root(own - random @ random.T, np.sqrt(np.maximum(np.diag(own), 0.0)))
+    return np.vstack([random, fitted]), np.pad(fixed, ((0, fitted.shape[0]), (0, 0)))
 
 
-def _root(covariance: FloatArray) -> FloatArray:
-    """A square root of a covariance that may be singular."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+def _root(covariance: FloatArray, scale: FloatArray | None = None) -> FloatArray:
+    """A square root of a covariance that may be singular, its rows of the given sizes."""
+    if scale is None:
+        scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     safe = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
     return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
