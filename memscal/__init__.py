@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
-    from memscal.measurement.restoration import Restoration, restore
+    from memscal.measurement.procedure import restore
+    from memscal.measurement.restoration import Restoration
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.indent import indent
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
@@ -57,7 +58,7 @@ _HOMES = {
     "monte_carlo": "memscal.calibration.monte_carlo",
     "read_reference": "memscal.formats.reference",
     "read_scan": "memscal.formats.scan",
-    "restore": "memscal.measurement.restoration",
+    "restore": "memscal.measurement.procedure",
     "simulate": "memscal.simulation",
     "write_reference": "memscal.formats.reference",
     "write_scan": "memscal.formats.scan",

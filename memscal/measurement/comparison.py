@@ -9,11 +9,14 @@ noise: with columns D of what their standard uncertainties do, the residuals hav
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
+from typing import TypeAlias
 
 import numpy as np
 from scipy.special import chdtrc
 
 from memscal.axisymmetry.hankel import hankel_transform
+from memscal.errors import InputError
 from memscal.estimation.hypotheses import chi_square_limit
 from memscal.measurement.posterior import Posterior
 from memscal.measurement.pressure import film_transfer
@@ -22,7 +25,11 @@ from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
-__all__ = ["Comparison", "compare_stress"]
+__all__ = ["Comparison", "Expected", "compare_stress", "read_expected"]
+
+Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
+"""A base stress to compare with, or the path of a file that holds one."""
+
 
 #: Coverage factor of 95 %.
 _EXPANDED = 1.96
@@ -114,3 +121,17 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     left = whiten @ (points.u - signal)
     left = left - flat @ (flat.T @ left)
     return float(left @ left), left.size - flat.shape[1]
+
+
+def read_expected(expected: Expected) -> StressProfile | Contact:
+    """Return a stress to compare with, read from its file where it is one."""
+    if isinstance(expected, str | PathLike):
+        from memscal.formats.reference import read_reference
+
+        return read_reference(expected)
+    if isinstance(expected, StressProfile | Contact):
+        return expected
+    raise InputError(
+        f"The expected stress is a {type(expected).__name__}.",
+        cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
+    )

@@ -19,6 +19,7 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.estimation.forward import gaussian_transfer
+from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.measurement.pressure import film_transfer, pressure_shapes
 from memscal.measurement.shape_fit import ShapeFit, believed_noise, fit_shape
@@ -26,13 +27,15 @@ from memscal.model.film import ElasticFilm
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
-__all__ = ["Posterior", "restore_posterior"]
+__all__ = ["Posterior", "reach_of", "restore_posterior", "sensor_transfer"]
 
 #: A shape of less probability is left out.
 _NEGLIGIBLE = 1e-4
 #: Directions in which A G is known better than this share of its worst are exact.
 _EXACT = 1e-10
 _RESOLVED = 3.0
+#: The stress is computed out to this multiple of the scan's width.
+_REACH = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +87,16 @@ class Posterior:
     def nodes(self) -> int:
         """How many entries of the state are the transform."""
         return self.estimate.model.k.size
+
+
+def reach_of(points: ScanPoints) -> float:
+    """Return the radius out to which a scan's stress is computed, in m."""
+    return _REACH * float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
+
+
+def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
+    """Return the transform of G at ``k`` (rad/m), as a convolution with it has it."""
+    return hankel_transform(apparatus.radial_profile.r, apparatus.radial_profile.g, k)
 
 
 def restore_posterior(

@@ -1,42 +1,31 @@
-"""The way back: the stress at the base of the film, restored from a scan and a calibration."""
+"""The stress at the base of the film as a scan tells it, and everything that goes with it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from os import PathLike
-from typing import TypeAlias
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from memscal.apparatus import ApparatusFunction, load_apparatus
-from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
+from memscal.apparatus import ApparatusFunction
+from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.errors import InputError
-from memscal.estimation.points import ScanPoints, measured_points
-from memscal.estimation.profile_estimate import estimate_profile
-from memscal.measurement.comparison import Comparison, compare_stress
-from memscal.measurement.posterior import Posterior, restore_posterior
-from memscal.measurement.pressure import film_transfer
-from memscal.measurement.requirements import require_measurement, restored_or_explained
-from memscal.measurement.restoration_checks import restoration_checks, restoration_messages
-from memscal.mechanics.contact import Contact
+from memscal.estimation.points import ScanPoints
+from memscal.measurement.comparison import (
+    Comparison,
+    Expected,
+    compare_stress,
+    read_expected,
+)
+from memscal.measurement.posterior import Posterior, reach_of, sensor_transfer
 from memscal.model.apparatus import QualityCheck
 from memscal.model.notation import format_measured
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
-__all__ = ["Expected", "Restoration", "restore"]
-
-Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
-"""A base stress to compare with, or the path of a file that holds one."""
-
-#: A film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
-_LARGEST_KH = 20.0
-_REACH = 1.5
-#: Radii of the table, a scan's half width in all.
-_RADII = 161
+__all__ = ["Restoration"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -199,12 +188,18 @@ class Restoration:
         r"""Return the restored stress blurred again, :math:`G \otimes \sigma_{zz}`, in Pa."""
         k, nodes = self.posterior.estimate.model.k, self.posterior.nodes
         return np.asarray(
-            self._synthesis(r) @ (_transfer(self.apparatus, k) * self.posterior.state[:nodes])
+            self._synthesis(r) @ (sensor_transfer(self.apparatus, k) * self.posterior.state[:nodes])
         )
 
     def compare(self, expected: Expected) -> Comparison:
-        """Compare with a calculated stress, blurred by G (the direct way) and restored."""
-        return compare_stress(self.posterior, self.scan, _profile(expected), self.r)
+        """Compare a calculated stress with the scan, blurred by G, and with the restored one.
+
+        Raises
+        ------
+        InputError
+            If it is no stress.
+        """
+        return compare_stress(self.posterior, self.scan, read_expected(expected), self.r)
 
     def profile(self) -> StressProfile:
         """Return the restored stress as a table with its uncertainty, as a file holds it."""
@@ -239,7 +234,7 @@ class Restoration:
     def _synthesis(self, r: ArrayLike) -> FloatArray:
         """Matrix from the transform at the nodes to values at radii."""
         radii = np.abs(np.asarray(r, dtype=np.float64))
-        reach = _REACH * _span(self.points)
+        reach = reach_of(self.points)
         if not np.all(radii <= reach):
             raise InputError(
                 f"A radius is {np.max(radii) * 1e3:.4g} mm.",
@@ -248,91 +243,3 @@ class Restoration:
             )
         known = self.posterior.estimate.model.reference.wavenumbers
         return known.synthesise(np.eye(known.k.size), radii)
-
-
-def restore(
-    scan: Scan,
-    apparatus: ApparatusFunction | str | PathLike[str],
-    *,
-    expected: Expected = None,
-) -> Restoration:
-    r"""Restore the stress at the base of the film from a scan with a calibrated sensor.
-
-    Solves :math:`U_{zz} = A\,G \otimes \sigma_{zz}` for the base stress, with a known A and G: what
-    presses on the film is a pressure of any radial shape, weighed by evidence, and the film of the
-    scan turns it into the stress at its base.  No contact is calculated.
-
-    Parameters
-    ----------
-    scan : Scan
-        Voltage against the indenter's position, at one load; a rod's loads may differ.
-    apparatus : ApparatusFunction or path
-        The calibrated sensor.
-    expected : StressProfile, Contact or path, optional
-        A calculated base stress to hold against the restored one: adds a check.
-
-    Returns
-    -------
-    Restoration
-        The stress with its uncertainty; its checks may have failed: see ``.passed``.
-
-    Raises
-    ------
-    InputError
-        If scan, artifact or expected stress cannot be used, or not together.
-    FitError
-        If the scan does not determine a stress.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1), method="evidence").apparatus
-    >>> restored = memscal.restore(memscal.simulate(seed=2), apparatus)
-    >>> abs(restored.force - 1.0) < 3 * restored.force_uncertainty
-    True
-    """
-    known = apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
-    require_measurement(scan, known)
-    points = measured_points(scan)
-    wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, _REACH * _span(points))
-    transfer = known.conversion_constant * _transfer(known, wavenumbers.k)
-    through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan.film, wavenumbers.k))
-    estimate = restored_or_explained(lambda: estimate_profile(points, through))
-    posterior = restore_posterior(scan, known, estimate, transfer)
-    nodes = posterior.nodes
-    r = np.linspace(0.0, _span(points) / 2, _RADII)
-    matrix = wavenumbers.synthesise(np.eye(nodes), r)
-    found = Restoration(
-        scan=scan,
-        apparatus=known,
-        posterior=posterior,
-        r=r,
-        sigma_zz=matrix @ posterior.state[:nodes],
-        covariance=matrix @ posterior.covariance[:nodes, :nodes] @ matrix.T,
-    )
-    if expected is not None:
-        found = replace(found, comparison=found.compare(expected))
-    checks = restoration_checks(found)
-    return replace(found, checks=checks, messages=restoration_messages(found, checks))
-
-
-def _transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
-    """Transform of G, as :meth:`ApparatusFunction.convolve` has it."""
-    return hankel_transform(apparatus.radial_profile.r, apparatus.radial_profile.g, k)
-
-
-def _span(points: ScanPoints) -> float:
-    return float(np.hypot(np.ptp(points.x), np.ptp(points.y)))
-
-
-def _profile(expected: Expected) -> StressProfile | Contact:
-    if isinstance(expected, str | PathLike):
-        from memscal.formats.reference import read_reference
-
-        return read_reference(expected)
-    if isinstance(expected, StressProfile | Contact):
-        return expected
-    raise InputError(
-        f"The expected stress is a {type(expected).__name__}.",
-        cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
-    )
