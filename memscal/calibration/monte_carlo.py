@@ -9,14 +9,12 @@ it is counted, but no draw can show it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from memscal.calibration.coverage import sampling_error, shortest_interval, symmetric_interval
+from memscal.calibration.comparison import COVERAGE, TOLERANCE, Comparison, compared, judged
+from memscal.calibration.coverage import shortest_interval, symmetric_interval
 from memscal.calibration.disagreement import Blame
 from memscal.calibration.draw_blocks import DrawModel, drawn_results
 from memscal.calibration.replicate_results import REPLICATED
@@ -30,64 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["Comparison", "MonteCarlo", "monte_carlo"]
 
 _METHODS = ("evidence", "white-noise", "tikhonov")
-#: What an estimate counts but no draw shows.
-_NOT_RANDOM = ("regularisation", "window", "raster_noise")
-_COVERAGE = 0.95
-_TOLERANCE = 0.1
-_LARGEST_SHIFT = 0.25
 #: A point of less weight is an outlier.
 _ORDINARY = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """One parameter by draws and by the first-order budget, in its SI unit.
-
-    Parameters
-    ----------
-    name : str
-        The parameter.
-    value : float
-        The calibration's.
-    mean, uncertainty : float
-        Mean and standard deviation of the draws.
-    sampling_error : float
-        Standard uncertainty of ``uncertainty`` for the number of draws.
-    symmetric, shortest : tuple of float
-        Coverage intervals of 95 %.
-    first_order : float
-        Standard uncertainty by the budget, of what scatters: noise and inputs.
-    stated : float
-        The calibration's standard uncertainty, what regularisation hides included.
-    reason : str
-        Why both do not agree; empty where they do.
-    """
-
-    name: str
-    value: float
-    mean: float
-    uncertainty: float
-    sampling_error: float
-    symmetric: tuple[float, float]
-    shortest: tuple[float, float]
-    first_order: float
-    stated: float
-    reason: str = ""
-
-    @property
-    def ratio(self) -> float:
-        """Standard uncertainty of the draws over that of the budget."""
-        return self.uncertainty / self.first_order if self.first_order > 0 else np.nan
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the budget may be used in place of draws.
-
-        Their standard uncertainties differ by no more than a tenth, and the mean of the draws
-        from the calibration's value by no more than a quarter of one, beyond what the number of
-        draws allows (two standard errors).
-        """
-        return not self.reason
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,7 +103,8 @@ def monte_carlo(
     Parameters
     ----------
     calibration : Calibration
-        From :func:`memscal.calibrate`, by method evidence, white-noise or tikhonov.
+        From :func:`memscal.calibrate`, by method evidence, white-noise or tikhonov; of lines, or
+        of several scans.
     draws : int, default 1000
         How many; two or more.  The 95 % interval's ends are known to about
         :math:`3/\sqrt{M}` standard uncertainties.
@@ -178,7 +121,8 @@ def monte_carlo(
     Raises
     ------
     InputError
-        If a number is out of range, or the method is not linear in the fields.
+        If a number is out of range, the method is not linear in the fields, or the scan is a
+        raster.
 
     Examples
     --------
@@ -191,7 +135,8 @@ def monte_carlo(
     _check(calibration, draws, seed, workers)
     model = DrawModel.of(calibration)
     samples, g = drawn_results(model, draws, seed, workers)
-    comparisons = _compared(calibration, samples)
+    apparatus = calibration.apparatus
+    comparisons = compared(apparatus.parameters, apparatus.budget, samples)
     blame = Blame(
         lambda only: drawn_results(model, draws, seed, workers, only=only)[0], model.table
     )
@@ -202,14 +147,14 @@ def monte_carlo(
         sources=sources,
         samples=samples,
         comparisons=tuple(
-            _judged(each, i, calibration.apparatus.budget[each.name], sources, draws, blame)
+            judged(each, i, apparatus.budget[each.name], sources, draws, blame)
             for i, each in enumerate(comparisons)
         ),
         r=model.results.r,
         g_mean=g.mean(axis=0),
         g_uncertainty=g.std(axis=0, ddof=1),
-        g_symmetric=symmetric_interval(g, _COVERAGE),
-        g_shortest=shortest_interval(g, _COVERAGE),
+        g_symmetric=symmetric_interval(g, COVERAGE),
+        g_shortest=shortest_interval(g, COVERAGE),
         g_first_order=model.first_order(),
         messages=_messages(calibration, model, comparisons),
     )
@@ -224,52 +169,19 @@ def _check(calibration: Calibration, draws: Any, seed: Any, workers: int) -> Non
             )
     require_workers(workers)
     solution = calibration.solution
-    name = solution.regulariser.name
-    windowed = name != "evidence" and solution.estimate.points.planar
-    if name not in _METHODS or windowed:
+    name, points = solution.regulariser.name, solution.estimate.points
+    if name not in _METHODS:
         raise InputError(
-            f"The calibration is by method {name}{' of a raster' if windowed else ''}, whose draws "
-            "would have to be divided one by one.",
+            f"The calibration is by method {name}; its draws would be divided one by one.",
             why="A draw is estimated at once with all others, without fields.",
             cure="Calibrate with method='evidence'.",
         )
-
-
-def _compared(calibration: Calibration, samples: FloatArray) -> list[Comparison]:
-    parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget
-    return [
-        Comparison(
-            name=name,
-            value=parameters[name],
-            mean=float(column.mean()),
-            uncertainty=float(column.std(ddof=1)),
-            sampling_error=float(sampling_error(column) * column.std(ddof=1)),
-            symmetric=_pair(symmetric_interval(column, _COVERAGE)),
-            shortest=_pair(shortest_interval(column, _COVERAGE)),
-            first_order=_random_part(budget[name]),
-            stated=parameters.uncertainty(name),
+    if points.planar and points.scans == 1:
+        raise InputError(
+            "The calibration is of a raster, whose G is read off the raster's own lattice.",
+            why="Draws are of the profile, whose widths are not those of a coarse lattice.",
+            cure="Draw a line of it, or use the first-order budget.",
         )
-        for name, column in zip(REPLICATED, samples.T, strict=True)
-    ]
-
-
-def _judged(
-    found: Comparison,
-    column: int,
-    budget: Mapping[str, float],
-    sources: tuple[str, ...],
-    draws: int,
-    blame: Blame,
-) -> Comparison:
-    """Give the reason where draws and budget disagree."""
-    u = found.first_order
-    spread = abs(found.uncertainty - u) <= _TOLERANCE * u + 2 * found.sampling_error
-    error = 2 * found.uncertainty / np.sqrt(draws)
-    place = abs(found.mean - found.value) <= _LARGEST_SHIFT * u + error
-    if spread and place:
-        return found
-    drawn = {source: budget.get(source, 0.0) for source in sources}
-    return replace(found, reason=blame.sentence(column, found.value, drawn))
 
 
 def _messages(
@@ -286,7 +198,7 @@ def _messages(
     hidden = [
         f"{1 - (each.first_order / each.stated) ** 2:.0%} of {each.name}"
         for each in comparisons
-        if each.first_order < (1 - _TOLERANCE) * each.stated
+        if each.first_order < (1 - TOLERANCE) * each.stated
     ]
     if hidden:
         messages.append(
@@ -297,17 +209,3 @@ def _messages(
     if (calibration.solution.estimate.outlier_weight < _ORDINARY).any():
         messages.append("Outliers keep their reduced weight in every draw.")
     return tuple(messages)
-
-
-def _random_part(budget: Mapping[str, float]) -> float:
-    """Standard uncertainty of what scatters; correlations carry the sign of what they add."""
-    variance = sum(
-        float(np.copysign(part**2, part))
-        for source, part in budget.items()
-        if source not in _NOT_RANDOM
-    )
-    return float(np.sqrt(max(variance, 0.0)))
-
-
-def _pair(ends: FloatArray) -> tuple[float, float]:
-    return float(ends[0]), float(ends[1])

@@ -237,6 +237,22 @@ def test_a_method_that_is_not_linear_is_refused() -> None:
         memscal.monte_carlo(calibrated("richardson-lucy"))
 
 
+def test_a_raster_is_refused() -> None:
+    with pytest.raises(memscal.MemscalError, match="lattice"):
+        memscal.monte_carlo(calibrated(raster=True, points=17))
+
+
+def test_unstated_noise_outliers_and_missing_points_are_drawn_as_they_were_weighed() -> None:
+    scan = simulated(noise=0.004, state_noise=False, seed=6)
+    u = scan.u_zz.copy()
+    u[10], u[30] = np.nan, u[30] + 0.3 * np.nanmax(u)
+    found = memscal.monte_carlo(
+        memscal.calibrate(replace(scan, u_zz=u), method="evidence"), draws=500
+    )
+    assert found["gaussian_sigma"].ratio == pytest.approx(1.0, abs=0.15)
+    assert any("Outliers" in text for text in found.messages)
+
+
 def test_a_parameter_that_is_not_drawn_is_named(paper: Calibration) -> None:
     with pytest.raises(memscal.MemscalError, match="centre is not drawn"):
         memscal.monte_carlo(paper, draws=5)["centre"]
