@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -169,7 +170,7 @@ class DepartureBasis:
         widening = self.conversion_constant * unit_gaussian_slope(r, self.sigma)
         return self._columns(gaussian, widening, [ring.radial(r) for ring in self.rings])
 
-    @property
+    @cached_property
     def integrals(self) -> FloatArray:
         """Integrals of all columns over the plane, shape (p,)."""
         return np.asarray(self.kernels(np.zeros(1))[0])

@@ -231,14 +231,16 @@ def _neighbours(residuals: Residuals) -> csr_array:
     from scipy.sparse import coo_array
 
     place, sequence, n = residuals.place, residuals.sequence, residuals.place.size
-    matrix = coo_array((n, n)).tocsr()
+    rows, columns, weights = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)], []
     for apart in range(1, min(_FARTHEST, n - 1) + 1):
         first = np.flatnonzero(sequence[apart:] == sequence[:-apart])
-        steps = place[first + apart] - place[first]
-        weight = 0.5 * _DECAY**steps
-        pairs = coo_array((weight, (first, first + apart)), shape=(n, n))
-        matrix = matrix + pairs + pairs.T
-    return matrix
+        rows.append(first)
+        columns.append(first + apart)
+        weights.append(0.5 * _DECAY ** (place[first + apart] - place[first]))
+    found = (np.concatenate([np.zeros(0), *weights]), (np.hstack(rows), np.hstack(columns)))
+    pairs = coo_array(found, shape=(n, n))
+    # Assembled once: every sum of sparse matrices costs more than all of their entries.
+    return (pairs + pairs.T).tocsr()
 
 
 def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
