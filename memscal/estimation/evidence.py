@@ -44,9 +44,10 @@ def _hypotheses() -> tuple[Hypothesis, ...]:
     kinds: list[tuple[str, tuple[float, ...], float, float]] = [
         ("edge", (0.4, 0.8), 0.20, 0.0),
         ("rough edge 0.4", (0.4,), 0.08, 0.30),
-        ("rough edge 0.5", (0.8, 1.6), 0.0, 0.09),
-        ("core", (0.4,), 0.06, 0.44),
-        ("tail", (0.2,), 0.33, 0.17),
+        ("rough edge 0.5", (0.8, 1.6), 0.0, 0.10),
+        ("core", (0.4,), 0.06, 0.0),
+        ("core", (0.3,), 0.0, 0.30),
+        ("tail", (0.2,), 0.33, 0.30),
     ]
     found = [Hypothesis(None, 0.0, 0.33, 0.0)]
     for kind, strengths, estimate, uncertainty in kinds:
