@@ -7,8 +7,10 @@ from scipy.special import chdtrc
 
 from memscal.calibration.model_checks import check, model_checks
 from memscal.calibration.solution import Misfit, Solution
+from memscal.deconvolution.evidence import Evidence
 from memscal.estimation.band import RESOLVED
 from memscal.estimation.forward import gaussian_transfer
+from memscal.estimation.free_model import free_model
 from memscal.estimation.hypotheses import chi_square_limit
 from memscal.model.apparatus import ParameterSet, QualityCheck
 
@@ -27,6 +29,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
     """Run every check that applies to the scan."""
     return (
         *_reconvolutions(solution),
+        *_constraint(solution),
         *_agreements(solution, parameters),
         *_set_up(solution),
         *model_checks(solution.estimate),
@@ -57,6 +60,29 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
             "not gaussian_sigma.",
             exact=stated,
         ),
+    ]
+
+
+def _constraint(solution: Solution) -> list[QualityCheck]:
+    """Compare a G that was kept from falling below zero, or from rising, with the free one."""
+    regulariser, estimate = solution.regulariser, solution.estimate
+    if not (isinstance(regulariser, Evidence) and regulariser.constrained):
+        return []
+    weights = estimate.weights / estimate.noise_scale**2
+    misfits = [
+        float(np.sum(estimate.points.standardised(estimate.points.u - u, weights) ** 2))
+        for u in (solution.quotient.predicted, estimate.predicted)
+    ]
+    # As many directions of G as the scan tells apart, and which the constraint may cost.
+    told = free_model(estimate).design.shape[1] - estimate.basis.flat
+    return [
+        check(
+            "constraint",
+            max(misfits[0] - misfits[1], 0.0),
+            chi_square_limit(max(told, 1)),
+            "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
+            "estimate. A failure means that the scan contradicts it: leave it out.",
+        )
     ]
 
 

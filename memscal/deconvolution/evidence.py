@@ -40,6 +40,11 @@ class Evidence:
         "Detail finer than a third of G's width that the film hides is not found, only allowed for."
     )
 
+    @property
+    def constrained(self) -> bool:
+        """Whether a constraint was asked for."""
+        return self.nonnegative or self.monotone
+
     def divide(self, problem: DivisionProblem) -> Division:
         """Take the posterior mean; its window is open everywhere."""
         if problem.posterior is None:

@@ -133,14 +133,15 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
 
     The departures enter as explained: they are even, and absorb nothing odd or uneven.
     """
-    root = np.sqrt(estimate.weights) / estimate.noise_scale
+    weights = estimate.weights / estimate.noise_scale**2
+    standardised = estimate.points.standardised
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     round_ = estimate.gaussian.jacobian[:, : estimate.basis.flat - estimate.points.ellipse]
     jacobian = round_ / np.linalg.norm(round_, axis=0)
-    base = np.linalg.qr(jacobian * root[:, None])[0]
-    scaled = columns * root[:, None]
-    residual = (estimate.weighed.residual + estimate.oval) * root
+    base = np.linalg.qr(standardised(jacobian, weights))[0]
+    scaled = standardised(columns, weights)
+    residual = standardised(estimate.weighed.residual + estimate.oval, weights)
     residual = residual - base @ (base.T @ residual)
     free = scaled - base @ (base.T @ scaled)
     information = np.linalg.pinv(free.T @ free, hermitian=True)

@@ -31,6 +31,7 @@ def test_the_table_of_checks_lists_those_that_there_are_and_which_have_p_values(
         [simulated(points=33, seed=1), simulated(points=33, seed=2)],
     ]
     found = [check for scan in scans for check in checks(scan).values()]
+    found += checks(simulated(points=33), nonnegative=True).values()
     assert {check.name: check.p_value is not None for check in found} == listed
 
 
@@ -103,3 +104,14 @@ def test_p_values_are_kept_in_the_artifact(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     made.save(path)
     assert memscal.load_apparatus(path).checks == made.checks
+
+
+def test_a_constraint_that_the_scan_contradicts_is_found_and_one_that_it_meets_is_not() -> None:
+    ring = simulated(noise=2e-4, repeats=4, kernel=RING)
+    assert not checks(ring, monotone=True)["constraint"].passed
+    passed = [
+        checks(simulated(noise=0.003, seed=seed, kernel=kernel), monotone=True)["constraint"].passed
+        for kernel in (memscal.GaussianMixture(), TAILS)
+        for seed in range(10)
+    ]
+    assert all(passed)
