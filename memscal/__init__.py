@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from memscal.model.indenter import Cone, Profile, Rod, Sphere
     from memscal.model.scan import Scan, StressSensor
     from memscal.model.stress import StressProfile
+    from memscal.planning.outcome import Design
+    from memscal.planning.procedure import design
     from memscal.simulation import simulate
 
 _HOMES = {
@@ -35,6 +37,7 @@ _HOMES = {
     "Calibration": "memscal.calibration.procedure",
     "Cone": "memscal.model.indenter",
     "Contact": "memscal.mechanics.contact",
+    "Design": "memscal.planning.outcome",
     "ElasticFilm": "memscal.model.film",
     "ExponentialCompliance": "memscal.mechanics.interface",
     "FleetCalibration": "memscal.calibration.fleet",
@@ -53,6 +56,7 @@ _HOMES = {
     "StressSensor": "memscal.model.scan",
     "calibrate": "memscal.calibration.procedure",
     "calibrate_many": "memscal.calibration.fleet",
+    "design": "memscal.planning.procedure",
     "indent": "memscal.mechanics.indent",
     "load_apparatus": "memscal.apparatus",
     "monte_carlo": "memscal.calibration.monte_carlo",
@@ -69,6 +73,7 @@ __all__ = [
     "Calibration",
     "Cone",
     "Contact",
+    "Design",
     "ElasticFilm",
     "ExponentialCompliance",
     "FleetCalibration",
@@ -88,6 +93,7 @@ __all__ = [
     "__version__",
     "calibrate",
     "calibrate_many",
+    "design",
     "indent",
     "load_apparatus",
     "monte_carlo",

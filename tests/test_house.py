@@ -18,7 +18,8 @@ MODULES = {
 
 FLOW = [
     "version", "errors", "model", "axisymmetry", "mechanics", "deconvolution", "estimation",
-    "apparatus", "calibration", "simulation", "measurement", "figures", "cli", "__main__",
+    "apparatus", "calibration", "simulation", "measurement", "planning",
+    "figures", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 

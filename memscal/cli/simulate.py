@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from memscal.cli.failures import DONE, debug_option
+from memscal.cli.kernel_options import kernel_from, kernel_options, require_one_kernel
 from memscal.cli.options import (
     FILE,
     Quantity,
@@ -25,7 +26,6 @@ from memscal.cli.output import emit_json, message, note
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
-    from memscal.axisymmetry.kernels import RadialKernel
     from memscal.model.scan import Scan
 
 __all__ = ["command"]
@@ -65,36 +65,7 @@ Examples:
     metavar="SCAN",
     help="Scan to write (memscal-scan).",
 )
-@click.option(
-    "--sigma",
-    "sigmas",
-    type=Quantity("um"),
-    multiple=True,
-    default=(561.0,),
-    show_default=True,
-    help="Standard deviation of the Gaussian apparatus function, in um. Repeated with --weight: "
-    "a sum of Gaussians.",
-)
-@click.option(
-    "--weight",
-    "weights",
-    type=Quantity("ratio", low=-math.inf),
-    multiple=True,
-    help="Share of each Gaussian, in the order of --sigma; they add up to 1.",
-)
-@click.option(
-    "--disc-radius",
-    type=Quantity("um"),
-    help="Radius of a uniform disc, in um: the apparatus function is this disc, blurred by a "
-    "Gaussian of --sigma.",
-)
-@click.option(
-    "--conversion-constant",
-    type=Quantity("mV/Pa"),
-    default=1e-4,
-    show_default=True,
-    help="Conversion constant A, in mV/Pa.",
-)
+@kernel_options
 @click.option(
     "--load",
     "loads",
@@ -194,7 +165,7 @@ def command(output: Path, as_json: bool, force: bool, **given: Any) -> int:
     function; noise, an offset and a drift are added. The file is labelled as synthetic and holds
     its truth. What the options do not say is the paper's.
     """
-    _require_one_kernel(given["sigmas"], given["weights"], given["disc_radius"])
+    require_one_kernel(given)
     if given["raster"] and len(given["loads"]) * given["repeats"] > 1:
         raise click.UsageError("A raster has one repeat at one load.")
     prove_writable([output], force=force)
@@ -207,30 +178,6 @@ def command(output: Path, as_json: bool, force: bool, **given: Any) -> int:
     return DONE
 
 
-def _require_one_kernel(
-    sigmas: tuple[float, ...], weights: tuple[float, ...], disc_radius: float | None
-) -> None:
-    if disc_radius is not None:
-        if weights or len(sigmas) > 1:
-            raise click.UsageError(
-                "A disc is blurred by one Gaussian: give --disc-radius and one --sigma, and no "
-                "--weight."
-            )
-    elif len(weights) != len(sigmas) and (weights or len(sigmas) > 1):
-        raise click.UsageError(
-            f"There are {len(sigmas)} --sigma and {len(weights)} --weight: give one weight to each."
-        )
-
-
-def _kernel(given: Mapping[str, Any]) -> RadialKernel:
-    from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
-
-    sigmas = tuple(si(sigma, -6) for sigma in given["sigmas"])
-    if given["disc_radius"] is not None:
-        return SmoothedDisc(radius=si(given["disc_radius"], -6), sigma=sigmas[0])
-    return GaussianMixture(given["weights"] or (1.0,), sigmas)
-
-
 def _simulate(given: Mapping[str, Any]) -> Scan:
     from memscal.model.indenter import Rod
     from memscal.simulation import simulate
@@ -241,7 +188,7 @@ def _simulate(given: Mapping[str, Any]) -> Scan:
     return simulate(
         film=film,
         rod=rod,
-        kernel=_kernel(given),
+        kernel=kernel_from(given),
         conversion_constant=si(given["conversion_constant"], -3),
         load=loads[0] if len(loads) == 1 else loads,
         half_range=si(given["half_range"], -3),

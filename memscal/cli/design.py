@@ -1,0 +1,227 @@
+"""``memscal design``: the uncertainties to expect of a scan that is not made yet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from memscal.cli.failures import DONE, debug_option
+from memscal.cli.kernel_options import kernel_from, kernel_options, require_one_kernel
+from memscal.cli.options import (
+    Quantity,
+    film_from,
+    film_options,
+    force_option,
+    indenter_from,
+    json_option,
+    radius_options,
+    si,
+)
+from memscal.cli.output import message
+from memscal.cli.simulate import FILM
+from memscal.cli.targets import FigurePath, prove_writable
+
+if TYPE_CHECKING:
+    from memscal.planning.outcome import Design
+
+    _WishType = click.ParamType[tuple[str, float]]
+else:  # generic since click 8.2 only
+    _WishType = click.ParamType
+
+__all__ = ["command"]
+
+_VARIED = ("step", "half-range", "repeats")
+
+EXAMPLES = """\b
+Examples:
+  memscal design
+  memscal design --step 0.5 --half-range 10 --repeats 4 --noise 1
+  memscal design --load 0.5 --noise-voltage 0.05 --figure design.png
+  memscal design --noise 1 --want A=1.2% --vary step
+  memscal design --thickness-uncertainty 0.005 --want sigma=1.2% --vary repeats --json
+  memscal design --disc-radius 800 --sigma 300 --want resolved=4 --vary repeats
+"""
+
+
+class _Wish(_WishType):
+    """What is wanted: ``sigma=1%``, or ``resolved=4`` in rad/mm."""
+
+    name = "wish"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, float]:
+        """Read name and number; the name is the library's to judge."""
+        if isinstance(value, tuple):
+            return value
+        name, found, text = str(value).partition("=")
+        percent = text.strip().endswith("%")
+        try:
+            number = float(text.strip().removesuffix("%"))
+        except ValueError:
+            found = ""
+            number = 0.0
+        if not found:
+            self.fail(f"{value!r} is no wish: write sigma=1% or resolved=4 (rad/mm).", param, ctx)
+        name = name.strip()
+        if percent == (name == "resolved"):
+            unit = "in rad/mm, without %" if percent else "in percent: write the %"
+            self.fail(f"{value!r}: {name} is wanted {unit}.", param, ctx)
+        return name, si(number, -2) if percent else si(number, 3)
+
+
+@click.command("design", epilog=EXAMPLES)
+@kernel_options
+@click.option(
+    "--load",
+    type=Quantity("N"),
+    default=1.0,
+    show_default=True,
+    help="Normal load, in N.",
+)
+@click.option(
+    "--load-uncertainty",
+    type=Quantity("percent", open_low=False),
+    default=1.0,
+    show_default=True,
+    help="Standard uncertainty (k = 1) of the load, in percent.",
+)
+@radius_options(default=0.25, uncertainty=0.0025)
+@film_options(defaults=FILM)
+@click.option(
+    "--step",
+    type=Quantity("mm"),
+    default=0.25,
+    show_default=True,
+    help="Distance of neighbouring positions, in mm.",
+)
+@click.option(
+    "--half-range",
+    type=Quantity("mm"),
+    default=8.0,
+    show_default=True,
+    help="Positions run from minus to plus this, in mm.",
+)
+@click.option(
+    "--repeats",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="How often the line is scanned.",
+)
+@click.option(
+    "--noise",
+    type=Quantity("percent"),
+    default=0.5,
+    show_default=True,
+    help="Standard deviation of one voltage, in percent of the signal with the rod right above "
+    "the sensor.",
+)
+@click.option(
+    "--noise-voltage",
+    type=Quantity("mV"),
+    help="The same in mV, in place of --noise.",
+)
+@click.option(
+    "--centre",
+    type=Quantity("mm", low=-float("inf")),
+    default=0.0,
+    show_default=True,
+    help="Expected position of the sensor along the scan, in mm.",
+)
+@click.option(
+    "--method",
+    default="evidence",
+    show_default=True,
+    help="Method of memscal calibrate with which the scan would be evaluated.",
+)
+@click.option(
+    "--want",
+    "wishes",
+    type=_Wish(),
+    multiple=True,
+    metavar="WISH",
+    help="What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
+    "uncertainty, or resolved=4 at least, in rad/mm. May be repeated: all of them.",
+)
+@click.option(
+    "--vary",
+    type=click.Choice(_VARIED),
+    help="What to vary for --want: the coarsest step, shortest range or fewest repeats is found.",
+)
+@click.option(
+    "--figure",
+    "figures",
+    type=FigurePath(),
+    multiple=True,
+    metavar="FILE",
+    help="Figure of the expected result (.png, .svg or .pdf). May be repeated.",
+)
+@json_option
+@force_option
+@debug_option
+def command(
+    figures: tuple[Path, ...],
+    wishes: tuple[tuple[str, float], ...],
+    vary: str | None,
+    as_json: bool,
+    force: bool,
+    **given: Any,
+) -> int:
+    """Predict the uncertainties of a calibration before its scan is made.
+
+    Without simulation: from the Fisher information of the planned scan and the prior of the
+    estimate, with the uncertainties of film, rod and load. What the options do not say is the
+    paper's. With --want and --vary, the least scan that reaches what is wanted.
+    """
+    require_one_kernel(given)
+    if bool(wishes) != (vary is not None):
+        raise click.UsageError("--want and --vary go together: what to reach, and by what.")
+    prove_writable(figures, force=force)
+    planned = _designed(given, dict(wishes), vary)
+    _draw(planned, vary, figures, force=force)
+
+    from memscal.cli.design_view import tell
+
+    tell(planned, dict(wishes), as_json=as_json)
+    for path in figures:
+        message(f"Written: {path}")
+    return DONE
+
+
+def _designed(given: dict[str, Any], wishes: dict[str, float], vary: str | None) -> Design:
+    from memscal.model.indenter import Rod
+    from memscal.planning.procedure import design
+
+    rod = indenter_from("rod", given)
+    assert isinstance(rod, Rod)
+    return design(
+        film=film_from(given),
+        rod=rod,
+        kernel=kernel_from(given),
+        conversion_constant=si(given["conversion_constant"], -3),
+        load=given["load"],
+        load_uncertainty=si(given["load_uncertainty"], -2),
+        step=si(given["step"], -3),
+        half_range=si(given["half_range"], -3),
+        repeats=given["repeats"],
+        noise=si(given["noise"], -2),
+        noise_voltage=si(given["noise_voltage"], -3),
+        centre=si(given["centre"], -3),
+        method=given["method"],
+        want=wishes,
+        vary=None if vary is None else vary.replace("-", "_"),
+    )
+
+
+def _draw(planned: Design, vary: str | None, figures: tuple[Path, ...], *, force: bool) -> None:
+    if not figures:
+        return
+    from memscal.figures.design import design_figure
+    from memscal.figures.save import save_figure
+
+    figure = design_figure(planned, vary="step" if vary is None else vary.replace("-", "_"))
+    for path in figures:
+        save_figure(figure, path, overwrite=force)

@@ -1,0 +1,145 @@
+"""What a planned scan would tell: G and its transfer function with their bands, and what helps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from memscal.errors import InputError
+from memscal.figures.quantities import MM, PER_MM, PER_MM2
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
+from memscal.planning.outcome import Design
+from memscal.planning.procedure import varied_designs
+
+__all__ = ["design_figure"]
+
+#: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
+_WIDTHS, _BANDS = 4.0, 2.0
+#: Factors on the planned number at which the third panel is evaluated.
+_FACTORS = np.geomspace(0.25, 4.0, 9)
+#: No variation has more positions than this, unless the plan itself does.
+_MOST_POSITIONS = 1025
+_AXES = {
+    "step": ("step (mm)", MM),
+    "half_range": ("half range (mm)", MM),
+    "repeats": ("repeats", 1),
+}
+_CURVES = (
+    ("conversion_constant", "A", "deconvolved", "o"),
+    ("gaussian_sigma", "σ", "gaussian", "s"),
+)
+
+
+def design_figure(planned: Design, vary: str = "step") -> Figure:
+    """Draw what is to be expected of a planned scan.
+
+    Parameters
+    ----------
+    planned : Design
+        From :func:`memscal.design`.
+    vary : str
+        What the third panel varies: ``step``, ``half_range`` or ``repeats``.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Panel a, G with its expected band (k = 1); b, its transfer function, the resolved band
+        shaded; c, relative uncertainties of A and sigma, and their share from noise, against what
+        is varied.
+
+    Raises
+    ------
+    InputError
+        If that cannot be varied.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> figure = design_figure(memscal.design(), vary="repeats")
+    >>> [axes.get_xlabel() for axes in figure.axes]
+    ['radius (mm)', 'wavenumber (rad/mm)', 'repeats']
+    """
+    if vary not in _AXES:
+        raise InputError(
+            f"The figure is to vary {vary!r}, which cannot be varied.",
+            cure=f"Choose from {', '.join(_AXES)}.",
+        )
+    with house_style():
+        figure = new_figure(2.9)
+        panels = figure.subplots(1, 3)
+        _draw_radial(panels[0], planned)
+        _draw_transfer(panels[1], planned)
+        _draw_varied(panels[2], planned, vary)
+        for axes, letter in zip(panels, "abc", strict=True):
+            panel_letter(axes, letter)
+    return figure
+
+
+def _draw_radial(axes: Axes, planned: Design) -> None:
+    shown = planned.r <= _WIDTHS * planned.parameters["gaussian_sigma"]
+    r, g, error = (a[shown] for a in (planned.r / MM, planned.g / PER_MM2, planned.g_errors))
+    error = error / PER_MM2
+    colour = COLOURS["deconvolved"]
+    axes.fill_between(r, g - error, g + error, color=colour, alpha=0.25, lw=0, label="k = 1")
+    axes.plot(r, g, color=colour, label="G expected")
+    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+    axes.set_xlim(0, r[-1])
+    axes.set(xlabel="radius (mm)", ylabel="G (1/mm²)")
+    legend_above(axes)
+
+
+def _draw_transfer(axes: Axes, planned: Design) -> None:
+    resolved = planned.resolved_wavenumber
+    shown = planned.k <= _BANDS * resolved
+    k, transfer, error = (a[shown] for a in (planned.k, planned.transfer, planned.transfer_errors))
+    k = k / PER_MM
+    colour = COLOURS["deconvolved"]
+    axes.axvspan(0, resolved / PER_MM, color=COLOURS["window"], alpha=0.12, lw=0)
+    axes.axvline(resolved / PER_MM, color=COLOURS["window"], ls=":", label="resolved")
+    axes.fill_between(k, transfer - error, transfer + error, color=colour, alpha=0.25, lw=0)
+    axes.plot(k, transfer, color=colour, label="|transform of G|")
+    axes.set_xlim(0, k[-1])
+    axes.set(xlabel="wavenumber (rad/mm)", ylabel="transfer function", ylim=(0, None))
+    legend_above(axes)
+
+
+def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
+    label, scale = _AXES[vary]
+    here = getattr(planned.plan, vary)
+    designs = varied_designs(planned, vary, _values(planned, vary))
+    along = np.array([getattr(each.plan, vary) for each in designs]) / scale
+    for name, symbol, colour, marker in _CURVES:
+        share = np.array([each.relative_uncertainty(name) for each in designs])
+        noise = [each.budget[name]["noise"] / abs(each.parameters[name]) for each in designs]
+        shown: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "ms": 3}
+        axes.plot(along, 100 * share, label=symbol, **shown)
+        axes.plot(along, 100 * np.array(noise), ls="--", mfc="none", **shown)
+    axes.plot([], [], color="0.4", ls="--", label="noise alone")
+    axes.axvline(here / scale, color=COLOURS["muted"], ls=":", lw=0.8)
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty (%)")
+    _plain_ticks(axes)
+    legend_above(axes, columns=3)
+
+
+def _values(planned: Design, vary: str) -> list[float]:
+    here = getattr(planned.plan, vary)
+    if vary == "repeats":
+        return sorted({max(1, round(here * factor)) for factor in _FACTORS})
+    most = max(_MOST_POSITIONS, planned.plan.positions) / planned.plan.positions
+    factors = [f for f in _FACTORS if (1 / f if vary == "step" else f) <= most]
+    values = [float(here * factor) for factor in factors]
+    # The sensor has to stay within.
+    return [v for v in values if vary == "step" or v > abs(planned.plan.centre)]
+
+
+def _plain_ticks(axes: Axes) -> None:
+    """Show 0.5 and 20 in place of powers of ten: the axes span a decade or two."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,226 @@
+"""Expected uncertainties: laws that they follow, and limits in which they are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scans import EXACT_FILM, EXACT_ROD, estimated, simulated
+
+import memscal
+from memscal.deconvolution.registry import create_regulariser
+from memscal.errors import FitError, InputError
+from memscal.estimation.band import find_band
+from memscal.estimation.evidence import weigh_departures
+from memscal.planning.expectation import expected_calibration
+from memscal.planning.outcome import Design
+from memscal.planning.plan import Plan
+from memscal.planning.procedure import varied_designs
+
+EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
+
+
+@pytest.fixture(scope="module")
+def paper() -> Design:
+    return memscal.design()
+
+
+def test_sigma_has_the_bound_of_cramer_and_rao_by_finite_differences() -> None:
+    planned = memscal.design(**EXACT, noise=0.004)
+    plan = planned.plan
+    x = plan.scan().x
+
+    def voltages(a: float, sigma: float, centre: float) -> np.ndarray:
+        kernel = memscal.GaussianMixture((1.0,), (sigma,))
+        made = memscal.simulate(
+            film=EXACT_FILM, rod=EXACT_ROD, kernel=kernel, conversion_constant=a, noise=0.0,
+            centre=(centre, 0.0), baseline=0.0, drift=0.0,
+        )  # fmt: skip
+        return made.u_zz
+
+    theta, steps = np.array([1e-7, 561e-6, 0.0]), np.array([1e-9, 1e-6, 1e-6])
+    columns = [(voltages(*(theta + h)) - voltages(*(theta - h))) / 2 for h in np.diag(steps)]
+    jacobian = np.stack([*columns, np.ones_like(x), x / x.max()], axis=1)
+    covariance = np.linalg.inv(jacobian.T @ jacobian) * plan.point_noise**2
+    bound = np.sqrt(covariance[1, 1]) * steps[1]
+    assert planned.parameters.uncertainty("gaussian_sigma") == pytest.approx(bound, rel=1e-3)
+
+
+def test_four_repeats_halve_the_noise_of_sigma() -> None:
+    once, often = (memscal.design(**EXACT, repeats=n) for n in (1, 4))
+    ratio = once.relative_uncertainty("gaussian_sigma") / often.relative_uncertainty(
+        "gaussian_sigma"
+    )
+    assert ratio == pytest.approx(2.0, rel=1e-6)
+
+
+def test_a_voltage_and_a_share_of_noise_are_the_same_thing(paper: Design) -> None:
+    again = memscal.design(noise_voltage=paper.plan.point_noise)
+    np.testing.assert_allclose(again.parameters.covariance, paper.parameters.covariance)
+
+
+def test_at_a_given_voltage_of_noise_twice_the_load_is_worth_four_repeats() -> None:
+    heavy = memscal.design(**EXACT, load=2.0, noise_voltage=5e-5)
+    often = memscal.design(**EXACT, repeats=4, noise_voltage=5e-5)
+    assert heavy.relative_uncertainty("gaussian_sigma") == pytest.approx(
+        often.relative_uncertainty("gaussian_sigma"), rel=1e-6
+    )
+
+
+def test_the_loads_uncertainty_is_as_much_of_a() -> None:
+    planned = memscal.design(load_uncertainty=0.03)
+    part = planned.budget["conversion_constant"]["load"]
+    assert part / planned.parameters["conversion_constant"] == pytest.approx(0.03, rel=1e-6)
+    assert planned.largest_source("conversion_constant") == "load"
+
+
+def test_without_uncertain_inputs_only_noise_and_the_prior_are_left() -> None:
+    budget = memscal.design(**EXACT).budget["gaussian_sigma"]
+    small = 1e-9 * budget["noise"]
+    assert all(part < small for source, part in budget.items() if source != "noise")
+
+
+def test_the_expected_noise_is_the_one_that_was_planned() -> None:
+    expected = expected_calibration(Plan(repeats=3), create_regulariser("evidence"))
+    assert expected.solution.estimate.weighed.noise == pytest.approx(1.0, abs=0.02)
+
+
+def test_expectations_are_the_means_over_draws_of_the_noise() -> None:
+    """Weights of the hypotheses, and the resolved band: expected at once, or one scan at a time."""
+    expected = expected_calibration(
+        Plan(film=EXACT_FILM, rod=EXACT_ROD, load_uncertainty=None), create_regulariser("evidence")
+    ).solution
+    drawn = [estimated(simulated(seed=seed)) for seed in range(30)]
+    weights = np.array([estimate.weighed.probability for estimate in drawn])
+    # A posterior weight is no linear function of the squares: 0.03 is allowed beside the sampling.
+    error = 3.9 * weights.std(axis=0, ddof=1) / np.sqrt(len(drawn))
+    off = np.abs(expected.estimate.weighed.probability - weights.mean(axis=0))
+    assert np.all(off < 0.03 + error)
+    bands = np.array([find_band(estimate).resolved for estimate in drawn])
+    assert abs(expected.band.resolved / bands.mean() - 1) < 0.02 + 3.9 * bands.std() / (
+        bands.mean() * np.sqrt(len(drawn))
+    )
+
+
+def test_no_expected_noise_leaves_the_data_as_they_are() -> None:
+    estimate = estimated(simulated(seed=3))
+    count = float(estimate.outlier_weight.sum())
+    given = (estimate.model, estimate.gaussian, estimate.basis, estimate.weights, count)
+    np.testing.assert_array_equal(
+        weigh_departures(*given).covariance, weigh_departures(*given, 0.0).covariance
+    )
+    more = weigh_departures(*given, expected_noise=estimate.weighed.noise)
+    assert more.noise > estimate.weighed.noise
+
+
+def test_a_disc_is_expected_as_a_disc() -> None:
+    disc = memscal.SmoothedDisc(radius=0.9e-3, sigma=0.2e-3)
+    planned = memscal.design(kernel=disc, repeats=100, noise=0.002)
+    flat = planned.r < 1.5e-3
+    truth = disc.radial(planned.r)
+    gaussian = memscal.GaussianMixture((1.0,), (planned.parameters["gaussian_sigma"],))
+    ours, theirs = (
+        np.sum(planned.r[flat] * (g[flat] - truth[flat]) ** 2)
+        for g in (planned.g, gaussian.radial(planned.r))
+    )
+    assert ours < 0.5 * theirs
+
+
+def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design) -> None:
+    other = memscal.design(method="white-noise")
+    assert other.method == "white-noise"
+    assert other.budget["fwhm"]["window"] > 0
+    assert paper.budget["fwhm"]["window"] == 0
+
+
+def test_less_noise_resolves_more(paper: Design) -> None:
+    finer = memscal.design(repeats=16)
+    assert finer.resolved_wavenumber > 1.05 * paper.resolved_wavenumber
+
+
+def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
+    steps = [0.2e-3, 0.5e-3, 4e-3]
+    designs = varied_designs(paper, "step", steps)
+    # Of the last, five positions, nothing can be determined.
+    assert [each.plan.step for each in designs] == steps[:2]
+    assert designs[0].relative_uncertainty("gaussian_sigma") < designs[1].relative_uncertainty(
+        "gaussian_sigma"
+    )
+
+
+def test_a_design_says_what_it_is(paper: Design) -> None:
+    assert repr(paper).startswith("<Design of 65 positions every 0.25 mm, 1 repeat: u(A)/A = ")
+    with pytest.raises(InputError, match="no parameter"):
+        paper.relative_uncertainty("colour")
+
+
+@pytest.mark.parametrize(
+    ("want", "vary"),
+    [
+        ({"A": 0.016}, "step"),
+        ({"sigma": 0.027}, "repeats"),
+        ({"A": 0.02}, "half_range"),
+        ({"resolved": 3.8e3}, "repeats"),
+        ({"A": 0.018, "sigma": 0.028}, "repeats"),
+    ],
+)
+def test_what_is_found_reaches_the_wish_and_one_less_does_not(
+    want: dict[str, float], vary: str
+) -> None:
+    found = memscal.design(noise=0.01, want=want, vary=vary)
+    less = {
+        "step": {"step": 2 * found.plan.half_range / (found.plan.positions - 2)},
+        "repeats": {"repeats": found.plan.repeats - 1},
+        "half_range": {"half_range": found.plan.half_range - found.plan.step / 2},
+    }[vary]
+    before = memscal.design(noise=0.01, **less)
+    assert reaches(found, want)
+    assert not reaches(before, want)
+
+
+def reaches(planned: Design, want: dict[str, float]) -> bool:
+    names = {"A": "conversion_constant", "sigma": "gaussian_sigma", "fwhm": "fwhm"}
+    return all(
+        planned.resolved_wavenumber >= value
+        if name == "resolved"
+        else planned.relative_uncertainty(names[name]) <= value
+        for name, value in want.items()
+    )
+
+
+@pytest.mark.parametrize(
+    ("want", "vary", "told"),
+    [
+        ({"sigma": 0.01}, "repeats", r"the best is .* of sigma of 2\.4.*\n.*thickness"),
+        ({"A": 0.005}, "step", r"\nload alone contributes 1 %"),
+        ({"resolved": 6e3}, "repeats", "passes little"),
+        ({"resolved": 20e3}, "half_range", "best is a resolved wavenumber"),
+    ],
+)
+def test_a_wish_out_of_reach_names_the_best_and_what_stands_in_the_way(
+    want: dict[str, float], vary: str, told: str
+) -> None:
+    with pytest.raises(FitError, match=told):
+        memscal.design(want=want, vary=vary)
+
+
+def test_a_coarse_step_is_named_where_it_ends_the_band() -> None:
+    with pytest.raises(FitError, match=r"step of 1 mm samples no more than 3\.142 rad/mm"):
+        memscal.design(step=1e-3, want={"resolved": 4e3}, vary="repeats")
+
+
+@pytest.mark.parametrize(
+    ("want", "vary", "told"),
+    [
+        ({"colour": 0.01}, "step", "'colour', which is no wish"),
+        ({"sigma": 0.0}, "step", "above zero"),
+        ({"sigma": float("nan")}, "step", "above zero"),
+        ({"sigma": 0.01}, "weather", "'weather', which cannot be varied"),
+        ({"sigma": 0.01}, None, "something to vary"),
+        ({}, "step", "something to vary"),
+    ],
+)
+def test_a_wish_that_is_none_is_refused(
+    want: dict[str, float], vary: str | None, told: str
+) -> None:
+    with pytest.raises(InputError, match=told):
+        memscal.design(want=want, vary=vary)
