@@ -9,21 +9,24 @@ from typing import Protocol
 import numpy as np
 import scipy.fft
 
-from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice, cut, lift
-from memscal.deconvolution.problem import NOISE_RATIO, DivisionProblem
-from memscal.errors import InputError
+from memscal.axisymmetry.grids import EvenGrid, FieldGrid, cut, lift
+from memscal.deconvolution.problem import NOISE_RATIO, DivisionProblem, KernelProfile
 from memscal.estimation.band import Band
 from memscal.estimation.constrained import constrained_profile
-from memscal.estimation.ellipse import elliptic_departure
-from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
-__all__ = ["Fields", "GridChoice", "KernelView", "choose_grid", "prepare_fields"]
+__all__ = [
+    "Fields",
+    "GridChoice",
+    "KernelView",
+    "LineFields",
+    "choose_grid",
+    "division_problem",
+    "taper",
+]
 
 _POINTS_PER_WIDTH = 6.0
-_RASTER_REFINEMENT = 5
-_RASTER_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -93,8 +96,8 @@ class Fields(Protocol):
         """Values of a field at the measured points."""
         ...
 
-    def view(self, kernel: FloatArray) -> KernelView:
-        """A kernel on its support."""
+    def view(self, kernel: FloatArray, profile: KernelProfile | None) -> KernelView:
+        """A kernel on its support; from its profile, where that is known."""
         ...
 
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -114,7 +117,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     """
     points = estimate.points
     support = float(estimate.distance.max())
-    if _as_raster(points):
+    if points.as_raster:
         # A square of this half width lies within the raster's longer side.
         support = float(np.abs(points.x - estimate.centre[0]).max())
     reference = np.abs(estimate.model.reference.values)
@@ -128,19 +131,12 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     return GridChoice(spacing=float(spacing), support=support, extent=extent)
 
 
-def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
-    """Lift the profile of lines or of several scans, or place a raster as it was measured."""
-    if _as_raster(estimate.points):
-        return _RasterFields.place(estimate, choice)
-    return _LineFields.lift(estimate, choice)
-
-
 def division_problem(estimate: ProfileEstimate, band: Band, fields: Fields) -> DivisionProblem:
     """Return what a regulariser is given."""
 
-    def posterior(nonnegative: bool, monotone: bool) -> FloatArray:
+    def posterior(nonnegative: bool, monotone: bool) -> tuple[KernelProfile, FloatArray]:
         profile = constrained_profile(estimate, nonnegative=nonnegative, monotone=monotone)
-        return fields.kernel(profile)
+        return profile, fields.kernel(profile.radial)
 
     return DivisionProblem(
         fields.grid,
@@ -152,12 +148,7 @@ def division_problem(estimate: ProfileEstimate, band: Band, fields: Fields) -> D
     )
 
 
-def _as_raster(points: ScanPoints) -> bool:
-    """Whether the points are one raster, which is used as it is; several scans share a profile."""
-    return points.planar and points.scans == 1
-
-
-def _taper(radius: FloatArray, support: float) -> FloatArray:
+def taper(radius: FloatArray, support: float) -> FloatArray:
     """One up to half of the support, then falling as a cosine to zero at its edge.
 
     A sharp edge would cut the ripples of G at full height: their integral, and with it A, would
@@ -168,7 +159,7 @@ def _taper(radius: FloatArray, support: float) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class _LineFields:
+class LineFields:
     """Both profiles, lifted to a quarter plane."""
 
     grid: EvenGrid
@@ -178,7 +169,8 @@ class _LineFields:
     radius: FloatArray
 
     @classmethod
-    def lift(cls, estimate: ProfileEstimate, choice: GridChoice) -> _LineFields:
+    def lift(cls, estimate: ProfileEstimate, choice: GridChoice) -> LineFields:
+        """Lift the profile of the estimate, and the reference."""
         cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
         grid = EvenGrid(cells + 1, choice.spacing)
         step = choice.spacing / 2
@@ -192,15 +184,20 @@ class _LineFields:
 
     @property
     def confinement(self) -> FloatArray:
-        return _taper(self.grid.radius, self.support * self.grid.spacing)
+        """Taper on the grid that confines a kernel to its support."""
+        return taper(self.grid.radius, self.support * self.grid.spacing)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """Lift a radial function about a kernel's zero."""
         return lift(profile, self.grid, self.grid.spacing / 2)
 
     def at_points(self, field: FloatArray) -> FloatArray:
+        """Return the values of a field at the measured points."""
         return cut(field, self.grid, self.radius)
 
-    def view(self, kernel: FloatArray) -> KernelView:
+    def view(self, kernel: FloatArray, profile: KernelProfile | None) -> KernelView:  # noqa: ARG002
+        """Return a kernel on its support."""
+        # The lifted profile's grid is fine enough to be read as it is.
         inside = slice(0, self.support + 1)
         quarter = kernel[inside, inside]
         axis = self.grid.axis[inside]
@@ -210,97 +207,5 @@ class _LineFields:
         return KernelView(mirrored, mirrored, plane, axis, quarter[0], integral)
 
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wavenumbers along one axis and a spectral quantity there."""
         return self.grid.wavenumber_axis, spectral[0]
-
-
-@dataclass(frozen=True, eq=False)
-class _RasterFields:
-    """A measured raster on its own lattice, continued by the fitted profile around it."""
-
-    grid: Lattice
-    voltage: FloatArray
-    reference: FloatArray
-    support: float
-    step: float
-    oval: FloatArray
-    index: tuple[FloatArray, FloatArray]
-
-    @classmethod
-    def place(cls, estimate: ProfileEstimate, choice: GridChoice) -> _RasterFields:
-        points = estimate.points
-        x, columns = _even_axis("x", points.x, choice.extent)
-        y, rows = _even_axis("y", points.y, choice.extent)
-        grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
-        step = choice.spacing / 2
-        voltage = lift(estimate.spectrum.at, grid, step)
-        # A point that is missing keeps the profile; an outlier keeps most of it.
-        departure = estimate.weighed.residual * estimate.outlier_weight + estimate.oval
-        voltage[rows, columns] += departure / points.load
-        reference = lift(estimate.model.reference.at, grid, step)
-        gaussian = estimate.gaussian
-        oval = gaussian.conversion_constant * elliptic_departure(
-            _about_zero(x), _about_zero(y), gaussian.sigma, gaussian.ellipticity
-        )
-        return cls(grid, voltage, reference, choice.support, step, oval, (rows, columns))
-
-    @property
-    def confinement(self) -> FloatArray:
-        return _taper(self._kernel_grid.radius, self.support)
-
-    @property
-    def _kernel_grid(self) -> Lattice:
-        return Lattice(_about_zero(self.grid.x), _about_zero(self.grid.y))
-
-    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        return lift(profile, self._kernel_grid, self.step) + self.oval
-
-    def at_points(self, field: FloatArray) -> FloatArray:
-        return np.asarray(field[self.index])
-
-    def view(self, kernel: FloatArray) -> KernelView:
-        fine, values = self.grid.refined(kernel, _RASTER_REFINEMENT)
-        inside_x, inside_y = np.abs(fine.x) <= self.support, np.abs(fine.y) <= self.support
-        plane = values[np.ix_(inside_y, inside_x)]
-        x, y = fine.x[inside_x], fine.y[inside_y]
-        r = x[x.size // 2 :]
-        radial = _azimuthal_mean(x, y, plane, r)
-        return KernelView(x, y, plane, r, radial, float(plane.sum() * fine.cell_area))
-
-    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return self.grid.wavenumber[0], spectral[0]
-
-
-def _about_zero(axis: FloatArray) -> FloatArray:
-    """A kernel's zero is the central point of the lattice, wherever the sensor is."""
-    return np.asarray(axis - axis[axis.size // 2])
-
-
-def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatArray, FloatArray]:
-    """Continue a raster's axis on both sides, to an odd number of points; index the points."""
-    unique = np.unique(positions)
-    reach = unique[-1] - unique[0]
-    # Whole rows or columns may be missing: steps are counted, not positions.
-    steps = int(np.rint(reach / np.median(np.diff(unique))))
-    step = reach / steps
-    index = (positions - unique[0]) / step
-    if np.any(np.abs(index - np.rint(index)) > _RASTER_TOLERANCE * steps):
-        raise InputError(
-            f"The raster's {name} positions are not evenly spaced.",
-            why="A raster is transformed as it is, on its own lattice.",
-            cure="Import it with positions snapped to a grid, or scan evenly.",
-        )
-    padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * step))) + 1
-    count = steps + 1 + 2 * padding + steps % 2
-    axis = unique[0] + step * (np.arange(count) - padding)
-    return axis, np.rint(index).astype(int) + padding
-
-
-def _azimuthal_mean(x: FloatArray, y: FloatArray, plane: FloatArray, r: FloatArray) -> FloatArray:
-    """Mean over 64 directions, by cubic splines; beyond the plane its edge is continued."""
-    from scipy.ndimage import map_coordinates
-
-    angle = 2 * np.pi * np.arange(64) / 64
-    rows = (np.multiply.outer(r, np.sin(angle)) - y[0]) / (y[1] - y[0])
-    columns = (np.multiply.outer(r, np.cos(angle)) - x[0]) / (x[1] - x[0])
-    samples = map_coordinates(plane, [rows, columns], order=3, mode="nearest")
-    return np.asarray(samples.mean(axis=1))

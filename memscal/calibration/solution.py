@@ -11,11 +11,12 @@ from scipy.special import j1
 from memscal.calibration.fields import (
     Fields,
     GridChoice,
+    LineFields,
     choose_grid,
     division_problem,
-    prepare_fields,
 )
 from memscal.calibration.normalise import NormalisedKernel, normalise
+from memscal.calibration.raster_fields import RasterFields
 from memscal.deconvolution.problem import Division, Regulariser
 from memscal.estimation.band import Band, find_band
 from memscal.estimation.points import joined_points, measured_points
@@ -26,7 +27,7 @@ from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
-__all__ = ["Misfit", "Quotient", "Solution", "divide", "solve"]
+__all__ = ["Misfit", "Quotient", "Solution", "divide", "prepare_fields", "solve"]
 
 
 @dataclass(frozen=True)
@@ -148,19 +149,31 @@ def solve(
     )
 
 
+def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
+    """Lift the profile of lines or of several scans, or place a raster as it was measured."""
+    if estimate.points.as_raster:
+        return RasterFields.place(estimate, choice)
+    return LineFields.lift(estimate, choice)
+
+
 def divide(
     estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
 ) -> Quotient:
     """Divide the fields, normalise the quotient, and convolve it back."""
     raw = regulariser.divide(division_problem(estimate, band, fields))
-    division = Division(raw.field * fields.confinement, raw.window)
-    kernel = normalise(fields.view(division.field), estimate.gaussian.sigma)
+    division = Division(raw.field * fields.confinement, raw.window, raw.profile)
+    view = fields.view(division.field, division.profile)
+    kernel = normalise(view, estimate.gaussian.sigma)
     predicted = _reconvolved(estimate, fields, division) + estimate.background
     return Quotient(division, kernel, predicted, _misfit(estimate, predicted))
 
 
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, division: Division) -> FloatArray:
     """Signal of the deconvolved A G at the points, in V: each scan through its own reference."""
+    model, profile = estimate.model, division.profile
+    if profile is not None:
+        geometry = model.geometry(estimate.centres)
+        return np.asarray(model.signal(geometry, profile.transform(model.k)) + estimate.oval)
     if estimate.points.scans == 1:
         back = fields.grid.convolve(division.field, fields.reference)
         return fields.at_points(back) * estimate.points.load

@@ -52,5 +52,5 @@ class Evidence:
                 "Method evidence was given fields without the scan that they came from.",
                 cure="Use it by memscal.calibrate(scan, method='evidence').",
             )
-        field = problem.posterior(self.nonnegative, self.monotone)
-        return Division(field, np.ones(problem.voltage_spectrum.shape))
+        profile, field = problem.posterior(self.nonnegative, self.monotone)
+        return Division(field, np.ones(problem.voltage_spectrum.shape), profile)

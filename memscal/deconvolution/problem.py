@@ -18,6 +18,7 @@ from memscal.model.validation import FloatArray
 __all__ = [
     "Division",
     "DivisionProblem",
+    "KernelProfile",
     "Regulariser",
     "filtered_division",
     "image_division",
@@ -29,6 +30,18 @@ __all__ = [
 NOISE_RATIO = 0.1
 
 _CLOSED = 1e-9
+
+
+class KernelProfile(Protocol):
+    """A radial kernel, known on both sides of the Hankel transform."""
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """Values at radii (m)."""
+        ...
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Transform at wavenumbers (rad/m)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +60,9 @@ class DivisionProblem:
         Moduli of the weakest relevant spectral components: the fields' transforms where the
         voltage's stands ten times above its noise, in V m^2/N and 1.
     posterior : callable, optional
-        Returns A G on the grid, in V/Pa/m^2, as the scan's points give it without any division:
-        the mean of its posterior, or the most credible that is not negative (first argument) or
-        does not rise with the radius (second).
+        Returns A G, in V/Pa/m^2, as the scan's points give it without any division, and the same
+        on the grid: the mean of its posterior, or the most credible that is not negative (first
+        argument) or does not rise with the radius (second).
     """
 
     grid: FieldGrid
@@ -57,7 +70,7 @@ class DivisionProblem:
     reference: FloatArray
     weakest_voltage: float
     weakest_reference: float
-    posterior: Callable[[bool, bool], FloatArray] | None = None
+    posterior: Callable[[bool, bool], tuple[KernelProfile, FloatArray]] | None = None
 
     @cached_property
     def voltage_spectrum(self) -> FloatArray:
@@ -80,10 +93,13 @@ class Division:
         A G on the grid, in V/Pa/m^2.
     window : ndarray
         What the regularisation leaves of each spectral component, from 0 to 1.
+    profile : KernelProfile, optional
+        What the field was made of, where it was no division: finer than any grid.
     """
 
     field: FloatArray
     window: FloatArray
+    profile: KernelProfile | None = None
 
 
 class Regulariser(Protocol):

@@ -9,15 +9,16 @@ chapter 23).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from memscal.errors import FitError
+from memscal.estimation.forward import gaussian_transfer
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.validation import FloatArray
 
-__all__ = ["constrained_profile"]
+__all__ = ["PosteriorProfile", "constrained_profile"]
 
 _RADII = 60
 _REACH_IN_WIDTHS = 6.0
@@ -25,10 +26,29 @@ _REACH_IN_WIDTHS = 6.0
 _SLACK = 1e-6
 
 
+@dataclass(frozen=True, eq=False)
+class PosteriorProfile:
+    """A G as the scan's points have it: the posterior mean, its coefficients shifted."""
+
+    estimate: ProfileEstimate
+    shift: FloatArray
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """A G at radii ``r`` (m), in V/Pa/m^2."""
+        return np.asarray(self.estimate.radial(r) + self.estimate.basis.radial(r) @ self.shift)
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Hankel transform of A G at ``k`` (rad/m), in V/Pa."""
+        fit, basis = self.estimate.gaussian, self.estimate.basis
+        corrections = self.estimate.weighed.mean + self.shift
+        gaussian = fit.conversion_constant * gaussian_transfer(k, fit.sigma)
+        return np.asarray(gaussian + basis.kernels(k) @ corrections)
+
+
 def constrained_profile(
     estimate: ProfileEstimate, *, nonnegative: bool, monotone: bool
-) -> Callable[[FloatArray], FloatArray]:
-    """Return A G as a function of the radius (m), in V/Pa/m^2, under constraints.
+) -> PosteriorProfile:
+    """Return the most credible A G under constraints; without any, the posterior mean.
 
     Parameters
     ----------
@@ -45,7 +65,7 @@ def constrained_profile(
         If no profile meets the constraints.
     """
     if not (nonnegative or monotone):
-        return estimate.radial
+        return PosteriorProfile(estimate, np.zeros_like(estimate.weighed.mean))
     width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)
     r = np.linspace(0.0, _REACH_IN_WIDTHS * width, _RADII)
     profile, columns = estimate.radial(r), estimate.basis.radial(r)
@@ -58,8 +78,7 @@ def constrained_profile(
     kept = values > 1e-12 * values[-1]
     root = _deviation(estimate)[:, None] * vectors[:, kept] * np.sqrt(values[kept])
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
-    shift = root @ z
-    return lambda radii: estimate.radial(radii) + estimate.basis.radial(radii) @ shift
+    return PosteriorProfile(estimate, root @ z)
 
 
 def _deviation(estimate: ProfileEstimate) -> FloatArray:

@@ -70,6 +70,11 @@ class ScanPoints:
         return bool(self.free.all(axis=1).any())
 
     @property
+    def as_raster(self) -> bool:
+        """Whether they are one raster, which is used as it is; several scans share a profile."""
+        return self.planar and self.scans == 1
+
+    @property
     def ellipse(self) -> int:
         """How many numbers of an ellipse the points tell: crossed lines do not see diagonals."""
         return 2 if self.planar else int(self.free.any(axis=0).all())

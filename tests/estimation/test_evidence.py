@@ -98,7 +98,7 @@ def test_a_constrained_profile_meets_its_constraint_and_moves_little(monotone) -
     for seed in range(6):
         estimate = estimated(simulated(noise=0.003, repeats=2, seed=seed, kernel=TAILS))
         profile = constrained_profile(estimate, nonnegative=not monotone, monotone=monotone)
-        found, free = profile(R), estimate.radial(R)
+        found, free = profile.radial(R), estimate.radial(R)
         least = np.diff(found).max() if monotone else -found.min()
         assert least < 2e-3 * found[0]
         moved.append(plane_error(R, found, free))
@@ -120,7 +120,7 @@ def test_a_ring_is_no_falling_profile_and_its_constrained_fit_misses_the_scan() 
 def test_without_constraints_the_profile_is_the_posterior_mean() -> None:
     estimate = estimated(simulated(noise=0.003))
     profile = constrained_profile(estimate, nonnegative=False, monotone=False)
-    np.testing.assert_array_equal(profile(R), estimate.radial(R))
+    np.testing.assert_array_equal(profile.radial(R), estimate.radial(R))
 
 
 def test_the_method_needs_a_scan_and_says_so() -> None:

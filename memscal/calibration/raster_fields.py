@@ -1,0 +1,136 @@
+"""A measured raster, used as it is on its own lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.grids import Lattice, lift
+from memscal.calibration.fields import GridChoice, KernelView, taper
+from memscal.deconvolution.problem import KernelProfile
+from memscal.errors import InputError
+from memscal.estimation.ellipse import elliptic_departure
+from memscal.estimation.gaussian_fit import GaussianFit
+from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.model.validation import FloatArray
+
+__all__ = ["RasterFields"]
+
+_REFINEMENT = 5
+_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class _Oval:
+    """What an elliptic Gaussian adds to the round one, in V/Pa/m^2."""
+
+    fit: GaussianFit
+
+    def on(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Values on a grid about the kernel's zero."""
+        departure = elliptic_departure(x, y, self.fit.sigma, self.fit.ellipticity)
+        return self.fit.conversion_constant * departure
+
+
+@dataclass(frozen=True, eq=False)
+class RasterFields:
+    """A measured raster on its own lattice, continued by the fitted profile around it."""
+
+    grid: Lattice
+    voltage: FloatArray
+    reference: FloatArray
+    support: float
+    step: float
+    oval: _Oval
+    index: tuple[FloatArray, FloatArray]
+
+    @classmethod
+    def place(cls, estimate: ProfileEstimate, choice: GridChoice) -> RasterFields:
+        """Place the raster, and continue it by the fitted profile."""
+        points = estimate.points
+        x, columns = _even_axis("x", points.x, choice.extent)
+        y, rows = _even_axis("y", points.y, choice.extent)
+        grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
+        step = choice.spacing / 2
+        voltage = lift(estimate.spectrum.at, grid, step)
+        # A point that is missing keeps the profile; an outlier keeps most of it.
+        departure = estimate.weighed.residual * estimate.outlier_weight + estimate.oval
+        voltage[rows, columns] += departure / points.load
+        reference = lift(estimate.model.reference.at, grid, step)
+        oval = _Oval(estimate.gaussian)
+        return cls(grid, voltage, reference, choice.support, step, oval, (rows, columns))
+
+    @property
+    def confinement(self) -> FloatArray:
+        """Taper on the grid that confines a kernel to its support."""
+        return taper(self._kernel_grid.radius, self.support)
+
+    @property
+    def _kernel_grid(self) -> Lattice:
+        return Lattice(_about_zero(self.grid.x), _about_zero(self.grid.y))
+
+    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """Lift a radial function about a kernel's zero."""
+        grid = self._kernel_grid
+        return lift(profile, grid, self.step) + self.oval.on(grid.x, grid.y)
+
+    def at_points(self, field: FloatArray) -> FloatArray:
+        """Return the values of a field at the measured points."""
+        return np.asarray(field[self.index])
+
+    def view(self, kernel: FloatArray, profile: KernelProfile | None) -> KernelView:
+        """Return a kernel on its support."""
+        step = float(self.grid.x[1] - self.grid.x[0])
+        # Odd, so that the kernel's zero stays a point of the lattice.
+        refinement = max(_REFINEMENT, int(np.ceil(step / (2 * self.step))) | 1)
+        fine, values = self.grid.refined(kernel, refinement)
+        if profile is not None:
+            values = lift(profile.radial, fine, self.step) + self.oval.on(fine.x, fine.y)
+        inside_x, inside_y = np.abs(fine.x) <= self.support, np.abs(fine.y) <= self.support
+        plane = values[np.ix_(inside_y, inside_x)]
+        x, y = fine.x[inside_x], fine.y[inside_y]
+        r = x[x.size // 2 :]
+        radial = _azimuthal_mean(x, y, plane, r)
+        return KernelView(x, y, plane, r, radial, float(plane.sum() * fine.cell_area))
+
+    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wavenumbers along one axis and a spectral quantity there."""
+        return self.grid.wavenumber[0], spectral[0]
+
+
+def _about_zero(axis: FloatArray) -> FloatArray:
+    """A kernel's zero is the central point of the lattice, wherever the sensor is."""
+    return np.asarray(axis - axis[axis.size // 2])
+
+
+def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatArray, FloatArray]:
+    """Continue a raster's axis on both sides, to an odd number of points; index the points."""
+    unique = np.unique(positions)
+    reach = unique[-1] - unique[0]
+    # Whole rows or columns may be missing: steps are counted, not positions.
+    steps = int(np.rint(reach / np.median(np.diff(unique))))
+    step = reach / steps
+    index = (positions - unique[0]) / step
+    if np.any(np.abs(index - np.rint(index)) > _TOLERANCE * steps):
+        raise InputError(
+            f"The raster's {name} positions are not evenly spaced.",
+            why="A raster is transformed as it is, on its own lattice.",
+            cure="Import it with positions snapped to a grid, or scan evenly.",
+        )
+    padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * step))) + 1
+    count = steps + 1 + 2 * padding + steps % 2
+    axis = unique[0] + step * (np.arange(count) - padding)
+    return axis, np.rint(index).astype(int) + padding
+
+
+def _azimuthal_mean(x: FloatArray, y: FloatArray, plane: FloatArray, r: FloatArray) -> FloatArray:
+    """Mean over 64 directions, by cubic splines; beyond the plane its edge is continued."""
+    from scipy.ndimage import map_coordinates
+
+    angle = 2 * np.pi * np.arange(64) / 64
+    rows = (np.multiply.outer(r, np.sin(angle)) - y[0]) / (y[1] - y[0])
+    columns = (np.multiply.outer(r, np.cos(angle)) - x[0]) / (x[1] - x[0])
+    samples = map_coordinates(plane, [rows, columns], order=3, mode="nearest")
+    return np.asarray(samples.mean(axis=1))
