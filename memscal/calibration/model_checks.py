@@ -120,8 +120,8 @@ def _order(residuals: Residuals) -> list[QualityCheck]:
             alike.value,
             alike.limit,
             "Correlation of each residual with its neighbours along the scan, halved for each step "
-            f"farther, over what chance gives on average. A failure means that residuals are alike: "
-            f"{cause}",
+            f"farther, over what chance gives on average. A failure means that residuals are "
+            f"alike: {cause}",
             alike.p_value,
         ),
     ]
