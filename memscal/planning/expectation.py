@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.calibration.fields import choose_grid, prepare_fields
+from memscal.calibration.fields import choose_grid
 from memscal.calibration.inputs import InputEffect, input_effects
-from memscal.calibration.solution import Solution, divide
+from memscal.calibration.solution import Solution, divide, prepare_fields
 from memscal.calibration.uncertainty import Results, propagate
 from memscal.deconvolution.problem import Regulariser
 from memscal.errors import FitError

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scans import EXACT_FILM, EXACT_ROD, estimated, simulated
@@ -10,7 +12,12 @@ import memscal
 from memscal.deconvolution.registry import create_regulariser
 from memscal.errors import FitError, InputError
 from memscal.estimation.band import find_band
+from memscal.estimation.departure import departure_basis
 from memscal.estimation.evidence import weigh_departures
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian_fit import fit_gaussian
+from memscal.estimation.points import measured_points
+from memscal.estimation.reference import reference_spectrum
 from memscal.planning.expectation import expected_calibration
 from memscal.planning.outcome import Design
 from memscal.planning.plan import Plan
@@ -98,6 +105,29 @@ def test_expectations_are_the_means_over_draws_of_the_noise() -> None:
     bands = np.array([find_band(estimate).resolved for estimate in drawn])
     assert abs(expected.band.resolved / bands.mean() - 1) < 0.02 + 3.9 * bands.std() / (
         bands.mean() * np.sqrt(len(drawn))
+    )
+
+
+def test_the_mean_of_repeats_is_worth_all_of_them() -> None:
+    clean = simulated(noise=0.0, repeats=3)
+    noise = 0.01 * float(clean.u_zz.max())
+    found = []
+    for u_zz, share in ((clean.u_zz, 1), (clean.u_zz[0], 3)):
+        errors = np.full(u_zz.shape, noise / np.sqrt(share))
+        points = measured_points(replace(clean, u_zz=u_zz, u_zz_errors=errors))
+        contact = memscal.indent(clean.film, clean.indenter, load=clean.load)
+        reference = reference_spectrum(contact, points, clean.film.thickness)
+        model, weights = ForwardModel(points, (reference,)), 1 / errors.ravel() ** 2
+        fit = fit_gaussian(model, weights, start=fit_gaussian(model, weights))
+        basis = departure_basis(model, fit)
+        count = float(share * weights.size)
+        found.append(weigh_departures(model, fit, basis, weights, count, expected_noise=1.0))
+    every, mean = found
+    np.testing.assert_allclose(mean.probability, every.probability, atol=1e-6)
+    assert mean.noise == pytest.approx(every.noise, rel=1e-6)
+    size = np.sqrt(np.diag(every.covariance))
+    np.testing.assert_allclose(
+        mean.covariance / np.outer(size, size), every.covariance / np.outer(size, size), atol=1e-5
     )
 
 
