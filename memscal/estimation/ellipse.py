@@ -3,7 +3,8 @@ r"""An elliptic Gaussian apparatus function: its response to a round stress, by 
 With second moments :math:`s^2\begin{pmatrix}1+e_1&e_2\\e_2&1-e_1\end{pmatrix}`,
 :math:`e = \sqrt{e_1^2+e_2^2}` and :math:`\tan 2\alpha = e_2/e_1`, the transform is
 :math:`\exp(-\tfrac12 s^2k^2)\,\exp(-z\cos 2(\varphi-\alpha))` with
-:math:`z = \tfrac12 s^2k^2e`.  By the Jacobi-Anger expansion (DLMF 10.35.2) its response at distance R in direction :math:`\theta` is
+:math:`z = \tfrac12 s^2k^2e`.  By the Jacobi-Anger expansion (DLMF 10.35.2) its response at
+distance R in direction :math:`\theta` is
 
 .. math::
 
