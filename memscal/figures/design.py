@@ -46,9 +46,9 @@ def design_figure(planned: Design, vary: str = "step") -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Panel a, G with its expected band (k = 1); b, its transfer function, the resolved band
-        shaded; c, relative uncertainties of A and sigma, and their share from noise, against what
-        is varied.
+        Panel a, G as it would be found, with its band (k = 1), and as the plan assumes it; b, its
+        transfer function, the resolved band shaded; c, relative uncertainties of A and sigma, and
+        their share from noise, against what is varied.
 
     Raises
     ------
@@ -85,10 +85,12 @@ def _draw_radial(axes: Axes, planned: Design) -> None:
     colour = COLOURS["deconvolved"]
     axes.fill_between(r, g - error, g + error, color=colour, alpha=0.25, lw=0, label="k = 1")
     axes.plot(r, g, color=colour, label="G expected")
+    assumed = planned.plan.kernel.radial(r * MM) / PER_MM2
+    axes.plot(r, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
     axes.set_xlim(0, r[-1])
     axes.set(xlabel="radius (mm)", ylabel="G (1/mm²)")
-    legend_above(axes)
+    legend_above(axes, columns=2)
 
 
 def _draw_transfer(axes: Axes, planned: Design) -> None:
