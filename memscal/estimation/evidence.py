@@ -4,7 +4,7 @@ A hypothesis is a shape of departure and its strength; its evidence and its post
 :mod:`memscal.estimation.restricted_likelihood`.
 
 Two sets of prior weights are in use.  The estimate is the posterior mean under one that believes
-in the Gaussian by 0.45, so that a Gaussian sensor costs little.  Its uncertainty is the mean
+in the Gaussian by 0.4, so that a Gaussian sensor costs little.  Its uncertainty is the mean
 squared distance from the truth under another that believes in departures only, rougher ones
 among them: what regularisation hides is counted as what such fields have there.
 """
@@ -42,14 +42,14 @@ class Hypothesis:
 def _hypotheses() -> tuple[Hypothesis, ...]:
     """The prior: weights by kind of departure, shared evenly within one."""
     kinds: list[tuple[str, tuple[float, ...], float, float]] = [
-        ("edge", (0.4, 0.8), 0.165, 0.0),
-        ("rough edge 0.4", (0.4,), 0.065, 0.30),
+        ("edge", (0.4, 0.8), 0.20, 0.0),
+        ("rough edge 0.4", (0.4,), 0.07, 0.30),
         ("rough edge 0.5", (0.8, 1.6), 0.0, 0.10),
-        ("core", (0.4,), 0.05, 0.0),
+        ("core", (0.4,), 0.06, 0.0),
         ("core", (0.3,), 0.0, 0.30),
         ("tail", (0.2,), 0.27, 0.30),
     ]
-    found = [Hypothesis(None, 0.0, 0.45, 0.0)]
+    found = [Hypothesis(None, 0.0, 0.40, 0.0)]
     for kind, strengths, estimate, uncertainty in kinds:
         shapes = [s for s in SHAPES if kind in (s.name, f"{s.name} {s.blur}")]
         share = len(shapes) * len(strengths)
@@ -96,7 +96,7 @@ class WeighedFit:
 
     @property
     def gaussian_probability(self) -> float:
-        """Posterior probability that there is no departure, from a prior of 0.45."""
+        """Posterior probability that there is no departure, from a prior of 0.4."""
         return float(self.probability[0])
 
 
