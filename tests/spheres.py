@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,9 +25,15 @@ GAUSSIAN = memscal.GaussianMixture((1.0,), (SIGMA,))
 SENSOR = StressSensor(name="a simulated sensor", channel="zz")
 
 
-def pressed(load: float = 1.0, friction: float = 0.0) -> memscal.Contact:
+def pressed(
+    load: float = 1.0,
+    friction: float = 0.0,
+    *,
+    film: memscal.ElasticFilm = EXACT_FILM,
+    indenter: memscal.Rod | memscal.Sphere = SPHERE,
+) -> memscal.Contact:
     """Press the paper's sphere on the film; the contact is remembered."""
-    contact = memscal.indent(EXACT_FILM, SPHERE, load=load, friction=friction)
+    contact = memscal.indent(film, indenter, load=load, friction=friction)
     assert isinstance(contact, memscal.Contact)
     return contact
 
@@ -101,8 +106,3 @@ def known_apparatus(
         process=Process(program="test", version="0", date=""),
         budget={},
     )
-
-
-def plane_share(r: np.ndarray, inside: Sequence[np.ndarray]) -> float:
-    """Share of radii, over all cases, at which a statement holds."""
-    return float(np.mean(np.asarray(inside)[:, r >= 0]))

@@ -84,7 +84,7 @@ def command(
     files = [path for path in (output, *figures) if path is not None]
     prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
-    from memscal.measurement.restoration import restore
+    from memscal.measurement.procedure import restore
 
     with working("Restoring"):
         found = restore(data, known, expected=wanted)

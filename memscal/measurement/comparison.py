@@ -20,7 +20,9 @@ from memscal.errors import InputError
 from memscal.estimation.hypotheses import chi_square_limit
 from memscal.measurement.posterior import Posterior
 from memscal.measurement.pressure import film_transfer
+from memscal.measurement.requirements import SAME_LOAD
 from memscal.mechanics.contact import Contact
+from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
@@ -69,7 +71,20 @@ class Comparison:
 def compare_stress(
     posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
 ) -> Comparison:
-    """Compare a calculated stress, scaled to the scan's load, with scan and restoration."""
+    """Compare a calculated stress, scaled to the scan's load, with scan and restoration.
+
+    Raises
+    ------
+    InputError
+        If the stress of a curved indenter was calculated for another load.
+    """
+    if not isinstance(scan.indenter, Rod) and abs(stress.load / scan.load - 1) > SAME_LOAD:
+        raise InputError(
+            f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",
+            why=f"The contact of a {scan.indenter.shape} grows with its load: stress is not "
+            "proportional to it.",
+            cure="Calculate the stress for the scan's load.",
+        )
     estimate, nodes = posterior.estimate, posterior.nodes
     model = estimate.model
     spectrum = _per_newton(stress, model.k)
@@ -114,7 +129,9 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     if scan.load_uncertainty is not None:
         share = scan.load_uncertainty / scan.load
         added = np.column_stack([added, share * signal])
-    root = posterior.noise_ratio * estimate.noise_root
+    # A stated noise is taken at its word: raised by a misfit, it would hide it.
+    stated = points.u_errors is not None
+    root = estimate.noise_root * (1 / estimate.noise_scale if stated else posterior.noise_ratio)
     covariance = root @ root.T + added @ added.T
     whiten = np.linalg.inv(np.linalg.cholesky(covariance))
     flat = np.linalg.qr(whiten @ np.hstack(columns))[0]

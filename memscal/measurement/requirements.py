@@ -12,10 +12,10 @@ from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 
-__all__ = ["require_measurement", "restored_or_explained"]
+__all__ = ["SAME_LOAD", "require_measurement", "restored_or_explained"]
 
 #: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
-_SAME_LOAD = 0.01
+SAME_LOAD = 0.01
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
@@ -38,7 +38,7 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     if load is None or isinstance(scan.indenter, Rod):
         return
     low, high = float(np.nanmin(load)), float(np.nanmax(load))
-    if high - low > _SAME_LOAD * scan.load:
+    if high - low > SAME_LOAD * scan.load:
         raise InputError(
             f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
             why=f"The contact of a {scan.indenter.shape} grows with its load: each has a stress of "

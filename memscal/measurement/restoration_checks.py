@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["restoration_checks", "restoration_messages"]
 
 _FORCE_LIMIT = 3.0
-_NEGLIGIBLE_FORCE = 0.002
+#: What the shapes of pressure themselves leave open of the force, however small the noise.
+_NEGLIGIBLE_FORCE = 0.01
 _SAME_FILM = 0.02
 _NOISE_LIMIT = 1.5
 _OUTLIER_LIMIT = 0.10

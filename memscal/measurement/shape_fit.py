@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,9 @@ __all__ = ["ShapeFit", "believed_noise", "fit_shape"]
 _FARTHEST = 4.0
 #: A pressure narrower than this share of the scan's step is not told from one without width.
 _NARROWEST = 0.2
+#: One of several shapes is nearer to a contact's pressure than a Gaussian is to a sensor's G:
+#: departures are expected to be smaller by this factor.
+_SMALLER = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +77,8 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     model, weights = start.model, start.weights
     fit = _fit(shape, model, weights, start.gaussian)
     rings = departure_basis(model, fit)
-    basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, rings.rings, shape)
+    smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
+    basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, shape)
     count = float(start.outlier_weight.sum())
     weighed = weigh_departures(model, fit, basis, weights, count)
     rows = _state_rows(model.k, basis)

@@ -1,0 +1,113 @@
+"""The restored stress over many noise draws and contacts: its error, and the truth of its band.
+
+Set MEMSCAL_FULL_STUDY for 40 seeds a case in place of 6.  Neighbouring radii of one scan share
+their error: the scan, not the radius, is the unit of every bound.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scans import EXACT_FILM, RING, TAILS, plane_error, simulated
+from scipy.stats import binom
+from spheres import GAUSSIAN, known_apparatus, pressed, sphere_scan
+
+import memscal
+
+pytestmark = pytest.mark.accuracy
+
+SEEDS = 40 if os.environ.get("MEMSCAL_FULL_STUDY") else 6
+NOISES = (0.002, 0.005, 0.01)
+SIGMAS = 4.0
+CHANCE = 1e-4
+REACH = 6e-3
+
+CASES = {
+    "light": (pressed(0.34), GAUSSIAN),
+    "middle": (pressed(1.0), GAUSSIAN),
+    "heavy": (pressed(2.75), GAUSSIAN),
+    "sticking, light": (pressed(0.34, np.inf), GAUSSIAN),
+    "sticking, heavy": (pressed(2.75, np.inf), GAUSSIAN),
+    "compressible": (pressed(film=replace(EXACT_FILM, poisson_ratio=0.3)), GAUSSIAN),
+    "ring": (pressed(), RING),
+    "tails": (pressed(), TAILS),
+    "thin rod": (pressed(indenter=memscal.Rod(radius=0.25e-3)), GAUSSIAN),
+    "wide rod": (pressed(indenter=memscal.Rod(radius=2.5e-3)), GAUSSIAN),
+}
+
+
+@lru_cache
+def study(case: str, noise: float) -> np.ndarray:
+    """Of each seed: share of radii within 95 % bounds, error, stated error, z of the force."""
+    contact, kernel = CASES[case]
+    sensor = known_apparatus(kernel)
+    # Every case and noise has draws of its own: shared ones would be unlucky together.
+    first = 1000 * (list(CASES).index(case) * len(NOISES) + NOISES.index(noise))
+    seeds = range(first, first + SEEDS)
+    scans = (sphere_scan(contact, kernel=kernel, noise=noise, seed=s) for s in seeds)
+    return np.array([outcome(memscal.restore(scan, sensor), contact) for scan in scans])
+
+
+def outcome(found: memscal.Restoration, contact: memscal.Contact) -> tuple[float, ...]:
+    r = found.r[found.r <= REACH]
+    stress, errors, truth = found.stress(r), found.stress_uncertainty(r), contact.base_stress(r)
+    within = np.mean(np.abs(stress - truth) <= 1.96 * errors)
+    stated = plane_error(r, truth + errors, truth)
+    z = (found.force - contact.load) / found.force_uncertainty
+    return float(within), plane_error(r, stress, truth), stated, z
+
+
+def everything() -> np.ndarray:
+    return np.concatenate([study(case, noise) for case in CASES for noise in NOISES])
+
+
+def test_the_band_holds_the_truth_as_often_as_it_says() -> None:
+    within = everything()[:, 0]
+    allowed = SIGMAS * within.std() / np.sqrt(within.size)
+    assert 0.93 - allowed < within.mean() < 0.98 + allowed
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_contact_is_left_out_of_the_band(case: str) -> None:
+    within = np.concatenate([study(case, noise)[:, 0] for noise in NOISES])
+    assert within.mean() > 0.90 - SIGMAS * within.std() / np.sqrt(within.size)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_error_is_no_larger_than_stated(case: str) -> None:
+    found = np.concatenate([study(case, noise) for noise in NOISES])
+    error, stated = np.mean(found[:, 1:3] ** 2, axis=0)
+    assert np.sqrt(error / stated) < 1.5
+
+
+def test_the_error_falls_with_the_noise() -> None:
+    for case in CASES:
+        errors = [np.median(study(case, noise)[:, 1]) for noise in NOISES]
+        assert errors == sorted(errors)
+        assert errors[0] < 0.01
+
+
+def test_the_force_is_the_load_as_often_as_it_says() -> None:
+    z = everything()[:, 3]
+    hits = int(np.sum(np.abs(z) <= 1.96))
+    low, high = binom.ppf(CHANCE, z.size, 0.92), binom.isf(CHANCE, z.size, 0.99)
+    assert low <= hits <= high
+
+
+@pytest.mark.parametrize("kernel", [GAUSSIAN, RING], ids=["gaussian", "ring"])
+def test_the_uncertainty_of_a_calibrated_sensor_is_counted(
+    kernel: memscal.GaussianMixture,
+) -> None:
+    within = []
+    for seed in range(2 * SEEDS):
+        rod = simulated(kernel=kernel, noise=0.01, seed=500 + seed, load_uncertainty=None)
+        sensor = memscal.calibrate(rod, method="evidence").apparatus
+        contact = pressed((0.34, 1.0, 2.75)[seed % 3], (0.0, np.inf)[seed % 2])
+        scan = sphere_scan(contact, kernel=kernel, noise=0.003, seed=seed)
+        within.append(outcome(memscal.restore(scan, sensor), contact)[0])
+    allowed = SIGMAS * np.std(within) / np.sqrt(len(within))
+    assert np.mean(within) > 0.92 - allowed

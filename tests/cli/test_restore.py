@@ -1,0 +1,102 @@
+"""``memscal restore``: what it prints, what it writes, and its exit codes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from console import Run, names
+from spheres import known_apparatus, pressed, sphere_scan
+
+import memscal
+from memscal.cli.failures import CHECK_FAILED
+
+CHECKED, REFUSED, EXISTS = CHECK_FAILED, 3, 4
+
+
+@pytest.fixture
+def artifact(folder: Path) -> Path:
+    path = folder / "sensor.apparatus.h5"
+    known_apparatus(conversion_uncertainty=0.01, width_uncertainty=0.01).save(path)
+    return path
+
+
+@pytest.fixture
+def sphere(folder: Path) -> Path:
+    path = folder / "sphere.h5"
+    memscal.write_scan(sphere_scan(pressed(), seed=5), path)
+    return path
+
+
+def test_it_prints_force_stress_and_checks(run: Run, artifact: Path, sphere: Path) -> None:
+    done = run("restore", artifact, sphere)
+    assert done.code == 0, done.err
+    for words in ("total force", "stress on the axis", "restored force", "calculated", "kPa"):
+        assert words in done.out
+    assert names(artifact.parent) == ["sensor.apparatus.h5", "sphere.h5"]
+
+
+def test_json_holds_the_same_numbers(run: Run, artifact: Path, sphere: Path) -> None:
+    done = run("restore", artifact, sphere, "--json")
+    found = memscal.restore(memscal.read_scan(sphere), artifact)
+    assert done.json["force"]["value"] == pytest.approx(found.force)
+    assert done.json["force"]["standard_uncertainty"] == pytest.approx(found.force_uncertainty)
+    np.testing.assert_allclose(done.json["stress"]["sigma_zz_kpa"], found.sigma_zz * 1e-3)
+    assert {check["name"] for check in done.json["checks"]} == {c.name for c in found.checks}
+    assert done.json["calculated"]["origin"] == "calculated without friction"
+
+
+def test_the_file_is_a_reference_with_uncertainties(
+    run: Run, artifact: Path, sphere: Path, folder: Path
+) -> None:
+    done = run("restore", artifact, sphere, "-o", "stress.h5")
+    assert "Written: stress.h5" in done.err
+    profile = memscal.read_reference(folder / "stress.h5")
+    assert profile.sigma_zz_errors is not None
+    assert np.all(profile.sigma_zz_errors > 0)
+    assert profile.force == pytest.approx(1.0, rel=0.1)
+    assert run("check", "stress.h5").code == 0
+
+
+def test_an_expected_stress_that_was_not_there_is_exit_code_1(
+    run: Run, artifact: Path, sphere: Path, folder: Path
+) -> None:
+    memscal.write_reference(pressed(1.0, np.inf).profile(), folder / "sticking.h5")
+    memscal.write_reference(pressed(1.0).profile(), folder / "sliding.h5")
+    wrong = run("restore", artifact, sphere, "--expected", "sticking.h5", "-o", "out.h5")
+    assert wrong.code == CHECKED
+    assert "expected stress" in wrong.out
+    assert "out.h5" in names(folder)
+    right = run("restore", artifact, sphere, "--expected", "sliding.h5")
+    assert right.code == 0, right.err
+    assert "sliding.h5" in right.out
+
+
+def test_another_film_is_exit_code_1(run: Run, artifact: Path, folder: Path) -> None:
+    scan = sphere_scan(pressed(), seed=5)
+    thicker = replace(scan, film=replace(scan.film, thickness=2.5e-3))
+    memscal.write_scan(thicker, folder / "other.h5")
+    done = run("restore", artifact, "other.h5")
+    assert done.code == CHECKED
+    assert "film agreement" in done.err
+
+
+def test_files_in_the_wrong_order_are_refused(run: Run, artifact: Path, sphere: Path) -> None:
+    done = run("restore", sphere, artifact)
+    assert done.code == REFUSED
+    assert "memscal-artifact" in done.err
+
+
+def test_nothing_is_overwritten_without_force(run: Run, artifact: Path, sphere: Path) -> None:
+    (artifact.parent / "stress.h5").write_bytes(b"mine")
+    assert run("restore", artifact, sphere, "-o", "stress.h5").code == EXISTS
+    assert (artifact.parent / "stress.h5").read_bytes() == b"mine"
+    assert run("restore", artifact, sphere, "-o", "stress.h5", "--force").code == 0
+
+
+def test_the_figure_is_written(run: Run, artifact: Path, sphere: Path, folder: Path) -> None:
+    done = run("restore", artifact, sphere, "--figure", "stress.png")
+    assert done.code == 0, done.err
+    assert (folder / "stress.png").read_bytes().startswith(b"\x89PNG")

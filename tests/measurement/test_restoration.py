@@ -1,0 +1,246 @@
+"""The way back: what is restored is what was pressed, as far as its uncertainty says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scans import CONVERSION, SIGMA, plane_error
+from spheres import known_apparatus, pressed, sphere_scan
+
+import memscal
+from memscal.measurement.restoration import Restoration
+from memscal.simulation import PAPER_FILM
+
+EXACT = known_apparatus()
+FEW = 6
+NOISE = 0.005
+
+
+def wider(share: float) -> memscal.GaussianMixture:
+    return memscal.GaussianMixture((1.0,), ((1 + share) * SIGMA,))
+
+
+def apparatus_part(found: Restoration, source: str, r: np.ndarray) -> np.ndarray:
+    """Standard uncertainty of the stress by one source, in Pa."""
+    n = found.posterior.nodes
+    matrix = found.posterior.estimate.model.reference.wavenumbers.synthesise(np.eye(n), r)
+    covariance = found.posterior.covariances[source][:n, :n]
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", matrix, covariance, matrix)))
+
+
+@lru_cache
+def restored(load: float, friction: float, seed: int, noise: float = NOISE) -> Restoration:
+    contact = pressed(load, friction)
+    return memscal.restore(sphere_scan(contact, noise=noise, seed=seed), EXACT, expected=contact)
+
+
+@pytest.mark.parametrize("load", [0.34, 1.0, 2.75])
+@pytest.mark.parametrize("friction", [0.0, np.inf])
+def test_without_noise_the_calculated_stress_comes_back(load: float, friction: float) -> None:
+    found = restored(load, friction, 0, 0.0)
+    truth = pressed(load, friction).base_stress(found.r)
+    assert plane_error(found.r, found.sigma_zz, truth) < 4e-3
+    assert found.force == pytest.approx(load, rel=0.02)
+    assert found.passed
+
+
+def test_the_restored_stress_blurred_again_is_what_was_measured() -> None:
+    found = [restored(1.0, 0.0, seed) for seed in range(FEW)]
+    total, degrees = (sum(getattr(f, name) for f in found) for name in ("chi_square", "degrees"))
+    # What departures explain of the noise is at most the handful that the scan can tell apart.
+    assert 0.6 < total / degrees < 1 + 4 * np.sqrt(2 / degrees)
+    for f in found:
+        order = np.argsort(f.distance)
+        blurred = f.blurred_stress(f.distance[order])
+        apart = f.measured_stress[order] - blurred
+        np.testing.assert_allclose(apart, f.residual[order] / CONVERSION, atol=20.0)
+
+
+def test_the_blur_is_that_of_the_apparatus_function() -> None:
+    found = restored(1.0, 0.0, 0)
+    r = np.linspace(0.0, 20e-3, 801)
+    np.testing.assert_allclose(
+        found.blurred_stress(r), EXACT.convolve(r, found.stress(r)), atol=2e-3 * found.sigma_zz[0]
+    )
+
+
+def test_the_total_force_is_the_load_within_its_uncertainty() -> None:
+    cases = [(load, mu, seed) for load in (0.34, 2.75) for mu in (0.0, np.inf) for seed in range(4)]
+    found = [restored(*case) for case in cases]
+    z = [(f.force - f.scan.load) / f.force_uncertainty for f in found]
+    assert np.mean(np.square(z)) < 2.2
+    assert all(f.passed for f in found if np.all(f.posterior.estimate.outlier_weight > 0.5))
+
+
+def test_a_calculated_contact_is_told_from_another() -> None:
+    found = restored(1.0, np.inf, 3)
+    same, other = found.compare(pressed(1.0, np.inf)), found.compare(pressed(1.0, 0.0))
+    assert same.p_value > 1e-3 > other.p_value
+    assert same.within > 0.7 > other.within
+
+
+def test_the_direct_comparison_has_the_chi_square_of_its_degrees() -> None:
+    compared = [restored(1.0, 0.0, seed).comparison for seed in range(FEW)]
+    total = sum(c.chi_square * c.degrees for c in compared if c is not None)
+    degrees = sum(c.degrees for c in compared if c is not None)
+    assert abs(total / degrees - 1) < 4 * np.sqrt(2 / degrees)
+
+
+def test_an_uncertain_conversion_constant_makes_every_stress_as_uncertain() -> None:
+    scan = sphere_scan(pressed(), seed=2)
+    found = memscal.restore(scan, known_apparatus(conversion_uncertainty=0.02))
+    assert found.force_budget["apparatus"] == pytest.approx(0.02 * found.force, rel=0.05)
+    r = np.linspace(0, 2e-3, 5)
+    np.testing.assert_allclose(
+        apparatus_part(found, "apparatus", r), 0.02 * found.stress(r), rtol=0.05
+    )
+
+
+def test_an_uncertain_width_of_g_counts_as_much_as_it_changes() -> None:
+    scan, r = sphere_scan(pressed(), noise=0.001, seed=2), np.array([0.0, 1e-3, 3e-3])
+    share = 0.02
+    found = memscal.restore(scan, known_apparatus(width_uncertainty=share))
+    changed = memscal.restore(scan, known_apparatus(wider(share)))
+    difference = np.abs(changed.stress(r) - found.stress(r))
+    allowed = 0.35 * difference.max()
+    np.testing.assert_allclose(apparatus_part(found, "apparatus", r), difference, atol=allowed)
+
+
+@pytest.mark.parametrize("source", ["position_scale", "film"])
+def test_an_uncertain_input_counts_as_much_as_it_changes(source: str) -> None:
+    scan, r = sphere_scan(pressed(), noise=0.001, seed=2), np.array([0.0, 1.5e-3, 3e-3])
+    share = 0.01
+    if source == "film":
+        film = replace(scan.film, thickness_uncertainty=share * scan.film.thickness)
+        other = replace(scan.film, thickness=(1 + share) * scan.film.thickness)
+        stated, wrong = replace(scan, film=film), replace(scan, film=other)
+    else:
+        stated = replace(scan, position_scale_uncertainty=share)
+        wrong = replace(scan, x=(1 + share) * scan.x)
+    found = memscal.restore(stated, EXACT)
+    changed = memscal.restore(wrong, EXACT)
+    difference = np.append(changed.stress(r) - found.stress(r), changed.force - found.force)
+    counted = np.append(apparatus_part(found, source, r), found.force_budget[source])
+    size = np.append(np.full(r.size, found.sigma_zz[0]), found.force)
+    np.testing.assert_allclose(counted / size, np.abs(difference) / size, atol=3e-3)
+
+
+def test_less_noise_resolves_more() -> None:
+    resolved = [restored(1.0, 0.0, 0, noise).resolved_wavenumber for noise in (0.02, 0.005, 0.001)]
+    assert resolved == sorted(resolved)
+    assert resolved[0] < resolved[-1] <= np.pi / 0.5e-3 * (1 + 1e-9)
+
+
+def test_a_rod_s_stress_comes_back_from_several_loads() -> None:
+    scan = memscal.simulate(load=[0.5, 1.0, 2.0], points=33, seed=1)
+    found = memscal.restore(scan, EXACT)
+    assert abs(found.force - scan.load) < 4 * found.force_uncertainty
+
+
+def test_a_raster_is_restored_like_a_line() -> None:
+    scan = memscal.simulate(raster=True, points=21, seed=1)
+    found = memscal.restore(scan, EXACT)
+    assert abs(found.force - 1.0) < 4 * found.force_uncertainty
+    assert "axisymmetry" in {check.name for check in found.checks}
+    assert np.all(np.abs(found.centre - [0.14e-3, 0.0]) < 5 * found.centre_uncertainty)
+
+
+def test_the_direction_of_a_scan_changes_nothing() -> None:
+    scan = sphere_scan(pressed(), seed=1)
+    along_x, along_y = (memscal.restore(replace(scan, direction=d), EXACT) for d in "xy")
+    np.testing.assert_allclose(along_y.sigma_zz, along_x.sigma_zz)
+    assert along_y.centre[1] == along_x.centre[0]
+
+
+def test_a_wrong_unit_of_the_voltage_fails_the_force() -> None:
+    scan = sphere_scan(pressed(), seed=1)
+    assert scan.u_zz_errors is not None
+    in_mv = replace(scan, u_zz=1e3 * scan.u_zz, u_zz_errors=1e3 * scan.u_zz_errors)
+    failed = {c.name for c in memscal.restore(in_mv, EXACT).checks if not c.passed}
+    assert "restored_force" in failed
+
+
+def test_another_film_than_the_calibration_s_fails_a_check() -> None:
+    scan = sphere_scan(pressed(), seed=1)
+    film = replace(scan.film, thickness=2.2e-3)
+    failed = {
+        c.name for c in memscal.restore(replace(scan, film=film), EXACT).checks if not c.passed
+    }
+    assert "film_agreement" in failed
+
+
+def test_a_spoilt_point_is_named_and_moves_little() -> None:
+    scan = sphere_scan(pressed(), seed=4)
+    u = scan.u_zz.copy()
+    u[14] *= 1.5
+    clean, spoilt = (memscal.restore(s, EXACT) for s in (scan, replace(scan, u_zz=u)))
+    assert any("Outlier" in text for text in spoilt.messages)
+    assert abs(spoilt.stress(0.0) - clean.stress(0.0)) < 2 * clean.stress_uncertainty(0.0)
+
+
+def test_the_table_is_a_reference_with_uncertainties() -> None:
+    found = restored(1.0, 0.0, 0)
+    profile = found.profile()
+    assert profile.sigma_zz_errors is not None
+    np.testing.assert_allclose(profile.sigma_zz_errors, found.stress_uncertainty(found.r))
+    assert profile.load == found.scan.load
+
+
+def test_the_paper_s_film_adds_its_uncertainty() -> None:
+    scan = replace(sphere_scan(pressed(), seed=1), film=PAPER_FILM)
+    assert memscal.restore(scan, EXACT).force_budget["film"] > 0
+
+
+SCAN = sphere_scan(pressed(), seed=1)
+BAD = {
+    "several loads": (replace(SCAN, normal_load=np.linspace(0.5, 1.5, 33)), EXACT, "grows"),
+    "another sensor": (
+        replace(SCAN, sensor=memscal.StressSensor(name="other")),
+        EXACT,
+        "belongs to one sensor",
+    ),
+    "no covariance": (
+        SCAN,
+        replace(
+            EXACT,
+            radial_profile=replace(EXACT.radial_profile, g_covariance=np.full((301, 301), np.nan)),
+        ),
+        "does not state the covariance",
+    ),
+    "zero noise": (replace(SCAN, u_zz_errors=np.zeros(33)), EXACT, "uncertainty of zero"),
+    "wrong sign": (replace(SCAN, u_zz=-SCAN.u_zz), EXACT, "Change the sign"),
+    "beside the sensor": (
+        replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None),
+        EXACT,
+        "Scan across",
+    ),
+    "noise alone": (
+        replace(SCAN, u_zz=np.random.default_rng(0).normal(0, 1e-5, 33)),
+        EXACT,
+        "determines no stress",
+    ),
+    "no scan": ("scan.h5", EXACT, "not a Scan"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_restored_is_refused_with_a_reason(case: str) -> None:
+    scan, apparatus, text = BAD[case]
+    with pytest.raises(memscal.MemscalError) as caught:
+        memscal.restore(scan, apparatus)  # type: ignore[arg-type]
+    assert text in str(caught.value)
+    assert caught.value.cure
+
+
+@pytest.mark.parametrize("expected", [3, pressed(2.75)])
+def test_an_expected_stress_that_does_not_fit_is_refused(expected: object) -> None:
+    with pytest.raises(memscal.MemscalError):
+        memscal.restore(SCAN, EXACT, expected=expected)  # type: ignore[arg-type]
+
+
+def test_a_radius_beyond_what_was_computed_is_refused() -> None:
+    with pytest.raises(memscal.MemscalError, match="24 mm"):
+        restored(1.0, 0.0, 0).stress(1.0)
