@@ -15,6 +15,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^```console\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+SPHERE = next(block for block in COMMANDS if "reference sphere" in block)
 EXAMPLES = re.findall(r"^```python\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 
 
@@ -43,15 +44,29 @@ def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> No
     assert run.stdout.strip()
 
 
+def test_the_commands_for_the_best_estimate_and_its_plan_run(fresh_folder: Path) -> None:
+    best = next(block for block in COMMANDS if "--method evidence" in block)
+    installed = Path(sys.executable).with_name("memscal")
+    for line in best.strip().splitlines():
+        _, *arguments = shlex.split(line)
+        run = subprocess.run(
+            [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
+        )
+        assert run.returncode == 0, run.stderr
+        assert run.stdout.strip()
+    assert (fresh_folder / "best.apparatus.h5").is_file()
+    assert (fresh_folder / "design.png").is_file()
+
+
 def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
-    _, *arguments = shlex.split(COMMANDS[2])
+    _, *arguments = shlex.split(SPHERE)
     installed = Path(sys.executable).with_name("memscal")
     run = subprocess.run(
         [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
     )
     assert run.returncode == 0, run.stderr
     assert (fresh_folder / "sphere.png").is_file()
-    shown = README.split(COMMANDS[2])[1].split("```text\n")[1].split("```")[0]
+    shown = README.split(SPHERE)[1].split("```text\n")[1].split("```")[0]
     printed, expected = run.stdout.splitlines(), shown.splitlines()
     assert printed[:2] == expected[:2]
     for ours, theirs in zip(printed[3:], expected[3:], strict=True):

@@ -8,23 +8,21 @@ from memscal.calibration.comparison import Comparison
 from memscal.calibration.monte_carlo import MonteCarlo
 from memscal.cli.output import finite
 from memscal.cli.tables import Table
-from memscal.figures.quantities import MM, quantity
+from memscal.figures.quantities import quantity
 
 __all__ = ["monte_carlo_json", "monte_carlo_notes", "monte_carlo_table"]
-
-#: Parameters that no figure shows, with the SI units' names beside the shown ones.
-_FURTHER = {"fwhm": ("mm", MM), "noise_equivalent_area": ("mm²", MM**2)}
 
 
 def monte_carlo_table(found: MonteCarlo) -> Table:
     """Return each parameter's standard uncertainty by the budget and by draws."""
     rows = []
     for each in found.comparisons:
-        words, unit, scale = _shown(each.name)
+        shown = quantity(each.name)
+        scale = shown.scale
         low, high = (end / scale for end in each.symmetric)
         rows.append(
             (
-                f"{words} ({unit})",
+                f"{shown.words} ({shown.unit})",
                 f"{each.first_order / scale:.2g}",
                 f"{each.uncertainty / scale:.2g}",
                 f"{low:.4g} to {high:.4g}",
@@ -40,7 +38,7 @@ def monte_carlo_table(found: MonteCarlo) -> Table:
 def monte_carlo_notes(found: MonteCarlo) -> list[str]:
     """Return what the numbers rest on, and why draws and budget disagree."""
     apart = (each for each in found.comparisons if not each.agrees)
-    return [*found.messages, *(f"{_shown(each.name)[0]}: {each.reason}" for each in apart)]
+    return [*found.messages, *(f"{quantity(each.name).words}: {each.reason}" for each in apart)]
 
 
 def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:
@@ -56,7 +54,7 @@ def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:
 
 
 def _one(each: Comparison) -> dict[str, Any]:
-    _, unit, scale = _shown(each.name)
+    unit, scale = quantity(each.name).unit, quantity(each.name).scale
     return {
         "value": finite(each.value / scale),
         "mean": finite(each.mean / scale),
@@ -70,14 +68,6 @@ def _one(each: Comparison) -> dict[str, Any]:
         "agrees": each.agrees,
         "reason": each.reason,
     }
-
-
-def _shown(name: str) -> tuple[str, str, float]:
-    shown = quantity(name)
-    if name in _FURTHER:
-        unit, scale = _FURTHER[name]
-        return shown.words.replace("fwhm", "full width at half maximum"), unit, scale
-    return shown.words, shown.unit, shown.scale
 
 
 def _listed(sources: tuple[str, ...]) -> str:

@@ -46,6 +46,10 @@ _KNOWN = {
     "conversion_constant": ("conversion constant", "A", "V/Pa"),
     "gaussian_sigma": ("Gaussian width, fitted to the scan", "σ", "m"),
     "gaussian_sigma_deconvolved": ("Gaussian width, fitted to the deconvolved G", "σ(G)", "m"),
+    "fwhm": ("full width of G at half maximum", "FWHM", "m"),
+    "noise_equivalent_area": ("noise-equivalent area of G", "", "m^2"),
+    "ellipticity": ("ellipticity of the Gaussian along x", "e₁", ""),
+    "ellipticity_diagonal": ("ellipticity of the Gaussian along the diagonal", "e₂", ""),
     "centre": ("centre of the scan", "x₀", "m"),
     "centre_y": ("centre of the scan along y", "y₀", "m"),
     "baseline": ("baseline", "U₀", "V"),
@@ -58,6 +62,7 @@ _KNOWN = {
 _SHOWN_UNITS = {
     "V/Pa": ("mV/Pa", MV),
     "m": ("mm", MM),
+    "m^2": ("mm²", MM**2),
     "V": ("mV", MV),
     "V/m": ("mV/mm", MV / MM),
     "Pa": ("kPa", KPA),
@@ -67,6 +72,8 @@ _SHOWN_UNITS = {
 def quantity(name: str, si_unit: str = "") -> Quantity:
     """Return how a parameter is shown; one that is not known keeps its name.
 
+    A number at the end of a known name says which scan it belongs to.
+
     Examples
     --------
     >>> quantity("centre").unit
@@ -74,7 +81,12 @@ def quantity(name: str, si_unit: str = "") -> Quantity:
     >>> quantity("baseline_slope", "V/m")
     Quantity(words='baseline slope', symbol='', unit='mV/mm', scale=1.0)
     """
-    words, symbol, usual = _KNOWN.get(name, (name.replace("_", " "), "", "SI units"))
+    known, _, number = name.rpartition("_")
+    if known in _KNOWN and number.isdigit():
+        words, symbol, usual = _KNOWN[known]
+        words = f"{words}, scan {number}"
+    else:
+        words, symbol, usual = _KNOWN.get(name, (name.replace("_", " "), "", "SI units"))
     si_unit = si_unit or usual
     unit, scale = _SHOWN_UNITS.get(si_unit, (si_unit, 1.0))
     return Quantity(words, symbol, unit, scale)
