@@ -35,7 +35,7 @@ class PosteriorProfile:
 
     def radial(self, r: FloatArray) -> FloatArray:
         """A G at radii ``r`` (m), in V/Pa/m^2."""
-        return np.asarray(self.estimate.radial(r) + self.estimate.basis.radial(r) @ self.shift)
+        return self.estimate.radial(r, self.shift)
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Hankel transform of A G at ``k`` (rad/m), in V/Pa."""

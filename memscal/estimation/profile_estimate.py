@@ -105,10 +105,10 @@ class ProfileEstimate:
         correction = self.basis.kernels(self.model.k) @ self.weighed.mean
         return np.asarray(self.gaussian.conversion_constant * gaussian + correction)
 
-    def radial(self, r: FloatArray) -> FloatArray:
-        """A G at radii ``r`` (m), in V/Pa/m^2."""
+    def radial(self, r: FloatArray, shift: FloatArray | float = 0.0) -> FloatArray:
+        """A G at radii ``r`` (m), in V/Pa/m^2; its coefficients may be shifted, shape (p,)."""
         gaussian = self.gaussian.conversion_constant * unit_gaussian(r, self.gaussian.sigma)
-        return np.asarray(gaussian + self.basis.radial(r) @ self.weighed.mean)
+        return np.asarray(gaussian + self.basis.radial(r) @ (self.weighed.mean + shift))
 
     @property
     def spectrum(self) -> RadialSpectrum:
