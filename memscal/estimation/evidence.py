@@ -107,6 +107,7 @@ def weigh_departures(
     weights: FloatArray,
     effective_count: float,
     expected_noise: float = 0.0,
+    least_noise: float = 0.0,
 ) -> WeighedFit:
     """Weigh departures from a Gaussian fit by evidence.
 
@@ -122,6 +123,9 @@ def weigh_departures(
     expected_noise : float
         Standard deviation of the noise of a point of weight one that is to be expected, for
         voltages that have none; zero for data.
+    least_noise : float
+        Noise of a point of weight one that the covariance counts at least: what is stated is
+        believed though the data scatter less.
 
     Returns
     -------
@@ -141,13 +145,15 @@ def weigh_departures(
         assert hypothesis.shape is not None
         part = parts[SHAPES.index(hypothesis.shape)]
         outcomes.append(problem.weigh(part, hypothesis.strength))
-    found = _average(problem, outcomes, flat + rings.shape[1])
+    found = _average(problem, outcomes, flat + rings.shape[1], least_noise**2)
     explained = fit.jacobian @ found.mean[:flat] + voltages @ found.mean[flat:]
     gain = found.gain @ standardised(np.eye(data.size), weights)
     return replace(found, gain=gain, residual=unexplained - explained)
 
 
-def _average(problem: Projected, outcomes: list[Outcome], count: int) -> WeighedFit:
+def _average(
+    problem: Projected, outcomes: list[Outcome], count: int, least_variance: float
+) -> WeighedFit:
     """Average mean and gain by one set of weights, squared errors by the other.
 
     The gain is that of the standardised data, and the residual is left to be found.
@@ -179,7 +185,7 @@ def _average(problem: Projected, outcomes: list[Outcome], count: int) -> Weighed
             if problem.added:
                 apart = own - gain
                 covariance += p * problem.added * (apart @ apart.T)
-            _add_covariance(covariance, problem, outcome, p)
+            _add_covariance(covariance, problem, outcome, p, least_variance)
     variance = np.array([o.variance for o in outcomes])
     prior = np.array([h.estimate for h in HYPOTHESES])
     believed = prior > 0
@@ -217,16 +223,18 @@ def _add_gain(gain: FloatArray, problem: Projected, outcome: Outcome, share: flo
 
 
 def _add_covariance(
-    covariance: FloatArray, problem: Projected, outcome: Outcome, share: float
+    covariance: FloatArray,
+    problem: Projected,
+    outcome: Outcome,
+    share: float,
+    least_variance: float,
 ) -> None:
     flat = problem.scale.size
     plain = problem.inverse @ problem.inverse.T / np.outer(problem.scale, problem.scale)
-    covariance[:flat, :flat] += share * outcome.variance * plain
+    covariance[:flat, :flat] += share * max(outcome.variance, least_variance) * plain
     part = outcome.part
     if part is not None:
-        # Fewer points than components leave the prior as it was along what they do not see.
-        known = (part.right.T * outcome.reduction) @ part.right
-        amplitudes = outcome.strength**2 * np.eye(known.shape[0]) - known
+        amplitudes = outcome.amplitude_covariance(least_variance)
         carried = _flat_map(problem) @ part.columns
         covariance[part.block, part.block] += share * amplitudes
         covariance[:flat, part.block] -= share * carried @ amplitudes

@@ -86,7 +86,7 @@ class ProfileEstimate:
     @property
     def covariance(self) -> FloatArray:
         """Covariance of all corrections, at the noise that is believed."""
-        return self.weighed.covariance * (self.noise_scale / self.weighed.noise) ** 2
+        return self.weighed.covariance
 
     @property
     def gaussian_covariance(self) -> FloatArray:
@@ -207,11 +207,15 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     stated = _stated_weights(points, _position_noise(model, fit))
     residual = points.u - fit.predicted
     outlier = _outlier_weight(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
+    least = NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
+    least = least if points.u_errors is None else 1.0
     for _ in range(_WEIGHING_ROUNDS):
         weights = stated * outlier
         fit = fit_gaussian(model, weights, start=fit)
         basis = departure_basis(model, fit)
-        weighed = weigh_departures(model, fit, basis, weights, float(outlier.sum()))
+        weighed = weigh_departures(
+            model, fit, basis, weights, float(outlier.sum()), least_noise=least
+        )
         found = _outlier_weight(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
         if np.allclose(found, outlier, atol=0.02):
             break

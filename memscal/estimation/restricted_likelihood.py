@@ -53,9 +53,8 @@ class Part:
 class Outcome:
     """One hypothesis: log evidence, noise variance, and what gives its posterior.
 
-    ``shrink``: factors from data to amplitudes along the singular vectors; ``reduction``: by how
-    much the data have reduced the prior variance ``strength**2`` there; ``slope``: derivative of
-    the log evidence by the weighted data.
+    ``shrink``: factors from data to amplitudes along the singular vectors; ``slope``: derivative
+    of the log evidence by the weighted data.
     """
 
     log_evidence: float
@@ -63,8 +62,20 @@ class Outcome:
     strength: float
     part: Part | None
     shrink: FloatArray
-    reduction: FloatArray
     slope: FloatArray
+
+    def amplitude_covariance(self, least_variance: float) -> FloatArray:
+        """Posterior covariance of the amplitudes, at a noise that is believed at least."""
+        if self.part is None:
+            return np.zeros((0, 0))
+        prior, right = self.strength**2, self.part.right
+        variance = max(self.variance, least_variance)
+        left_over = prior * variance / (variance + prior * self.part.singular**2)
+        seen = (right.T * left_over) @ right
+        if right.shape[0] == right.shape[1]:
+            return np.asarray(seen)
+        # Fewer points than components leave the prior as it was along what they do not see.
+        return np.asarray(seen + prior * (np.eye(right.shape[1]) - right.T @ right))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +123,7 @@ class Projected:
         variance = self._floor(self.power / self.freedom)
         nothing = np.zeros(0)
         log_evidence = -0.5 * self.freedom * float(np.log(variance))
-        return Outcome(log_evidence, variance, 0.0, None, nothing, nothing, -self.rest / variance)
+        return Outcome(log_evidence, variance, 0.0, None, nothing, -self.rest / variance)
 
     def weigh(self, part: Part, strength: float) -> Outcome:
         """Return the outcome for one shape at one strength, the noise at its most probable."""
@@ -130,7 +141,6 @@ class Projected:
             strength,
             part,
             strength**2 * part.singular / (variance + signal),
-            strength**2 * signal / (variance + signal),
             (part.left @ (signal / (variance + signal) * part.along) - self.rest) / variance,
         )
 

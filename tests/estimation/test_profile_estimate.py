@@ -107,3 +107,22 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
 
 def test_the_public_name_of_a_refusal_is_a_memscal_error() -> None:
     assert issubclass(FitError, memscal.MemscalError)
+
+
+def test_noise_that_is_stated_too_large_widens_the_band_by_what_noise_does_and_no_more() -> None:
+    """What the film hides does not grow with the noise: only its share of the band does."""
+    scan = simulated(noise=0.002)
+    bands = [
+        memscal.calibrate(
+            replace(scan, u_zz_errors=scan.u_zz_errors * factor), method="evidence"
+        ).apparatus.radial_uncertainty(0.0)
+        for factor in (1.0, 10.0)
+    ]
+    assert bands[0] < bands[1] < 3 * bands[0]
+
+
+def test_a_scan_without_scatter_is_calibrated_at_the_noise_that_it_states() -> None:
+    clean = simulated(noise=0.0)
+    apparatus = memscal.calibrate(replace(clean, u_zz_errors=np.full(65, 1e-5))).apparatus
+    assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=1e-3)
+    assert apparatus.parameters.uncertainty("conversion_constant") > 1e-4 * CONVERSION
