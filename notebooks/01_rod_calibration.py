@@ -249,8 +249,8 @@ plt.show()
 #
 # - the **relevant** one, where the voltage stands ten times above its noise. The paper chooses
 #   its regularisation by the "weakest relevant spectral component", and this is our rule for it;
-# - the **resolved** one, where it stands three times above. Beyond it the scan says nothing about
-#   $G$, whatever the method.
+# - the **resolved** one, up to which the estimate below knows the transfer function of $G$ to a
+#   third of a Gaussian's. Beyond it the scan says little about $G$, whatever the method.
 #
 # ## 6. Dividing: the white noise as a window
 #
@@ -267,7 +267,7 @@ plt.show()
 # every spectral component, as a mean over the ring of components with nearly the same $k$.
 
 # %%
-problem = division_problem(fields, band)
+problem = division_problem(estimate, band, fields)
 exact = grid.forward(fields.voltage) / grid.forward(fields.reference)
 k, expected = fields.along_axis(WhiteNoise().divide(problem).window)
 edges = np.arange(0.1e3, 6e3, 0.25e3)
