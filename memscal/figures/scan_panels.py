@@ -109,11 +109,11 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
         x, curve = _as_curve(scan.x, u - background)
         if net:
             curve = np.where(curve > 0, curve, np.nan)
-        line_like = x.size < scan.x.size or _single_valued(scan.x)
+        line_like = (x.size < scan.x.size or _single_valued(scan.x)) and not _joint(data)
         (line,) = axes.plot(x / MM, curve / MV, style, color=COLOURS[name], label=label, zorder=3)
-        if not line_like:  # a raster: many voltages over one x, which no line can join
+        if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
             line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
-            line.set(markersize=1.2, rasterized=True)
+            line.set(markersize=1.2 if x.size > SCATTER_THRESHOLD else 2.5, rasterized=True)
 
 
 def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -127,6 +127,11 @@ def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     if spread <= 1e-3 * np.ptp(u):
         return places, mean
     return x, u
+
+
+def _joint(data: ApparatusData) -> bool:
+    """Whether several scans were fitted together: their points mix along x."""
+    return "further_scans" in data.process.configuration
 
 
 def _single_valued(x: FloatArray) -> bool:

@@ -297,3 +297,14 @@ def test_the_settings_of_matplotlib_are_given_back(make_apparatus):
         figure = calibration_figure(make_apparatus())
         assert dict(mpl.rcParams) == before
     assert panels(figure)["scan"].get_facecolor() == (1.0, 1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize("joint", [False, True])
+def test_no_line_joins_the_points_of_several_scans(make_apparatus, joint):
+    data = make_apparatus(points=33)
+    if joint:
+        configuration = {**data.process.configuration, "further_scans": [None]}
+        data = replace(data, process=replace(data.process, configuration=configuration))
+    axes = panels(calibration_figure(data))["scan"]
+    (found,) = [each for each in axes.lines if each.get_label() == "reconvolved, G"]
+    assert (found.get_linestyle() == "None") is joint
