@@ -1,0 +1,1 @@
+"""From measured contact scans to friction: calculated profiles, and what the data say of them."""
