@@ -18,12 +18,12 @@ MODULES = {
 
 FLOW = [
     "version", "errors", "model", "axisymmetry", "mechanics", "deconvolution", "estimation",
-    "apparatus", "calibration", "simulation", "measurement", "planning",
+    "apparatus", "calibration", "simulation", "measurement", "friction", "planning",
     "figures", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 
-USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli", "measurement"}
+USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli", "friction", "measurement"}
 
 ONLY_IN = {
     "h5py": {"formats"},
