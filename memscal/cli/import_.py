@@ -20,6 +20,7 @@ from memscal.cli.options import (
     indenter_from,
     json_option,
     radius_options,
+    si,
 )
 from memscal.cli.output import emit, emit_json, message, readable, warn
 from memscal.cli.targets import prove_writable
@@ -53,13 +54,14 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 _SCAN_NAMES = [
     *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "u_xz", "u_yz"),
     *("load_column", "load_unit", "load_uncertainty", "grid_tolerance", "repeats", "title"),
+    *("lubrication", "lubricant"),
 ]
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
 _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
-    "scan": [*_SCAN_NAMES, *_SENSOR_NAMES.values()],
+    "scan": [*_SCAN_NAMES, "load_scatter", *_SENSOR_NAMES.values()],
     "reference": import_reference.NAMES,
 }
 _NEEDED = ("x", "x_unit", "u", "u_unit")
@@ -94,8 +96,20 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @click.option(
     "--load-uncertainty",
     type=Quantity("N", open_low=False),
-    help="Scan: standard uncertainty of the load, in N.",
+    help="Scan: standard uncertainty of the load common to all points, in N.",
 )
+@click.option(
+    "--load-scatter",
+    type=Quantity("percent", open_low=False),
+    help="Scan: standard uncertainty of each point's own load, independent from point to point, "
+    "in percent: a weight set down by hand.",
+)
+@click.option(
+    "--lubrication",
+    type=click.Choice(["dry", "lubricated"]),
+    help="Scan: what was between indenter and film.",
+)
+@click.option("--lubricant", metavar="TEXT", help="Scan: name of the lubricant.")
 @click.option(
     "--u-scale",
     type=float,
@@ -216,6 +230,7 @@ def _scan(path: Path, given: dict[str, Any]) -> ImportedScan:
     return read_scan_table(
         path,
         **_given(given, [*_SCAN_NAMES, *_TABLE_NAMES]),
+        load_scatter=si(given["load_scatter"], -2),
         film=film,
         indenter=indenter,
         sensor=StressSensor(**labels),

@@ -36,7 +36,7 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
 _ARRAYS = {
     SCAN_SCHEMA: {
         "/entry/data": "x y repeat x_errors y_errors u_zz u_zz_errors u_zz_correlation "
-        "normal_load u_xz u_yz",
+        "normal_load normal_load_errors u_xz u_yz",
         "/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz",
     },
     REFERENCE_SCHEMA: {"/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz"},
@@ -68,6 +68,8 @@ _PROVENANCE = {
     "end_time": "/entry/end_time",
     "notes": "/entry/notes/data",
     "reference_notes": "/entry/process/notes/data",
+    "lubrication": "/entry/sample/lubrication",
+    "lubricant": "/entry/sample/lubricant",
     "sensor": "/entry/instrument/stress_sensor/name",
     "sensor_model": "/entry/instrument/stress_sensor/model",
     "channel": "/entry/instrument/stress_sensor/channel",

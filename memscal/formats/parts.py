@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from memscal.errors import FormatError
 from memscal.formats.fields import (
     optional_array,
@@ -74,9 +76,10 @@ def read_film(file: SafeFile, path: str) -> ElasticFilm:
     )
 
 
-def sample_group(film: ElasticFilm) -> Group:
-    """Return the NXsample that holds the film."""
-    return Group("NXsample", {"film": film_group(film)})
+def sample_group(film: ElasticFilm, texts: Mapping[str, str] | None = None) -> Group:
+    """Return the NXsample that holds the film, and the texts beside it that are not empty."""
+    stated = {name: text for name, text in (texts or {}).items() if text}
+    return Group("NXsample", {"film": film_group(film), **stated})
 
 
 def indenter_group(

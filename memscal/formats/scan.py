@@ -39,6 +39,7 @@ __all__ = ["read_scan", "write_scan"]
 
 _CHANNELS = ("u_xz", "u_yz")
 _DATA = "/entry/data"
+_SAMPLE = "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
 # One name for each axis of the correlation: netCDF tools want each dimension once.
@@ -88,7 +89,7 @@ def scan_from(file: SafeFile) -> Scan:
     """Read the scan of an open memscal-scan file."""
     require_schema(file, SCAN_SCHEMA)
     load = require_scalar(file, "/entry/indenter/load", "force")
-    film = read_film(file, "/entry/sample/film")
+    film = read_film(file, f"{_SAMPLE}/film")
     indenter = read_round_indenter(file, "/entry/indenter")
     along_y = _check_axes(file) in _ALONG_Y.values()
     along = "y" if along_y else "x"
@@ -113,11 +114,14 @@ def scan_from(file: SafeFile) -> Scan:
         u_zz_errors=optional_array(file, f"{_DATA}/u_zz_errors", "voltage"),
         u_zz_correlation=optional_array(file, f"{_DATA}/u_zz_correlation", "dimensionless", ndim=2),
         normal_load=optional_array(file, f"{_DATA}/normal_load", "force"),
+        normal_load_errors=optional_array(file, f"{_DATA}/normal_load_errors", "force"),
         channels=channels,
         load=load,
         load_uncertainty=optional_scalar(file, "/entry/indenter/load_errors", "force"),
         indenter=indenter,
         film=film,
+        lubrication=optional_text(file, f"{_SAMPLE}/lubrication").strip().lower(),
+        lubricant=optional_text(file, f"{_SAMPLE}/lubricant"),
         sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
         title=optional_text(file, "/entry/title"),
         start_time=optional_text(file, "/entry/start_time"),
@@ -154,7 +158,8 @@ def _entry(scan: Scan) -> Group:
     children: dict[str, Node] = {name: text for name, text in texts.items() if text}
     children["data"] = _data_group(scan)
     children["indenter"] = indenter_group(scan.indenter, scan.load, scan.load_uncertainty)
-    children["sample"] = sample_group(scan.film)
+    contact = {"lubrication": scan.lubrication, "lubricant": scan.lubricant}
+    children["sample"] = sample_group(scan.film, contact)
     children["instrument"] = instrument_group(scan.sensor)
     if scan.notes:
         children["notes"] = note(scan.notes)
@@ -190,6 +195,8 @@ def _data_group(scan: Scan) -> Group:
         data["u_zz_errors"] = si(scan.u_zz_errors, "voltage", axes)
     if scan.normal_load is not None:
         data["normal_load"] = si(scan.normal_load, "force", axes)
+    if scan.normal_load_errors is not None:
+        data["normal_load_errors"] = si(scan.normal_load_errors, "force", axes)
     for name, values in scan.channels.items():
         data[name] = si(values, "voltage", axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})

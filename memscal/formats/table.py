@@ -48,6 +48,9 @@ def read_scan_table(
     load_column: Column | None = None,
     load_unit: str = "N",
     load_uncertainty: float | None = None,
+    load_scatter: float | None = None,
+    lubrication: str = "",
+    lubricant: str = "",
     u_scale: float | None = None,
     u_sign: int = 1,
     grid_tolerance: float = 0.1,
@@ -84,7 +87,12 @@ def read_scan_table(
     load_unit : str
         Unit of ``load_column``.
     load_uncertainty : float, optional
-        Standard uncertainty of the load, in N.
+        Standard uncertainty of the load common to all points, in N.
+    load_scatter : float, optional
+        Relative standard uncertainty of each point's own load, independent from point to point,
+        as of a weight that is set down by hand.
+    lubrication, lubricant : str
+        ``"dry"`` or ``"lubricated"``, and with what; empty if not stated.
     u_scale : float, optional
         Volts per unit of the ``u`` columns, for a sensor whose output is not a voltage;
         ``u_unit`` is then only its name, and the notes of the scan record the choice.
@@ -121,6 +129,12 @@ def read_scan_table(
             f"The grid tolerance is {grid_tolerance:g} of the step, but it must lie between 0 and "
             "0.5.",
             why="Beyond half a step a reading has no nearest place.",
+        )
+    if load_scatter is not None and repeats == "average":
+        raise InputError(
+            "load_scatter is given, but repeats are averaged.",
+            why="The mean of several contacts has a smaller scatter than one of them.",
+            cure='Keep the repeats (repeats="keep").',
         )
     if u_sign not in (1, -1):
         raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
@@ -160,15 +174,21 @@ def read_scan_table(
         notes=notes,
     )
     fields = dict(placed.fields)
+    loads = fields.pop("normal_load", None)
+    if load_scatter is not None and loads is None:
+        loads = np.full(fields["u_zz"].shape, load)
     scan = Scan(
         x=placed.x,
         y=placed.y,
         u_zz=fields.pop("u_zz"),
         u_zz_errors=placed.errors,
-        normal_load=fields.pop("normal_load", None),
+        normal_load=loads,
+        normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
         channels=fields,
         load=load,
         load_uncertainty=load_uncertainty,
+        lubrication=lubrication,
+        lubricant=lubricant,
         film=film,
         indenter=indenter,
         sensor=sensor or StressSensor(),

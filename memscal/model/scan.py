@@ -13,13 +13,11 @@ from memscal.errors import InputError
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import SourceFile
+from memscal.model.scan_checks import checked_correlation, require_contacts
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray, finite_vector, frozen_array, require_non_negative
 
 __all__ = ["Scan", "StressSensor"]
-
-#: A combination of voltages with less of the noise than this would outweigh all others.
-_LEAST_EIGENVALUE = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +49,9 @@ class Scan:
         Standard uncertainty of each voltage (electronic noise), in V.
     normal_load : ndarray, shape of ``u_zz``, optional
         Load at each point, in N, where it was recorded.
+    normal_load_errors : ndarray, shape of ``u_zz``, optional
+        Standard uncertainty of the load at each point, independent from point to point, in N: of
+        a weight that is set down by hand.
     x_errors : ndarray, shape of ``x``, optional
         Standard uncertainty of each position, independent from point to point, in m.
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
@@ -64,6 +65,10 @@ class Scan:
         Further channels (``u_xz``, ``u_yz``), in V.
     load_uncertainty : float, optional
         Standard uncertainty of the load common to all points, in N.
+    lubrication : str
+        ``"dry"`` or ``"lubricated"``: what was between indenter and film; empty if not stated.
+    lubricant : str
+        Name of the lubricant.
     title, start_time, end_time, notes : str
         Free text; times in ISO 8601.
     reference : StressProfile, optional
@@ -97,12 +102,15 @@ class Scan:
     y: FloatArray | None = None
     u_zz_errors: FloatArray | None = None
     normal_load: FloatArray | None = None
+    normal_load_errors: FloatArray | None = None
     x_errors: FloatArray | None = None
     u_zz_correlation: FloatArray | None = None
     direction: str = "x"
     position_scale_uncertainty: float | None = None
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     load_uncertainty: float | None = None
+    lubrication: str = ""
+    lubricant: str = ""
     title: str = ""
     start_time: str = ""
     end_time: str = ""
@@ -117,14 +125,18 @@ class Scan:
             object.__setattr__(self, "y", finite_vector("y of the scan", self.y))
         object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
         self._check_signal_shape()
-        for name in ("u_zz_errors", "normal_load"):
+        for name in ("u_zz_errors", "normal_load", "normal_load_errors"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, self._like_signal(name, getattr(self, name)))
         channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
         object.__setattr__(self, "channels", MappingProxyType(channels))
         self._check_values()
         self._check_positions()
-        self._check_correlation()
+        require_contacts(self)
+        if self.u_zz_correlation is not None:
+            points = self.u_zz.size if self.kind == "raster" else self.x.size
+            correlation = checked_correlation(self.u_zz_correlation, points)
+            object.__setattr__(self, "u_zz_correlation", correlation)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the fields, and prove them again: a read-only mapping cannot be pickled."""
@@ -209,33 +221,6 @@ class Scan:
                 cure="Give one standard uncertainty for each position, in m, none negative.",
             )
         object.__setattr__(self, "x_errors", errors)
-
-    def _check_correlation(self) -> None:
-        """Refuse a correlation that no noise can have."""
-        if self.u_zz_correlation is None:
-            return
-        given = frozen_array(self.u_zz_correlation)
-        size = self.u_zz.size if self.kind == "raster" else self.x.size
-        if given.shape != (size, size) or not np.isfinite(given).all():
-            raise InputError(
-                f"u_zz_correlation has shape {given.shape}, but it should be ({size}, {size}) and "
-                "finite.",
-                why="It correlates every point of one repeat with every other.",
-            )
-        if not np.allclose(given, given.T, atol=1e-9) or not np.allclose(np.diag(given), 1.0):
-            raise InputError(
-                "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
-                cure="Divide a covariance by the standard uncertainties of row and column, and "
-                "give those as u_zz_errors.",
-            )
-        least = float(np.linalg.eigvalsh(given)[0])
-        if least <= _LEAST_EIGENVALUE:
-            raise InputError(
-                f"u_zz_correlation is not positive definite: it has the eigenvalue {least:.3g}.",
-                why="Some combination of the voltages would have no noise, or less than none.",
-                cure="Add the electronic noise, which is independent from point to point.",
-            )
-        object.__setattr__(self, "u_zz_correlation", given)
 
 
 def _rebuilt(values: Mapping[str, Any]) -> Scan:

@@ -109,6 +109,27 @@ def test_a_column_of_loads_is_kept_per_point(run: Run, folder: Path) -> None:
     assert np.all(scan.normal_load == 0.5)
 
 
+def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(
+    run: Run, folder: Path
+) -> None:
+    rows = np.stack([np.arange(9.0), np.arange(9.0), np.linspace(0.3, 0.4, 9)], axis=1)
+    write_table(folder / "scan.csv", "position,voltage,force", rows)
+    wet = ["--load-scatter", 2, "--lubrication", "lubricated", "--lubricant", "glycerol"]
+    assert run("import", "scan.csv", "-o", "one.h5", *COLUMNS, *SET_UP, *wet).code == 0
+    one = memscal.read_scan("one.h5")
+    assert (one.lubrication, one.lubricant) == ("lubricated", "glycerol")
+    np.testing.assert_allclose(one.normal_load, np.full(9, 1.0), rtol=1e-12)
+    np.testing.assert_allclose(one.normal_load_errors, np.full(9, 0.02), rtol=1e-12)
+    column = ["--load-column", "force", *wet]
+    assert run("import", "scan.csv", "-o", "each.h5", *COLUMNS, *SET_UP, *column).code == 0
+    each = memscal.read_scan("each.h5")
+    np.testing.assert_allclose(each.normal_load_errors, 0.02 * rows[:, 2], rtol=1e-12)
+    assert "glycerol" in run("inspect", "each.h5").out
+    mean = [*COLUMNS, *SET_UP, *wet, "--repeats", "average"]
+    refused = run("import", "scan.csv", "-o", "mean.h5", *mean)
+    assert (refused.code, "averaged" in refused.err) == (3, True)
+
+
 def test_a_fem_table_becomes_a_reference(run: Run, folder: Path) -> None:
     film = memscal.simulate().film
     profile = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=1.0).profile()

@@ -81,6 +81,20 @@ def test_errors_of_positions_and_correlated_noise_come_back(
     assert_same(found, make_scan(kind, **extra), but=("source", "reference"))
 
 
+@pytest.mark.parametrize("kind", ["line", "repeats", "raster"])
+def test_what_was_between_the_contacts_comes_back(tmp_path: Path, kind: str):
+    plain = make_scan(kind)
+    errors = 0.02 * plain.normal_load * (1 + np.arange(plain.u_zz.size).reshape(plain.u_zz.shape))
+    errors[..., 4] = np.nan
+    wet = dataclasses.replace(
+        plain, normal_load_errors=errors, lubrication="lubricated", lubricant="glycerol, 99 %"
+    )
+    write_scan(wet, tmp_path / "scan.h5")
+    assert_same(read_scan(tmp_path / "scan.h5"), wet, but=("source",))
+    with h5py.File(tmp_path / "scan.h5") as file:
+        assert file["/entry/data/normal_load_errors"].attrs["units"] == b"N"
+
+
 def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):
     bare: dict[str, Any] = dict.fromkeys(
         ("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")
