@@ -1,4 +1,4 @@
-r"""Radial functions and their Hankel transforms of order zero.
+r"""Radial functions and their Hankel transforms, of order zero and one.
 
 The two-dimensional Fourier transform of an axisymmetric field is a Hankel transform,
 
@@ -8,6 +8,17 @@ The two-dimensional Fourier transform of an axisymmetric field is a Hankel trans
     f(r) = \frac{1}{2\pi}\int_0^\infty \hat f(k)\,J_0(kr)\,k\,dk,
 
 so that :math:`\hat f(0)` is the integral of the field, and convolution is multiplication.
+
+Of a radial vector field :math:`v(r)\,\hat r`, such as the shear at the base, every component is
+:math:`v(r)\cos\theta`, and its transform one of order one,
+
+.. math::
+
+    \hat v(k) = 2\pi\int_0^\infty v(r)\,J_1(kr)\,r\,dr, \qquad
+    v(r) = \frac{1}{2\pi}\int_0^\infty \hat v(k)\,J_1(kr)\,k\,dk .
+
+Convolved with a radial function it stays a radial vector field, and the transforms are
+multiplied: :math:`(G \otimes v\,\hat r)\,\hat{} = \hat G\,\hat v`.
 """
 
 from __future__ import annotations
@@ -16,7 +27,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import j0
+from scipy.special import j0, j1
 
 from memscal.axisymmetry.quadrature import gauss_between, gauss_panels
 from memscal.errors import InputError
@@ -61,36 +72,60 @@ class Wavenumbers:
         k, dk = gauss_panels(k_max, _PHASE / r_max, _ORDER)
         return cls(k, k * dk / (2 * np.pi))
 
-    def synthesise(self, spectrum: FloatArray, r: FloatArray) -> FloatArray:
+    def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at radii ``r`` (m), any shape.
 
-        Of several spectra, shape (n, m), the values have a last axis of m.
+        Of several spectra, shape (n, m), the values have a last axis of m.  A transform of
+        ``order`` one gives the radial component of a vector field.
         """
         radii = np.asarray(r, dtype=np.float64)
-        matrix = j0(np.multiply.outer(radii, self.k))
+        matrix = _bessel(order, np.multiply.outer(radii, self.k))
         return np.asarray(matrix @ (spectrum.T * self.weights).T)
 
 
 @dataclass(frozen=True, eq=False)
 class RadialSpectrum:
-    """A radial function, held as its Hankel transform on quadrature nodes."""
+    r"""A radial function, held as its Hankel transform on quadrature nodes.
+
+    Parameters
+    ----------
+    wavenumbers : Wavenumbers
+        The nodes.
+    values : ndarray, shape (n,)
+        The transform there.
+    order : int
+        Zero for a scalar; one for the radial component of a vector field.
+    """
 
     wavenumbers: Wavenumbers
     values: FloatArray
+    order: int = 0
+
+    @property
+    def scalar(self) -> RadialSpectrum:
+        r"""The scalar itself; of a vector field :math:`v = -\nabla\phi` its potential.
+
+        The potential has the transform :math:`\hat v(k)/k`, which is finite at k = 0.
+        """
+        if self.order == 0:
+            return self
+        return RadialSpectrum(self.wavenumbers, self.values / self.wavenumbers.k)
 
     @property
     def integral(self) -> float:
-        """Integral of the field over the plane: its transform at k = 0, by parabola in k^2."""
+        """Integral of :attr:`scalar` over the plane: its transform at k = 0, by parabola in k^2."""
         k2 = self.wavenumbers.k[:3] ** 2
-        return float(np.polynomial.polynomial.polyfit(k2, self.values[:3], 2)[0])
+        return float(np.polynomial.polynomial.polyfit(k2, self.scalar.values[:3], 2)[0])
 
     def at(self, r: FloatArray) -> FloatArray:
-        """Evaluate the function at radii ``r`` (m)."""
-        return self.wavenumbers.synthesise(self.values, r)
+        """Evaluate the function, or the vector's radial component, at radii ``r`` (m)."""
+        return self.wavenumbers.synthesise(self.values, r, order=self.order)
 
 
-def radial_spline(r: FloatArray, f: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Return an even cubic spline through a radial table.
+def radial_spline(
+    r: FloatArray, f: FloatArray, *, order: int = 0
+) -> Callable[[FloatArray], FloatArray]:
+    """Return an even cubic spline through a radial table, an odd one for ``order`` one.
 
     The table is mirrored, so that the spline has no kink on the axis.
     """
@@ -102,17 +137,17 @@ def radial_spline(r: FloatArray, f: FloatArray) -> Callable[[FloatArray], FloatA
         )
     inner = slice(1, 4) if r[0] == 0 else slice(0, 3)
     mirrored_r = np.concatenate([-r[inner][::-1], r])
-    mirrored_f = np.concatenate([f[inner][::-1], f])
+    mirrored_f = np.concatenate([-f[inner][::-1] if order else f[inner][::-1], f])
     spline = CubicSpline(mirrored_r, mirrored_f)
     return lambda radius: np.asarray(spline(radius))
 
 
-def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
-    r"""Hankel transform of order zero of a tabulated radial function.
+def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int = 0) -> FloatArray:
+    r"""Hankel transform of a tabulated radial function.
 
-    An even cubic spline through the table is integrated from 0 to ``r[-1]`` by
-    Gauss-Legendre quadrature fine enough for the table and for the largest ``k``; beyond the
-    table the function counts as zero.
+    An even cubic spline (an odd one for order one) through the table is integrated from 0 to
+    ``r[-1]`` by Gauss-Legendre quadrature fine enough for the table and for the largest ``k``;
+    beyond the table the function counts as zero.
 
     Parameters
     ----------
@@ -122,11 +157,13 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
         Values of the function there.
     k : ndarray, shape (m,)
         Wavenumbers, in rad/m.
+    order : int
+        Zero for a scalar; one for the radial component of a vector field.
 
     Returns
     -------
     ndarray, shape (m,)
-        :math:`2\pi\int f J_0(kr) r\,dr`, in the unit of ``f`` times m^2.
+        :math:`2\pi\int f J_n(kr) r\,dr`, in the unit of ``f`` times m^2.
 
     Examples
     --------
@@ -136,11 +173,22 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray) -> FloatArray:
     >>> gaussian = np.exp(-(r**2) / 2) / (2 * np.pi)
     >>> bool(np.isclose(hankel_transform(r, gaussian, np.array([1.0]))[0], np.exp(-0.5)))
     True
+
+    Its radial derivative is a vector field, of transform -k exp(-s^2 k^2 / 2):
+
+    >>> slope = hankel_transform(r, -r * gaussian, np.array([2.0]), order=1)
+    >>> bool(np.isclose(slope[0], -2 * np.exp(-2)))
+    True
     """
-    spline = radial_spline(r, f)
+    spline = radial_spline(r, f, order=order)
     nodes, weights = gauss_between(_panel_edges(r, float(np.max(np.abs(k)))), _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
-    return np.asarray(j0(np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
+    return np.asarray(_bessel(order, np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
+
+
+def _bessel(order: int, x: FloatArray) -> FloatArray:
+    """Bessel function of the first kind, of order zero or one."""
+    return np.asarray(j1(x) if order else j0(x))
 
 
 def _panel_edges(r: FloatArray, fastest: float) -> FloatArray:

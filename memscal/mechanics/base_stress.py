@@ -26,6 +26,7 @@ from memscal.model.validation import FloatArray
 __all__ = [
     "base_normal_spectrum",
     "base_normal_stress",
+    "base_shear_spectrum",
     "base_shear_stress",
     "decay_radius",
 ]
@@ -66,14 +67,21 @@ def base_shear_stress(
 
     Positive outward; negative where the base holds a film back that is squeezed outward.
     """
-    nu = elastic_film.poisson_ratio
+    return _hankel_synthesis(
+        elastic_film, traction, r, lambda k: base_shear_spectrum(elastic_film, traction, k), j1
+    )
 
-    def spectrum(k: FloatArray) -> FloatArray:
-        x = k * elastic_film.thickness
-        pressed = film.base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
-        return -(pressed + film.base_shear_from_shear(x, nu) * traction.shear_transform(k))
 
-    return _hankel_synthesis(elastic_film, traction, r, spectrum, j1)
+def base_shear_spectrum(
+    elastic_film: ElasticFilm, traction: InterfaceTraction, k: FloatArray
+) -> FloatArray:
+    r"""Return :math:`\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k`` (rad/m), in N.
+
+    That of the traction :math:`\tau = -\sigma_{rz}` of the base on the film.
+    """
+    x, nu = k * elastic_film.thickness, elastic_film.poisson_ratio
+    pressed = film.base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
+    return -(pressed + film.base_shear_from_shear(x, nu) * traction.shear_transform(k))
 
 
 def decay_radius(elastic_film: ElasticFilm, contact_radius: float) -> float:

@@ -151,6 +151,15 @@ class Contact:
         """
         return self.inside.base_shear(_radii(r))
 
+    def base_shear_spectrum(self, k: ArrayLike) -> FloatArray:
+        r"""Return the Hankel transform of order one of the base shear, in N.
+
+        At ``k`` in rad/m, of any shape and sign: :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of
+        :meth:`base_shear`, which is odd in k and zero at k = 0.
+        """
+        signed = np.asarray(k, dtype=np.float64)
+        return np.sign(signed) * self.inside.base_shear_spectrum(np.abs(signed))
+
     def interface_pressure(self, r: ArrayLike) -> FloatArray:
         """Return the pressure between indenter and film in Pa; zero outside the contact.
 

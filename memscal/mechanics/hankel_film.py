@@ -18,6 +18,7 @@ from memscal.mechanics import film_response
 from memscal.mechanics.base_stress import (
     base_normal_spectrum,
     base_normal_stress,
+    base_shear_spectrum,
     base_shear_stress,
 )
 from memscal.mechanics.half_space import coupling_integrals, singular_integrals
@@ -101,6 +102,10 @@ class HankelField:
     def base_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
         return 2 * np.pi * base_normal_spectrum(self.film, self.traction, k)
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
+        return 2 * np.pi * base_shear_spectrum(self.film, self.traction, k)
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""

@@ -78,6 +78,9 @@ class FilmField(Protocol):
     def base_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
 
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
+
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""
 

@@ -206,3 +206,27 @@ def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated
     k = np.array([0.0, 1.0, 5.0])
     found = hankel_transform(r, np.exp(-0.5 * (r / width) ** 2) / (2 * np.pi * width**2), k)
     np.testing.assert_allclose(found, np.exp(-0.5 * (width * k) ** 2), atol=1e-6)
+
+
+@pytest.mark.parametrize("spread", [0.4, 1.0])
+def test_the_slope_of_a_gaussian_has_k_times_its_transform(spread: float) -> None:
+    r = np.linspace(0.0, 9.0 * spread, 600)
+    slope = -r / spread**2 * np.exp(-(r**2) / (2 * spread**2)) / (2 * np.pi * spread**2)
+    found = hankel_transform(r, slope, K, order=1)
+    np.testing.assert_allclose(found, -K * np.exp(-((K * spread) ** 2) / 2), atol=1e-6)
+
+
+def test_a_table_of_a_vector_field_need_not_begin_on_the_axis() -> None:
+    r = np.linspace(0.05, 9.0, 600)
+    found = hankel_transform(r, -r * gaussian(r), K, order=1)
+    np.testing.assert_allclose(found, -K * np.exp(-(K**2) / 2), atol=1e-6)
+
+
+def test_synthesis_of_order_one_takes_a_transform_back_and_has_a_potential() -> None:
+    wavenumbers = Wavenumbers.covering(9.0, 12.0)
+    k = wavenumbers.k
+    spectrum = RadialSpectrum(wavenumbers, k * np.exp(-(k**2) / 2), order=1)
+    r = np.linspace(0.0, 6.0, 25)
+    np.testing.assert_allclose(spectrum.at(r), r * gaussian(r), atol=1e-12)
+    np.testing.assert_allclose(spectrum.scalar.at(r), gaussian(r), atol=1e-12)
+    assert spectrum.integral == pytest.approx(1.0, abs=1e-6)

@@ -85,6 +85,11 @@ class FiniteStrainField:
         flat = np.ravel(np.asarray(k, dtype=np.float64))
         return hankel_transform(self.base[0], self.base[1], flat).reshape(np.shape(k))
 
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
+        flat = np.ravel(np.asarray(k, dtype=np.float64))
+        return hankel_transform(self.base[0], self.base[2], flat, order=1).reshape(np.shape(k))
+
     def depression(self, r: FloatArray) -> FloatArray:
         """Return how far the points at ``r`` before deformation (m) moved into the film, in m."""
         radii, w, _ = self.surface
