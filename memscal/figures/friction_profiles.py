@@ -1,0 +1,305 @@
+"""Measured stress profiles beside calculated ones: the limits of friction, and a set of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from memscal.figures.friction_scale import (
+    LUBRICATIONS,
+    chosen,
+    friction_colours,
+    friction_name,
+    load_colours,
+    lubricated_words,
+    main_loading,
+    on_axis,
+)
+from memscal.figures.quantities import KPA, MM
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
+from memscal.friction.results import FrictionComparison, LoadComparison
+from memscal.model.validation import FloatArray
+
+__all__ = ["draw_profiles", "draw_residuals", "friction_set_figure", "profile_figure"]
+
+_FINE = 241
+_DECADES = 3.3
+_EXPANDED = 2.0
+_LEAST_LIMIT, _LARGEST_LIMIT = 3.5, 12.0
+_SHOWN = (0.0, 0.05, 0.1, 0.2, 0.3, np.inf)
+#: Panels of a row of loads: with more, only the smallest, the largest and those between fit.
+_MOST_LOADS = 4
+
+
+def profile_figure(
+    found: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
+) -> Figure:
+    """Draw measured profiles between no friction and full stick, as Figure 3 of the paper.
+
+    Parameters
+    ----------
+    found : FrictionComparison
+        What was compared.
+    lubrication : str, optional
+        ``"dry"``, ``"lubricated"`` or ``""``: the first one measured by default.
+    loading : str, optional
+        Definition of the loading: the first one compared by default.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Panels a and b, stress against the distance from the centre, on a linear and on a
+        logarithmic scale, with standard uncertainties; c and d, residuals against the frictionless
+        profile and against that of the largest coefficient, over them.
+
+    Raises
+    ------
+    InputError
+        If nothing was measured or compared so.
+    """
+    loading = main_loading(found, loading)
+    loads = chosen(found, loading, lubrication)
+    with house_style():
+        figure = new_figure(4.6)
+        panels = figure.subplots(2, 2, height_ratios=(2.2, 1), sharex=True)
+        draw_profiles(panels[0, 0], found, loads)
+        draw_profiles(panels[0, 1], found, loads, logarithmic=True)
+        for axes, index in zip(panels[1], (0, -1), strict=True):
+            draw_residuals(axes, found, loads, index)
+        _share_limits(panels[1])
+        for axes, letter in zip(panels.flat, "abcd", strict=True):
+            panel_letter(axes, letter)
+    return figure
+
+
+def draw_profiles(
+    axes: Axes,
+    found: FrictionComparison,
+    loads: Sequence[LoadComparison],
+    *,
+    logarithmic: bool = False,
+) -> None:
+    """Draw measured points with their uncertainties, and the calculated limits through them."""
+    colours = load_colours(len(loads))
+    for one, colour in zip(loads, colours, strict=True):
+        r = np.linspace(0.0, one.profile.r[-1], _FINE)
+        limits = on_axis(one.profile.r, one.calculated[[0, -1]], r) / KPA
+        axes.plot(r / MM, limits[0], color=colour, lw=1.0)
+        axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
+        label = "" if logarithmic else f"{one.load:.3g} N"
+        _points(axes, one, colour, label, logarithmic)
+    if logarithmic:
+        top = max(float(one.profile.s_zz.max()) for one in loads) / KPA
+        axes.set_yscale("log")
+        axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
+        for ls, index in (("-", 0), ("--", -1)):
+            label = rf"$G*\sigma_{{zz}}$, $\mu$ = {friction_name(found.friction[index])}"
+            axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
+    else:
+        axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+        axes.set_xlim(0, max(float(one.profile.r[-1]) for one in loads) / MM)
+        _say_what(axes, found, loads[0])
+    axes.set_ylabel("stress at the base (kPa)")
+    legend_above(axes, columns=4 if not logarithmic else 2)
+
+
+def _say_what(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
+    """Say inside the frame, where no data are, which scan and which curves these are."""
+    ends = [friction_name(found.friction[i]) for i in (0, -1)]
+    lines = [lubricated_words(one.lubrication)]
+    lines += [f"{one.loading} loading"] if one.loading else []
+    lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
+    axes.annotate(
+        "\n".join(lines), (0.97, 0.95), xycoords="axes fraction", ha="right", va="top", fontsize=7
+    )
+
+
+def _points(axes: Axes, one: LoadComparison, colour: str, label: str, logarithmic: bool) -> None:
+    """Draw the measured points; on a logarithmic scale those that are not above 0 are left out."""
+    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+    r, s, u = (np.asarray(v) for v in (one.profile.r, one.profile.s_zz, one.profile.s_zz_errors))
+    shown = s > 0 if logarithmic else np.ones(s.size, dtype=bool)
+    _errorbar(
+        axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA,
+        colour=colour, marker=marker, filled=filled, label=label,
+    )  # fmt: skip
+
+
+def _errorbar(
+    axes: Axes,
+    x: FloatArray,
+    y: FloatArray,
+    u: FloatArray,
+    *,
+    colour: str,
+    marker: str,
+    filled: bool,
+    label: str,
+) -> None:
+    style: dict[str, Any] = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
+    face = colour if filled else "white"
+    axes.errorbar(
+        x, y, u, fmt=marker, color=colour, mfc=face, label=label or "_points", **style
+    )  # fmt: skip
+
+
+def draw_residuals(
+    axes: Axes, found: FrictionComparison, loads: Sequence[LoadComparison], index: int
+) -> None:
+    """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
+    axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
+    axes.axhline(0.0, color="0.4", lw=0.6)
+    for one, colour in zip(loads, load_colours(len(loads)), strict=True):
+        z = (one.profile.s_zz - one.calculated[index]) / one.profile.s_zz_errors
+        marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+        (points,) = axes.plot(one.profile.r / MM, z, marker, color=colour, ms=2.5, mew=0.6)
+        points.set_markerfacecolor(colour if filled else "white")
+    axes.set_xlabel("distance from the centre (mm)")
+    axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(found.friction[index])}}})/u$")
+
+
+def _share_limits(panels: Sequence[Axes]) -> None:
+    """Give residual panels one scale that shows every point, and at least the band."""
+    sizes = [
+        np.abs(np.asarray(line.get_ydata()))
+        for axes in panels
+        for line in axes.lines
+        if line.get_marker() not in ("None", "", None)
+    ]
+    limit = max(_LEAST_LIMIT, 1.1 * float(np.max(np.concatenate(sizes))))
+    for axes in panels:
+        axes.set_ylim(-limit, limit)
+
+
+def friction_set_figure(
+    found: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
+) -> Figure:
+    """Draw profiles beside those of a set of friction coefficients, as Figure 4 of the paper.
+
+    Parameters
+    ----------
+    found, lubrication, loading
+        As for :func:`profile_figure`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A column for each load (four at most, from the smallest to the largest).  Top, stress near
+        the centre for several coefficients; middle, the same less the frictionless profile, in
+        percent of its maximum;
+        bottom, residuals against the calculated coefficient of least chi-square, over their
+        standard uncertainties.
+
+    Raises
+    ------
+    InputError
+        If nothing was measured or compared so.
+    """
+    loading = main_loading(found, loading)
+    loads = _spread(chosen(found, loading, lubrication))
+    with house_style():
+        figure = new_figure(5.0)
+        rows = (1.5, 1.5, 1.0)
+        panels = figure.subplots(3, len(loads), height_ratios=rows, sharex="col", squeeze=False)
+        for column, one in zip(panels.T, loads, strict=True):
+            _draw_set(column[0], found, one)
+            _draw_differences(column[1], found, one)
+            _draw_best(column[2], found, one)
+        _share_limits(panels[2])
+        _share_differences(panels[1])
+        words = ("stress (kPa)", "beyond frictionless\n(% of its maximum)", "residual / $u$")
+        for axes, label in zip(panels[:, 0], words, strict=True):
+            axes.set_ylabel(label)
+        figure.align_ylabels(panels[:, 0])
+        figure.supxlabel("distance from the centre (mm)", fontsize=8)
+        _legend_of_friction(figure, found, lubricated_words(loads[0].lubrication), loading)
+    return figure
+
+
+def _spread(loads: Sequence[LoadComparison]) -> list[LoadComparison]:
+    """Return at most as many loads as fit in a row, the ends always."""
+    count = min(len(loads), _MOST_LOADS)
+    return [loads[i] for i in np.unique(np.linspace(0, len(loads) - 1, count).round().astype(int))]
+
+
+def _shown_indices(found: FrictionComparison) -> list[int]:
+    """Return indices of the coefficients to draw: some of them, the ends always."""
+    wanted = {int(np.argmin(np.abs(found.friction - mu))) for mu in _SHOWN if np.isfinite(mu)}
+    return sorted(wanted | {0, found.friction.size - 1})
+
+
+def _core(one: LoadComparison) -> float:
+    """Return the radius within which the frictionless profile exceeds a twentieth of its top."""
+    strong = one.calculated[0] > 0.05 * one.calculated[0].max()
+    return float(one.profile.r[np.flatnonzero(strong)[-1]])
+
+
+def _draw_set(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
+    axes.set_title(f"{one.load:.3g} N", fontsize=8)
+    r = np.linspace(0.0, _core(one), _FINE)
+    for i in _shown_indices(found):
+        curve = on_axis(one.profile.r, one.calculated[[i]], r)[0]
+        axes.plot(r / MM, curve / KPA, color=friction_colours(found.friction[i])[0], lw=0.9)
+    _points(axes, one, COLOURS["measured"], "", False)
+    axes.set_xlim(0, r[-1] / MM)
+    axes.set_ylim(bottom=0)
+
+
+def _draw_differences(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
+    """Draw what friction adds to the frictionless stress, in percent of its maximum."""
+    unit = one.p0_max / 100
+    r = np.linspace(0.0, _core(one), _FINE)
+    for i in _shown_indices(found):
+        change = (one.calculated[i] - one.calculated[0])[None, :]
+        colour = friction_colours(found.friction[i])[0]
+        axes.plot(r / MM, on_axis(one.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
+    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+    _errorbar(
+        axes,
+        one.profile.r / MM,
+        (one.profile.s_zz - one.calculated[0]) / unit,
+        one.profile.s_zz_errors / unit,
+        colour=COLOURS["measured"], marker=marker, filled=filled, label="",
+    )  # fmt: skip
+
+
+def _draw_best(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
+    best = int(np.argmin(one.chi_square))
+    z = (one.profile.s_zz - one.calculated[best]) / one.profile.s_zz_errors
+    axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
+    axes.axhline(0.0, color="0.4", lw=0.6)
+    axes.plot(one.profile.r / MM, z, "o", color=COLOURS["measured"], ms=2.5)
+    label = rf"$\mu$ = {friction_name(found.friction[best])}"
+    axes.annotate(
+        label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7
+    )  # fmt: skip
+
+
+def _share_differences(panels: Sequence[Axes]) -> None:
+    low = min(axes.get_ylim()[0] for axes in panels)
+    high = max(axes.get_ylim()[1] for axes in panels)
+    for axes in panels:
+        axes.set_ylim(low, high)
+
+
+def _legend_of_friction(
+    figure: Figure, found: FrictionComparison, lubrication: str, loading: str
+) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=friction_colours(found.friction[i])[0], lw=1.2,
+               label=rf"$\mu$ = {friction_name(found.friction[i])}")
+        for i in _shown_indices(found)
+    ]  # fmt: skip
+    words = f"measured, {lubrication}"
+    point = Line2D([], [], color="k", marker="o", ms=3, ls="none", label=words)
+    title = f"{loading} loading" if loading else "profiles as given"
+    figure.legend(
+        handles=[point, *handles], loc="outside upper center", ncols=len(handles) + 1, title=title,
+        title_fontsize=8,
+    )  # fmt: skip

@@ -1,0 +1,211 @@
+"""The effective friction coefficient against the load, and the likelihoods that it is read from."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from memscal.figures.friction_scale import (
+    LUBRICATIONS,
+    chosen,
+    friction_axis,
+    friction_position,
+    load_colours,
+    lubricated_words,
+    main_loading,
+)
+from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
+from memscal.friction.results import EffectiveFriction, FrictionComparison
+
+__all__ = ["draw_effective", "draw_likelihood", "effective_friction_figure", "likelihood_figure"]
+
+_READINGS = {
+    "by_maximum": ("by the maximum", "gaussian", -1),
+    "by_profile": ("by the profile", "deconvolved", 1),
+}
+#: Both readings of one load stand this share of the loads' span to its left and right.
+_ASIDE = 0.008
+#: Differences of chi-square that bound 68.3 % and 95 % of one parameter.
+_LEVELS = ((1.0, "68 %"), (3.84, "95 %"))
+_HIGHEST = 12.0
+
+
+def effective_friction_figure(found: FrictionComparison) -> Figure:
+    """Draw the effective friction coefficient against the load.
+
+    Parameters
+    ----------
+    found : FrictionComparison
+        What was compared.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A row for each lubrication, a panel for each definition of the loading: the coefficient by
+        the maximum and by the whole profile with intervals (arrows where one side is open), the
+        interval of all loads together as a band, and the macroscopic coefficient.
+    """
+    lubrications = list(found.joint)
+    with house_style():
+        figure = new_figure(0.6 + 2.7 * len(lubrications))
+        panels = figure.subplots(
+            len(lubrications), len(found.loadings), sharex=True, sharey=True, squeeze=False
+        )
+        for row, lubrication in zip(panels, lubrications, strict=True):
+            for axes, loading in zip(row, found.loadings, strict=True):
+                draw_effective(axes, found, lubrication, loading)
+                _name_panel(axes, lubrication, loading)
+        for axes, letter in zip(panels.flat, "abcdef", strict=False):
+            panel_letter(axes, letter)
+            axes.label_outer()
+        _one_legend(figure, panels[0, 0])
+    return figure
+
+
+def draw_effective(
+    axes: Axes,
+    found: FrictionComparison,
+    lubrication: str | None = None,
+    loading: str | None = None,
+) -> None:
+    """Draw both readings of each load, the joint interval, and the macroscopic coefficient."""
+    loading = main_loading(found, loading)
+    loads = chosen(found, loading, lubrication)
+    span = loads[-1].load - loads[0].load or loads[0].load
+    for name, (words, colour, side) in _READINGS.items():
+        for i, one in enumerate(loads):
+            _draw_reading(
+                axes,
+                getattr(one, name),
+                one.load + side * _ASIDE * span,
+                COLOURS[colour],
+                words if i == 0 else "",
+                LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""]),
+            )
+    _draw_joint(axes, found.joint[loads[0].lubrication][loading])
+    _draw_macroscopic(axes, found.macroscopic)
+    friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
+    axes.set_xlim(0, loads[-1].load + 0.08 * span)
+    axes.set_xlabel("load (N)")
+
+
+def _draw_reading(
+    axes: Axes,
+    reading: EffectiveFriction,
+    x: float,
+    colour: str,
+    label: str,
+    marker: tuple[str, bool],
+) -> None:
+    """Draw a value with its interval; where there is none, the open interval as an arrow."""
+    low, high = reading.interval.low, reading.interval.high
+    ends = friction_position([low, math.inf if high is None else high])
+    (bar,) = axes.plot([x, x], ends, color=colour, lw=1.0, solid_capstyle="butt")
+    bar.set_gid("interval")
+    axes.plot([x], ends[:1], "_" if low > 0 else "", color=colour, ms=5, mew=1.0)
+    if high is None:
+        axes.plot([x], [1.0], "^", color=colour, ms=4, clip_on=False, label="_open")
+    else:
+        axes.plot([x], ends[1:], "_", color=colour, ms=5, mew=1.0)
+    if reading.value is not None:
+        axes.plot(
+            [x], friction_position([reading.value]), marker[0], color=colour, ms=4, mew=0.8,
+            mfc=colour if marker[1] else "white", zorder=3, label="_value",
+        )  # fmt: skip
+    if label:
+        axes.plot([], [], marker[0], color=colour, ms=4, ls="-", lw=1.0, label=label)
+
+
+def _draw_joint(axes: Axes, joint: EffectiveFriction) -> None:
+    high = math.inf if joint.interval.high is None else joint.interval.high
+    low, top = friction_position([joint.interval.low, high])
+    axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
+    if joint.value is not None:
+        axes.axhline(float(friction_position(joint.value)), color=COLOURS["reference"], lw=0.8)
+
+
+def _draw_macroscopic(axes: Axes, given: tuple[float, float | None] | None) -> None:
+    if given is None:
+        return
+    value, u = given
+    place = float(friction_position(value))
+    axes.axhline(place, color=COLOURS["muted"], lw=0.8, ls="--", label="macroscopic")
+    if u:
+        low, high = friction_position([max(value - 1.96 * u, 0.0), value + 1.96 * u])
+        axes.axhspan(low, high, color=COLOURS["muted"], alpha=0.15, lw=0)
+
+
+def _name_panel(axes: Axes, lubrication: str, loading: str) -> None:
+    words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
+    axes.set_title(words, fontsize=8, loc="left")
+
+
+def _one_legend(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(handles))
+
+
+def likelihood_figure(found: FrictionComparison) -> Figure:
+    """Draw the profile likelihoods of the effective friction coefficient.
+
+    Parameters
+    ----------
+    found : FrictionComparison
+        What was compared.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A row for each lubrication, a panel for each definition of the loading: chi-square above
+        its least value against the coefficient, of each load's profile and of all together, with
+        the levels that bound 68.3 % and 95 %.
+    """
+    lubrications = list(found.joint)
+    with house_style():
+        figure = new_figure(0.6 + 2.4 * len(lubrications))
+        panels = figure.subplots(
+            len(lubrications), len(found.loadings), sharex=True, sharey=True, squeeze=False
+        )
+        for row, lubrication in zip(panels, lubrications, strict=True):
+            for axes, loading in zip(row, found.loadings, strict=True):
+                draw_likelihood(axes, found, lubrication, loading)
+                _name_panel(axes, lubrication, loading)
+        for axes, letter in zip(panels.flat, "abcdef", strict=False):
+            panel_letter(axes, letter)
+            axes.label_outer()
+        _one_legend(figure, panels[0, 0])
+    return figure
+
+
+def draw_likelihood(
+    axes: Axes,
+    found: FrictionComparison,
+    lubrication: str | None = None,
+    loading: str | None = None,
+) -> None:
+    """Draw chi-square above its least value of each load and of all loads together."""
+    loading = main_loading(found, loading)
+    loads = chosen(found, loading, lubrication)
+    for one, colour in zip(loads, load_colours(len(loads)), strict=True):
+        _draw_curve(axes, one.by_profile, colour, f"{one.load:.3g} N", 1.0)
+    joint = found.joint[loads[0].lubrication][loading]
+    _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
+    for level, words in _LEVELS:
+        axes.axhline(level, color="0.6", lw=0.6, ls=":")
+        axes.annotate(
+            words, (0.995, level), (0, 1), xycoords=("axes fraction", "data"),
+            textcoords="offset points", ha="right", fontsize=6, color="0.4",
+        )  # fmt: skip
+    friction_axis(axes, "x", r"effective friction coefficient $\mu_e$")
+    axes.set_ylim(0, _HIGHEST)
+    axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+
+
+def _draw_curve(
+    axes: Axes, reading: EffectiveFriction, colour: str, label: str, width: float
+) -> None:
+    rise = np.asarray(reading.chi_square) - float(np.min(reading.chi_square))
+    axes.plot(friction_position(reading.values), rise, color=colour, lw=width, label=label)

@@ -1,0 +1,163 @@
+"""What figures of friction share: an axis that reaches infinity, colours, and who is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from memscal.errors import InputError
+from memscal.figures.style import COLOURS
+from memscal.friction.results import FrictionComparison, LoadComparison
+from memscal.model.validation import FloatArray
+
+__all__ = [
+    "LUBRICATIONS",
+    "chosen",
+    "friction_axis",
+    "friction_colours",
+    "friction_name",
+    "friction_position",
+    "load_colours",
+    "lubricated_words",
+    "main_loading",
+    "on_axis",
+]
+
+#: The friction coefficient in the middle of the axis.
+_MIDDLE = 0.3
+_TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
+#: Marker and filling of a lubrication, so that both are told apart in grey.
+LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
+
+
+def friction_position(friction: ArrayLike) -> FloatArray:
+    r"""Return where a friction coefficient stands on an axis from 0 to infinity.
+
+    .. math:: t = \frac{\mu}{\mu + 0.3}
+
+    Examples
+    --------
+    >>> friction_position([0.0, 0.3, np.inf])
+    array([0. , 0.5, 1. ])
+    """
+    mu = np.asarray(friction, dtype=np.float64)
+    finite = np.isfinite(mu)
+    bounded = np.where(finite, mu, 0.0)
+    return np.where(finite, bounded / (bounded + _MIDDLE), 1.0)
+
+
+def friction_axis(axes: Axes, which: Literal["x", "y"], label: str) -> None:
+    """Give an axis the ticks of friction coefficients from 0 to infinity."""
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    positions = friction_position(_TICKS)
+    axis.set_ticks(list(positions), [friction_name(mu) for mu in _TICKS])
+    margin = 0.02
+    (axes.set_xlim if which == "x" else axes.set_ylim)(-margin, 1 + margin)
+    axis.set_label_text(label)
+
+
+def friction_name(friction: float) -> str:
+    """Return a coefficient as a label: ``0.15``, or the sign of infinity."""
+    return "∞" if np.isinf(friction) else f"{friction:.3g}"
+
+
+def friction_colours(friction: ArrayLike) -> list[str]:
+    """Return colours of friction coefficients, by their place between 0 and infinity."""
+    import matplotlib as mpl
+
+    shades = mpl.colormaps["plasma"](0.92 * (1.0 - friction_position(friction)))
+    return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
+
+
+def load_colours(count: int) -> list[str]:
+    """Return colours that get darker with the load, also in grey."""
+    import matplotlib as mpl
+
+    shades = mpl.colormaps["viridis_r"](np.linspace(0.2, 1.0, max(count, 1)))
+    return [mpl.colors.to_hex(shade) for shade in shades] if count > 1 else [COLOURS["deconvolved"]]
+
+
+def lubricated_words(lubrication: str) -> str:
+    """Return a lubrication in words."""
+    return lubrication or "lubrication not stated"
+
+
+def main_loading(found: FrictionComparison, loading: str | None) -> str:
+    """Return the definition of the loading to draw: the first one unless another is named.
+
+    Raises
+    ------
+    InputError
+        If that was not compared.
+    """
+    if loading is None:
+        return found.loadings[0]
+    if loading not in found.loads:
+        raise InputError(
+            f"The loading {loading!r} was not compared.",
+            cure=f"There is {', '.join(repr(name) for name in found.loadings)}.",
+        )
+    return loading
+
+
+def chosen(
+    found: FrictionComparison, loading: str, lubrication: str | None
+) -> list[LoadComparison]:
+    """Return the loads of one lubrication, increasing; the first one measured by default.
+
+    Raises
+    ------
+    InputError
+        If nothing was measured so.
+    """
+    measured = [one.lubrication for one in found.loads[loading]]
+    wanted = measured[0] if lubrication is None else lubrication
+    if wanted not in measured:
+        raise InputError(
+            f"No profile is {lubricated_words(wanted)!r}.",
+            cure=f"There is {', '.join(sorted({lubricated_words(name) for name in measured}))}.",
+        )
+    of_it = [one for one in found.loads[loading] if one.lubrication == wanted]
+    return sorted(of_it, key=lambda one: one.load)
+
+
+def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
+    """Return smooth even profiles at fine radii, through their values at measured ones.
+
+    Parameters
+    ----------
+    r : ndarray, shape (n,)
+        Radii in m, not negative, increasing; those closer than a micrometre count as one.
+    values : ndarray, shape (m, n)
+        Profiles there.
+    fine : ndarray, shape (k,)
+        Radii within those of ``r``, or between the axis and the first.
+
+    Returns
+    -------
+    ndarray, shape (m, k)
+    """
+    from scipy.interpolate import CubicSpline
+
+    kept = _apart(r)
+    inner, known = r[kept], values[:, kept]
+    start = 1 if inner[0] < _CLOSE else 0
+    mirrored = np.concatenate([-inner[start:][::-1], inner])
+    both = np.concatenate([known[:, start:][:, ::-1], known], axis=1)
+    return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
+
+
+_CLOSE = 1e-6
+
+
+def _apart(r: FloatArray) -> Sequence[int]:
+    kept, last = [], -np.inf
+    for i, radius in enumerate(r):
+        if radius - last > _CLOSE:
+            kept.append(i)
+            last = radius
+    return kept
