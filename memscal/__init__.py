@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
+    from memscal.laboratory.rod_scan import simulate
     from memscal.measurement.procedure import restore
     from memscal.measurement.restoration import Restoration
     from memscal.mechanics.contact import Contact
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from memscal.model.stress import StressProfile
     from memscal.planning.outcome import Design
     from memscal.planning.procedure import design
-    from memscal.simulation import simulate
 
 _HOMES = {
     "ApparatusFunction": "memscal.apparatus",
@@ -63,7 +63,7 @@ _HOMES = {
     "read_reference": "memscal.formats.reference",
     "read_scan": "memscal.formats.scan",
     "restore": "memscal.measurement.procedure",
-    "simulate": "memscal.simulation",
+    "simulate": "memscal.laboratory.rod_scan",
     "write_reference": "memscal.formats.reference",
     "write_scan": "memscal.formats.scan",
 }

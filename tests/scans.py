@@ -11,8 +11,8 @@ import memscal
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile_estimate import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectrum
+from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.scan import Scan
-from memscal.simulation import PAPER_FILM, PAPER_ROD
 
 CONVERSION = 1e-7
 SIGMA = 561e-6

@@ -18,7 +18,7 @@ MODULES = {
 
 FLOW = [
     "version", "errors", "model", "axisymmetry", "mechanics", "deconvolution", "estimation",
-    "apparatus", "calibration", "simulation", "measurement", "friction", "planning",
+    "apparatus", "calibration", "laboratory", "measurement", "friction", "planning",
     "figures", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""

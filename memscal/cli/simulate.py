@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-#: The paper's film as ``memscal.simulation`` has it, in the units of the command line.
+#: The paper's film as the virtual laboratory has it, in the units of the command line.
 FILM = {
     "young-modulus": 2.2,
     "poisson-ratio": 0.5,
@@ -179,8 +179,8 @@ def command(output: Path, as_json: bool, force: bool, **given: Any) -> int:
 
 
 def _simulate(given: Mapping[str, Any]) -> Scan:
+    from memscal.laboratory.rod_scan import simulate
     from memscal.model.indenter import Rod
-    from memscal.simulation import simulate
 
     film, rod = film_from(given), indenter_from("rod", given)
     assert isinstance(rod, Rod)

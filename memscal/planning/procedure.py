@@ -9,12 +9,12 @@ from functools import partial
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.deconvolution.problem import Regulariser
 from memscal.errors import FitError
+from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.planning.outcome import Design, evaluate
 from memscal.planning.plan import Plan
 from memscal.planning.wishes import least_design, require_wishes
-from memscal.simulation import PAPER_FILM, PAPER_ROD
 
 __all__ = ["design", "varied_designs"]
 

@@ -12,8 +12,8 @@ from memscal.calibration.draw_blocks import DrawModel, drawn_results
 from memscal.calibration.input_draws import InputDraws, ReferenceTable
 from memscal.calibration.procedure import Calibration
 from memscal.calibration.replicate_results import REPLICATED
+from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.mechanics.indent import indent
-from memscal.simulation import PAPER_FILM, PAPER_ROD
 
 KERNELS = {"gaussian": None, "tails": TAILS, "ring": RING}
 

@@ -9,7 +9,7 @@ import pytest
 from scans import TAILS, simulated
 
 import memscal
-from memscal.simulation import PAPER_FILM, PAPER_ROD
+from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 
 PARAMETERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
 

@@ -11,8 +11,8 @@ from scans import CONVERSION, SIGMA, plane_error
 from spheres import known_apparatus, pressed, sphere_scan
 
 import memscal
+from memscal.laboratory.rod_scan import PAPER_FILM
 from memscal.measurement.restoration import Restoration
-from memscal.simulation import PAPER_FILM
 
 EXACT = known_apparatus()
 FEW = 6

@@ -14,8 +14,8 @@ from scipy.stats import chi2
 from memscal import ElasticFilm, GaussianMixture, Rod, SmoothedDisc, indent, simulate
 from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
+from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.validation import FloatArray
-from memscal.simulation import PAPER_FILM, PAPER_ROD
 
 RARE = 1e-9
 """Probability with which a correct program would fail one of the random tests here."""
