@@ -26,10 +26,24 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.model.validation import FloatArray, freeze_arrays, require_positive
 
-__all__ = ["FamilyMember", "ProfileFamily"]
+__all__ = ["FRICTION_SCALE", "FamilyMember", "ProfileFamily", "bounded"]
+
+FRICTION_SCALE = 0.3
+"""Friction at the middle of the bounded coordinate: there a contact begins to stick wholly."""
 
 #: A value this much, relatively, beyond the last one of a family is the last one.
 _ROUNDING = 1e-9
+
+
+def bounded(value: float, scale: float) -> float:
+    """Return the bounded coordinate of a value: 1 where it is infinite.
+
+    Examples
+    --------
+    >>> bounded(0.3, 0.3), bounded(math.inf, 0.3)
+    (0.5, 1.0)
+    """
+    return 1.0 if math.isinf(value) else value / (value + scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +196,7 @@ class ProfileFamily:
         """
         if math.isnan(value) or value < 0:
             raise InputError(f"A {self.name} family has no value {value:g}: it is not negative.")
-        return 1.0 if math.isinf(value) else value / (value + self.scale)
+        return bounded(value, self.scale)
 
     def value_at(self, coordinate: float) -> float:
         """Return the value at a bounded coordinate: the inverse of :meth:`coordinate`.

@@ -1,0 +1,240 @@
+"""Families of base stresses that were calculated elsewhere: finite-element tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.axisymmetry.hankel import hankel_transform
+from memscal.errors import InputError
+from memscal.friction.amontons import amontons_family
+from memscal.friction.assembly import base_wavenumbers, require_loads
+from memscal.friction.cache import CacheFolder
+from memscal.friction.family import FRICTION_SCALE, ProfileFamily
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter, Sphere
+from memscal.model.stress import StressProfile
+from memscal.model.validation import FloatArray
+
+__all__ = ["external_family"]
+
+#: Loads that differ by no more, relatively, are one; the stress is scaled in proportion.
+_SAME_LOAD = 0.01
+#: A table must have decayed to this share of its maximum where it ends.
+_DECAYED = 1e-3
+#: A table's force must be its load but for this share.
+_CARRIES = 0.05
+#: Missing tables that an error names.
+_MOST_NAMED = 6
+
+
+def external_family(
+    profiles: Sequence[StressProfile],
+    loads: ArrayLike,
+    *,
+    reach: float,
+    film: ElasticFilm | None = None,
+    indenter: Indenter | None = None,
+    cache: CacheFolder = None,
+    workers: int = 1,
+) -> ProfileFamily:
+    """Return the base stresses of tables that were calculated elsewhere.
+
+    Parameters
+    ----------
+    profiles : sequence of StressProfile
+        One table for each load and friction coefficient (see :func:`memscal.read_reference`).
+        A load within 1 % of one that is wanted serves it, its stress scaled in proportion.
+    loads : array_like, shape (L,)
+        Loads of the scan, in N.
+    reach : float
+        Largest distance from the axis at which stresses will be asked for, in m.
+    film, indenter : ElasticFilm and Sphere, optional
+        What was pressed on what; by default as the first table states it.  Contacts of the two
+        are solved at the tables' friction coefficients, and their sensitivities taken over; where
+        they are not known there are none, and the stress counts as proportional to the load.
+    cache, workers
+        As for :func:`memscal.friction.amontons.amontons_family`, for those contacts.
+
+    Returns
+    -------
+    ProfileFamily
+        Its values are the friction coefficients of the tables.
+
+    Raises
+    ------
+    InputError
+        If a table lacks its friction coefficient, ends before its stress has decayed or does
+        not carry its load; if tables contradict each other, or the grid of loads and friction
+        coefficients has a gap.
+
+    Examples
+    --------
+    >>> from memscal.mechanics.indent import indent
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> contact = indent(film, Sphere(radius=128.8e-3), load=0.34, friction=0.1)
+    >>> family = external_family([contact.profile()], [0.342], reach=8e-3)
+    >>> family.values, round(float(family.spectra[0, 0, 0]), 2)
+    (array([0.1]), 0.34)
+    """
+    wanted = require_loads(loads)
+    tables = [_checked(profile, reach) for profile in profiles]
+    if not tables:
+        raise InputError("No table of a calculated stress was given.")
+    loading = _common_loading(tables)
+    frictions = np.array(sorted({_friction(profile) for profile in tables}))
+    grid = _grid(tables, frictions, wanted)
+    film = film or next((p.film for p in tables if p.film is not None), None)
+    indenter = indenter or next((p.indenter for p in tables if p.indenter is not None), None)
+    # Where no film is known, the tables' own spacing says how fine their stress can be.
+    nodes = base_wavenumbers(film.thickness if film is not None else _finest(tables), reach)
+    spectra = np.array([[_transform(cell, nodes.k) for cell in row] for row in grid])
+    spectra *= (wanted / np.array([[cell.load for cell in row] for row in grid]))[:, :, None]
+    by_load, changes = spectra, {}
+    notes = "No film and sphere are known: the stress counts as proportional to the load."
+    if film is not None and isinstance(indenter, Sphere):
+        ours = amontons_family(
+            film,
+            indenter,
+            wanted,
+            friction=[float(mu) for mu in frictions],
+            loading=loading or "incremental",
+            reach=reach,
+            cache=cache,
+            workers=workers,
+        )
+        # What the tables have beside the contacts solved here counts as proportional to the load.
+        by_load = ours.by_load + (spectra - ours.spectra)
+        changes = dict(ours.changes)
+        notes = "Sensitivities are those of the contacts that memscal calculates."
+    return ProfileFamily(
+        name="external",
+        loading=loading,
+        wavenumbers=nodes,
+        loads=wanted,
+        values=frictions,
+        scale=FRICTION_SCALE,
+        spectra=spectra,
+        by_load=by_load,
+        changes=changes,
+        depths=_numbers(grid, "depth"),
+        contact_radii=_numbers(grid, "contact_radius"),
+        convergence=_numbers(grid, "convergence"),
+        notes=(notes,),
+    )
+
+
+def _grid(
+    tables: Sequence[StressProfile], frictions: FloatArray, loads: FloatArray
+) -> list[list[StressProfile]]:
+    """Return the table of each friction coefficient and load; name all that are missing."""
+    grid, missing = [], []
+    for mu in frictions:
+        row = [_nearest(tables, float(mu), float(load)) for load in loads]
+        missing += [
+            f"{load:g} N with friction {mu:g}"
+            for load, cell in zip(loads, row, strict=True)
+            if cell is None
+        ]
+        grid.append([cell for cell in row if cell is not None])
+    if missing:
+        known = sorted({profile.load for profile in tables})
+        raise InputError(
+            f"No table was given for {_listed(missing)}.",
+            why=f"The tables are for {', '.join(f'{load:g}' for load in known)} N; a load must be "
+            f"within {_SAME_LOAD:.0%} of one of them, because a sphere's stress is not "
+            "proportional to its load.",
+            cure="Calculate the missing ones, or leave out the friction coefficients or loads "
+            "that lack them.",
+        )
+    return grid
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = "; ".join(names[:_MOST_NAMED])
+    return shown + (f"; and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else "")
+
+
+def _nearest(tables: Sequence[StressProfile], mu: float, load: float) -> StressProfile | None:
+    near = [
+        profile
+        for profile in tables
+        if _friction(profile) == mu and abs(profile.load / load - 1) <= _SAME_LOAD
+    ]
+    near.sort(key=lambda profile: abs(profile.load - load))
+    if len(near) > 1 and near[0].load == near[1].load:
+        raise InputError(
+            f"{_name(near[0])} and {_name(near[1])} are both for {near[0].load:g} N with friction "
+            f"{mu:g}.",
+            cure="Give each load and friction coefficient once.",
+        )
+    return near[0] if near else None
+
+
+def _checked(profile: StressProfile, reach: float) -> StressProfile:
+    """Refuse a table that cannot be compared."""
+    if profile.friction_coefficient is None:
+        raise InputError(
+            f"{_name(profile)} does not say its friction coefficient.",
+            cure="State it when the table is imported (--friction).",
+        )
+    tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
+    if profile.r[-1] < reach and tail > _DECAYED:
+        raise InputError(
+            f"{_name(profile)} ends at r = {profile.r[-1] * 1e3:.4g} mm with {tail:.1%} of its "
+            f"maximum left, but stresses are needed out to {reach * 1e3:.4g} mm.",
+            cure="Extend the table to where the stress has decayed.",
+        )
+    if abs(profile.force / profile.load - 1) > _CARRIES:
+        raise InputError(
+            f"The stress in {_name(profile)} carries {profile.force:.4g} N, but its load is "
+            f"{profile.load:g} N.",
+            why="The force that the base carries must be the load.",
+            cure="Check the load, the units, and that the table is fine enough.",
+        )
+    return profile
+
+
+def _common_loading(tables: Sequence[StressProfile]) -> str:
+    found = {p.loading for p in tables if p.loading and _friction(p) > 0}
+    if len(found) > 1:
+        raise InputError(
+            "Some of the tables are for incremental loading and some for total loading.",
+            why="A family holds one loading.",
+            cure="Give the tables of one loading at a time.",
+        )
+    return found.pop() if found else ""
+
+
+def _friction(profile: StressProfile) -> float:
+    mu = profile.friction_coefficient
+    return math.nan if mu is None else float(mu)
+
+
+def _name(profile: StressProfile) -> str:
+    if profile.source is not None:
+        return profile.source.file_name
+    return f"A table for {profile.load:g} N"
+
+
+def _transform(profile: StressProfile, k: FloatArray) -> FloatArray:
+    return hankel_transform(profile.r, profile.sigma_zz, k)
+
+
+def _finest(tables: Sequence[StressProfile]) -> float:
+    """Return the film's thickness that fits the tables: a stress halves over about as much."""
+    return min(_half_width(profile) for profile in tables)
+
+
+def _half_width(profile: StressProfile) -> float:
+    below = np.flatnonzero(profile.sigma_zz < profile.sigma_zz.max() / 2)
+    return float(profile.r[below[below > np.argmax(profile.sigma_zz)][0]])
+
+
+def _numbers(grid: Sequence[Sequence[StressProfile]], name: str) -> FloatArray:
+    """Return a number that tables may state, NaN where they do not."""
+    rows = [[getattr(cell, name) for cell in row] for row in grid]
+    return np.array([[math.nan if v is None else float(v) for v in row] for row in rows])
