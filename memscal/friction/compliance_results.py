@@ -1,4 +1,4 @@
-"""What laws of the interface are worth, by their evidence, and the lengths over which they yield."""
+"""What laws of the interface are worth by their evidence, and the lengths of those that yield."""
 
 from __future__ import annotations
 
