@@ -7,11 +7,12 @@ from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import j0
+from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline
 from memscal.axisymmetry.quadrature import ring_areas
 from memscal.errors import InputError
+from memscal.estimation.channels import TANGENTIAL
 from memscal.model.apparatus import ApparatusData
 from memscal.model.validation import FloatArray, finite_vector, require_increasing
 
@@ -28,6 +29,11 @@ _FEWEST_RADII = 4
 class ApparatusFunction(ApparatusData):
     r"""A calibrated sensor: :math:`U_{zz} = A\,G \otimes \sigma_{zz}`.
 
+    A tangential channel (``sensor.channel`` is ``"xz"`` or ``"yz"``) measures one component of the
+    shear at the base.  Give its radial profile, as ``Contact.base_shear`` has it, in place of
+    :math:`\sigma_{zz}`: what comes back is the radial profile of the blurred vector field, and of
+    the voltage where the indenter stands at larger x (or y) than the sensor.
+
     Made by :func:`memscal.calibrate` or :func:`memscal.load_apparatus`; its data are described
     in :class:`memscal.model.apparatus.ApparatusData`.  All quantities are in SI units.
 
@@ -41,6 +47,11 @@ class ApparatusFunction(ApparatusData):
     >>> bool(apparatus.stress(volts)[0] < contact.base_stress(0.0))
     True
     """
+
+    @property
+    def order(self) -> int:
+        """Order of the channel's Hankel transforms: zero, or one of a tangential channel."""
+        return int(self.sensor.channel in TANGENTIAL)
 
     def radial(self, r: ArrayLike) -> FloatArray:
         """Return G at radii ``r`` (m, any shape), in 1/m^2; zero beyond its support."""
@@ -58,7 +69,7 @@ class ApparatusFunction(ApparatusData):
         r : array_like, shape (n,)
             Increasing radii of the base stress, in m, from the axis to where it has decayed.
         sigma_zz : array_like, shape (n,)
-            Normal stress at the base, in Pa.
+            Normal stress at the base, in Pa; of a tangential channel the radial shear.
 
         Returns
         -------
@@ -77,8 +88,8 @@ class ApparatusFunction(ApparatusData):
         reach = float(radii[-1] + profile.r[-1])
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
-        blurred = kernel * hankel_transform(radii, stress, wavenumbers.k)
-        return wavenumbers.synthesise(blurred, radii)
+        blurred = kernel * hankel_transform(radii, stress, wavenumbers.k, order=self.order)
+        return wavenumbers.synthesise(blurred, radii, order=self.order)
 
     def predict(self, r: ArrayLike, sigma_zz: ArrayLike) -> FloatArray:
         r"""Return the voltage :math:`A\,G \otimes \sigma_{zz}` of a base stress, in V.
@@ -146,8 +157,10 @@ class ApparatusFunction(ApparatusData):
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         # The radii are even and fine, so that the plain sum is as good as a quadrature rule.
         kernel = j0(np.multiply.outer(wavenumbers.k, profile.r)) * ring_areas(profile.r)
-        field = wavenumbers.weights * hankel_transform(radii, stress, wavenumbers.k)
-        operator = (j0(np.multiply.outer(radii, wavenumbers.k)) * field) @ kernel
+        transform = hankel_transform(radii, stress, wavenumbers.k, order=self.order)
+        bessel = j1 if self.order else j0
+        field = wavenumbers.weights * transform
+        operator = (bessel(np.multiply.outer(radii, wavenumbers.k)) * field) @ kernel
         return operator, operator @ profile.g
 
     def _at(self, values: FloatArray, r: ArrayLike) -> FloatArray:

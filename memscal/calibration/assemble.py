@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from memscal.model.apparatus import (
     TransferFunction,
 )
 from memscal.model.provenance import Process
+from memscal.model.scan import StressSensor
 from memscal.model.validation import FloatArray
 from memscal.version import __version__
 
@@ -48,7 +50,7 @@ def assemble(
         checks=checks,
         film=scan.film,
         indenter=scan.indenter,
-        sensor=scan.sensor,
+        sensor=_sensor(solution),
         load=scan.load,
         reference=reference,
         process=Process(
@@ -72,6 +74,12 @@ def assemble(
         ),
         budget=results.budget,
     )
+
+
+def _sensor(solution: Solution) -> StressSensor:
+    """The sensor, by the channel that was calibrated: a scan's own is the normal one."""
+    channel, sensor = solution.estimate.points.channel, solution.scan.sensor
+    return sensor if channel == "zz" else replace(sensor, channel=channel)
 
 
 def _further_scans(solution: Solution) -> dict[str, Any]:

@@ -121,7 +121,9 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
         # A square of this half width lies within the raster's longer side.
         support = float(np.abs(points.x - estimate.centre[0]).max())
     reference = np.abs(estimate.model.reference.values)
-    closed = reference < 0.1 * NOISE_RATIO * band.weakest_reference
+    # A shear's transform vanishes at k = 0, too: only what lies beyond its largest counts.
+    beyond = np.arange(reference.size) > np.argmax(reference)
+    closed = beyond & (reference < 0.1 * NOISE_RATIO * band.weakest_reference)
     last = float(band.k[int(np.argmax(closed))] if closed.any() else band.k[-1])
     width = max(estimate.gaussian.sigma, 0.5 * points.step)
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
@@ -160,7 +162,7 @@ def taper(radius: FloatArray, support: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class LineFields:
-    """Both profiles, lifted to a quarter plane."""
+    """Both profiles, lifted to a quarter plane; of a vector field its potential."""
 
     grid: EvenGrid
     voltage: FloatArray
@@ -175,8 +177,9 @@ class LineFields:
         grid = EvenGrid(cells + 1, choice.spacing)
         step = choice.spacing / 2
         # Both at once: they share the Bessel functions of their transforms.
-        spectra = np.stack([estimate.spectrum.values, estimate.model.reference.values], axis=1)
-        wavenumbers = estimate.model.reference.wavenumbers
+        known = estimate.model.reference
+        spectra = np.stack([estimate.spectrum.scalar.values, known.scalar.values], axis=1)
+        wavenumbers = known.wavenumbers
         both = lift(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, reference = np.ascontiguousarray(np.moveaxis(both, -1, 0))
         support = round(choice.support / choice.spacing)

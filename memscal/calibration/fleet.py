@@ -110,7 +110,7 @@ def calibrate_many(
             cure="Give a list of scans; calibrate one with memscal.calibrate(scan).",
         )
     method, seed = options.get("method", "white-noise"), options.get("seed", 0)
-    known = ("reference", "alternative", "method", "correlations", "seed")
+    known = ("reference", "alternative", "channel", "method", "correlations", "seed")
     chosen_method(method, seed, {name: v for name, v in options.items() if name not in known})
     task = partial(_calibrated, options=options)
     items = list(enumerate(scans))

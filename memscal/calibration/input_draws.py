@@ -134,7 +134,8 @@ class ReferenceTable:
                 poisson_ratio=changed.get("poisson_ratio", scan.film.poisson_ratio),
             )
             rod = replace(scan.indenter, radius=changed.get("rod_radius", scan.indenter.radius))
-            return indent(film, rod, load=scan.load).base_spectrum(k)
+            contact = indent(film, rod, load=scan.load)
+            return contact.base_shear_spectrum(k) if reference.order else contact.base_spectrum(k)
 
         scale = reference.values / transform([each.value for each in inputs])
         grid = product(*(each.nodes.tolist() for each in inputs))

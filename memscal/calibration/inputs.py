@@ -15,7 +15,11 @@ import numpy as np
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.errors import InputError
 from memscal.estimation.profile_estimate import ProfileEstimate
-from memscal.estimation.reference import film_sensitivities, rod_sensitivities
+from memscal.estimation.reference import (
+    carried_force,
+    film_sensitivities,
+    rod_sensitivities,
+)
 from memscal.mechanics.contact import Contact
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -77,7 +81,10 @@ def input_effects(
                 blank = [np.zeros_like(change) for _ in scans]
                 changes.setdefault(source + suffix, blank)[i] = change
     for i, stress in enumerate(stresses):
-        if isinstance(stress, StressProfile) and stress.sigma_zz_errors is not None:
+        # What is stated of the normal stress says nothing of the shear.
+        if model.order or not isinstance(stress, StressProfile):
+            continue
+        if stress.sigma_zz_errors is not None:
             errors = hankel_transform(stress.r, stress.sigma_zz_errors, model.k) / stress.load
             blank = [np.zeros_like(errors) for _ in scans]
             changes.setdefault("reference_stress", blank)[i] = errors
@@ -90,7 +97,7 @@ def input_effects(
 
 def _of_reference(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> InputEffect:
     spectra = (
-        RadialSpectrum(reference.wavenumbers, change)
+        replace(reference, values=change)
         for reference, change in zip(estimate.model.references, changes, strict=True)
     )
     changed = replace(estimate.model, references=tuple(spectra))
@@ -113,7 +120,10 @@ def _of_loads(
     model = estimate.model
     signal = estimate.predicted - estimate.background
     shares: dict[str, Sequence[float | None]] = {
-        "reference_force": [abs(reference.integral - 1.0) for reference in model.references],
+        "reference_force": [
+            abs(carried_force(stress, reference) - 1.0)
+            for stress, reference in zip(stresses, model.references, strict=True)
+        ],
         "load": [
             None if scan.load_uncertainty is None else scan.load_uncertainty / scan.load
             for scan in scans

@@ -27,6 +27,7 @@ def calibration_messages(solution: Solution, checks: tuple[QualityCheck, ...]) -
         for check in checks
         if not check.passed
     ]
+    messages += _channel(estimate)
     messages += _points(estimate)
     messages += _method(solution)
     messages += _reference(solution)
@@ -34,6 +35,18 @@ def calibration_messages(solution: Solution, checks: tuple[QualityCheck, ...]) -
     if scan.synthetic is not None:
         messages.append("The scan is synthetic: its truth is stored in it.")
     return tuple(messages)
+
+
+def _channel(estimate: ProfileEstimate) -> list[str]:
+    channel = estimate.points.channel
+    if estimate.model.order == 0:
+        return []
+    text = (
+        f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
+        "those of the shear at the base; the voltage is positive where the film pulls the sensor "
+        f"towards larger {channel[0]}."
+    )
+    return [text]
 
 
 def _points(estimate: ProfileEstimate) -> list[str]:
@@ -53,9 +66,9 @@ def _points(estimate: ProfileEstimate) -> list[str]:
         )
     if points.u_errors is None:
         messages.append(
-            f"u_zz_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV was estimated "
-            "from the scan's scatter, so that chi-square cannot tell noise from misfit of the same "
-            "size, and has no p-value."
+            f"u_{points.channel}_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV "
+            "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
+            "misfit of the same size, and has no p-value."
         )
     return messages
 

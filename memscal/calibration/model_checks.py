@@ -70,7 +70,8 @@ def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
             "noise_as_stated",
             estimate.weighed.noise,
             _NOISE_LIMIT,
-            "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
+            f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. "
+            "A failure means that "
             "something besides electronic noise scatters the scan, such as position or load; the "
             "uncertainties have been raised accordingly.",
         )
@@ -150,6 +151,13 @@ def _symmetry(estimate: ProfileEstimate) -> list[QualityCheck]:
         )
         return [_added("axisymmetry", uneven, meaning)]
     odd = symmetry_test(estimate)
+    if estimate.model.order:
+        meaning = (
+            f"Fall of chi-square by {odd.count} even columns, which then make up {odd.size:.2%} of "
+            "the largest signal. A failure means that the left and right halves differ by more "
+            "than their sign: cross-talk of the normal stress, a tilted rod, or an uneven film."
+        )
+        return [_added("symmetry", odd, meaning)]
     meaning = (
         f"Fall of chi-square by {odd.count} odd columns, which then make up {odd.size:.2%} of the "
         "largest signal. A failure means that the left and right halves differ: a tilted rod, an "

@@ -90,6 +90,7 @@ def calibrate(
     *,
     reference: Reference | Sequence[Reference] = None,
     alternative: Reference | Sequence[Reference] = None,
+    channel: str = "zz",
     method: str | Regulariser = "white-noise",
     correlations: Mapping[tuple[str, str], float] | None = None,
     seed: int = 0,
@@ -98,7 +99,8 @@ def calibrate(
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
 
     Solves :math:`U_{zz} = A\,G \otimes \sigma_{zz}` (the paper's Eq. 1) for the conversion
-    constant A and the apparatus function G of unit integral.
+    constant A and the apparatus function G of unit integral.  A tangential channel, experimental,
+    is solved with the shear at the base: :math:`U_{xz} = A\,G \otimes \tau\cos\theta`.
 
     Parameters
     ----------
@@ -112,6 +114,9 @@ def calibrate(
     alternative : StressProfile, Contact or path, optional
         The same by another model of the film, such as finite strain.  Its difference from the
         reference is counted as an uncertainty of the model's form, ``model_form``, rectangular.
+    channel : str, default "zz"
+        ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
+        by method ``"evidence"``; see docs/tangential.md.
     method : str or Regulariser, default "white-noise"
         How the fields are divided; see :func:`memscal.deconvolution.registry.regulariser_names`.
         ``"evidence"`` divides none: it takes G from the scan's points, and is the most accurate.
@@ -148,13 +153,15 @@ def calibrate(
     given = _each(reference, scans)
     stresses = [reference_profile(s, r) for s, r in zip(scans, given, strict=True)]
     regulariser = chosen_method(method, seed, options)
-    solution = solve(scans, stresses, regulariser)
+    solution = solve(scans, stresses, regulariser, channel)
     others = None if alternative is None else _each(alternative, scans)
     effects = _effects(solution, others)
     results = _uncertainties(solution, effects, correlations or {})
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)
     configuration = {"method": regulariser.name, "seed": seed, **_settings(regulariser)}
+    if channel != "zz":
+        configuration["channel"] = channel
     if correlations:
         configuration["correlations"] = {" ".join(pair): c for pair, c in correlations.items()}
     apparatus = assemble(solution, results, checks, messages, configuration)

@@ -18,7 +18,9 @@ from memscal.calibration.fields import (
 from memscal.calibration.normalise import NormalisedKernel, normalise
 from memscal.calibration.raster_fields import RasterFields
 from memscal.deconvolution.problem import Division, Regulariser
+from memscal.errors import InputError
 from memscal.estimation.band import Band, find_band
+from memscal.estimation.channels import channel_order
 from memscal.estimation.points import joined_points, measured_points
 from memscal.estimation.profile_estimate import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectra
@@ -27,7 +29,19 @@ from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
-__all__ = ["Misfit", "Quotient", "Solution", "divide", "prepare_fields", "solve"]
+__all__ = [
+    "Misfit",
+    "Quotient",
+    "Solution",
+    "divide",
+    "prepare_fields",
+    "require_channel_method",
+    "solve",
+]
+
+#: The spectra are resolved out to twice the scan's reach at the least.
+_FAR = 2.0
+_RADII = 2001
 
 
 @dataclass(frozen=True)
@@ -116,9 +130,14 @@ class Solution:
         r"""Share of the voltage's integral beyond the scan's reach.
 
         Within a radius R the integral is
-        :math:`R \int \hat U(k) J_1(kR)\,dk`, from the Hankel transform.
+        :math:`R \int \hat U(k) J_1(kR)\,dk`, from the Hankel transform.  Of a tangential channel
+        it is that of the radial component's modulus, of which it is summed over radii.
         """
         spectrum, reach = self.estimate.spectrum, self.choice.support
+        if spectrum.order:
+            r = np.linspace(0.0, _FAR * reach, _RADII)
+            flux = np.abs(spectrum.at(r)) * r
+            return float(flux[r > reach].sum() / flux.sum())
         k = spectrum.wavenumbers.k
         dk = 2 * np.pi * spectrum.wavenumbers.weights / k
         inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
@@ -126,10 +145,14 @@ class Solution:
 
 
 def solve(
-    scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], regulariser: Regulariser
+    scans: Sequence[Scan],
+    stresses: Sequence[StressProfile | Contact],
+    regulariser: Regulariser,
+    channel: str = "zz",
 ) -> Solution:
     """Go through the paper's steps: profile, lift, transform, divide, normalise, reconvolve."""
-    parts = [measured_points(scan) for scan in scans]
+    require_channel_method(channel, regulariser)
+    parts = [measured_points(scan, channel) for scan in scans]
     thicknesses = [scan.film.thickness for scan in scans]
     references = reference_spectra(stresses, parts, thicknesses)
     estimate = estimate_profile(joined_points(parts), *references)
@@ -149,6 +172,23 @@ def solve(
     )
 
 
+def require_channel_method(channel: str, regulariser: Regulariser) -> None:
+    """Refuse to divide the fields of a tangential channel.
+
+    Raises
+    ------
+    InputError
+        If the method is not evidence, or there is no such channel.
+    """
+    if channel_order(channel) and regulariser.name != "evidence":
+        raise InputError(
+            f"Channel {channel} cannot be calibrated by method {regulariser.name}.",
+            why="It divides fields, and the transform of a shear is zero along a line and at "
+            "k = 0, where A is read off.",
+            cure='Use method="evidence" (--method evidence), which divides none.',
+        )
+
+
 def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
     """Lift the profile of lines or of several scans, or place a raster as it was measured."""
     if estimate.points.as_raster:
@@ -160,6 +200,7 @@ def divide(
     estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
 ) -> Quotient:
     """Divide the fields, normalise the quotient, and convolve it back."""
+    require_channel_method(estimate.points.channel, regulariser)
     raw = regulariser.divide(division_problem(estimate, band, fields))
     division = Division(raw.field * fields.confinement, raw.window, raw.profile)
     view = fields.view(division.field, division.profile)

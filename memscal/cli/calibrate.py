@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from memscal.cli.calibration_outputs import Outputs
-from memscal.cli.calibration_setup import chosen_method, correlation
+from memscal.cli.calibration_setup import artifact_beside, chosen_method, correlation
 from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
 from memscal.cli.options import FILE, force_option, json_option
 from memscal.cli.output import emit_json, message, note, warn
 from memscal.cli.progress import working
-from memscal.cli.targets import FigurePath, beside, prove_writable
+from memscal.cli.targets import FigurePath, prove_writable
 
 if TYPE_CHECKING:
     from memscal.calibration.monte_carlo import MonteCarlo
@@ -30,10 +30,10 @@ EXAMPLES = """\b
 Examples:
   memscal calibrate scan.h5
   memscal calibrate scan.h5 -o sensor.apparatus.h5 --figure scan.png --report scan.html
-  memscal calibrate scan.h5 --reference fem.h5 --json
+  memscal calibrate scan.h5 --reference fem.h5 --json --sweep
   memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
-  memscal calibrate scan.h5 --sweep --sweep-figure sweep.pdf
   memscal calibrate scan.h5 --method evidence --monte-carlo 1000
+  memscal calibrate scan.h5 --channel xz
 """
 
 
@@ -71,19 +71,24 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "correlations",
     multiple=True,
     metavar="INPUT,INPUT=R",
-    help="Correlation coefficient, from -1 to 1, of the errors of two inputs, such as "
-    "thickness,poisson_ratio=0.5. May be repeated.",
+    help="Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable.",
+)
+@click.option(
+    "--channel",
+    type=click.Choice(("zz", "xz", "yz")),
+    default="zz",
+    show_default=True,
+    help="Which voltage is calibrated. xz, yz: the shear, experimental, by method evidence, to "
+    "SCAN.xz.apparatus.h5.",
 )
 @click.option(
     "--method",
-    default="white-noise",
-    show_default=True,
     metavar="NAME",
     shell_complete=_complete_method,
     help="How G is found: evidence (from the scan's points, the most accurate), or by a division "
     "of fields: white-noise (its exact expectation), white-noise-draw (one "
     "seeded draw, as published), tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a "
-    "plug-in's.",
+    "plug-in's.  [default: white-noise]",
 )
 @click.option(
     "--option",
@@ -139,7 +144,8 @@ def command(
     reference: Path | None,
     alternative: Path | None,
     correlations: tuple[str, ...],
-    method: str,
+    channel: str,
+    method: str | None,
     options: tuple[str, ...],
     seed: int | None,
     as_json: bool,
@@ -162,15 +168,16 @@ def command(
 
     A failed quality check is exit code 1: the artifact is written and says so.
     """
-    outputs = Outputs(output or beside(scans[0], ".apparatus.h5"), report, figures, sweep_figure)
-    regulariser = chosen_method(method, options, seed)
+    output = output or artifact_beside(scans[0], channel)
+    outputs = Outputs(output, report, figures, sweep_figure)
+    regulariser = chosen_method(method, options, seed, channel)
     correlated = dict(correlation(text) for text in correlations)
     data, profile = _read(scans, reference)
     other = None if alternative is None else _read_reference(alternative)
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     prove_writable(outputs.paths, force=force, inputs=inputs)
     if dry_run:
-        _rehearse(data, profile, regulariser, outputs, as_json)
+        _rehearse(data, profile, channel, regulariser, outputs, as_json)
         return DONE
 
     from memscal.calibration.procedure import calibrate
@@ -180,6 +187,7 @@ def command(
             data,
             reference=profile,
             alternative=other,
+            channel=channel,
             method=regulariser,
             correlations=correlated,
             seed=seed or 0,
@@ -228,11 +236,13 @@ def _read_reference(path: Path) -> StressProfile:
 def _rehearse(
     scans: list[Scan],
     profile: StressProfile | None,
+    channel: str,
     regulariser: Regulariser,
     outputs: Outputs,
     as_json: bool,
 ) -> None:
     """Go as far as the calibration goes before it computes, and say what it would do."""
+    from memscal.calibration.solution import require_channel_method
     from memscal.cli.calibration_view import rehearsal_json, rehearsal_table
     from memscal.cli.tables import emit_tables
     from memscal.estimation.points import joined_points, measured_points
@@ -243,7 +253,8 @@ def _rehearse(
     )
 
     require_one_sensor(scans)
-    parts = [measured_points(scan) for scan in scans]
+    require_channel_method(channel, regulariser)
+    parts = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
     reference_spectra(stresses, parts, [scan.film.thickness for scan in scans])
     points = joined_points(parts)

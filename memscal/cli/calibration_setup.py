@@ -4,23 +4,33 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from memscal.cli.output import note
+from memscal.cli.targets import beside
 
 if TYPE_CHECKING:
     from memscal.deconvolution.problem import Regulariser
 
-__all__ = ["chosen_method", "correlation"]
+__all__ = ["artifact_beside", "chosen_method", "correlation"]
 
 
-def chosen_method(method: str, options: tuple[str, ...], seed: int | None) -> Regulariser:
-    """Set up the method; a wrong name or option is a matter of usage."""
+def artifact_beside(scan: Path, channel: str) -> Path:
+    """Name the artifact of one of a scan's channels."""
+    return beside(scan, ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5")
+
+
+def chosen_method(
+    method: str | None, options: tuple[str, ...], seed: int | None, channel: str = "zz"
+) -> Regulariser:
+    """Set up the method, or a channel's usual one; a wrong name or option is a matter of usage."""
     from memscal.deconvolution.registry import create_regulariser
     from memscal.errors import InputError
 
+    method = method or ("white-noise" if channel == "zz" else "evidence")
     given = dict(_option(text) for text in options)
     if "seed" in given:
         raise click.UsageError("Give the seed as --seed, not as --option.")

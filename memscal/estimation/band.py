@@ -13,9 +13,9 @@ wavenumbers says more about G than the scan does.
 
 Which components are relevant to a division of fields is told by the voltage itself.  The measured
 points are rings: the transform of the voltage at :math:`k` is a sum
-:math:`\sum_i a_i u_i J_0(kR_i)` with ring areas :math:`a_i`, and its noise is the same sum in
-quadrature.  Points whose signal is lost in noise carry the profile's tail instead, and count
-as :math:`u_i^2/(u_i^2 + s_i^2)`.
+:math:`\sum_i a_i u_i J_0(kR_i)` with ring areas :math:`a_i` (of a tangential channel with
+:math:`J_1`), and its noise is the same sum in quadrature.  Points whose signal is lost in noise
+carry the profile's tail instead, and count as :math:`u_i^2/(u_i^2 + s_i^2)`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import j0
+from scipy.special import j0, j1
 
 from memscal.estimation.forward import gaussian_transfer
 from memscal.estimation.profile_estimate import ProfileEstimate
@@ -123,7 +123,8 @@ def _ring_noise(estimate: ProfileEstimate, k: FloatArray) -> FloatArray:
     share = signal**2 / (signal**2 + noise**2) * estimate.outlier_weight
     area = _ring_areas(radius, tolerance=0.25 * points.step)
     weighted = area * share * noise
-    return np.asarray(np.sqrt(j0(np.multiply.outer(k, radius)) ** 2 @ weighted**2))
+    bessel = j1 if estimate.model.order else j0
+    return np.asarray(np.sqrt(bessel(np.multiply.outer(k, radius)) ** 2 @ weighted**2))
 
 
 def _ring_areas(radius: FloatArray, tolerance: float) -> FloatArray:

@@ -6,6 +6,15 @@ the sensor's centre and per newton,
 .. math::
 
     (K \otimes \sigma_{zz})(R) = \frac{1}{2\pi}\int \hat K(k)\,\hat\sigma(k)\,J_0(kR)\,k\,dk.
+
+With a tangential channel it is one component of a radial vector field, of order one: for the base
+shear :math:`\tau(r)\,\hat r` and the angle :math:`\theta` between the component and the way from
+the sensor to the indenter,
+
+.. math::
+
+    (K \otimes \tau\,\hat r)_x = \cos\theta\,\frac{1}{2\pi}\int
+    \hat K(k)\,\hat\tau(k)\,J_1(kR)\,k\,dk.
 """
 
 from __future__ import annotations
@@ -18,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.estimation.channels import channel_axis
 from memscal.estimation.points import ScanPoints
 from memscal.model.validation import FloatArray
 
@@ -68,7 +78,8 @@ class ForwardModel:
     points : ScanPoints
         Where and at what load, in one scan or several.
     references : tuple of RadialSpectrum
-        Transform of the base stress per newton, dimensionless, for each scan; on the same nodes.
+        Transform of the base stress per newton, dimensionless, for each scan; on the same nodes,
+        and of the order of the points' channel.
     """
 
     points: ScanPoints
@@ -82,6 +93,16 @@ class ForwardModel:
     def only(self, scan: int) -> ForwardModel:
         """Return the model of one of the scans."""
         return ForwardModel(self.points.only(scan), (self.references[scan],))
+
+    @property
+    def order(self) -> int:
+        """Zero for the normal channel; one for a tangential one, a component of a vector."""
+        return self.reference.order
+
+    @property
+    def axis(self) -> int:
+        """Which component a tangential channel measures: 0 for x, 1 for y."""
+        return channel_axis(self.points.channel)
 
     @property
     def k(self) -> FloatArray:
@@ -116,29 +137,74 @@ class ForwardModel:
         towards = -np.stack([dx, dy]) / safe
         return Geometry(radius, towards, j0(argument)[back], j1(argument)[back])
 
+    def cosines(self, centres: FloatArray) -> FloatArray:
+        """Cosines between a channel's component and the points, for trial centres (m, 2)."""
+        across = [self.points.x - centres[:, :1], self.points.y - centres[:, 1:]]
+        radius = np.hypot(*across)
+        return np.asarray(across[self.axis] / np.where(radius > 0, radius, 1.0))
+
+    def synthesis(self, geometry: Geometry) -> FloatArray:
+        """Voltages of single wavenumbers, shape (n, nodes): Bessel functions and their parity."""
+        if self.order == 0:
+            return geometry.bessel0
+        return np.asarray(-geometry.towards[self.axis][:, None] * geometry.bessel1)
+
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
         per_newton = np.empty((geometry.radius.size, *kernel.shape[1:]))
+        synthesis = self.synthesis(geometry)
         for rows, measure in self._measures:
             spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
-            per_newton[rows] = geometry.bessel0[rows] @ spread
+            per_newton[rows] = synthesis[rows] @ spread
         return self._times_load(per_newton)
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
-        slope = np.empty_like(geometry.radius)
-        for rows, measure in self._measures:
-            slope[rows] = -(geometry.bessel1[rows] @ (measure * self.k * kernel))
-        return self._times_load(slope)
+        if self.order:
+            slope, _ = self._vector_slopes(geometry, kernel)
+            return np.asarray(-geometry.towards[self.axis] * slope)
+        return self._times_load(-self._summed(geometry.bessel1, kernel))
+
+    def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
+        r"""Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m.
+
+        A vector's component :math:`f\cos\theta` turns as well as it changes: by
+        :math:`f/R` across the way to the indenter.
+        """
+        if self.order == 0:
+            return np.asarray(geometry.towards * self.radial_derivative(geometry, kernel))
+        slope, turn = self._vector_slopes(geometry, kernel)
+        shift = geometry.towards[self.axis] * geometry.towards * (turn - slope)
+        shift[self.axis] -= turn
+        return np.asarray(shift)
 
     def centre_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by the free coordinates of all centres, shape (n, m)."""
-        slope = self.radial_derivative(geometry, kernel)
+        shift = self.shift_derivative(geometry, kernel)
         columns = [
-            np.where(self.points.scan == i, geometry.towards[axis] * slope, 0.0)
+            np.where(self.points.scan == i, shift[axis], 0.0)
             for i, axis in np.argwhere(self.points.free)
         ]
         return np.stack(columns, axis=1)
+
+    def _vector_slopes(
+        self, geometry: Geometry, kernel: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""
+        x = np.multiply.outer(geometry.radius, self.k)
+        turn = np.divide(geometry.bessel1, x, out=np.full_like(x, 0.5), where=x > 0)
+        bent, turned = (
+            self._times_load(self._summed(matrix, kernel))
+            for matrix in (geometry.bessel0 - turn, turn)
+        )
+        return bent, turned
+
+    def _summed(self, matrix: FloatArray, kernel: FloatArray) -> FloatArray:
+        """Sum k times a kernel over the quadrature, by every scan's own reference."""
+        per_newton = np.empty(len(matrix))
+        for rows, measure in self._measures:
+            per_newton[rows] = matrix[rows] @ (measure * self.k * kernel)
+        return per_newton
 
     @property
     def _measures(self) -> list[tuple[slice | NDArray[np.bool_], FloatArray]]:

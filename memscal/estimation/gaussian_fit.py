@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 
-from memscal.errors import FitError
 from memscal.estimation.ellipse import elliptic_columns
 from memscal.estimation.forward import ForwardModel, Geometry, gaussian_transfer
 from memscal.estimation.newton import gauss_newton
 from memscal.estimation.points import ScanPoints
+from memscal.estimation.starting import robust_start, smoothing_length, undetermined
 from memscal.model.validation import FloatArray
 
 __all__ = ["GaussianFit", "fit_gaussian", "linearise"]
@@ -25,8 +25,6 @@ _Loss = Literal["linear", "soft_l1"]
 
 #: A step in the ellipticity that the solver takes for one.
 _TYPICAL_ELLIPTICITY = 0.2
-#: Widths from which the search starts, in units of the film's smoothing length.
-_STARTING_WIDTHS = (0.1, 0.3, 0.8)
 #: Standardised residual from which on the robust fit's loss grows linearly.
 _KNEE = 3.0
 #: A width below this share of its typical size is left to a search with a trust region.
@@ -104,7 +102,7 @@ def fit_gaussian(
         If the scan does not determine the parameters.
     """
     if start is None:
-        return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
+        return _solve(model, weights, robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
     shape = [start.conversion_constant, start.sigma]
     ellipse = start.ellipticity[: model.points.ellipse]
@@ -158,17 +156,17 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
             max_nfev=100,
         )
         if not result.success:
-            raise _undetermined(model, linearise(model, result.x * scale))
+            raise undetermined(model, linearise(model, result.x * scale).conversion_constant)
         found = np.asarray(result.x)
     fit = linearise(model, found * scale)
     if not 0 < fit.conversion_constant < np.inf:
-        raise _undetermined(model, fit)
+        raise undetermined(model, fit.conversion_constant)
     return _positive_width(fit)
 
 
 def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     """Typical size of each parameter, so that the solver sees numbers near one."""
-    width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
+    width = max(abs(theta[1]), 0.05 * smoothing_length(model))
     amplitude = np.ptp(model.points.u)
     centres = int(model.points.free.sum())
     ellipse = np.full(model.points.ellipse, _TYPICAL_ELLIPTICITY)
@@ -221,96 +219,7 @@ def _positive_width(fit: GaussianFit) -> GaussianFit:
     return replace(fit, sigma=-fit.sigma, jacobian=jacobian)
 
 
-def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Start each scan by itself, and A and the width at the medians of all."""
-    points = model.points
-    parts = [
-        _robust_start_of_one(model.only(i), weights[points.scan == i]) for i in range(points.scans)
-    ]
-    shape = np.median([part[:2] for part in parts], axis=0)
-    free = points.free.sum(axis=1)
-    centres = [part[2 : 2 + n] for part, n in zip(parts, free, strict=True)]
-    drifts = [part[2 + n : 3 + 2 * n] for part, n in zip(parts, free, strict=True)]
-    return np.concatenate([shape, *centres, *drifts, np.zeros(points.ellipse)])
-
-
-def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Best of a grid of centres and widths, by the sum of absolute residuals.
-
-    A single outlier can be the largest voltage of a scan: positions are tried, not read off.
-    """
-    points = model.points
-    centres = _trial_centres(model)
-    distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
-    radii = np.linspace(0.0, 2 * np.ptp(points.x) + 2 * np.ptp(points.y), 400)
-    widths = _smoothing_length(model) * np.array(_STARTING_WIDTHS)
-    kernels = np.stack([gaussian_transfer(model.k, float(width)) for width in widths])
-    # Profiles per newton of every width, on a table for quick trials.
-    spectra = (model.reference.values * kernels).T
-    tables = model.reference.wavenumbers.synthesise(spectra, radii).T
-    root = np.sqrt(weights)
-    data, drift = root * points.u, root[:, None] * model.drift_columns
-    best, best_cost = np.zeros(0), np.inf
-    for sigma, table in zip(widths, tables, strict=True):
-        shapes = np.interp(distances, radii, table) * (points.load * root)
-        amplitudes, costs = _amplitudes(shapes, data, drift)
-        i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
-        if amplitudes[i] > 0 and costs[i] < best_cost:
-            left = data - amplitudes[i] * shapes[i]
-            baseline = np.linalg.lstsq(drift, left, rcond=None)[0]
-            best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
-            best_cost = float(costs[i])
-    if not best.size:
-        raise _undetermined(model, None)
-    return best
-
-
-def _amplitudes(
-    shapes: FloatArray, data: FloatArray, drift: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Fit each row of shapes beside the drift: its amplitude, the sum of absolute residuals."""
-    base = np.linalg.qr(drift)[0]
-    free = shapes - (shapes @ base) @ base.T
-    rest = data - base @ (base.T @ data)
-    square = np.sum(free**2, axis=1)
-    amplitudes = np.divide(free @ rest, square, out=np.zeros_like(square), where=square > 0)
-    return amplitudes, np.abs(rest - amplitudes[:, None] * free).sum(axis=1)
-
-
-def _trial_centres(model: ForwardModel) -> FloatArray:
-    """At most 40 candidates per axis: the positions themselves, less the outer tenth."""
-    points = model.points
-
-    def inner(positions: FloatArray) -> FloatArray:
-        unique = np.unique(positions)
-        margin = unique.size // 10
-        kept = unique[margin : unique.size - margin]
-        return kept[:: int(np.ceil(kept.size / (12 if points.planar else 40)))]
-
-    along = [
-        inner(positions) if free else np.zeros(1)
-        for free, positions in zip(points.free[0], (points.x, points.y), strict=True)
-    ]
-    mesh = np.meshgrid(*along)
-    return np.stack([axis.ravel() for axis in mesh], axis=1)
-
-
-def _smoothing_length(model: ForwardModel) -> float:
-    r"""Length over which the film blurs: :math:`1/k` where the reference has fallen to half."""
-    values = model.reference.values / model.reference.values[0]
-    return float(1 / model.k[int(np.argmax(values < 0.5))])
-
-
 def _robust_scale(residual: FloatArray) -> float:
     """Median absolute deviation as a standard deviation, never zero."""
     scale = 1.4826 * float(np.median(np.abs(residual)))
     return max(scale, 1e-12 * float(np.abs(residual).max()), np.finfo(float).tiny)
-
-
-def _undetermined(model: ForwardModel, fit: GaussianFit | None) -> FitError:
-    found = "" if fit is None else f" (it stopped at A = {fit.conversion_constant:.3g} V/Pa)"
-    return FitError(
-        f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{found}.",
-        why="The voltage does not rise and fall with the distance from one centre.",
-        cure="Look at the scan; check its channel, its positions and that it crosses the sensor.",
-    )

@@ -87,7 +87,7 @@ def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Compare the left and right halves of a line scan.
 
     Is anything odd left over?  The columns are odd in the distance from the centre, at three
-    widths of the profile.
+    widths of the profile.  A tangential channel's own signal is odd, and the columns are even.
     """
     points = estimate.points
     dx, dy = estimate.offset

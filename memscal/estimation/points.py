@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
+from memscal.estimation.channels import channel_order, channel_signal
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
@@ -28,7 +29,7 @@ class ScanPoints:
     x, y : ndarray, shape (n,)
         Position of the indenter, in m; zero across a line scan.
     u : ndarray, shape (n,)
-        Voltage, in V.
+        Voltage of the channel, in V.
     load : ndarray, shape (n,)
         Load, in N.
     u_errors : ndarray, shape (n,), or None
@@ -45,6 +46,8 @@ class ScanPoints:
         How many points were missing.
     decorrelation : ndarray, shape (n, n), or None
         Takes noise of unit variance and the stated correlation to independent noise.
+    channel : str
+        ``"zz"``, or a tangential channel: ``"xz"`` or ``"yz"``.
     """
 
     x: FloatArray
@@ -58,6 +61,12 @@ class ScanPoints:
     free: NDArray[np.bool_]
     missing: int
     decorrelation: FloatArray | None = None
+    channel: str = "zz"
+
+    @property
+    def order(self) -> int:
+        """Order of the channel's transforms: one where it measures a vector's component."""
+        return channel_order(self.channel)
 
     @property
     def scans(self) -> int:
@@ -77,6 +86,8 @@ class ScanPoints:
     @property
     def ellipse(self) -> int:
         """How many numbers of an ellipse the points tell: crossed lines do not see diagonals."""
+        if self.order:
+            return 0
         return 2 if self.planar else int(self.free.any(axis=0).all())
 
     @cached_property
@@ -124,27 +135,33 @@ class ScanPoints:
         return scaled if self.decorrelation is None else self.decorrelation @ scaled
 
 
-def measured_points(scan: Scan) -> ScanPoints:
-    """Flatten a scan to its measured points.
+def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
+    """Flatten a scan to the measured points of one channel.
+
+    Parameters
+    ----------
+    scan : Scan
+        What was measured.
+    channel : str
+        ``"zz"``, ``"xz"`` or ``"yz"``.
 
     Raises
     ------
     InputError
         If no point was measured, a load is not positive, or the voltage does not change or
-        has the wrong sign.
+        has the wrong sign; or if the scan cannot calibrate the channel.
     FitError
         If there are fewer positions than parameters.
     """
-    u = scan.u_zz
+    u, errors = channel_signal(scan, channel)
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
     x, y, repeat = _positions(scan)
     keep: NDArray[np.bool_] = np.isfinite(u) & np.isfinite(load)
-    errors = scan.u_zz_errors
     if errors is not None:
         keep &= np.isfinite(errors)
     if not keep.any():
         raise InputError(
-            "Every point of u_zz is missing (NaN).",
+            f"Every point of u_{channel} is missing (NaN).",
             why="There is nothing to calibrate with.",
             cure="Check the voltage column and its import.",
         )
@@ -153,13 +170,14 @@ def measured_points(scan: Scan) -> ScanPoints:
         y=y[keep],
         u=u[keep],
         load=load[keep],
-        u_errors=_stated_errors(errors, keep),
+        u_errors=_stated_errors(errors, keep, channel),
         x_errors=np.zeros(int(keep.sum())) if scan.x_errors is None else _along(scan)[keep],
         repeat=repeat[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.kind == "raster"]]),
         missing=int(u.size - keep.sum()),
-        decorrelation=_decorrelation(scan, keep),
+        decorrelation=None if channel_order(channel) else _decorrelation(scan, keep),
+        channel=channel,
     )
     _require_usable(points)
     return points
@@ -198,6 +216,7 @@ def joined_points(parts: Sequence[ScanPoints]) -> ScanPoints:
         free=np.concatenate([part.free for part in parts]),
         missing=sum(part.missing for part in parts),
         decorrelation=_joined_decorrelation(parts),
+        channel=parts[0].channel,
     )
 
 
@@ -236,14 +255,16 @@ def _positions(scan: Scan) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
     return (across, x, repeat) if scan.direction == "y" else (x, across, repeat)
 
 
-def _stated_errors(errors: FloatArray | None, keep: NDArray[np.bool_]) -> FloatArray | None:
+def _stated_errors(
+    errors: FloatArray | None, keep: NDArray[np.bool_], channel: str
+) -> FloatArray | None:
     if errors is None:
         return None
     if np.any(errors[keep] <= 0):
         raise InputError(
-            "u_zz_errors holds a standard uncertainty of zero.",
+            f"u_{channel}_errors holds a standard uncertainty of zero.",
             why="A point without noise would outweigh every other point.",
-            cure="Give the electronic noise, or leave u_zz_errors out to have it estimated.",
+            cure="Give the electronic noise, or leave it out to have it estimated.",
         )
     return np.asarray(errors[keep])
 
@@ -257,18 +278,24 @@ def _require_usable(points: ScanPoints) -> None:
             why="Conversion constant, width, centre, baseline and noise are estimated from them.",
             cure="Scan more positions.",
         )
-    _require_positive_peak(points)
+    _require_change(points)
+    if points.order == 0:
+        # The parity of a shear is held against the reference, where the search for a fit begins.
+        _require_positive_peak(points)
 
 
-def _require_positive_peak(points: ScanPoints) -> None:
-    """Refuse a voltage that does not rise where the indenter is above the sensor."""
-    u = points.u / points.load
+def _require_change(points: ScanPoints) -> None:
     if np.ptp(points.u) == 0:
         raise InputError(
             f"Every voltage of the scan is {points.u[0]:g} V.",
             why="A calibration needs a voltage that follows the indenter.",
             cure="Check the channel.",
         )
+
+
+def _require_positive_peak(points: ScanPoints) -> None:
+    """Refuse a voltage that does not rise where the indenter is above the sensor."""
+    u = points.u / points.load
     distance = np.hypot(points.x - np.median(points.x), points.y - np.median(points.y))
     baseline = np.median(u[distance >= np.quantile(distance, 0.75)])
     # Three points of a peak outvote single outliers of either sign.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -114,7 +114,7 @@ class ProfileEstimate:
     def spectrum(self) -> RadialSpectrum:
         """Transform of the voltage's radial profile per newton, in V m^2 / N."""
         reference = self.model.reference
-        return RadialSpectrum(reference.wavenumbers, self.kernel * reference.values)
+        return replace(reference, values=self.kernel * reference.values)
 
     @property
     def conversion_constant(self) -> float:
@@ -235,12 +235,10 @@ def _stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0
 def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
     """Voltage noise that uncertain positions make, shape (n,): most of it where U is steep."""
     kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
-    slope = model.radial_derivative(fit.geometry, kernel)
+    slope = model.shift_derivative(fit.geometry, kernel)
     # A raster's positions are uncertain along x; how much of that is radial depends on the place.
-    along = fit.geometry.towards[
-        np.argmax(model.points.free[model.points.scan], axis=1), range(slope.size)
-    ]
-    return np.asarray(slope * along * model.points.x_errors)
+    along = np.argmax(model.points.free[model.points.scan], axis=1), range(model.points.u.size)
+    return np.asarray(slope[along] * model.points.x_errors)
 
 
 def _require_determined(estimate: ProfileEstimate) -> None:

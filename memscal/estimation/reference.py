@@ -21,6 +21,7 @@ from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
 __all__ = [
+    "carried_force",
     "film_sensitivities",
     "reference_contact",
     "reference_profile",
@@ -152,23 +153,30 @@ def reference_spectra(
     Raises
     ------
     InputError
-        If a table ends inside the scan before its stress has decayed, or carries no force.
+        If a table ends inside the scan before its stress has decayed, carries no force, or has no
+        shear where a tangential channel needs it.
     """
+    order = parts[0].order
     spans = [float(np.hypot(np.ptp(part.x), np.ptp(part.y))) for part in parts]
     # Fields are lifted to squares that reach one span from the centre, to their corners.
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / min(thicknesses), 1.5 * max(spans))
     return tuple(
-        RadialSpectrum(wavenumbers, _per_newton(reference, wavenumbers.k, span))
+        RadialSpectrum(wavenumbers, _per_newton(reference, wavenumbers.k, span, order), order)
         for reference, span in zip(references, spans, strict=True)
     )
 
 
-def _per_newton(reference: StressProfile | Contact, k: FloatArray, span: float) -> FloatArray:
+def _per_newton(
+    reference: StressProfile | Contact, k: FloatArray, span: float, order: int
+) -> FloatArray:
     if isinstance(reference, Contact):
-        return _base_spectrum(reference, k.tobytes()) / reference.load
-    _require_coverage(reference, span)
-    values = hankel_transform(reference.r, reference.sigma_zz, k) / reference.load
-    if values[0] <= 0:
+        return _base_spectrum(reference, k.tobytes(), order) / reference.load
+    stress = _shear(reference) if order else reference.sigma_zz
+    _require_coverage(reference, stress, span)
+    values = hankel_transform(reference.r, stress, k, order=order) / reference.load
+    if order:
+        _require_held_back(values)
+    elif values[0] <= 0:
         raise InputError(
             "The stress of the reference adds up to a pull, not a push.",
             why="Normal stress is positive in compression.",
@@ -177,17 +185,50 @@ def _per_newton(reference: StressProfile | Contact, k: FloatArray, span: float) 
     return values
 
 
+def _shear(reference: StressProfile) -> FloatArray:
+    if reference.sigma_rz is None or not reference.sigma_rz.any():
+        raise InputError(
+            "The reference holds no shear (sigma_rz), only the normal stress.",
+            why="A tangential channel is calibrated with the shear at the base of the film.",
+            cure="Give a reference with sigma_rz (memscal import --format reference --shear "
+            "COLUMN), or leave it out to have the rod solved.",
+        )
+    return reference.sigma_rz
+
+
+def _require_held_back(values: FloatArray) -> None:
+    """Refuse a shear of the other sign: most of it, whatever the film, holds the film back."""
+    if values[int(np.argmax(np.abs(values)))] > 0:
+        raise InputError(
+            "The shear of the reference pulls the film outward.",
+            why="sigma_rz is the traction of the base on the film, positive outward: a film that "
+            "is squeezed outward is held back, and it is negative.",
+            cure="Change the sign of sigma_rz in the reference (memscal import --shear-sign -1).",
+        )
+
+
 @lru_cache(maxsize=256)
-def _base_spectrum(contact: Contact, nodes: bytes) -> FloatArray:
+def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
     """Transform of a contact's stress at wavenumbers, kept for scans over the same positions."""
-    found = contact.base_spectrum(np.frombuffer(nodes))
+    k = np.frombuffer(nodes)
+    found = contact.base_shear_spectrum(k) if order else contact.base_spectrum(k)
     found.flags.writeable = False
     return found
 
 
-def _require_coverage(profile: StressProfile, span: float) -> None:
+def carried_force(stress: StressProfile | Contact, reference: RadialSpectrum) -> float:
+    """Force that a reference carries, over the load it was made for: one if it is sound.
+
+    The shear's transform does not tell: there it is that of the normal stress beside it.
+    """
+    if reference.order == 0:
+        return reference.integral
+    return 1.0 if isinstance(stress, Contact) else stress.force / stress.load
+
+
+def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -> None:
     needed = span / 2
-    tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
+    tail = abs(float(stress[-1])) / float(np.abs(stress).max())
     if profile.r[-1] < needed and tail > _DECAYED:
         raise InputError(
             f"The reference ends at r = {profile.r[-1] * 1e3:.4g} mm with {tail:.1%} of its "
@@ -251,7 +292,8 @@ def _difference(
     k = reference.wavenumbers.k
 
     def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
-        return _base_spectrum(reference_contact(film, rod, scan.load), k.tobytes())
+        contact = reference_contact(film, rod, scan.load)
+        return _base_spectrum(contact, k.tobytes(), reference.order)
 
     upper, lower = zip(films or (scan.film,) * 2, rods or (scan.indenter,) * 2, strict=True)
     scale = reference.values / transform(scan.film, scan.indenter)

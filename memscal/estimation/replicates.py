@@ -180,7 +180,8 @@ class ReplicateEstimator:
         """Standardised voltages of kernels through the changes of their references."""
         model = self.estimate.model
         measure = model.reference.wavenumbers.weights
-        per_newton = (kernels * changes * measure) @ self.estimate.gaussian.geometry.bessel0.T
+        synthesis = model.synthesis(self.estimate.gaussian.geometry)
+        per_newton = (kernels * changes * measure) @ synthesis.T
         return self._standardised(per_newton * model.points.load)
 
     def _weighed(self, fits: GaussianFits, less: FloatArray | float) -> Replicates:

@@ -1,0 +1,158 @@
+"""The forward model of a tangential channel, against a 2-D convolution that knows no transform."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shears import CENTRE, shear_scan
+
+import memscal
+from memscal.axisymmetry.kernels import GaussianMixture
+from memscal.errors import InputError
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.points import ScanPoints, measured_points
+from memscal.estimation.reference import carried_force, reference_spectra
+from memscal.model.stress import StressProfile
+from memscal.model.validation import FloatArray
+
+KERNEL = GaussianMixture((1.4, -0.4), (450e-6, 250e-6))
+
+
+def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
+    """Points anywhere on the plane, at a load of 2 N."""
+    n = x.size
+    return ScanPoints(
+        x=x,
+        y=y,
+        u=np.zeros(n),
+        load=np.full(n, 2.0),
+        u_errors=None,
+        x_errors=np.zeros(n),
+        repeat=np.zeros(n, dtype=np.intp),
+        scan=np.zeros(n, dtype=np.intp),
+        free=np.array([[True, True]]),
+        missing=0,
+        channel=channel,
+    )
+
+
+def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
+    scan = memscal.simulate()
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    points = planar_points(x, y, channel)
+    return ForwardModel(points, reference_spectra([contact], [points], [2e-3]))
+
+
+@pytest.mark.parametrize("channel", ["xz", "yz"])
+def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(
+    channel: str,
+) -> None:
+    # The film's traction on every element of the base, weighed by G: in Cartesian coordinates,
+    # with the indenter at (x, y) and the sensor at the centre.
+    contact = memscal.indent(memscal.simulate().film, memscal.simulate().indenter, load=2.0)
+    rng = np.random.default_rng()
+    x, y = rng.uniform(-4e-3, 4e-3, (2, 6))
+    x0, y0 = rng.uniform(-0.5e-3, 0.5e-3, 2)
+    axis = np.linspace(-3e-3, 3e-3, 241)
+    cell = (axis[1] - axis[0]) ** 2
+    sx, sy = np.meshgrid(axis, axis)
+    sensitivity = KERNEL.radial(np.hypot(sx, sy)) * cell
+    table_r = np.linspace(0.0, 15e-3, 3001)
+    table = contact.base_shear(table_r)
+    expected = []
+    for px, py in zip(x, y, strict=True):
+        from_indenter = x0 + sx - px, y0 + sy - py
+        r = np.hypot(*from_indenter)
+        on_film = np.interp(r, table_r, table) / r  # radial traction of the base on the film
+        component = from_indenter[0 if channel == "xz" else 1]
+        expected.append(np.sum(sensitivity * -on_film * component))  # of the film on the base
+    model = model_at(x, y, channel)
+    found = model.signal(model.geometry(np.array([[x0, y0]])), KERNEL.transform(model.k))
+    np.testing.assert_allclose(found, expected, atol=2e-4 * np.abs(contact.base_shear(1e-3)))
+
+
+def test_the_signal_is_odd_along_its_component_and_even_across() -> None:
+    rng = np.random.default_rng()
+    x, y = rng.uniform(-4e-3, 4e-3, (2, 8))
+    signals = []
+    for sx, sy in ((1, 1), (-1, 1), (1, -1)):
+        model = model_at(sx * x, sy * y)
+        signals.append(model.signal(model.geometry(np.zeros((1, 2))), KERNEL.transform(model.k)))
+    np.testing.assert_allclose(signals[1], -signals[0], rtol=1e-9)
+    np.testing.assert_allclose(signals[2], signals[0], rtol=1e-9)
+    on_axis = model_at(np.zeros(3), np.array([-1e-3, 0.0, 2e-3]))
+    geometry = on_axis.geometry(np.zeros((1, 2)))
+    assert np.all(on_axis.signal(geometry, KERNEL.transform(on_axis.k)) == 0)
+
+
+def test_derivatives_by_centre_and_distance_are_those_of_the_signal() -> None:
+    rng = np.random.default_rng()
+    # One point exactly at the centre, where a shear changes fastest.
+    centre = np.array([[0.2e-3, -0.1e-3]])
+    x = np.append(rng.uniform(-4e-3, 4e-3, 7), centre[0, 0])
+    y = np.append(rng.uniform(-4e-3, 4e-3, 7), centre[0, 1])
+    model = model_at(x, y)
+    kernel = KERNEL.transform(model.k)
+
+    def signal(at: FloatArray) -> FloatArray:
+        return model.signal(model.geometry(at), kernel)
+
+    step = 1e-7
+    found = model.centre_derivative(model.geometry(centre), kernel)
+    for axis in range(2):
+        shift = step * np.eye(2)[axis]
+        expected = (signal(centre + shift) - signal(centre - shift)) / (2 * step)
+        np.testing.assert_allclose(found[:, axis], expected, atol=1e-5 * np.abs(found).max())
+    # Away from the centre along the way to it: every distance grows in proportion to itself.
+    slope = model.radial_derivative(model.geometry(centre), kernel) * model.geometry(centre).radius
+    scaled = [
+        replace(model, points=replace(model.points, x=centre[0, 0] + s * (x - centre[0, 0]),
+                                      y=centre[0, 1] + s * (y - centre[0, 1])))
+        for s in (1 + 1e-4, 1 - 1e-4)
+    ]  # fmt: skip
+    wide, narrow = (m.signal(m.geometry(centre), kernel) for m in scaled)
+    np.testing.assert_allclose(slope, (wide - narrow) / 2e-4, atol=1e-5 * np.abs(slope).max())
+
+
+def test_a_tabulated_shear_has_the_transform_of_the_contact_it_is_of() -> None:
+    scan = shear_scan(seed=1)
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    points = [measured_points(scan, "xz")]
+    solved, tabulated = (
+        reference_spectra([reference], points, [2e-3])[0]
+        for reference in (contact, contact.profile())
+    )
+    np.testing.assert_allclose(
+        tabulated.values, solved.values, atol=1e-5 * np.abs(solved.values).max()
+    )
+    assert carried_force(contact.profile(), tabulated) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_reference_without_shear_or_with_the_other_sign_is_refused() -> None:
+    scan = shear_scan(seed=1)
+    profile = memscal.indent(scan.film, scan.indenter, load=1.0).profile()
+    assert profile.sigma_rz is not None
+    points = [measured_points(scan, "xz")]
+
+    def spectra(reference: StressProfile) -> None:
+        reference_spectra([reference], points, [2e-3])
+
+    with pytest.raises(InputError, match="no shear"):
+        spectra(replace(profile, sigma_rz=None))
+    with pytest.raises(InputError, match="outward") as refusal:
+        spectra(replace(profile, sigma_rz=-profile.sigma_rz))
+    assert "--shear-sign -1" in refusal.value.cure
+
+
+def test_the_points_of_a_channel_are_its_own_voltages_and_noise() -> None:
+    scan = shear_scan(seed=2)
+    points = measured_points(scan, "xz")
+    np.testing.assert_array_equal(points.u, scan.channels["u_xz"])
+    assert points.u_errors is not None
+    np.testing.assert_array_equal(points.u_errors, scan.channels["u_xz_errors"])
+    assert (points.order, measured_points(scan).order) == (1, 0)
+    without = replace(scan, channels={"u_xz": scan.channels["u_xz"]})
+    assert measured_points(without, "xz").u_errors is None  # not the noise of u_zz
+    assert abs(CENTRE) < points.x.max()
