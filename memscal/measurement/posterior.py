@@ -27,7 +27,7 @@ from memscal.model.film import ElasticFilm
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
-__all__ = ["Posterior", "reach_of", "restore_posterior", "sensor_transfer"]
+__all__ = ["Posterior", "apparatus_changes", "reach_of", "restore_posterior", "sensor_transfer"]
 
 #: A shape of less probability is left out.
 _NEGLIGIBLE = 1e-4
@@ -123,7 +123,7 @@ def restore_posterior(
     film = film_transfer(scan.film, model.k)
     scale = np.concatenate([scan.load * film, np.ones(mean.size - nodes)])
     changes = {"film": _film_changes(scan.film, model.k)}
-    of_sensor = _apparatus_changes(apparatus, model.k)
+    of_sensor = apparatus_changes(apparatus, model.k)
     shifts = {
         "apparatus": _signals(estimate, mean, of_sensor * film[:, None]),
         "film": _signals(estimate, mean, changes["film"] * transfer[:, None]),
@@ -176,7 +176,7 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
     return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
 
 
-def _apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
+def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     """Independent changes of the transform of A G by one standard uncertainty, shape (k, q)."""
     profile, a = apparatus.radial_profile, apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
