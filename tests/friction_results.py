@@ -24,6 +24,7 @@ LOADS = (0.34, 0.69, 1.37, 2.75)
 #: Maxima without friction, and what full stick adds to them, at those loads (the paper's sphere).
 _MAXIMA = (27.73e3, 44.14e3, 67.93e3, 104.13e3)
 _GAINS = {"incremental": (0.114, 0.159, 0.210, 0.266), "total": (0.158, 0.205, 0.254, 0.306)}
+_GAINS[""] = _GAINS["incremental"]  # of profiles calculated elsewhere
 _LIMIT = 3.84
 _ONE_SIGMA = 1.0
 _COMMON = 0.008  # relative uncertainty of all stresses together
@@ -73,7 +74,7 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
     errors = np.maximum(errors * np.exp(-r / 2e-3), 2e-4 * clean.max())
     top = float(clean.max())
     return SimpleNamespace(
-        part=SimpleNamespace(lubrication=lubrication, load=load),
+        part=SimpleNamespace(lubrication=lubrication, load=load, scan=_scan(lubrication)),
         x=x,
         r=r,
         s_zz=clean + rng.normal(0.0, errors),
@@ -86,7 +87,15 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
     )
 
 
-def load_comparison(profile: Any, loading: str) -> LoadComparison:
+def _scan(lubrication: str) -> Any:
+    return SimpleNamespace(
+        source=SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32),
+        lubrication=lubrication,
+        indenter=SimpleNamespace(shape="sphere", radius=0.1288),
+    )
+
+
+def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> LoadComparison:
     """Compare one profile with the closed form."""
     fine = np.concatenate([np.linspace(0.0, 0.6, 301), np.geomspace(0.62, 30, 40), [math.inf]])
     load, r = profile.load, profile.r
@@ -99,7 +108,7 @@ def load_comparison(profile: Any, loading: str) -> LoadComparison:
     curve = np.array([misfit(mu) for mu in fine])
     maxima = np.array([float(stress(0.0, load, mu, loading)) for mu in fine])
     datum = ((profile.maximum - maxima) / math.hypot(profile.maximum_uncertainty, common)) ** 2
-    calculated = np.array([stress(r, load, mu, loading) for mu in FRICTION])
+    calculated = np.array([stress(r, load, mu, loading) for mu in grid])
     p0 = float(stress(0.0, load, 0.0, loading))
     low, high = calculated[0], calculated[-1]
     between = np.clip(profile.s_zz, np.minimum(low, high), np.maximum(low, high))
@@ -115,9 +124,9 @@ def load_comparison(profile: Any, loading: str) -> LoadComparison:
         ratio_uncertainty=0.012,
         calculated=calculated,
         calculated_errors=_COMMON * calculated,
-        p_max=np.array([float(stress(0.0, load, mu, loading)) for mu in FRICTION]),
-        chi_square=np.array([misfit(mu) for mu in FRICTION]),
-        p_values=np.full(FRICTION.size, 0.2),
+        p_max=np.array([float(stress(0.0, load, mu, loading)) for mu in grid]),
+        chi_square=np.array([misfit(mu) for mu in grid]),
+        p_values=np.full(grid.size, 0.2),
         degrees=29,
         bracketed=float(inside.mean()),
         by_maximum=reading(fine, datum, degrees=0),
@@ -132,6 +141,7 @@ def comparison(
     loadings: Sequence[str] = ("incremental", "total"),
     failed: bool = False,
     macroscopic: tuple[float, float | None] | None = (1.6, 0.2),
+    friction_grid: np.ndarray = FRICTION,
     seed: int = 1,
     **fields: Any,
 ) -> FrictionComparison:
@@ -143,7 +153,7 @@ def comparison(
         for load in LOADS
     ]
     loads = {
-        loading: tuple(load_comparison(profile, loading) for profile in profiles)
+        loading: tuple(load_comparison(profile, loading, friction_grid) for profile in profiles)
         for loading in loadings
     }
     joint = {
@@ -161,14 +171,14 @@ def comparison(
             source=SourceFile("sensor.apparatus.h5", "cd" * 32),
             sensor=SimpleNamespace(name="array 3", model="", channel="zz"),
         ),
-        scans=(),
+        scans=tuple(_scan(lubrication) for lubrication in lubrications),
         checks=(),
         messages=(),
         overridden=(),
     )
     given: dict[str, Any] = {
         "measured": measured,
-        "friction": FRICTION,
+        "friction": friction_grid,
         "loads": loads,
         "joint": joint,
         "dry_against_lubricated": _differences(profiles),

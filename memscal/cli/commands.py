@@ -16,6 +16,7 @@ COMMANDS = {
     "calibrate": ("calibrate", "Find a sensor's apparatus function from a rod scan."),
     "reference": ("reference", "Solve the stress at the base of a film under an indenter."),
     "restore": ("restore", "Restore the stress at the base of a film from a scan."),
+    "compare": ("compare", "Compare measured with calculated stress: effective friction."),
     "design": ("design", "Predict the uncertainties of a scan before it is made."),
     "simulate": ("simulate", "Make a synthetic scan from a known apparatus function."),
     "import": ("import_", "Convert a table (CSV) to a scan or a reference."),

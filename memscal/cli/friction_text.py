@@ -1,0 +1,92 @@
+"""An effective friction coefficient, or a length, in words: with its interval or as a bound."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from memscal.friction.results import Interval
+
+__all__ = ["bounded_text", "friction_name", "percent"]
+
+_DIGITS = 2
+
+
+class Bounded(Protocol):
+    """What has a value within an interval, or only the interval."""
+
+    @property
+    def value(self) -> float | None: ...
+    @property
+    def interval(self) -> Interval: ...
+
+
+def bounded_text(found: Bounded, scale: float = 1.0) -> str:
+    """Return a value with its interval, or the bound that is left of it; never a bare number.
+
+    Bounds are rounded outward, so that what is said is not more than what was found.
+
+    Parameters
+    ----------
+    found : EffectiveFriction or InterfaceLength
+        What was found.
+    scale : float
+        SI units in the unit that is shown.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> def found(value, low, high):
+    ...     return SimpleNamespace(value=value, interval=Interval(low, high))
+    >>> bounded_text(found(0.2134, 0.171, 0.262))
+    '0.21 [0.17, 0.26]'
+    >>> bounded_text(found(None, 0.2433, None))
+    'above 0.24 (95 %)'
+    >>> bounded_text(found(0.0, 0.0, 0.0123))
+    'below 0.013 (95 %)'
+    >>> bounded_text(found(None, 0.0, None))
+    'not identifiable'
+    """
+    low, high = found.interval.low / scale, found.interval.high
+    level = percent(found.interval.level)
+    if high is None:
+        if low <= 0:
+            return "not identifiable"
+        if found.value is None:
+            return f"above {_outward(low, math.floor)} ({level})"
+        return f"{found.value / scale:.2g} [{_outward(low, math.floor)}, ∞]"
+    high /= scale
+    if found.value is None or (found.value <= 0 and low <= 0):
+        bound = f"below {_outward(high, math.ceil)} ({level})"
+        return bound if low <= 0 else f"[{low:.2g}, {high:.2g}] ({level})"
+    return _rounded(found.value / scale, low, high)
+
+
+def _rounded(value: float, low: float, high: float) -> str:
+    """Return a value and its interval: two digits of half the interval if it begins with 1 or 2."""
+    half = (high - low) / 2
+    places = max(0, -math.floor(math.log10(half / 3))) if half > 0 else 3
+    ends = (f"{end:.{places}f}" if end > 0 else "0" for end in (low, high))
+    return f"{value:.{places}f} [{', '.join(ends)}]"
+
+
+def _outward(bound: float, direction: object) -> str:
+    """Round a bound to two digits: down (``math.floor``) or up (``math.ceil``)."""
+    if bound <= 0:
+        return "0"
+    place = _DIGITS - 1 - math.floor(math.log10(bound))
+    round_ = math.floor if direction is math.floor else math.ceil
+    shifted = bound * 10.0**place
+    nearest = round(shifted)
+    digits = nearest if abs(shifted - nearest) < 1e-9 else round_(shifted)
+    return f"{digits * 10.0**-place:.{max(place, 0)}f}"
+
+
+def friction_name(friction: float) -> str:
+    """Return a friction coefficient as it is typed: ``0.15`` or ``inf``."""
+    return "inf" if math.isinf(friction) else f"{friction:.4g}"
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, with the space of ISO 80000: ``95 %``."""
+    return f"{100 * share:.3g} %"

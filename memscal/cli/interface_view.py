@@ -1,0 +1,188 @@
+"""Laws of the interface and their evidence, as tables and as JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from memscal.cli.friction_text import bounded_text, friction_name
+from memscal.cli.output import finite
+from memscal.cli.tables import Table
+from memscal.friction.compliance_results import (
+    InterfaceComparison,
+    InterfaceLaw,
+    InterfaceLength,
+    LawComparison,
+)
+
+__all__ = ["interface_json", "interface_tables"]
+
+_UM = 1e-6
+_MPA_PER_MM = 1e9
+
+
+def _parts(found: InterfaceComparison) -> dict[str, LawComparison]:
+    """Return what was compared, by the direction in which the interface yields."""
+    both = {"tangential": found.tangential, "normal": found.normal}
+    return {name: part for name, part in both.items() if part is not None}
+
+
+def interface_tables(found: InterfaceComparison) -> list[Table]:
+    """Return evidence and lengths, and what a slip length means at each load."""
+    tables = []
+    for direction, part in _parts(found).items():
+        tables.append(_law_table(direction, part))
+        tables.append(_length_table(direction, part))
+        if part.implied is not None:
+            tables.append(_implied_table(part))
+    return tables
+
+
+def _law_table(direction: str, part: LawComparison) -> Table:
+    best = max(law.log_evidence for law in part.laws)
+    title = (
+        f"Laws of the {part.lubrication or 'contact'} interface, {direction}: "
+        "evidence over all loads"
+    )
+    rows = [
+        [
+            law.name,
+            _best(law),
+            f"{law.log_evidence - best:.1f}",
+            f"{law.least / law.degrees:.2f}" if law.degrees > 0 else "",
+            f"{law.p_value:.2g}",
+        ]
+        for law in part.laws
+    ]
+    return Table(title, ["law", "best", "ln of evidence", "χ²/ν", "p"], rows)
+
+
+def _best(law: InterfaceLaw) -> str:
+    """Return the free parameters where the likelihood is largest; a length in m."""
+    return ", ".join(friction_name(float(f"{value:.3g}")) for value in law.best)
+
+
+def _length_table(direction: str, part: LawComparison) -> Table:
+    """Return the length by which the interface yields, and who is favoured."""
+    words = "slip length" if direction == "tangential" else "length of the normal law"
+    rows = [[words, f"{_length(part.length)}"]]
+    rows += [
+        [
+            f"{factor.favoured} against {factor.against}",
+            f"Bayes factor {_factor(factor.value)}: {factor.words}",
+        ]
+        for factor in part.factors
+    ]
+    rows += [
+        [f"under another prior: {prior.prior}", f"ln of the Bayes factor {prior.log_factor:.1f}"]
+        for prior in part.priors
+    ]
+    return Table(f"What yields, {direction}", ("", ""), rows)
+
+
+def _length(length: InterfaceLength) -> str:
+    text = bounded_text(length, _UM)
+    return text if text == "not identifiable" else f"{text} um"
+
+
+def _factor(value: float) -> str:
+    return f"{value:.3g}" if value < 1e6 else f"{value:.1e}"
+
+
+def _implied_table(part: LawComparison) -> Table:
+    implied = part.implied
+    if implied is None:
+        return Table("", ("",), [])
+    rows = []
+    for load, friction, pressure, stiffness in zip(
+        implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True
+    ):
+        low, high = sorted((friction[0], friction[2]))
+        soft, stiff = sorted((stiffness[0], stiffness[2]))
+        rows.append([
+            f"{load:.4g}",
+            _between(friction[1], low, high),
+            f"{pressure / 1e3:.4g}",
+            _between(*(value / _MPA_PER_MM for value in (stiffness[1], soft, stiff))),
+        ])  # fmt: skip
+    head = ["load (N)", "effective coefficient", "mean pressure (kPa)", "stiffness (MPa/mm)"]
+    return Table("What the slip length means at each load [its 95 % interval]", head, rows)
+
+
+def _between(value: float, low: float, high: float) -> str:
+    return f"{_short(value)} [{_short(low)}, {_short(high)}]"
+
+
+def _short(value: float) -> str:
+    return friction_name(float(f"{value:.2g}"))
+
+
+def interface_json(found: InterfaceComparison) -> dict[str, Any]:
+    """Return laws, evidence and lengths as JSON says them."""
+    return {name: _part_json(part) for name, part in _parts(found).items()} | {
+        "warnings": list(found.messages)
+    }
+
+
+def _part_json(part: LawComparison) -> dict[str, Any]:
+    implied = part.implied
+    return {
+        "lubrication": part.lubrication,
+        "loads_n": [finite(load) for load in part.loads],
+        "laws": [_law_json(law) for law in part.laws],
+        "bayes_factors": [
+            {
+                "favoured": factor.favoured,
+                "against": factor.against,
+                "log_factor": finite(factor.log_factor),
+                "words": factor.words,
+            }
+            for factor in part.factors
+        ],
+        "length": _length_json(part.length),
+        "other_priors": [
+            {"prior": prior.prior, "log_factor": finite(prior.log_factor)} for prior in part.priors
+        ],
+        "implied": None
+        if implied is None
+        else [
+            {
+                "load_n": finite(load),
+                "effective_friction_coefficient": [finite(mu) for mu in friction],
+                "mean_pressure_kpa": finite(pressure / 1e3),
+                "stiffness_mpa_per_mm": [finite(k / _MPA_PER_MM) for k in stiffness],
+            }
+            for load, friction, pressure, stiffness in zip(
+                implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True
+            )
+        ],
+    }
+
+
+def _law_json(law: InterfaceLaw) -> dict[str, Any]:
+    return {
+        "name": law.name,
+        "best": [finite(value) for value in law.best],
+        "log_evidence": finite(law.log_evidence),
+        "log_likelihood": finite(law.log_likelihood),
+        "numerical_error": finite(law.numerical_error),
+        "chi2": finite(law.least),
+        "degrees": law.degrees,
+        "p_value": finite(law.p_value),
+    }
+
+
+def _length_json(length: InterfaceLength) -> dict[str, Any]:
+    def um(value: float | None) -> float | None:
+        return None if value is None else finite(value / _UM)
+
+    return {
+        "value": um(length.value),
+        "standard_uncertainty": um(length.standard_uncertainty),
+        "unit": "um",
+        "interval": {
+            "low": um(length.interval.low),
+            "high": um(length.interval.high),
+            "level": length.interval.level,
+        },
+        "reason": length.reason or None,
+    }

@@ -1,0 +1,166 @@
+"""What ``memscal compare`` prints: never a bare number, standard JSON, within 100 columns."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_results import FRICTION, LOADS, comparison
+
+from memscal.cli.compare_json import comparison_json
+from memscal.cli.compare_view import comparison_notes, comparison_tables
+from memscal.cli.friction_text import bounded_text
+from memscal.friction.results import EffectiveFriction, FrictionComparison, Interval
+from memscal.model.provenance import SourceFile
+
+ARTIFACT = SourceFile("sensor.apparatus.h5", "cd" * 32)
+
+
+@pytest.fixture(scope="module")
+def found() -> FrictionComparison:
+    return comparison()
+
+
+@pytest.fixture(scope="module")
+def sticking() -> FrictionComparison:
+    """A comparison whose coefficients have no upper end."""
+    return comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
+
+
+def printed(found: FrictionComparison) -> str:
+    return "\n".join(table.plain() for table in comparison_tables(found) if table.rows)
+
+
+def reading(value: float | None, low: float, high: float | None) -> EffectiveFriction:
+    nothing = np.zeros(1)
+    return EffectiveFriction(
+        value, None, Interval(low, high), "why", {}, nothing, nothing, 1, 0.0, 1.0
+    )
+
+
+def as_json(found: FrictionComparison) -> dict[str, Any]:
+    text = json.dumps(comparison_json(found, ARTIFACT), allow_nan=False)
+    value = json.loads(text)
+    assert isinstance(value, dict)
+    return value
+
+
+@pytest.mark.parametrize(
+    ("found", "text"),
+    [
+        (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
+        (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
+        (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
+        (reading(None, 0.2451, None), "above 0.24 (95 %)"),
+        (reading(None, 12.51, None), "above 12 (95 %)"),
+        (reading(0.0, 0.0, 0.0123), "below 0.013 (95 %)"),
+        (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
+        (reading(None, 0.0, 0.31), "below 0.31 (95 %)"),
+        (reading(None, 0.0, None), "not identifiable"),
+    ],
+)
+def test_a_coefficient_is_written_with_its_interval_or_as_a_bound(
+    found: EffectiveFriction, text: str
+) -> None:
+    assert bounded_text(found) == text
+
+
+@pytest.mark.parametrize("bound", [0.0999, 0.1001, 0.2451, 0.98765, 1.234, 9.99, 99.6])
+def test_a_bound_is_never_rounded_to_the_side_that_claims_more(bound: float) -> None:
+    lower = float(bounded_text(reading(None, bound, None)).split()[1])
+    upper = float(bounded_text(reading(None, 0.0, bound)).split()[1])
+    assert lower <= bound <= upper
+    assert upper - lower < 0.11 * bound
+
+
+def test_tables_fit_in_a_hundred_columns(found: FrictionComparison) -> None:
+    assert max(map(len, printed(found).splitlines())) < 100
+
+
+def test_every_load_has_both_readings_by_both_loadings(found: FrictionComparison) -> None:
+    for loading in ("incremental", "total"):
+        title = f"Effective friction coefficient, {loading} loading"
+        (table,) = (t for t in comparison_tables(found) if t.title.startswith(title))
+        of_each = [row for row in table.rows if row[1] != "all"]
+        assert len(table.rows) - len(of_each) == 2  # dry and lubricated
+        for row, one in zip(of_each, found.loads[loading], strict=True):
+            assert row[2:4] == [bounded_text(one.by_maximum), bounded_text(one.by_profile)]
+
+
+def test_chi_square_stands_for_every_calculated_coefficient(found: FrictionComparison) -> None:
+    tables = [t for t in comparison_tables(found) if t.title.startswith("χ² of each profile")]
+    heads = [name for table in tables for name in table.head[3:]]
+    assert heads == 2 * [f"{mu:g}" for mu in FRICTION]
+
+
+def test_coefficients_that_do_not_fit_in_one_table_go_on_in_the_next() -> None:
+    found = comparison(loadings=("total",), friction_grid=np.linspace(0.0, 1.0, 20))
+    tables = [t for t in comparison_tables(found) if t.title.startswith("χ² of each profile")]
+    assert [len(table.head) - 3 for table in tables] == [9, 9, 2]
+
+
+def test_a_bound_has_its_reason_and_no_budget(sticking: FrictionComparison) -> None:
+    text = printed(sticking)
+    assert "above" in text
+    assert "Contributions" not in text
+    assert any("Dry, incremental loading, all loads" in note for note in comparison_notes(sticking))
+
+
+def test_json_says_null_and_why_where_there_is_no_value(sticking: FrictionComparison) -> None:
+    for load in as_json(sticking)["loads"]:
+        by_loading = load["by_loading"]["incremental"]["effective_friction_coefficient"]
+        for found in by_loading.values():
+            assert found["value"] is None
+            assert found["interval"]["high"] is None
+            assert found["interval"]["low"] > 0
+            assert "lower bound" in found["reason"]
+
+
+def test_json_holds_the_numbers_of_the_comparison(found: FrictionComparison) -> None:
+    told = as_json(found)
+    assert [load["load"]["value"] for load in told["loads"]] == [*LOADS, *LOADS]
+    for i, load in enumerate(told["loads"]):
+        one = found.loads["total"][i]
+        assert load["S_max"]["value"] == pytest.approx(one.s_max * 1e-3)
+        assert load["p0_max"]["standard_uncertainty"] == pytest.approx(
+            one.p0_max_uncertainty * 1e-3
+        )
+        assert load["ratio"]["value"] == pytest.approx(one.ratio)
+        profiles = load["by_loading"]["total"]["profiles"]
+        np.testing.assert_allclose([p["chi2"] for p in profiles], one.chi_square)
+        assert profiles[-1]["friction_coefficient"] is None
+        assert profiles[-1]["sticking"]
+        assert not profiles[0]["sticking"]
+    assert {(j["lubrication"], j["loading"]) for j in told["joint"]} == {
+        (lubrication, loading)
+        for lubrication in ("dry", "lubricated")
+        for loading in ("incremental", "total")
+    }
+
+
+def test_json_names_the_files_and_their_digests(found: FrictionComparison) -> None:
+    told = as_json(found)
+    assert told["artifact"] == {"file_name": "sensor.apparatus.h5", "sha256": "cd" * 32}
+    assert [scan["file_name"] for scan in told["scans"]] == ["dry.h5", "lubricated.h5"]
+    assert all(len(scan["sha256"]) == 64 for scan in told["scans"])
+    assert told["loads"][0]["scan"] == "dry.h5"
+
+
+def test_a_profile_without_a_stated_lubrication_or_loading_is_named_all_the_same() -> None:
+    # Profiles calculated elsewhere need not say how they were loaded.
+    found = comparison(lubrications=("",), loadings=("",))
+    text = printed(found)
+    assert "not stated" in text
+    assert "profiles as given" in text
+    assert set(as_json(found)["loads"][0]["by_loading"]) == {"given"}
+
+
+def test_the_macroscopic_coefficient_stands_beside_the_interval(found: FrictionComparison) -> None:
+    (table,) = (t for t in comparison_tables(found) if "macroscopic" in t.title)
+    assert "1.60 ± 0.20" in table.title
+    assert all("above the 95 % interval" in row[2] for row in table.rows)
+    none = comparison(macroscopic=None)
+    assert not any("macroscopic" in t.title for t in comparison_tables(none))
