@@ -142,6 +142,7 @@ def comparison(
     failed: bool = False,
     macroscopic: tuple[float, float | None] | None = (1.6, 0.2),
     friction_grid: np.ndarray = FRICTION,
+    loads: Sequence[float] = LOADS,
     seed: int = 1,
     **fields: Any,
 ) -> FrictionComparison:
@@ -150,14 +151,14 @@ def comparison(
     profiles = [
         measured_profile(load, lubrication, friction if lubrication != "lubricated" else 0.0, rng)
         for lubrication in lubrications
-        for load in LOADS
+        for load in loads
     ]
-    loads = {
+    by_loading = {
         loading: tuple(load_comparison(profile, loading, friction_grid) for profile in profiles)
         for loading in loadings
     }
     joint = {
-        lubrication: {loading: _joint(loads[loading], lubrication) for loading in loadings}
+        lubrication: {loading: _joint(by_loading[loading], lubrication) for loading in loadings}
         for lubrication in lubrications
     }
     checks = tuple(
@@ -179,7 +180,7 @@ def comparison(
     given: dict[str, Any] = {
         "measured": measured,
         "friction": friction_grid,
-        "loads": loads,
+        "loads": by_loading,
         "joint": joint,
         "dry_against_lubricated": _differences(profiles),
         "macroscopic": macroscopic,

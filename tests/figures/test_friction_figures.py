@@ -1,0 +1,197 @@
+"""Figures of a comparison: what is drawn are the comparison's numbers, and nothing is lost."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from friction_results import FRICTION, LOADS, comparison, stress
+from matplotlib.axes import Axes
+
+from memscal.cli.compare_outputs import figure_stems
+from memscal.errors import InputError
+from memscal.figures.friction import comparison_figure, comparison_figures
+from memscal.figures.friction_maxima import maxima_figure
+from memscal.figures.friction_profiles import friction_set_figure, profile_figure
+from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
+from memscal.figures.friction_scale import friction_position, on_axis
+from memscal.figures.render import render_figure
+from memscal.friction.results import FrictionComparison
+
+
+@pytest.fixture(scope="module")
+def found() -> FrictionComparison:
+    return comparison()
+
+
+def bars(axes: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Abscissae, values and uncertainties of the error bars in a panel."""
+    drawn = []
+    for points, _, (stems,) in axes.containers:
+        x, y = points.get_data()
+        heights = np.array([np.ptp(segment[:, 1]) / 2 for segment in stems.get_segments()])
+        drawn.append((np.asarray(x, float), np.asarray(y, float), heights))
+    return drawn
+
+
+def test_profiles_are_drawn_with_their_standard_uncertainties(found: FrictionComparison) -> None:
+    figure = profile_figure(found, lubrication="lubricated")
+    profiles = found.measured.profiles[len(LOADS) :]
+    for (r, s, u), profile in zip(bars(figure.axes[0]), profiles, strict=True):
+        np.testing.assert_allclose(r, profile.r * 1e3)
+        np.testing.assert_allclose(s, profile.s_zz * 1e-3)
+        np.testing.assert_allclose(u, profile.s_zz_errors * 1e-3)
+
+
+def test_the_limits_of_friction_pass_through_the_calculated_profiles(
+    found: FrictionComparison,
+) -> None:
+    axes = profile_figure(found).axes[0]
+    solid = [
+        line for line in axes.lines if line.get_ls() == "-" and np.size(line.get_xdata()) > 100
+    ]
+    dashed = [line for line in axes.lines if line.get_ls() == "--"]
+    for lines, friction in ((solid, 0.0), (dashed, math.inf)):
+        assert len(lines) == len(LOADS)
+        for line, load in zip(lines, LOADS, strict=True):
+            expected = stress(np.asarray(line.get_xdata()) * 1e-3, load, friction, "incremental")
+            np.testing.assert_allclose(
+                np.asarray(line.get_ydata()) * 1e3, expected, atol=2e-3 * expected.max()
+            )
+
+
+def test_every_residual_is_within_its_panel(found: FrictionComparison) -> None:
+    figure = profile_figure(found)
+    for axes, index in zip(figure.axes[2:], (0, -1), strict=True):
+        low, high = axes.get_ylim()
+        drawn = [np.asarray(line.get_ydata()) for line in axes.lines if line.get_marker() == "o"]
+        for z, one in zip(drawn, found.loads["incremental"], strict=False):
+            expected = (one.profile.s_zz - one.calculated[index]) / one.profile.s_zz_errors
+            np.testing.assert_allclose(z, expected)
+            assert np.all((z > low) & (z < high))
+
+
+def test_a_logarithmic_scale_shows_every_positive_stress_of_three_decades(
+    found: FrictionComparison,
+) -> None:
+    axes = profile_figure(found).axes[1]
+    low, high = axes.get_ylim()
+    assert high / low > 1e3
+    for (_, s, _), profile in zip(bars(axes), found.measured.profiles, strict=False):
+        np.testing.assert_allclose(s, profile.s_zz[profile.s_zz > 0] * 1e-3)
+
+
+def test_a_set_of_coefficients_is_drawn_less_the_frictionless_profile(
+    found: FrictionComparison,
+) -> None:
+    figure = friction_set_figure(found, loading="total")
+    differences = figure.axes[len(LOADS) : 2 * len(LOADS)]
+    for axes, one in zip(differences, found.loads["total"], strict=False):
+        ((_, change, u),) = bars(axes)
+        measured = one.profile.s_zz - one.calculated[0]
+        np.testing.assert_allclose(change, 100 * measured / one.p0_max)
+        np.testing.assert_allclose(u, 100 * one.profile.s_zz_errors / one.p0_max)
+
+
+def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest() -> None:
+    found = comparison()
+    doubled = {name: (*loads, *loads) for name, loads in found.loads.items()}
+    many = comparison()
+    object.__setattr__(many, "loads", doubled)
+    titles = [axes.get_title() for axes in friction_set_figure(many).axes if axes.get_title()]
+    assert len(titles) == 4
+    assert (titles[0], titles[-1]) == ("0.34 N", "2.75 N")
+
+
+def test_ratios_stand_at_their_loads_among_the_calculated_curves(
+    found: FrictionComparison,
+) -> None:
+    figure = maxima_figure(found)
+    assert len(figure.axes) == len(found.loadings)
+    for axes, loads in zip(figure.axes, found.loads.values(), strict=True):
+        dry, lubricated = bars(axes)
+        of_dry = [one for one in loads if one.lubrication == "dry"]
+        np.testing.assert_allclose(dry[0], [one.load for one in of_dry])
+        np.testing.assert_allclose(dry[1], [one.ratio for one in of_dry])
+        np.testing.assert_allclose(dry[2], [one.ratio_uncertainty for one in of_dry])
+        assert np.all(lubricated[1] < dry[1])
+        (sticking,) = (line for line in axes.lines if line.get_gid() == "mu=inf")
+        np.testing.assert_allclose(
+            sticking.get_ydata(), [one.p_max[-1] / one.p0_max for one in of_dry]
+        )
+
+
+def test_both_readings_stand_within_their_intervals(found: FrictionComparison) -> None:
+    axes = effective_friction_figure(found).axes[0]
+    intervals = [line for line in axes.lines if line.get_gid() == "interval"]
+    values = [line for line in axes.lines if line.get_label() == "_value"]
+    of_dry = found.loads["incremental"][: len(LOADS)]
+    readings = [one.by_maximum for one in of_dry] + [one.by_profile for one in of_dry]
+    assert len(values) == len(readings)
+    for bar, point, reading in zip(intervals, values, readings, strict=True):
+        ends = friction_position([reading.interval.low, reading.interval.high or math.inf])
+        np.testing.assert_allclose(bar.get_ydata(), ends)
+        np.testing.assert_allclose(point.get_ydata(), friction_position([reading.value]))
+
+
+def test_an_open_interval_is_an_arrow_to_infinity_without_a_value() -> None:
+    sticking = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
+    (axes,) = effective_friction_figure(sticking).axes
+    open_ends = [line for line in axes.lines if line.get_label() == "_open"]
+    of_profile = [one.by_profile for one in sticking.loads["incremental"]]
+    assert all(reading.interval.high is None for reading in of_profile)
+    assert len(open_ends) == 2 * len(LOADS)
+    assert {float(line.get_ydata()[0]) for line in open_ends} == {1.0}
+    assert not [line for line in axes.lines if line.get_label() == "_value"]
+
+
+def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionComparison) -> None:
+    axes = likelihood_figure(found).axes[0]
+    curves = {line.get_label(): line for line in axes.lines}
+    one, joint = found.loads["incremental"][0], found.joint["dry"]["incremental"]
+    for label, reading in (("0.34 N", one.by_profile), ("all loads", joint)):
+        t, rise = (np.asarray(values) for values in curves[label].get_data())
+        np.testing.assert_allclose(rise, reading.chi_square - reading.least, atol=1e-9)
+        assert t[np.argmin(rise)] == pytest.approx(float(friction_position(reading.best)))
+
+
+def test_an_axis_of_friction_is_monotone_and_ends_at_infinity() -> None:
+    t = friction_position(FRICTION)
+    assert np.all(np.diff(t) > 0)
+    assert (t[0], t[-1]) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("first", [0.0, 1e-9, 0.2e-3])
+def test_a_profile_between_the_measured_radii_is_even_and_smooth(first: float) -> None:
+    width = 1e-3
+    r = np.concatenate([[first], np.sort(np.r_[0.25e-3:6e-3:0.3e-3, 0.4e-3:6e-3:0.3e-3])])
+    fine = np.linspace(0.0, r[-1], 500)
+    (found,) = on_axis(r, np.exp(-0.5 * (r[None] / width) ** 2), fine)
+    np.testing.assert_allclose(found, np.exp(-0.5 * (fine / width) ** 2), atol=2e-3)
+
+
+def test_all_figures_have_the_names_that_the_command_line_proves() -> None:
+    for lubrications in (("dry", "lubricated"), ("lubricated",), ("",)):
+        found = comparison(lubrications=lubrications)
+        assert list(comparison_figures(found)) == figure_stems(lubrications)
+
+
+@pytest.mark.parametrize("stem", figure_stems(["dry", "lubricated"]))
+def test_every_figure_renders(found: FrictionComparison, stem: str) -> None:
+    figure = comparison_figures(found)[stem]()
+    assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
+
+
+def test_one_load_and_one_loading_are_enough() -> None:
+    found = comparison(lubrications=("",), loadings=("",), loads=(1.37,), macroscopic=None)
+    figures = [comparison_figure(found), *(draw() for draw in comparison_figures(found).values())]
+    for figure in figures:
+        assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
+
+
+def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionComparison) -> None:
+    with pytest.raises(InputError, match="sideways"):
+        profile_figure(found, loading="sideways")
+    with pytest.raises(InputError, match="not stated"):
+        friction_set_figure(found, lubrication="")
