@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
+    from memscal.laboratory.experiment import Experiment, simulate_experiment
     from memscal.laboratory.rod_scan import simulate
     from memscal.measurement.procedure import restore
     from memscal.measurement.restoration import Restoration
@@ -39,6 +40,7 @@ _HOMES = {
     "Contact": "memscal.mechanics.contact",
     "Design": "memscal.planning.outcome",
     "ElasticFilm": "memscal.model.film",
+    "Experiment": "memscal.laboratory.experiment",
     "ExponentialCompliance": "memscal.mechanics.interface",
     "FleetCalibration": "memscal.calibration.fleet",
     "GaussianMixture": "memscal.axisymmetry.kernels",
@@ -64,6 +66,7 @@ _HOMES = {
     "read_scan": "memscal.formats.scan",
     "restore": "memscal.measurement.procedure",
     "simulate": "memscal.laboratory.rod_scan",
+    "simulate_experiment": "memscal.laboratory.experiment",
     "write_reference": "memscal.formats.reference",
     "write_scan": "memscal.formats.scan",
 }
@@ -75,6 +78,7 @@ __all__ = [
     "Contact",
     "Design",
     "ElasticFilm",
+    "Experiment",
     "ExponentialCompliance",
     "FleetCalibration",
     "GaussianMixture",
@@ -101,6 +105,7 @@ __all__ = [
     "read_scan",
     "restore",
     "simulate",
+    "simulate_experiment",
     "write_reference",
     "write_scan",
 ]

@@ -36,6 +36,22 @@ _DIMENSIONS = {
     "noise": "voltage",
     "load": "force",
     "seed": "dimensionless",
+    # The truth of a simulated experiment: film and indenter, their contact, and what went wrong.
+    "young_modulus": "stress",
+    "poisson_ratio": "dimensionless",
+    "thickness": "length",
+    "indenter_radius": "length",
+    "friction": "dimensionless",
+    "slip_length": "length",
+    "roughness": "length",
+    "asperity_density": "per area",
+    "asperity_radius": "length",
+    "decay_length": "length",
+    "reference_pressure": "stress",
+    "load_scale": "dimensionless",
+    "load_scatter": "dimensionless",
+    "position_error": "length",
+    "gain": "dimensionless",
 }
 # One name for each axis of the covariance: netCDF tools want each dimension once.
 _AXES = ("parameter", "parameter_prime")

@@ -6,19 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
-from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
+from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
+from memscal.laboratory.response import apparatus_function, blurred_stress, disturbance
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, StressSensor
-from memscal.model.validation import (
-    FloatArray,
-    require_non_negative,
-    require_positive,
-    require_range,
-)
+from memscal.model.validation import require_non_negative, require_positive, require_range
 
 __all__ = ["simulate"]
 
@@ -114,7 +109,7 @@ def simulate(
             f"The centre is {centre} m and the seed {seed}; the one must be finite, the other not "
             "negative."
         )
-    truth = GaussianMixture() if kernel is None else _apparatus_function(kernel)
+    truth = apparatus_function(kernel)
     loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
@@ -125,11 +120,12 @@ def simulate(
     x = np.linspace(-half_range, half_range, points)
     y = x if raster else np.zeros(1)
     radius = np.hypot.outer(y - centre[1], x - centre[0])
-    per_newton = conversion_constant * _blurred(film, rod, truth, radius, float(loads.max()))
+    contact = indent(film, rod, load=float(loads.max()))
+    per_newton = conversion_constant * blurred_stress([contact], truth, radius)[0] / contact.load
     row_loads = np.repeat(loads, repeats)
     signal = per_newton * row_loads[:, None] if not raster else per_newton * loads[0]
     largest = float(per_newton.max() * loads.mean())
-    clean = signal + largest * (baseline + 0.5 * drift * x / half_range)
+    clean = signal + largest * disturbance(x, baseline, drift)
     rng = np.random.default_rng(seed)
     u = clean + rng.normal(0.0, noise * largest, clean.shape)
     if not raster and row_loads.size == 1:
@@ -161,25 +157,6 @@ def simulate(
     )
 
 
-def _apparatus_function(kernel: RadialKernel) -> RadialKernel:
-    """Refuse what is no kernel, or has another integral, which would pass for an error of A."""
-    if not isinstance(kernel, RadialKernel):
-        raise InputError(
-            f"The kernel is a {type(kernel).__name__}, which has no transform(), radial() and "
-            "describe().",
-            cure="Give a GaussianMixture, a SmoothedDisc, or an object with these three methods.",
-        )
-    # Not at k = 0 itself, where a closed form such as J1(ka)/ka may divide by zero.
-    integral = float(kernel.transform(np.array([1e-2]))[0])
-    if not abs(integral - 1) <= 1e-6:
-        raise InputError(
-            f"The kernel's transform is {integral:g} at k = 0, not 1.",
-            why="An apparatus function has unit integral.",
-            cure="Divide the kernel by its integral; the conversion constant carries the size.",
-        )
-    return kernel
-
-
 def _require_plausible(
     half_range: float, points: int, repeats: int, noise: float, conversion_constant: float
 ) -> None:
@@ -188,13 +165,3 @@ def _require_plausible(
     require_non_negative("noise", noise)
     if points < 2 or repeats < 1:
         raise InputError("A scan needs two positions and one repeat at least.")
-
-
-def _blurred(
-    film: ElasticFilm, rod: Rod, kernel: RadialKernel, radius: FloatArray, load: float
-) -> FloatArray:
-    """G convolved with the base stress per newton, in 1/m^2, at the given radii."""
-    contact = indent(film, rod, load=load)
-    wavenumbers = Wavenumbers.covering(40 / film.thickness, float(radius.max()))
-    spectrum = contact.base_spectrum(wavenumbers.k) / load * kernel.transform(wavenumbers.k)
-    return RadialSpectrum(wavenumbers, spectrum).at(radius)
