@@ -9,6 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from memscal.friction.compliance_results import (
+    BayesFactor,
+    ImpliedFriction,
+    InterfaceComparison,
+    InterfaceLaw,
+    InterfaceLength,
+    LawComparison,
+    PriorChoice,
+)
 from memscal.friction.results import (
     DryAgainstLubricated,
     EffectiveFriction,
@@ -188,6 +197,59 @@ def comparison(
         "messages": (),
     }
     return FrictionComparison(**(given | fields))
+
+
+def interface_comparison(slip_length: float = 1.8e-6) -> InterfaceComparison:
+    """Return laws of a dry and of a lubricated interface, a slip length preferred."""
+    return InterfaceComparison(
+        macroscopic=(1.6, 0.2),
+        tangential=_laws(
+            "dry",
+            ("effective Amontons", "effective Amontons, one for each load", "elasto-plastic"),
+            (0.0, 2.1, 7.4),
+            slip_length,
+            ImpliedFriction(
+                loads=np.array(LOADS),
+                friction=np.outer([0.11, 0.14, 0.17, 0.2], [1.3, 1.0, 0.8]),
+                pressures=np.array([27e3, 33e3, 50e3, 80e3]),
+                stiffnesses=np.outer(
+                    [27e3, 33e3, 50e3, 80e3], 1.6 / slip_length / np.array([0.8, 1.0, 1.3])
+                ),
+            ),
+        ),
+        normal=_laws(
+            "lubricated", ("rigid, frictionless", "normal compliance"), (0.0, -1.2), 0.3e-6, None
+        ),
+        messages=("The slip length is that of the prior.",),
+    )
+
+
+def _laws(
+    lubrication: str,
+    names: Sequence[str],
+    evidence: Sequence[float],
+    length: float,
+    implied: ImpliedFriction | None,
+) -> LawComparison:
+    lengths = np.concatenate([[0.0], np.geomspace(0.05e-6, 50e-6, 120), [math.inf]])
+    bounded = np.where(np.isinf(lengths), 20.0, np.log1p(lengths / 1e-6) / 0.1)
+    chi_square = (bounded - math.log1p(length / 1e-6) / 0.1) ** 2 + 120.0
+    inside = lengths[chi_square - 120.0 <= _LIMIT]
+    laws = tuple(
+        InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120, 0.3)
+        for name, value in zip(names, evidence, strict=True)
+    )
+    return LawComparison(
+        lubrication=lubrication,
+        loads=np.array(LOADS),
+        laws=laws,
+        factors=(BayesFactor(names[-1], names[0], abs(evidence[-1] - evidence[0])),),
+        length=InterfaceLength(
+            length, 0.1 * length, Interval(inside[0], inside[-1]), "", lengths, chi_square
+        ),
+        priors=(PriorChoice("lengths from 0.1 to 30 um", evidence[-1] - 0.4),),
+        implied=implied,
+    )
 
 
 def _joint(of_each: Sequence[LoadComparison], lubrication: str) -> EffectiveFriction:

@@ -101,7 +101,7 @@ Examples:
     type=FILE,
     metavar="FOLDER",
     help="Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
-    "coefficients, maxima, effective friction, likelihood.",
+    "coefficients, maxima, effective friction, likelihood, interface.",
 )
 @click.option(
     "--figure-format",
@@ -150,7 +150,7 @@ def command(
     known, data = load_apparatus(artifact), [read_scan(path) for path in scans]
     tables = _read_references(references)
     lubrications = tuple(dict.fromkeys(scan.lubrication for scan in data))
-    files = FigureFiles(single, folder, figure_format, lubrications)
+    files = FigureFiles(single, folder, figure_format, lubrications, interface)
     files.prove(force=force, inputs=[artifact, *scans, *references])
 
     from memscal.friction.procedure import compare

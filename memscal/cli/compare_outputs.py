@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["FigureFiles", "figure_stems"]
 
 
-def figure_stems(lubrications: Iterable[str]) -> list[str]:
+def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
     """Return the stems of all figures' names: those of ``memscal.figures.friction``.
 
     They are needed before anything is computed, without matplotlib; a test compares both.
@@ -29,7 +29,8 @@ def figure_stems(lubrications: Iterable[str]) -> list[str]:
     """
     tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
     of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
-    return [*of_each, "maxima", "effective-friction", "likelihood"]
+    found = [*of_each, "maxima", "effective-friction", "likelihood"]
+    return [*found, "interface"] if interface else found
 
 
 @dataclass(frozen=True)
@@ -46,19 +47,22 @@ class FigureFiles:
         Their format: ``png``, ``svg`` or ``pdf``.
     lubrications : tuple of str
         Of the scans that are compared.
+    interface : bool
+        Whether laws of the interface are compared.
     """
 
     single: tuple[Path, ...]
     folder: Path | None
     suffix: str
     lubrications: tuple[str, ...]
+    interface: bool = False
 
     @property
     def in_folder(self) -> dict[str, Path]:
         """Files in the folder by the stem of their names."""
         if self.folder is None:
             return {}
-        stems = figure_stems(self.lubrications)
+        stems = figure_stems(self.lubrications, interface=self.interface)
         return {stem: self.folder / f"{stem}.{self.suffix}" for stem in stems}
 
     @property

@@ -46,7 +46,7 @@ def _law_table(direction: str, part: LawComparison) -> Table:
     rows = [
         [
             law.name,
-            _best(law),
+            _best(part, law),
             f"{law.log_evidence - best:.1f}",
             f"{law.least / law.degrees:.2f}" if law.degrees > 0 else "",
             f"{law.p_value:.2g}",
@@ -56,8 +56,10 @@ def _law_table(direction: str, part: LawComparison) -> Table:
     return Table(title, ["law", "best", "ln of evidence", "χ²/ν", "p"], rows)
 
 
-def _best(law: InterfaceLaw) -> str:
-    """Return the free parameters where the likelihood is largest; a length in m."""
+def _best(part: LawComparison, law: InterfaceLaw) -> str:
+    """Return the free parameters where the likelihood is largest; the last law's is a length."""
+    if law is part.laws[-1]:
+        return ", ".join(f"{value / _UM:.3g} um" for value in law.best)
     return ", ".join(friction_name(float(f"{value:.3g}")) for value in law.best)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from matplotlib.figure import Figure
 
+from memscal.figures.friction_interface import interface_figure
 from memscal.figures.friction_maxima import draw_maxima, maxima_figure
 from memscal.figures.friction_profiles import (
     draw_profiles,
@@ -79,7 +80,8 @@ def comparison_figures(found: FrictionComparison) -> Mapping[str, Callable[[], F
     -------
     mapping of str to callable
         ``profiles-dry`` and ``friction-set-dry`` (one for each lubrication), ``maxima``,
-        ``effective-friction`` and ``likelihood``; each draws when it is called.
+        ``effective-friction`` and ``likelihood``, and ``interface`` where one was compared; each
+        draws when it is called.
     """
     figures: dict[str, Callable[[], Figure]] = {}
     measured = (profile.part.lubrication for profile in found.measured.profiles)
@@ -90,6 +92,8 @@ def comparison_figures(found: FrictionComparison) -> Mapping[str, Callable[[], F
     figures["maxima"] = lambda: maxima_figure(found)
     figures["effective-friction"] = lambda: effective_friction_figure(found)
     figures["likelihood"] = lambda: likelihood_figure(found)
+    if found.interface is not None:
+        figures["interface"] = lambda: interface_figure(found)
     return figures
 
 

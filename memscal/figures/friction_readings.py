@@ -20,7 +20,13 @@ from memscal.figures.friction_scale import (
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
 from memscal.friction.results import EffectiveFriction, FrictionComparison
 
-__all__ = ["draw_effective", "draw_likelihood", "effective_friction_figure", "likelihood_figure"]
+__all__ = [
+    "draw_effective",
+    "draw_levels",
+    "draw_likelihood",
+    "effective_friction_figure",
+    "likelihood_figure",
+]
 
 _READINGS = {
     "by_maximum": ("by the maximum", "gaussian", -1),
@@ -193,15 +199,20 @@ def draw_likelihood(
         _draw_curve(axes, one.by_profile, colour, f"{one.load:.3g} N", 1.0)
     joint = found.joint[loads[0].lubrication][loading]
     _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
+    draw_levels(axes)
+    friction_axis(axes, "x", r"effective friction coefficient $\mu_e$")
+    axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+
+
+def draw_levels(axes: Axes) -> None:
+    """Draw the levels that bound 68.3 % and 95 %, and end the axis not far above."""
     for level, words in _LEVELS:
         axes.axhline(level, color="0.6", lw=0.6, ls=":")
         axes.annotate(
             words, (0.995, level), (0, 1), xycoords=("axes fraction", "data"),
             textcoords="offset points", ha="right", fontsize=6, color="0.4",
         )  # fmt: skip
-    friction_axis(axes, "x", r"effective friction coefficient $\mu_e$")
     axes.set_ylim(0, _HIGHEST)
-    axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
 
 
 def _draw_curve(

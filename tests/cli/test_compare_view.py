@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_results import FRICTION, LOADS, comparison
+from friction_results import FRICTION, LOADS, comparison, interface_comparison
 
 from memscal.cli.compare_json import comparison_json
 from memscal.cli.compare_view import comparison_notes, comparison_tables
@@ -164,3 +164,19 @@ def test_the_macroscopic_coefficient_stands_beside_the_interval(found: FrictionC
     assert all("above the 95 % interval" in row[2] for row in table.rows)
     none = comparison(macroscopic=None)
     assert not any("macroscopic" in t.title for t in comparison_tables(none))
+
+
+def test_a_slip_length_has_its_interval_its_unit_and_its_evidence() -> None:
+    found = comparison(interface=interface_comparison(1.8e-6))
+    text = printed(found)
+    assert "1.8 [1.4, 2.3] um" in text
+    assert "elasto-plastic against effective Amontons" in text
+    assert "very strong" in text
+    assert max(map(len, text.splitlines())) < 100
+    told = as_json(found)["interface"]
+    length = told["tangential"]["length"]
+    assert (length["value"], length["unit"]) == (pytest.approx(1.8), "um")
+    assert length["interval"]["low"] < 1.8 < length["interval"]["high"]
+    assert [load["load_n"] for load in told["tangential"]["implied"]] == list(LOADS)
+    assert told["normal"]["implied"] is None
+    assert "The slip length is that of the prior." in list(comparison_notes(found))

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from friction_results import FRICTION, LOADS, comparison, stress
+from friction_results import FRICTION, LOADS, comparison, interface_comparison, stress
 from matplotlib.axes import Axes
 
 from memscal.cli.compare_outputs import figure_stems
 from memscal.errors import InputError
 from memscal.figures.friction import comparison_figure, comparison_figures
+from memscal.figures.friction_interface import interface_figure, length_position
 from memscal.figures.friction_maxima import maxima_figure
 from memscal.figures.friction_profiles import friction_set_figure, profile_figure
 from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
@@ -175,12 +176,39 @@ def test_all_figures_have_the_names_that_the_command_line_proves() -> None:
     for lubrications in (("dry", "lubricated"), ("lubricated",), ("",)):
         found = comparison(lubrications=lubrications)
         assert list(comparison_figures(found)) == figure_stems(lubrications)
+    found = comparison(interface=interface_comparison())
+    assert list(comparison_figures(found)) == figure_stems(["dry", "lubricated"], interface=True)
 
 
 @pytest.mark.parametrize("stem", figure_stems(["dry", "lubricated"]))
 def test_every_figure_renders(found: FrictionComparison, stem: str) -> None:
     figure = comparison_figures(found)[stem]()
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
+
+
+def test_the_likelihood_of_a_slip_length_touches_zero_at_it() -> None:
+    figure = interface_figure(comparison(interface=interface_comparison(1.8e-6)))
+    curves = {line.get_label(): line for line in figure.axes[0].lines}
+    t, rise = (np.asarray(values) for values in curves["tangential, dry"].get_data())
+    assert t[np.argmin(rise)] == pytest.approx(float(length_position(1.8e-6)), abs=0.01)
+    assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
+
+
+def test_evidence_is_drawn_below_that_of_the_best_law() -> None:
+    laws = interface_comparison()
+    axes = interface_figure(comparison(interface=laws)).axes[1]
+    drawn = [float(line.get_xdata()[0]) for line in axes.lines if line.get_marker() == "o"]
+    assert laws.tangential is not None
+    assert laws.normal is not None
+    tangential = [law.log_evidence for law in laws.tangential.laws]
+    normal = [law.log_evidence for law in laws.normal.laws]
+    expected = [v - max(tangential) for v in tangential] + [v - max(normal) for v in normal]
+    np.testing.assert_allclose(drawn, expected)
+
+
+def test_without_laws_of_the_interface_there_is_nothing_to_draw(found: FrictionComparison) -> None:
+    with pytest.raises(InputError, match="interface=True"):
+        interface_figure(found)
 
 
 def test_one_load_and_one_loading_are_enough() -> None:
