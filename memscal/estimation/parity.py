@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from memscal.errors import InputError
@@ -18,8 +16,8 @@ _CLEARLY = 0.7
 
 def require_parity(
     points: ScanPoints,
-    shapes: FloatArray,
-    fitted: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
+    odd: tuple[FloatArray, FloatArray],
+    even: tuple[FloatArray, FloatArray],
 ) -> None:
     """Refuse a voltage that a shear of the other sign, or an even signal, meets far better.
 
@@ -27,22 +25,21 @@ def require_parity(
     ----------
     points : ScanPoints
         The points of one scan, by a tangential channel.
-    shapes : ndarray, shape (m, n)
-        Odd signals of trial centres and widths at the points, for a positive A.
-    fitted : callable
-        Returns amplitude and sum of absolute residuals of each of several shapes.
+    odd, even : tuple of two ndarray, shape (m,)
+        Amplitudes of odd and of even signals of trial centres and widths, fitted to the voltages,
+        and the sums of absolute residuals that each leaves.
 
     Raises
     ------
     InputError
         If the voltage has the wrong sign, or is even.
     """
-    amplitudes, costs = fitted(shapes)
+    amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
     turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
-    even = float(fitted(np.abs(shapes))[1].min())
+    same = float(even[1].min())
     name, along = f"u_{points.channel}", points.channel[0]
-    if even < _CLEARLY * min(right, turned):
+    if same < _CLEARLY * min(right, turned):
         raise InputError(
             f"{name} is the same on both sides of the sensor.",
             why="A shear changes its sign where the indenter passes the sensor; a normal stress "

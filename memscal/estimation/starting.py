@@ -67,12 +67,12 @@ def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray
     root = np.sqrt(weights)
     data, drift = root * points.u, root[:, None] * model.drift_columns
     best, best_cost = np.zeros(0), np.inf
-    trials = []
+    odd: list[FloatArray] = []
     for sigma, table in zip(widths, tables, strict=True):
         shapes = np.interp(distances, radii, table) * (points.load * root)
         if model.order:
             shapes *= model.cosines(centres)
-            trials.append(shapes)
+            odd.append(shapes)
         amplitudes, costs = _amplitudes(shapes, data, drift)
         i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
         if amplitudes[i] > 0 and costs[i] < best_cost:
@@ -81,7 +81,14 @@ def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray
             best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
             best_cost = float(costs[i])
     if model.order:
-        require_parity(points, np.concatenate(trials), lambda each: _amplitudes(each, data, drift))
+        # The potential of a shear looks much as the normal stress does.
+        potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
+        even = [np.interp(distances, radii, each) * (points.load * root) for each in potentials]
+        require_parity(
+            points,
+            _amplitudes(np.concatenate(odd), data, drift),
+            _amplitudes(np.concatenate(even), data, drift),
+        )
     if not best.size:
         raise undetermined(model)
     return best

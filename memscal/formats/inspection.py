@@ -36,7 +36,7 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
 _ARRAYS = {
     SCAN_SCHEMA: {
         "/entry/data": "x y repeat x_errors y_errors u_zz u_zz_errors u_zz_correlation "
-        "normal_load normal_load_errors u_xz u_yz",
+        "normal_load normal_load_errors u_xz u_xz_errors u_yz u_yz_errors",
         "/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz",
     },
     REFERENCE_SCHEMA: {"/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz"},

@@ -37,7 +37,7 @@ from memscal.model.scan import Scan
 
 __all__ = ["read_scan", "write_scan"]
 
-_CHANNELS = ("u_xz", "u_yz")
+_CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
 _SAMPLE = "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}

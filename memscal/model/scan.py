@@ -62,7 +62,8 @@ class Scan:
     position_scale_uncertainty : float, optional
         Relative standard uncertainty of the stage's scale, common to all positions.
     channels : mapping of str to ndarray, shape of ``u_zz``
-        Further channels (``u_xz``, ``u_yz``), in V.
+        Further channels (``u_xz``, ``u_yz``), in V, and where stated their noise
+        (``u_xz_errors``, ``u_yz_errors``).
     load_uncertainty : float, optional
         Standard uncertainty of the load common to all points, in N.
     lubrication : str

@@ -1,0 +1,284 @@
+"""A tangential channel's calibration: its truth found, its parity and sign held, its refusals.
+
+Set MEMSCAL_FULL_STUDY for 300 seeds in place of 60.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm
+from shears import CENTRE, CONVERSION, SIGMA, shear_scan
+
+import memscal
+from memscal.axisymmetry.kernels import GaussianMixture
+from memscal.calibration.procedure import Calibration
+from memscal.errors import InputError
+from memscal.model.apparatus import QualityCheck
+from memscal.model.scan import Scan
+
+SEEDS = 300 if os.environ.get("MEMSCAL_FULL_STUDY") else 60
+CHANCE = 1e-4
+RING = GaussianMixture((1.5, -0.5), (500e-6, 300e-6))
+
+
+def calibrated(scan: Scan, channel: str = "xz") -> Calibration:
+    return memscal.calibrate(scan, channel=channel, method="evidence")
+
+
+def checks_of(scan: Scan) -> dict[str, QualityCheck]:
+    return {check.name: check for check in calibrated(scan).apparatus.checks}
+
+
+@lru_cache
+def study(noise: float) -> dict[str, np.ndarray]:
+    """Errors in standard uncertainties; the film and the rod are exact, and so is the load."""
+    scan = memscal.simulate()
+    exact = {
+        "film": memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3),
+        "rod": replace(scan.indenter, radius_uncertainty=None),
+        "load_uncertainty": None,
+    }
+    truth = {
+        "conversion_constant": CONVERSION,
+        "conversion_constant_gaussian": CONVERSION,
+        "gaussian_sigma": SIGMA,
+        "centre": CENTRE,
+    }
+    found = [
+        calibrated(shear_scan(seed=seed, noise=noise, **exact)).apparatus.parameters
+        for seed in range(SEEDS)
+    ]
+    return {
+        name: np.array([(p[name] - value) / p.uncertainty(name) for p in found])
+        for name, value in truth.items()
+    }
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.02])
+def test_a_and_the_width_are_found_without_bias(noise: float) -> None:
+    for errors in study(noise).values():
+        # A third of a standard uncertainty, and what chance adds to the mean of so many.
+        allowed = 1 / 3 + norm.isf(CHANCE) * errors.std() / np.sqrt(SEEDS)
+        assert abs(errors.mean()) < allowed
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.02])
+def test_95_percent_intervals_hold_the_truth_as_often_as_they_say(noise: float) -> None:
+    for name, errors in study(noise).items():
+        held = int(np.sum(np.abs(errors) < 1.96))
+        # A few percent less than stated is allowed for; a free G is cautious, and never too sure.
+        assert held >= binom.ppf(CHANCE, SEEDS, 0.92), name
+        if name in ("conversion_constant_gaussian", "gaussian_sigma"):
+            assert held <= binom.isf(CHANCE, SEEDS, 0.97), name
+
+
+def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
+    free, gaussian, a = [], [], []
+    r = np.linspace(0.0, 2e-3, 81)
+    for seed in range(12):
+        apparatus = calibrated(shear_scan(seed=seed, noise=0.002, kernel=RING)).apparatus
+        truth = RING.radial(r)
+        norm_ = np.sqrt(np.sum(r * truth**2))
+        width = apparatus.gaussian_sigma
+        round_ = np.exp(-(r**2) / (2 * width**2)) / (2 * np.pi * width**2)
+        free.append(np.sqrt(np.sum(r * (apparatus.radial(r) - truth) ** 2)) / norm_)
+        gaussian.append(np.sqrt(np.sum(r * (round_ - truth) ** 2)) / norm_)
+        u = apparatus.parameters.uncertainty("conversion_constant")
+        a.append((apparatus.conversion_constant - CONVERSION) / u)
+    assert np.median(free) < 0.5 * np.median(gaussian)
+    assert abs(np.mean(a)) < 1.5
+
+
+def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
+    found = calibrated(shear_scan(seed=3))
+    apparatus, estimate = found.apparatus, found.solution.estimate
+    contact = memscal.indent(apparatus.film, apparatus.indenter, load=1.0)
+    r = np.linspace(0.0, 30e-3, 1501)
+    profile = apparatus.predict(r, contact.base_shear(r))
+    side = np.sign(estimate.points.x - estimate.centre[0])
+    expected = side * np.interp(estimate.distance, r, profile) + estimate.background
+    largest = float(np.abs(profile).max())
+    np.testing.assert_allclose(found.solution.quotient.predicted, expected, atol=3e-3 * largest)
+    # At larger x than the sensor the film is squeezed towards smaller x: the voltage falls.
+    assert profile.min() < 0 < np.abs(profile).max()
+    assert profile.max() < 0.01 * largest
+    u = apparatus.predict_uncertainty(r, contact.base_shear(r))
+    assert 0 < u.max() < 0.1 * largest
+
+
+def test_convolution_with_a_tangential_g_keeps_a_vector_field_s_zero_on_the_axis() -> None:
+    apparatus = calibrated(shear_scan(seed=3)).apparatus
+    r = np.linspace(0.0, 30e-3, 1501)
+    spread = 1.2e-3
+    shear = -r / spread**2 * np.exp(-(r**2) / (2 * spread**2))
+    blurred = apparatus.convolve(r, shear)
+    # The gradient of a Gaussian stays one of a wider Gaussian, if G is nearly a Gaussian.
+    wide = np.hypot(spread, apparatus.gaussian_sigma)
+    expected = -r * spread**2 / wide**4 * np.exp(-(r**2) / (2 * wide**2))
+    assert abs(blurred[0]) < 1e-9 * np.abs(blurred).max()
+    np.testing.assert_allclose(blurred, expected, atol=0.03 * np.abs(expected).max())
+
+
+def test_the_artifact_says_its_channel_and_comes_back_from_its_file(tmp_path: Path) -> None:
+    scan = shear_scan(seed=4)
+    apparatus = calibrated(scan).apparatus
+    assert apparatus.sensor == replace(scan.sensor, channel="xz")
+    assert apparatus.process.configuration["channel"] == "xz"
+    assert any("experimental" in message for message in apparatus.process.messages)
+    assert apparatus.reference.sigma_rz is not None
+    apparatus.save(tmp_path / "xz.h5")
+    again = memscal.load_apparatus(tmp_path / "xz.h5")
+    r = np.linspace(0.0, 30e-3, 1501)
+    shear = apparatus.reference.sigma_rz
+    table = np.interp(r, apparatus.reference.r, shear)
+    np.testing.assert_array_equal(again.convolve(r, table), apparatus.convolve(r, table))
+    assert again.order == 1
+
+
+def test_the_budget_names_what_the_shear_depends_on() -> None:
+    budget = calibrated(shear_scan(seed=5)).apparatus.budget["conversion_constant"]
+    for source in ("noise", "regularisation", "thickness", "poisson_ratio", "load"):
+        assert budget[source] > 0, source
+    # Young's modulus moves no stress at a given load, and a thin rod's radius hardly any.
+    assert budget["young_modulus"] == 0
+    assert budget["rod_radius"] < 0.1 * budget["load"]
+
+
+def test_a_film_that_is_off_by_its_uncertainty_moves_the_width_by_its_share() -> None:
+    scan = shear_scan(seed=6, noise=0.002)
+    found = calibrated(scan).apparatus
+    thicker = replace(scan.film, thickness=scan.film.thickness + 20e-6)
+    moved = calibrated(replace(scan, film=thicker)).apparatus
+    change = abs(moved.gaussian_sigma - found.gaussian_sigma)
+    assert change == pytest.approx(found.budget["gaussian_sigma"]["thickness"], rel=0.2)
+
+
+def test_a_line_along_y_calibrates_the_other_channel() -> None:
+    apparatus = calibrated(shear_scan(seed=7, channel="yz"), "yz").apparatus
+    u = apparatus.parameters.uncertainty("conversion_constant")
+    assert abs(apparatus.conversion_constant - CONVERSION) < 5 * u
+    assert abs(apparatus.parameters["centre_y"] - CENTRE) < 20e-6
+
+
+def test_two_scans_together_know_more_than_either() -> None:
+    scans = [shear_scan(seed=seed, noise=0.02) for seed in (8, 9)]
+    alone, together = (
+        calibrated(scans[0]),
+        memscal.calibrate(scans, channel="xz", method="evidence"),
+    )
+    u = [found.apparatus.budget["gaussian_sigma"]["noise"] for found in (alone, together)]
+    assert u[1] == pytest.approx(u[0] / np.sqrt(2), rel=0.25)
+
+
+def test_outliers_and_missing_points_move_nothing() -> None:
+    scan = shear_scan(seed=10)
+    u = scan.channels["u_xz"].copy()
+    clean = calibrated(scan).apparatus
+    u[12] += 0.8 * np.abs(u).max()
+    u[40] = np.nan
+    spoiled = replace(scan, channels={**scan.channels, "u_xz": u})
+    found = calibrated(spoiled).apparatus
+    spread = clean.parameters.uncertainty("conversion_constant_gaussian")
+    moved = (
+        found.parameters["conversion_constant_gaussian"]
+        - clean.parameters["conversion_constant_gaussian"]
+    )
+    assert abs(moved) < 1.5 * spread
+    assert any("Outlier" in message for message in found.process.messages)
+
+
+def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part() -> None:
+    failed = 0
+    for seed in range(8):
+        assert checks_of(shear_scan(seed=seed))["symmetry"].p_value is not None
+        check = checks_of(shear_scan(seed=seed, crosstalk=0.05))["symmetry"]
+        failed += not check.passed
+    assert failed >= 7
+    assert "cross-talk" in check.meaning
+
+
+def test_draws_of_a_tangential_scan_scatter_as_its_budget_says() -> None:
+    found = calibrated(shear_scan(seed=11, noise=0.02))
+    drawn = memscal.monte_carlo(found, draws=200)
+    width = drawn["gaussian_sigma"]
+    assert width.uncertainty == pytest.approx(width.first_order, rel=0.25)
+
+
+def test_the_wrong_sign_is_refused_and_the_cure_is_said() -> None:
+    scan = shear_scan(seed=12)
+    turned = replace(scan, channels={"u_xz": -scan.channels["u_xz"]})
+    with pytest.raises(InputError, match="wrong sign") as refusal:
+        calibrated(turned)
+    assert "sign of u_xz" in refusal.value.cure
+    # Positions of the sensor instead of the indenter are the same mistake.
+    with pytest.raises(InputError, match="wrong sign"):
+        calibrated(replace(scan, x=-scan.x))
+
+
+def test_a_normal_channel_in_its_place_is_refused_as_even() -> None:
+    scan = shear_scan(seed=13)
+    with pytest.raises(InputError, match="same on both sides"):
+        calibrated(replace(scan, channels={"u_xz": scan.u_zz}))
+
+
+@pytest.mark.parametrize("method", ["white-noise", "wiener", "tikhonov", "richardson-lucy"])
+def test_methods_that_divide_fields_are_refused_and_name_the_one_that_serves(method: str) -> None:
+    with pytest.raises(InputError, match=method) as refusal:
+        memscal.calibrate(shear_scan(seed=14), channel="xz", method=method)
+    assert 'method="evidence"' in refusal.value.cure
+    with pytest.raises(InputError, match="white-noise"):
+        calibrated(shear_scan(seed=14)).sweep(amplitudes=3, draws=1)
+
+
+def test_a_scan_without_the_channel_is_refused() -> None:
+    scan = memscal.simulate()
+    with pytest.raises(InputError, match="holds no u_xz") as refusal:
+        calibrated(scan)
+    assert "--u-xz" in refusal.value.cure
+    with pytest.raises(InputError, match="no channel 'xx'"):
+        calibrated(scan, "xx")
+
+
+def test_a_line_across_the_component_and_a_raster_are_refused() -> None:
+    scan = shear_scan(seed=15)
+    with pytest.raises(InputError, match="runs along y"):
+        calibrated(replace(scan, direction="y"))
+    raster = memscal.simulate(raster=True, points=11)
+    with pytest.raises(InputError, match="raster"):
+        calibrated(replace(raster, channels={"u_xz": raster.u_zz}))
+
+
+def test_a_scan_of_a_tangential_channel_is_not_taken_for_a_normal_one() -> None:
+    scan = memscal.simulate()
+    shear = replace(scan, sensor=replace(scan.sensor, channel="xz"))
+    with pytest.raises(InputError, match="recorded by channel xz"):
+        memscal.calibrate(shear)
+
+
+def test_a_reference_from_elsewhere_needs_its_shear() -> None:
+    scan = shear_scan(seed=16)
+    profile = memscal.indent(scan.film, scan.indenter, load=1.0).profile()
+    own, given = (
+        memscal.calibrate(scan, reference=reference, channel="xz", method="evidence").apparatus
+        for reference in (None, profile)
+    )
+    assert given.conversion_constant == pytest.approx(own.conversion_constant, rel=1e-3)
+    with pytest.raises(InputError, match="no shear"):
+        memscal.calibrate(
+            scan, reference=replace(profile, sigma_rz=None), channel="xz", method="evidence"
+        )
+
+
+def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative() -> None:
+    scan = shear_scan(seed=17, film=memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.4,
+                                                        thickness=2e-3))  # fmt: skip
+    sticking = memscal.indent(scan.film, scan.indenter, load=1.0, friction=np.inf)
+    found = memscal.calibrate(scan, alternative=sticking, channel="xz", method="evidence")
+    share = found.apparatus.budget["conversion_constant"]["model_form"] / CONVERSION
+    assert 1e-4 < share < 0.03

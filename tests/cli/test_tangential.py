@@ -1,0 +1,58 @@
+"""``memscal calibrate --channel``: the tangential channel on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from console import Run, names
+from shears import CONVERSION, shear_scan
+
+import memscal
+
+
+@pytest.fixture
+def sheared(folder: Path) -> Path:
+    """A scan with a tangential channel."""
+    path = folder / "scan.h5"
+    memscal.write_scan(shear_scan(seed=1), path)
+    return path
+
+
+def test_the_channel_goes_to_an_artifact_of_its_own_by_method_evidence(
+    run: Run, sheared: Path
+) -> None:
+    done = run("calibrate", sheared, "--channel", "xz", "--json")
+    assert done.code == 0, done.err
+    assert done.json["method"] == "evidence"
+    assert "experimental" in done.err
+    apparatus = memscal.load_apparatus(sheared.with_name("scan.xz.apparatus.h5"))
+    assert apparatus.sensor.channel == "xz"
+    u = apparatus.parameters.uncertainty("conversion_constant")
+    assert abs(apparatus.conversion_constant - CONVERSION) < 5 * u
+    assert run("calibrate", sheared).code == 0
+    assert names(sheared.parent) == ["scan.apparatus.h5", "scan.h5", "scan.xz.apparatus.h5"]
+
+
+def test_a_report_and_a_figure_are_drawn(run: Run, sheared: Path) -> None:
+    done = run(
+        "calibrate", sheared, "--channel", "xz", "--report", "r.html", "--figure", "f.png"
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    assert {"r.html", "f.png"} < set(names(sheared.parent))
+
+
+@pytest.mark.parametrize("further", [[], ["--dry-run"]])
+def test_a_method_that_divides_fields_is_an_input_refused(
+    run: Run, sheared: Path, further: list[str]
+) -> None:
+    done = run("calibrate", sheared, "--channel", "xz", "--method", "wiener", *further)
+    assert done.code == 3
+    assert "evidence" in done.err
+    assert names(sheared.parent) == ["scan.h5"]
+
+
+def test_a_scan_without_the_channel_is_an_input_refused(run: Run, scan: Path) -> None:
+    done = run("calibrate", scan, "--channel", "xz")
+    assert done.code == 3
+    assert "u_xz" in done.err
