@@ -125,6 +125,9 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     # A raster is shown against the distance from the centre: a line has a side, a plane has not.
     along = points.x if points.free[0, 0] else points.y
     place = estimate.distance if points.planar or points.scans > 1 else along
+    if points.scans > 1 and estimate.model.order:
+        # A shear has a side, too.
+        place = estimate.offset[estimate.model.axis]
     order = np.argsort(place, kind="stable")
 
     def sorted_(values: FloatArray) -> FloatArray:

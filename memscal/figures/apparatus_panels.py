@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from memscal.figures.quantities import MM, PER_MM, PER_MM2
+from memscal.figures.quantities import MM, PER_MM, PER_MM2, channel_indices
 from memscal.figures.style import COLOURS, legend_above
 from memscal.model.apparatus import ApparatusData, ApparatusRadial
 from memscal.model.validation import FloatArray
@@ -32,7 +32,7 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     bottom = -min(_largest(-low, floor=0.0), 1.5 * peak)
     axes.set_ylim((bottom - 0.06 * top) / PER_MM2, 1.06 * top / PER_MM2)
     axes.set_xlim(0.0, _shown_radius(radial) / MM)
-    axes.set_ylabel("$G_{zz}$ (1/mm$^2$)")
+    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
     legend_above(axes)
 
 
@@ -54,7 +54,7 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     axes.set_ylim(floor / PER_MM2, 3 * peak / PER_MM2)
     axes.set_xlim(0.0, _shown_radius(radial) / MM)
     axes.set_xlabel("distance from the axis $r$ (mm)")
-    axes.set_ylabel("$G_{zz}$ (1/mm$^2$)")
+    axes.set_ylabel(f"$G_{{{channel_indices(data)}}}$ (1/mm$^2$)")
 
 
 def draw_transfer(axes: Axes, data: ApparatusData) -> None:

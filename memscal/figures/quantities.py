@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from memscal.model.apparatus import ParameterSet
+from memscal.estimation.channels import TANGENTIAL
+from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.notation import format_measured
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "PER_MM",
     "PER_MM2",
     "Quantity",
+    "channel_indices",
     "measured_text",
     "quantity",
     "shown_quantity",
@@ -112,3 +114,8 @@ def measured_text(parameters: ParameterSet, name: str) -> str:
     shown = shown_quantity(parameters, name)
     uncertainty = parameters.uncertainty(name)
     return format_measured(parameters[name] / shown.scale, uncertainty / shown.scale, shown.unit)
+
+
+def channel_indices(data: ApparatusData) -> str:
+    """Return the indices of the stress that a sensor's channel measures: zz, xz or yz."""
+    return data.sensor.channel if data.sensor.channel in TANGENTIAL else "zz"

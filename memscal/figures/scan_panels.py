@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
-from memscal.figures.quantities import KPA, MM, MV
+from memscal.figures.quantities import KPA, MM, MV, channel_indices
 from memscal.figures.style import COLOURS, SCATTER_THRESHOLD, legend_above, marker_size
 from memscal.model.apparatus import ApparatusData
 from memscal.model.validation import FloatArray
@@ -29,7 +29,7 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
     _draw_reference(axes, data)
     _draw_indenter(axes, data)
     limit_to_scan(axes, scan.x)
-    axes.set_ylabel("voltage $U_{zz}$ (mV)")
+    axes.set_ylabel(f"voltage $U_{{{channel_indices(data)}}}$ (mV)")
     _stress_axis(axes, data, baseline=_baseline(data))
     legend_above(axes, points=scan.x.size)
 
@@ -38,10 +38,12 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     """Draw the scan less its baseline on a logarithmic axis.
 
     A point below twice its standard uncertainty is not a measurement of a magnitude: its
-    upper limit, max(U, 0) + 2u, is drawn instead, as an open triangle pointing down.
+    upper limit, max(U, 0) + 2u, is drawn instead, as an open triangle pointing down.  Of a
+    tangential channel, the side where the voltage is negative is turned over.
     """
     scan = data.reconvolution
-    signal, errors = scan.u_zz - _background(data, scan.x), _finite_errors(scan.u_zz_errors)
+    signal = _turned(data, scan.x) * (scan.u_zz - _background(data, scan.x))
+    errors = _finite_errors(scan.u_zz_errors)
     clear = (signal > _EXPANDED * errors) & (signal > 0)
     limit = np.where(clear, np.nan, np.maximum(signal, 0.0) + _EXPANDED * errors)
     limit[~(limit > 0)] = np.nan
@@ -63,7 +65,8 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     limit_to_scan(axes, scan.x)
     along = "distance from the centre $r$" if _by_distance(data) else "position $x$"
     axes.set_xlabel(f"{along} (mm)")
-    axes.set_ylabel("$U_{zz}$ less baseline (mV)")
+    bar = "|" if _tangential(data) else ""
+    axes.set_ylabel(f"{bar}$U_{{{channel_indices(data)}}}$ less baseline{bar} (mV)")
     _stress_axis(axes, data, baseline=0.0)
     if np.any(np.isfinite(limit)):
         axes.legend(handles=[limits], loc="lower left", bbox_to_anchor=(0, 1), borderpad=0.2)
@@ -108,6 +111,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
     ):
         x, curve = _as_curve(scan.x, u - background)
         if net:
+            curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
         line_like = (x.size < scan.x.size or _single_valued(scan.x)) and not _joint(data)
         (line,) = axes.plot(x / MM, curve / MV, style, color=COLOURS[name], label=label, zorder=3)
@@ -144,15 +148,16 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
     ``net``: less baseline and drift, and only where positive.
     """
     reference, constant = data.reference, data.conversion_constant
-    if not (np.isfinite(constant) and constant > 0):
+    stress = _seen_stress(data)
+    if not (np.isfinite(constant) and constant > 0) or stress is None:
         return
-    voltage = constant * reference.sigma_zz * (data.load / reference.load)
+    voltage = constant * stress * (data.load / reference.load)
     if net:
         voltage = np.where(voltage > 0, voltage, np.nan)
     x = _centre(data) + np.concatenate([-reference.r[::-1], reference.r])
     curve = np.concatenate([voltage[::-1], voltage])
     if not net:
-        curve = curve + _background(data, x)
+        curve = _turned(data, x) * curve + _background(data, x)
     axes.plot(
         x / MM,
         curve / MV,
@@ -160,14 +165,34 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
         color=COLOURS["reference"],
         lw=1.0,
         zorder=1.5,
-        label=r"reference $\sigma_{zz}$ (right axis)",
+        label=rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)",
     )
 
 
 def _reference_peak(data: ApparatusData) -> float:
-    voltage = data.conversion_constant * np.max(data.reference.sigma_zz) / data.reference.load
-    peak = float(voltage * data.load)
+    stress = _seen_stress(data)
+    if stress is None:
+        return 0.0
+    peak = float(data.conversion_constant * np.max(stress) / data.reference.load * data.load)
     return peak if np.isfinite(peak) else 0.0
+
+
+def _tangential(data: ApparatusData) -> bool:
+    return channel_indices(data) != "zz"
+
+
+def _seen_stress(data: ApparatusData) -> FloatArray | None:
+    """The reference as the channel sees it where its voltage is positive, in Pa."""
+    reference = data.reference
+    if not _tangential(data):
+        return reference.sigma_zz
+    return None if reference.sigma_rz is None else -reference.sigma_rz
+
+
+def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
+    """One; of a tangential channel -1 where the indenter stands beyond the sensor."""
+    beyond = (x > _centre(data)) & _tangential(data)
+    return np.where(beyond, -1.0, 1.0)
 
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
@@ -203,7 +228,7 @@ def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
         return np.asarray(stress, dtype=float) / per_mv + offset
 
     right = axes.secondary_yaxis("right", functions=(stress, voltage))
-    right.set_ylabel(r"stress $\sigma_{zz}$, $U/A$ (kPa)")
+    right.set_ylabel(rf"stress $\sigma_{{{channel_indices(data)}}}$, $U/A$ (kPa)")
 
 
 def _centre(data: ApparatusData) -> float:
@@ -216,10 +241,12 @@ def _centre(data: ApparatusData) -> float:
 def _by_distance(data: ApparatusData) -> bool:
     """Whether a raster's points are given by their distance from the centre.
 
-    A raster has a second centre; its points along x alone would be negative somewhere.
+    A raster has a second centre; its points along x alone would be negative somewhere.  Several
+    scans of a tangential channel keep the sign of the distance.
     """
     raster = any(name.startswith("centre_") for name in data.parameters.names)
-    return raster and bool(np.all(data.reconvolution.x >= 0))
+    signed = _tangential(data) and _joint(data)
+    return raster and (signed or bool(np.all(data.reconvolution.x >= 0)))
 
 
 def _baseline(data: ApparatusData) -> float:
