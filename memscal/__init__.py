@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from memscal.formats.scan import read_scan, write_scan
     from memscal.laboratory.experiment import Experiment, simulate_experiment
     from memscal.laboratory.rod_scan import simulate
+    from memscal.measurement.application import measure_stress
+    from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
     from memscal.measurement.procedure import restore
     from memscal.measurement.restoration import Restoration
     from memscal.mechanics.contact import Contact
@@ -46,6 +48,8 @@ _HOMES = {
     "GaussianMixture": "memscal.axisymmetry.kernels",
     "GreenwoodTripp": "memscal.mechanics.interface",
     "Interface": "memscal.mechanics.interface",
+    "MeasuredProfile": "memscal.measurement.measured_stress",
+    "MeasuredStress": "memscal.measurement.measured_stress",
     "MemscalError": "memscal.errors",
     "MonteCarlo": "memscal.calibration.monte_carlo",
     "Profile": "memscal.model.indenter",
@@ -61,6 +65,7 @@ _HOMES = {
     "design": "memscal.planning.procedure",
     "indent": "memscal.mechanics.indent",
     "load_apparatus": "memscal.apparatus",
+    "measure_stress": "memscal.measurement.application",
     "monte_carlo": "memscal.calibration.monte_carlo",
     "read_reference": "memscal.formats.reference",
     "read_scan": "memscal.formats.scan",
@@ -84,6 +89,8 @@ __all__ = [
     "GaussianMixture",
     "GreenwoodTripp",
     "Interface",
+    "MeasuredProfile",
+    "MeasuredStress",
     "MemscalError",
     "MonteCarlo",
     "Profile",
@@ -100,6 +107,7 @@ __all__ = [
     "design",
     "indent",
     "load_apparatus",
+    "measure_stress",
     "monte_carlo",
     "read_reference",
     "read_scan",

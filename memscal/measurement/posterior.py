@@ -51,8 +51,9 @@ class Posterior:
         centre (m), then baseline and drift (V).
     covariances : mapping of str to ndarray, shape (s, s)
         Their covariance by source; the sources are independent.
-    shifts : mapping of str to ndarray, shape (n, q)
-        What each input's standard uncertainties do to the predicted voltages, in V.
+    shifts, changes : mapping of str to ndarray, shape (n, q) and (s, q)
+        What each input's standard uncertainties do to the predicted voltages, in V, and to the
+        state.
     residual : ndarray, shape (n,)
         Voltages that are not explained, in V.
     found_noise : float
@@ -68,6 +69,7 @@ class Posterior:
     state: FloatArray
     covariances: Mapping[str, FloatArray]
     shifts: Mapping[str, FloatArray]
+    changes: Mapping[str, FloatArray]
     residual: FloatArray
     found_noise: float
     shares: Mapping[tuple[float, float], float]
@@ -122,24 +124,24 @@ def restore_posterior(
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan.film, model.k)
     scale = np.concatenate([scan.load * film, np.ones(mean.size - nodes)])
-    changes = {"film": _film_changes(scan.film, model.k)}
+    of_film = {"film": _film_changes(scan.film, model.k)}
     of_sensor = apparatus_changes(apparatus, model.k)
     shifts = {
         "apparatus": _signals(estimate, mean, of_sensor * film[:, None]),
-        "film": _signals(estimate, mean, changes["film"] * transfer[:, None]),
+        "film": _signals(estimate, mean, of_film["film"] * transfer[:, None]),
         "position_scale": _position_shift(scan, estimate, mean),
     }
     covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
-    for source, shift in shifts.items():
-        columns = -scale[:, None] * (gain @ shift)
-        if source in changes:
-            columns[:nodes] += scan.load * changes[source] * mean[:nodes, None]
-        covariances[source] = columns @ columns.T
+    changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
+    for source, direct in of_film.items():
+        changes[source][:nodes] += scan.load * direct * mean[:nodes, None]
+    covariances |= {source: columns @ columns.T for source, columns in changes.items()}
     posterior = Posterior(
         estimate=estimate,
         state=scale * mean,
         covariances=covariances,
         shifts=shifts,
+        changes=changes,
         residual=_sum_of(shares, [fit.residual for fit in found]),
         found_noise=float(np.dot(shares, [fit.noise for fit in found])),
         shares={
@@ -177,7 +179,20 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
 
 
 def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
-    """Independent changes of the transform of A G by one standard uncertainty, shape (k, q)."""
+    """Return independent changes of the transform of A G by one standard uncertainty.
+
+    Parameters
+    ----------
+    apparatus : ApparatusFunction
+        The calibrated sensor; A and G are correlated as its artifact says.
+    k : ndarray, shape (n,)
+        Wavenumbers, in rad/m; at zero the change is that of A.
+
+    Returns
+    -------
+    ndarray, shape (n, q)
+        One column for each change, in V/Pa.
+    """
     profile, a = apparatus.radial_profile, apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
     covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2

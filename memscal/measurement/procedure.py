@@ -9,8 +9,8 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction, load_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
-from memscal.estimation.points import measured_points
-from memscal.estimation.profile_estimate import estimate_profile
+from memscal.estimation.points import ScanPoints, measured_points
+from memscal.estimation.profile_estimate import ProfileEstimate, estimate_profile
 from memscal.measurement.comparison import Expected
 from memscal.measurement.posterior import reach_of, restore_posterior, sensor_transfer
 from memscal.measurement.pressure import film_transfer
@@ -18,8 +18,9 @@ from memscal.measurement.requirements import require_measurement, restored_or_ex
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restoration_checks import restoration_checks, restoration_messages
 from memscal.model.scan import Scan
+from memscal.model.validation import FloatArray
 
-__all__ = ["restore"]
+__all__ = ["gaussian_pressure", "restore", "restore_known"]
 
 #: A film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
@@ -70,11 +71,17 @@ def restore(
     """
     known = apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
     require_measurement(scan, known)
+    return restore_known(scan, known, expected)
+
+
+def restore_known(scan: Scan, known: ApparatusFunction, expected: Expected = None) -> Restoration:
+    """Restore a stress from a scan and an apparatus function that were proven to fit together.
+
+    Parameters and errors are those of :func:`restore`.
+    """
     points = measured_points(scan)
-    wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))
-    transfer = known.conversion_constant * sensor_transfer(known, wavenumbers.k)
-    through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan.film, wavenumbers.k))
-    estimate = restored_or_explained(lambda: estimate_profile(points, through))
+    estimate, transfer = gaussian_pressure(scan, known, points)
+    wavenumbers = estimate.model.reference.wavenumbers
     posterior = restore_posterior(scan, known, estimate, transfer)
     nodes = posterior.nodes
     r = np.linspace(0.0, reach_of(points) / 3, _RADII)
@@ -91,3 +98,19 @@ def restore(
         found = replace(found, comparison=found.compare(expected))
     checks = restoration_checks(found)
     return replace(found, checks=checks, messages=restoration_messages(found, checks))
+
+
+def gaussian_pressure(
+    scan: Scan, known: ApparatusFunction, points: ScanPoints
+) -> tuple[ProfileEstimate, FloatArray]:
+    """Return the best Gaussian pressure on the film, departures allowed for, and A G's transform.
+
+    Raises
+    ------
+    FitError
+        If the scan does not determine a stress.
+    """
+    wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))
+    transfer = known.conversion_constant * sensor_transfer(known, wavenumbers.k)
+    through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan.film, wavenumbers.k))
+    return restored_or_explained(lambda: estimate_profile(points, through)), transfer

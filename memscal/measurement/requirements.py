@@ -12,7 +12,7 @@ from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 
-__all__ = ["SAME_LOAD", "require_measurement", "restored_or_explained"]
+__all__ = ["SAME_LOAD", "require_covariance", "require_measurement", "restored_or_explained"]
 
 #: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
 SAME_LOAD = 0.01
@@ -33,7 +33,7 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
             cure="Read a scan file with memscal.read_scan(path).",
         )
     _require_same_sensor(scan, apparatus)
-    _require_covariance(apparatus)
+    require_covariance(apparatus)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
         return
@@ -80,7 +80,14 @@ def _require_same_sensor(scan: Scan, apparatus: ApparatusFunction) -> None:
         )
 
 
-def _require_covariance(apparatus: ApparatusFunction) -> None:
+def require_covariance(apparatus: ApparatusFunction) -> None:
+    """Refuse an apparatus function that does not say how well it is known.
+
+    Raises
+    ------
+    InputError
+        If the covariance of G or the uncertainty of A is missing or no number.
+    """
     profile = apparatus.radial_profile
     known = (
         profile.g_covariance.shape == (profile.r.size, profile.r.size)

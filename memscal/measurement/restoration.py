@@ -163,6 +163,11 @@ class Restoration:
         return self.posterior.noise_ratio * self.posterior.estimate.noise
 
     @property
+    def noise_root(self) -> FloatArray:
+        """Square root of the voltages' covariance, shape (n, n), in V; outliers' raised."""
+        return self.posterior.noise_ratio * self.posterior.estimate.noise_root
+
+    @property
     def degrees(self) -> float:
         """Points less parameters without prior: outliers count by their weight."""
         estimate = self.posterior.estimate

@@ -1,0 +1,123 @@
+r"""From the restored stress of one load to its measured profile, with its covariance by source.
+
+The voltages less baseline and drift, over A.  What is uncertain besides their noise: A, the same
+for all; and centre, baseline and drift, with their joint covariance :math:`\Sigma` and the columns
+:math:`J = -[\partial U/\partial c,\ 1,\ \xi]/A`.  Of :math:`J\Sigma J^T` the part that the centre
+explains is its own, the rest the baseline's, so that both are covariances and their sum is exact.
+That baseline and centre come from the same voltages is not counted: where the stress has decayed
+it would make the uncertainties a little smaller.
+
+The stress on the axis is the restored one, blurred by G.  An error of A or G changes what is
+restored so that it still meets the voltages: blurred again, nothing is left of an error of G but
+what the scan does not tell, and an error of A is left whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from memscal.measurement.contact_signal import ContactSignal
+from memscal.measurement.measured_stress import MeasuredProfile
+from memscal.measurement.posterior import apparatus_changes, sensor_transfer
+from memscal.measurement.prepared_scan import PreparedScan
+from memscal.measurement.pressure import film_transfer
+from memscal.measurement.restoration import Restoration
+from memscal.measurement.single_loads import SingleLoad
+from memscal.model.validation import FloatArray
+
+__all__ = ["measured_profile"]
+
+
+def measured_profile(
+    part: SingleLoad, prepared: PreparedScan, found: Restoration, signal: ContactSignal
+) -> MeasuredProfile:
+    """Return the measured profile of one load from its restored stress."""
+    a, estimate = found.apparatus.conversion_constant, found.posterior.estimate
+    noise = found.noise / np.sqrt(estimate.outlier_weight)
+    average, x, y = _averaging(found, noise)
+    level = average @ (found.points.u - _background(found))
+    r = np.hypot(x - found.centre[0], y - found.centre[1])
+    order = np.argsort(r, kind="stable")
+    average, s_zz = average[order], level[order] / a
+    root = average @ (found.noise_root / a)
+    relative = found.apparatus.parameters.uncertainty("conversion_constant") / a
+    covariances = {
+        "noise": root @ root.T,
+        "conversion_constant": np.outer(s_zz, s_zz) * relative**2,
+        **_of_place(found, average),
+    }
+    maximum, budget = _on_axis(found)
+    return MeasuredProfile(
+        part=part,
+        restoration=found,
+        x=x[order],
+        y=y[order],
+        r=r[order],
+        s_zz=s_zz,
+        covariances=covariances,
+        maximum=maximum,
+        maximum_budget=budget,
+        electronic_noise=_electronic(prepared, found),
+        contact_radius=signal.contact_radius,
+        noise_found=prepared.noise_found or found.points.u_errors is None,
+    )
+
+
+def _averaging(found: Restoration, noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Matrix (n, points) that averages repeats by their weight, and the n positions."""
+    places = np.stack([found.points.x, found.points.y])
+    unique, back = np.unique(places, axis=1, return_inverse=True)
+    average = np.zeros((unique.shape[1], noise.size))
+    average[back.ravel(), np.arange(noise.size)] = noise**-2
+    return average / average.sum(axis=1, keepdims=True), unique[0], unique[1]
+
+
+def _background(found: Restoration) -> FloatArray:
+    drift = found.posterior.state[found.posterior.nodes + int(found.points.free.sum()) :]
+    return np.asarray(found.posterior.estimate.model.drift_columns @ drift)
+
+
+def _of_place(found: Restoration, average: FloatArray) -> Mapping[str, FloatArray]:
+    """Covariance that centre, baseline and drift bring, shared out without a rest."""
+    posterior, model = found.posterior, found.posterior.estimate.model
+    nodes, free = posterior.nodes, found.points.free
+    geometry = model.geometry(np.atleast_2d(found.centre))
+    pressure = posterior.state[:nodes] / found.scan.load / film_transfer(found.scan.film, model.k)
+    columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
+    columns = [average @ column / found.apparatus.conversion_constant for column in columns]
+    sigma, n = posterior.covariance[nodes:, nodes:], int(free.sum())
+    carried = np.linalg.solve(sigma[:n, :n], sigma[:n, n:])
+    of_centre = columns[0] + columns[1] @ carried.T
+    rest = sigma[n:, n:] - sigma[n:, :n] @ carried
+    return {
+        "centre": of_centre @ sigma[:n, :n] @ of_centre.T,
+        "baseline": columns[1] @ rest @ columns[1].T,
+    }
+
+
+def _on_axis(found: Restoration) -> tuple[float, Mapping[str, float]]:
+    """Return the blurred stress on the axis and its standard uncertainty by source, in Pa."""
+    posterior, apparatus = found.posterior, found.apparatus
+    wavenumbers = posterior.estimate.model.reference.wavenumbers
+    nodes, k = posterior.nodes, wavenumbers.k
+    on_axis = wavenumbers.synthesise(np.eye(nodes), np.zeros(1))[0]
+    transfer = sensor_transfer(apparatus, k)
+    row, state = on_axis * transfer, posterior.state[:nodes]
+    maximum, a = float(row @ state), apparatus.conversion_constant
+    changes = {source: row @ columns[:nodes] for source, columns in posterior.changes.items()}
+    of_sensor = apparatus_changes(apparatus, np.append(k, 0.0))
+    # G = (A G)/A: its own change beside that of what was restored with it.
+    of_g = (of_sensor[:-1] - transfer[:, None] * of_sensor[-1]) / a
+    changes["apparatus"] = changes["apparatus"] + on_axis * state @ of_g
+    budget = {source: float(np.linalg.norm(change)) for source, change in changes.items()}
+    noise = float(row @ posterior.covariances["scan"][:nodes, :nodes] @ row)
+    return maximum, {"noise": float(np.sqrt(max(noise, 0.0))), **budget}
+
+
+def _electronic(prepared: PreparedScan, found: Restoration) -> FloatArray:
+    """Electronic noise of every voltage: where nothing else scatters, what restoration found."""
+    if prepared.electronic.any():
+        return prepared.electronic
+    return np.full(prepared.scan.u_zz.shape, float(found.noise.min()))

@@ -1,0 +1,116 @@
+r"""The quality checks of a measured stress: force against load, and those of each profile.
+
+The force is the transform of the restored stress at :math:`k = 0`, where :math:`\hat G = 1`: a G
+that is too wide or too narrow leaves it as it is.  So does a film of another thickness, whose
+transfer function is one there, too, but for what lies beyond the scan.  The force checks A and
+load; the shape of the profile (chi-square) checks G and film.
+
+All loads together tell more than each: with force over load :math:`q_j`, independent
+uncertainties :math:`u_j` and common ones :math:`c_j` (A, film, stage, common load), the mean
+weighted by :math:`1/u_j^2` has the variance :math:`w^T(\mathrm{diag}(u^2) + cc^T)w`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import erfc
+
+from memscal.calibration.model_checks import check
+from memscal.measurement.measured_stress import MeasuredProfile
+from memscal.model.apparatus import QualityCheck
+
+__all__ = ["pooled_force", "stress_checks"]
+
+_FORCE_LIMIT = 3.0
+#: What the shapes of pressure leave open of the force of one profile, however small the noise.
+_NEGLIGIBLE_FORCE = 0.01
+#: ... of the mean of several, whose shapes differ.
+_NEGLIGIBLE_MEAN = 0.005
+_FORCE = (
+    "It does not depend on the shape of G, and hardly on the film's thickness. A failure means "
+    "that A or the gain of the channel, the load, or the unit of one of them is wrong; a wrong "
+    "film thickness or width of G shows in chi_square and reconvolution instead."
+)
+#: Of a restoration's own checks, the force's is made here.
+_REPLACED = "restored_force"
+#: Without a noise that is stated there is nothing to compare the scatter with.
+_OF_STATED_NOISE = ("noise_as_stated", "chi_square")
+
+
+def stress_checks(profiles: Sequence[MeasuredProfile]) -> tuple[QualityCheck, ...]:
+    """Return the checks of each profile, numbered from one, then those of all together."""
+    found = [
+        replace(one, name=f"{one.name}_{i + 1}", meaning=f"{profile.label}: {one.meaning}")
+        for i, profile in enumerate(profiles)
+        for one in _of_profile(profile)
+    ]
+    if len(profiles) > 1:
+        found.append(_all_forces(profiles))
+    return tuple(found)
+
+
+def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
+    """Return the mean of force over load of all profiles, and its standard uncertainty.
+
+    The load's common uncertainty counts; that of each load of one profile does not.
+    """
+    parts = [_relative(profile) for profile in profiles]
+    own = np.array([part["own"] for part in parts])
+    weight = own**-2 / np.sum(own**-2)
+    ratio = np.array([profile.force / profile.load for profile in profiles])
+    variance = float(np.sum((weight * own) ** 2))
+    for source in ("apparatus", "film", "position_scale", "load"):
+        variance += float(weight @ [part[source] for part in parts]) ** 2
+    return float(weight @ ratio), math.sqrt(variance)
+
+
+def _relative(profile: MeasuredProfile) -> dict[str, float]:
+    """Standard uncertainties of force over load, by source."""
+    budget = {source: u / profile.load for source, u in profile.force_budget.items()}
+    own = budget.pop("scan")
+    common = profile.part.scan.load_uncertainty or 0.0
+    return {"own": own, **budget, "load": common / profile.load}
+
+
+def _of_profile(profile: MeasuredProfile) -> Iterator[QualityCheck]:
+    yield _force(profile)
+    for one in profile.restoration.checks:
+        stated = not profile.noise_found or one.name not in _OF_STATED_NOISE
+        if one.name != _REPLACED and stated:
+            yield one
+
+
+def _force(profile: MeasuredProfile) -> QualityCheck:
+    off = profile.force / profile.load - 1
+    allowed = float(np.linalg.norm([*_relative(profile).values(), _NEGLIGIBLE_FORCE]))
+    return check(
+        "applied_force",
+        abs(off) / allowed,
+        _FORCE_LIMIT,
+        f"Difference of the profile's total force, {profile.force:.4g} N, from the applied load of "
+        f"{profile.load:.4g} N, over its standard uncertainty of {allowed * profile.load:.2g} N. "
+        + _FORCE,
+        _two_sided(off / allowed),
+    )
+
+
+def _all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
+    mean, spread = pooled_force(profiles)
+    allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
+    return check(
+        "applied_force",
+        abs(mean - 1) / allowed,
+        _FORCE_LIMIT,
+        f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "
+        f"{mean:.4f}, with a standard uncertainty of {allowed:.2g}, in units of which its "
+        "difference from one is counted. " + _FORCE,
+        _two_sided((mean - 1) / allowed),
+    )
+
+
+def _two_sided(z: float) -> float:
+    return float(erfc(abs(z) / math.sqrt(2)))
