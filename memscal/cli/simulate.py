@@ -1,4 +1,4 @@
-"""``memscal simulate``: a synthetic scan whose truth is known."""
+"""``memscal simulate``: a synthetic scan, or a whole experiment, whose truth is known."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from memscal.cli.failures import DONE, debug_option
 from memscal.cli.kernel_options import kernel_from, kernel_options, require_one_kernel
@@ -22,7 +23,10 @@ from memscal.cli.options import (
     radius_options,
     si,
 )
-from memscal.cli.output import emit_json, message, note
+from memscal.cli.output import message, note
+from memscal.cli.simulate_sphere import FILES, experiment_from, sphere_options
+from memscal.cli.simulate_sphere import NAMES as SPHERE_NAMES
+from memscal.cli.simulate_view import tell_experiment, tell_scan
 from memscal.cli.targets import prove_writable
 
 if TYPE_CHECKING:
@@ -40,6 +44,9 @@ FILM = {
     "thickness-uncertainty": 0.02,
 }
 
+_ROD_NAMES = ("half_range", "raster")
+"""The options that only a rod scan alone has."""
+
 _SHARE = Quantity("percent", open_low=False)
 _SIGNED_SHARE = Quantity("percent", low=-math.inf)
 _POSITION = Quantity("mm", low=-math.inf)
@@ -52,18 +59,32 @@ Examples:
   memscal simulate -o raster.h5 --raster --points 33 --half-range 6
   memscal simulate -o ring.h5 --sigma 700 --weight 1.5 --sigma 400 --weight -0.5
   memscal simulate -o disc.h5 --disc-radius 800 --sigma 300
+
+\b
+Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts to measure:
+  memscal simulate --experiment sphere -o experiment
+  memscal simulate --experiment sphere -o sticky --friction inf --draw-inputs --seed 7
+  memscal simulate --experiment sphere -o rough --friction 1.6 --slip-length 1.82
+  memscal simulate --experiment sphere -o wrong --gain 1.05
 """
 
 
 @click.command("simulate", epilog=EXAMPLES)
 @click.option(
+    "--experiment",
+    type=click.Choice(["rod", "sphere"]),
+    default="rod",
+    show_default=True,
+    help="A rod scan; or a whole experiment with a sphere: a rod scan, and scans of the sphere's "
+    "contacts, dry and lubricated.",
+)
+@click.option(
     "-o",
     "--output",
     type=FILE,
-    default=Path("synthetic_scan.h5"),
-    show_default=True,
-    metavar="SCAN",
-    help="Scan to write (memscal-scan).",
+    metavar="SCAN|FOLDER",
+    help="Scan to write (memscal-scan), or the folder of an experiment's three scans.  "
+    "[default: synthetic_scan.h5, or synthetic_experiment]",
 )
 @kernel_options
 @click.option(
@@ -71,9 +92,8 @@ Examples:
     "loads",
     type=Quantity("N"),
     multiple=True,
-    default=(1.0,),
-    show_default=True,
-    help="Normal load, in N. Repeated: one scan at each.",
+    help="Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
+    "0.34, 0.69, 1.37 and 2.75]",
 )
 @radius_options(default=0.25, uncertainty=0.0025)
 @film_options(defaults=FILM)
@@ -82,23 +102,23 @@ Examples:
     type=Quantity("mm"),
     default=8.0,
     show_default=True,
-    help="Positions run from minus to plus this, in mm.",
+    help="Rod scan alone: positions run from minus to plus this, in mm.",
 )
 @click.option(
     "--points",
     type=click.IntRange(min=2, max=4096),
     default=65,
     show_default=True,
-    help="Positions along each axis.",
+    help="Positions of the rod along each axis.",
 )
 @click.option(
     "--repeats",
     type=click.IntRange(min=1, max=4096),
     default=1,
     show_default=True,
-    help="Repeats at each load.",
+    help="Repeats at each load; with a sphere, of its contacts.",
 )
-@click.option("--raster", is_flag=True, help="Scan a square instead of a line.")
+@click.option("--raster", is_flag=True, help="Rod scan alone: a square instead of a line.")
 @click.option(
     "--noise",
     type=_SHARE,
@@ -155,26 +175,68 @@ Examples:
     metavar="N",
     help="Seed of the noise.",
 )
+@sphere_options
 @json_option
 @force_option
 @debug_option
-def command(output: Path, as_json: bool, force: bool, **given: Any) -> int:
-    """Make a synthetic scan from a known apparatus function.
+def command(experiment: str, output: Path | None, as_json: bool, force: bool, **given: Any) -> int:
+    """Make a synthetic scan, or the scans of an experiment, from a known apparatus function.
 
-    The base stress of a frictionless rod on the bonded film is convolved with the apparatus
-    function; noise, an offset and a drift are added. The file is labelled as synthetic and holds
-    its truth. What the options do not say is the paper's.
+    The base stress of a frictionless rod on the bonded film, or of a sphere's contacts, is
+    convolved with the apparatus function; noise, an offset and a drift are added. Every file is
+    labelled as synthetic and holds its truth. What the options do not say is the paper's.
     """
-    require_one_kernel(given)
-    if given["raster"] and len(given["loads"]) * given["repeats"] > 1:
-        raise click.UsageError("A raster has one repeat at one load.")
+    _check_usage(experiment, given)
+    if experiment == "sphere":
+        return _sphere(output or Path("synthetic_experiment"), given, as_json, force)
+    output = output or Path("synthetic_scan.h5")
     prove_writable([output], force=force)
     scan = _simulate(given)
 
     from memscal.formats.scan import write_scan
 
     write_scan(scan, output, overwrite=force)
-    _tell(scan, output, as_json)
+    tell_scan(scan, output, as_json)
+    note("The scan is synthetic: nothing in it was measured.")
+    message(f"Written: {output}")
+    return DONE
+
+
+def _check_usage(experiment: str, given: Mapping[str, Any]) -> None:
+    """Refuse options that contradict each other, or belong to the other experiment."""
+    context = click.get_current_context()
+    typed = ParameterSource.COMMANDLINE
+    others = SPHERE_NAMES if experiment == "rod" else _ROD_NAMES
+    strange = [name for name in others if context.get_parameter_source(name) == typed]
+    if strange:
+        options = [
+            option.opts[0]
+            for option in context.command.params
+            if isinstance(option, click.Option) and option.name in strange
+        ]
+        other = "sphere" if experiment == "rod" else "rod"
+        belongs = "belongs" if len(options) == 1 else "belong"
+        raise click.UsageError(f"{', '.join(options)} {belongs} to --experiment {other}.")
+    require_one_kernel(given)
+    if given["raster"] and max(len(given["loads"]), 1) * given["repeats"] > 1:
+        raise click.UsageError("A raster has one repeat at one load.")
+    for name in ("loads", "lubricated_loads"):
+        if experiment == "sphere" and len(set(given[name])) < len(given[name]):
+            raise click.UsageError(
+                "A load of the sphere is given twice: give it once, and --repeats."
+            )
+
+
+def _sphere(folder: Path, given: Mapping[str, Any], as_json: bool, force: bool) -> int:
+    from memscal.formats.scan_folder import ensure_folder_writable, write_scans
+
+    ensure_folder_writable(folder, FILES, overwrite=force)
+    experiment = experiment_from(given)
+    scans = {f"{name}.h5": scan for name, scan in experiment.scans.items()}
+    write_scans(scans, folder, overwrite=force)
+    tell_experiment({folder / name: scan for name, scan in scans.items()}, as_json)
+    note("The scans are synthetic: nothing in them was measured.")
+    message(f"Written: {', '.join(str(folder / name) for name in scans)}")
     return DONE
 
 
@@ -184,7 +246,7 @@ def _simulate(given: Mapping[str, Any]) -> Scan:
 
     film, rod = film_from(given), indenter_from("rod", given)
     assert isinstance(rod, Rod)
-    loads = given["loads"]
+    loads = given["loads"] or (1.0,)
     return simulate(
         film=film,
         rod=rod,
@@ -203,37 +265,3 @@ def _simulate(given: Mapping[str, Any]) -> Scan:
         state_noise=given["state_noise"],
         seed=given["seed"],
     )
-
-
-def _tell(scan: Scan, output: Path, as_json: bool) -> None:
-    truth = dict(scan.synthetic or {})
-    if as_json:
-        emit_json(
-            {
-                "schema_version": "1",
-                "scan": str(output),
-                "synthetic": True,
-                "kind": scan.kind,
-                "shape": list(scan.u_zz.shape),
-                "truth_si": truth,
-            }
-        )
-    else:
-        from memscal.cli.tables import Table, emit_tables
-        from memscal.figures.quantities import quantity
-
-        rows = [("kind", scan.kind), ("points", " x ".join(str(n) for n in scan.u_zz.shape))]
-        for name, value in truth.items():
-            if isinstance(value, str):
-                rows.append((name.replace("_", " "), value))
-            elif name == "seed":
-                rows.append((name, f"{value:g}"))
-            else:
-                shown = quantity(name, "V" if name == "noise" else "")
-                words = "Gaussian width" if name == "gaussian_sigma" else shown.words
-                rows.append((words, f"{value / shown.scale:.6g} {shown.unit}"))
-        emit_tables(
-            Table("Synthetic scan (calculated, not measured) and its truth", ("", ""), rows)
-        )
-    note("The scan is synthetic: nothing in it was measured.")
-    message(f"Written: {output}")

@@ -180,7 +180,7 @@ def test_the_defaults_are_the_papers_scan() -> None:
         ({"load": []}, InputError, "list of loads is empty"),
         ({"load": [0.3, 0.3]}, InputError, "given twice"),
         ({"load": [-1.0]}, InputError, "load is -1 N"),
-        ({"load": 1e5}, DomainError, "load|film"),
+        ({"load": 1e7}, DomainError, "load|film"),
         ({"points": 1}, InputError, "two contacts"),
         ({"repeats": 0}, InputError, "one row"),
         ({"seed": -1}, InputError, "seed"),

@@ -1,0 +1,176 @@
+"""``memscal simulate --experiment sphere``."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from console import Run, names
+
+import memscal
+from memscal.cli.simulate_sphere import FILES
+from memscal.formats.inspection import check
+
+SPHERE = ("simulate", "--experiment", "sphere")
+FEW = ("--load", 0.69, "--lubricated-load", 0.69, "--contacts", 9, "--spacing", 2)
+
+
+def scans(folder: Path) -> dict[str, memscal.Scan]:
+    return {name: memscal.read_scan(folder / name) for name in FILES}
+
+
+def truth(scan: memscal.Scan) -> dict[str, Any]:
+    assert scan.synthetic is not None
+    return dict(scan.synthetic)
+
+
+def test_the_defaults_are_those_of_the_library(run: Run, folder: Path) -> None:
+    done = run(*SPHERE)
+    assert done.code == 0, done.err
+    assert names(folder) == ["synthetic_experiment"]
+    assert names(folder / "synthetic_experiment") == sorted(FILES)
+    own = memscal.simulate_experiment()
+    assert list(FILES) == [f"{name}.h5" for name in own.scans]
+    found = scans(folder / "synthetic_experiment")
+    for scan, expected in zip(found.values(), own.scans.values(), strict=True):
+        np.testing.assert_allclose(scan.u_zz, expected.u_zz, rtol=1e-12)
+        assert truth(scan).keys() == truth(expected).keys()
+        for name, value in truth(expected).items():
+            told = value if isinstance(value, str) else pytest.approx(value, rel=1e-12)
+            assert truth(scan)[name] == told, name
+        assert scan.indenter == expected.indenter
+        assert (scan.lubrication, scan.lubricant) == (expected.lubrication, expected.lubricant)
+        for name in ("load", "load_uncertainty", "normal_load", "normal_load_errors", "x_errors"):
+            ours, theirs = getattr(scan, name), getattr(expected, name)
+            assert (ours is None) == (theirs is None), name
+            if ours is not None:
+                np.testing.assert_allclose(ours, theirs, rtol=1e-12)
+
+
+def test_options_mean_their_units(run: Run, folder: Path) -> None:
+    options = [
+        *FEW, "--friction", 0.3, "--loading", "total", "--sphere-radius", 100, "--repeats", 2,
+        "--sphere-radius-uncertainty", 0.2, "--load-scatter", 1, "--position-error", 5,
+        "--points", 33, "--thickness", 3, "--gain", 1.05, "--thickness-factor", 0.95,
+    ]  # fmt: skip
+    done = run(*SPHERE, "-o", "run", *options, "--json")
+    assert done.code == 0, done.err
+    rod, dry, lubricated = scans(folder / "run").values()
+    assert rod.u_zz.shape == (33,)
+    assert dry.u_zz.shape == lubricated.u_zz.shape == (2, 9)
+    assert (dry.x[0], dry.x[-1]) == pytest.approx((-8e-3, 8e-3))
+    assert dry.indenter == memscal.Sphere(radius=0.1, radius_uncertainty=0.2e-3)
+    np.testing.assert_allclose(dry.x_errors, np.full(9, 5e-6))
+    np.testing.assert_allclose(dry.normal_load_errors, np.full((2, 9), 0.0069))
+    told = truth(dry)
+    assert (told["friction"], told["loading"], told["gain"]) == (0.3, "total", 1.05)
+    assert (dry.film.thickness, told["thickness"]) == pytest.approx((3e-3, 2.85e-3))
+    assert [item["scan"] for item in done.json["scans"]] == [f"run/{name}" for name in FILES]
+    assert done.json["synthetic"] is True
+    assert done.json["scans"][1]["truth_si"]["position_error"] == pytest.approx(5e-6)
+
+
+def test_laws_of_the_interface_and_their_units_are_stored_as_truth(run: Run, folder: Path) -> None:
+    still = [*FEW, "--load-scatter", 0]
+    slip = ["--friction", "inf", "--slip-length", 3]
+    done = run(*SPHERE, "-o", "slip", *still, *slip, "--json")
+    assert done.code == 0, done.err
+    told = truth(memscal.read_scan("slip/sphere_dry.h5"))
+    assert (told["friction"], told["slip_length"]) == (np.inf, pytest.approx(3e-6))
+    assert done.json["scans"][1]["truth_si"]["friction"] == "inf"
+    done = run(*SPHERE, "-o", "rough", *still, "--exponential", 1, 0.5)
+    assert done.code == 0, done.err
+    for name in FILES[1:]:
+        told = truth(memscal.read_scan(f"rough/{name}"))
+        assert told["decay_length"] == pytest.approx(1e-6)
+        assert told["reference_pressure"] == pytest.approx(0.5e6)
+
+
+def test_the_experiment_is_labelled_as_synthetic_wherever_it_is_shown(
+    run: Run, folder: Path
+) -> None:
+    done = run(*SPHERE, "-o", "run", *FEW, "--draw-inputs", "--record-loads")
+    assert done.code == 0, done.err
+    assert "Synthetic experiment (calculated, not measured)" in done.out
+    assert "friction coefficient" in done.out
+    assert "nothing in them was measured" in done.err
+    for name in FILES:
+        assert "synthetic" in run("inspect", f"run/{name}").out
+        assert [finding for finding in check(f"run/{name}") if not finding.passed] == []
+    assert "lubricated" in run("inspect", "run/sphere_lubricated.h5").out
+    told = truth(memscal.read_scan("run/sphere_dry.h5"))
+    assert told["thickness"] != 2e-3
+    assert f"{told['thickness'] * 1e3:.6g} mm" in done.out
+
+
+def test_existing_scans_are_replaced_only_if_it_is_asked_for(run: Run, folder: Path) -> None:
+    assert run(*SPHERE, "-o", "run", *FEW).code == 0
+    before = {name: (folder / "run" / name).read_bytes() for name in FILES}
+    (folder / "run" / FILES[0]).unlink()
+    refused = run(*SPHERE, "-o", "run", *FEW, "--seed", 1)
+    assert refused.code == 4
+    assert "exists already" in refused.err
+    assert names(folder / "run") == sorted(FILES[1:])
+    assert (folder / "run" / FILES[1]).read_bytes() == before[FILES[1]]
+    (folder / "run" / "notes.txt").write_text("mine")
+    assert run(*SPHERE, "-o", "run", *FEW, "--seed", 1, "--force").code == 0
+    assert names(folder / "run") == sorted([*FILES, "notes.txt"])
+    assert truth(memscal.read_scan(f"run/{FILES[1]}"))["seed"] == 1
+
+
+def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path) -> None:
+    command = [sys.executable, "-m", "memscal", *SPHERE, "-o", "run", *map(str, FEW)]
+    # The last file has a longer table of contacts than the first, which alone would fit.
+    done = subprocess.run(
+        [*command, "--repeats", "40", "--load-scatter", "0"], cwd=folder, capture_output=True,
+        text=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (36_000, 36_000)),
+    )  # fmt: skip
+    assert done.returncode == 4, done.stderr
+    assert "sphere" in done.stderr
+    assert names(folder) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "hint"),
+    [
+        (["--raster"], 2, "--raster belongs to --experiment rod"),
+        (["--half-range", 5, "--raster"], 2, "--half-range, --raster belong"),
+        (["--load", 1, "--load", 1], 2, "given twice"),
+        (["--lubricated-load", 1, "--lubricated-load", 1], 2, "given twice"),
+        (["--greenwood-tripp", 1, 1, 1, "--exponential", 1, 1], 2, "one normal law"),
+        (["--load-scatter", 11], 2, "(in percent)"),
+        (["--friction", -1], 2, "of at least 0"),
+        (["--contacts", 1], 2, "2<=x<=4096"),
+        (["--load", 1e7], 3, "film"),
+        (["-o", "no/such/folder"], 4, "Create the folder first"),
+        (["-o", "file"], 4, "not a folder"),
+    ],
+)
+def test_what_makes_no_experiment_is_refused(
+    run: Run, folder: Path, arguments: list[object], code: int, hint: str
+) -> None:
+    (folder / "file").write_text("mine")
+    refused = run(*SPHERE, *arguments)
+    assert (refused.code, hint in refused.err) == (code, True), refused.err
+    assert names(folder) == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (["--friction", 0.2], "--friction belongs to --experiment sphere"),
+        (["--gain", 1, "--slip-length", 2], "--slip-length, --gain belong"),
+    ],
+)
+def test_a_rod_scan_refuses_what_only_a_sphere_has(
+    run: Run, folder: Path, arguments: list[object], hint: str
+) -> None:
+    refused = run("simulate", *arguments)
+    assert (refused.code, hint in refused.err) == (2, True), refused.err
+    assert names(folder) == []
