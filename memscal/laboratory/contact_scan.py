@@ -12,6 +12,7 @@ from memscal.errors import InputError
 from memscal.laboratory.contact_signal import pressed_path
 from memscal.laboratory.response import apparatus_function, disturbance
 from memscal.laboratory.rod_scan import PAPER_FILM
+from memscal.laboratory.shear_channel import Disturbances, shear_channel
 from memscal.mechanics.interface import Interface
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
@@ -39,6 +40,9 @@ def simulate_contacts(
     sphere: Sphere = PAPER_SPHERE,
     kernel: RadialKernel | None = None,
     conversion_constant: float = 1e-7,
+    channels: Sequence[str] = ("zz",),
+    shear_kernel: RadialKernel | None = None,
+    shear_conversion_constant: float = 5e-8,
     load: float | Sequence[float] = PAPER_LOADS,
     friction: float = 0.0,
     loading: str = "incremental",
@@ -79,6 +83,8 @@ def simulate_contacts(
         The apparatus function G; the paper's Gaussian of 561 um where absent.
     conversion_constant : float
         A, in V/Pa.
+    channels, shear_kernel, shear_conversion_constant
+        Whether ``u_xz`` is recorded, too, and its G and A, as of :func:`memscal.simulate`.
     load : float or sequence of float
         Nominal loads, in N, each once; each gives ``repeats`` rows of the scan.
     friction, loading, interface
@@ -139,6 +145,7 @@ def simulate_contacts(
     require_non_negative("position_error", position_error)
     _require_finite(centre, baseline, drift)
     interface, truth = interface or Interface(), apparatus_function(kernel)
+    shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
     path = pressed_path(
         film,
         sphere,
@@ -152,7 +159,8 @@ def simulate_contacts(
     row = np.repeat(np.arange(loads.size), repeats)
     draws = _draw(row.size, points, seed)
     ratio = 1 + load_scatter * draws["load"]
-    away = np.hypot(x + position_error * draws["position"] - centre[0], centre[1])
+    along = x + position_error * draws["position"] - centre[0]
+    away = np.hypot(along, centre[1])
     largest = conversion_constant * float(
         path.at_nominal(truth, np.hypot(x - centre[0], centre[1])).max()
     )
@@ -165,6 +173,15 @@ def simulate_contacts(
     if record_loads:
         stated, unsure = stated * ratio * (1 + load_reading * draws["reading"]), load_reading
     shape = u.shape[1:] if len(u) == 1 else u.shape
+    further: dict[str, FloatArray] = {}
+    known: dict[str, float | str] = {}
+    if shear is not None:
+        blurred = [
+            path.near(int(j), shear.kernel, away[i], ratio[i], order=1) for i, j in enumerate(row)
+        ]
+        sheared = np.stack(blurred) * shear.side(along, away)
+        disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
+        further, known = shear.recorded(sheared.reshape(shape), x, disturbed)
     return Scan(
         x=x,
         u_zz=u.reshape(shape),
@@ -172,6 +189,7 @@ def simulate_contacts(
         x_errors=np.full(points, position_error) if position_error > 0 else None,
         normal_load=stated.reshape(shape),
         normal_load_errors=(unsure * stated).reshape(shape) if unsure > 0 else None,
+        channels=further,
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=sphere,
@@ -199,6 +217,7 @@ def simulate_contacts(
             "drift": drift * largest,
             "noise": noise * largest,
             "seed": float(seed),
+            **known,
         },
     )
 

@@ -55,7 +55,13 @@ class LoadPath:
         return blurred_stress([state[len(state) // 2] for state in self.states], kernel, radius)
 
     def near(
-        self, index: int, kernel: RadialKernel, radius: FloatArray, ratio: FloatArray
+        self,
+        index: int,
+        kernel: RadialKernel,
+        radius: FloatArray,
+        ratio: FloatArray,
+        *,
+        order: int = 0,
     ) -> FloatArray:
         """Return the blurred stress at radii (m), each at its own load, in Pa.
 
@@ -67,8 +73,10 @@ class LoadPath:
             The apparatus function.
         radius, ratio : ndarray, shape (n,)
             Distance from the axis in m, and load relative to the nominal one, of each contact.
+        order : int
+            Zero for the normal stress, one for the shear's radial component.
         """
-        values = blurred_stress(self.states[index], kernel, radius)
+        values = blurred_stress(self.states[index], kernel, radius, order=order)
         if len(values) == 1:
             return np.asarray(values[0])
         below, middle, above = values

@@ -62,6 +62,9 @@ def simulate_experiment(
     sphere: Sphere = PAPER_SPHERE,
     kernel: RadialKernel | None = None,
     conversion_constant: float = 1e-7,
+    channels: Sequence[str] = ("zz",),
+    shear_kernel: RadialKernel | None = None,
+    shear_conversion_constant: float = 5e-8,
     rod_load: float = 1.0,
     rod_points: int = 65,
     rod_repeats: int = 1,
@@ -104,6 +107,8 @@ def simulate_experiment(
         The apparatus function G; the paper's Gaussian of 561 um where absent.
     conversion_constant : float
         A, in V/Pa.
+    channels, shear_kernel, shear_conversion_constant
+        Whether ``u_xz`` is recorded, too, and its G and A, as of :func:`memscal.simulate`.
     rod_load, rod_points, rod_repeats : float, int, int
         Load of the rod in N, positions of its scan over 8 mm to both sides, and repeats.
     loads, lubricated_loads : sequence of float
@@ -174,6 +179,8 @@ def simulate_experiment(
     shared: dict[str, Any] = {
         "film": reality.film,
         "kernel": kernel,
+        "channels": channels,
+        "shear_kernel": shear_kernel,
         "centre": centre,
         "baseline": baseline,
         "drift": drift,
@@ -183,6 +190,7 @@ def simulate_experiment(
     contacts: dict[str, Any] = shared | {
         "sphere": reality.sphere,
         "conversion_constant": gain * conversion_constant,
+        "shear_conversion_constant": gain * shear_conversion_constant,
         "loading": loading,
         "points": points,
         "spacing": spacing,
@@ -198,6 +206,7 @@ def simulate_experiment(
     calibration = simulate(
         rod=reality.rod,
         conversion_constant=conversion_constant,
+        shear_conversion_constant=shear_conversion_constant,
         load=reality.rod_load_scale * rod_load,
         points=rod_points,
         repeats=rod_repeats,
@@ -227,6 +236,8 @@ def simulate_experiment(
         "gain": gain,
         "seed": float(seed),
     }
+    if len(channels) > 1:
+        common["conversion_constant_xz"] = shear_conversion_constant
     return Experiment(
         rod=_as_stated(
             _with_load(calibration, rod_load, reality), film, rod, common | {"gain": 1.0}

@@ -46,9 +46,11 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
 
 
 def blurred_stress(
-    contacts: Sequence[Contact], kernel: RadialKernel, radius: FloatArray
+    contacts: Sequence[Contact], kernel: RadialKernel, radius: FloatArray, *, order: int = 0
 ) -> FloatArray:
     r"""Return :math:`G \otimes \sigma_{zz}` of several contacts on one film.
+
+    Of order one it is the radial component of the blurred base shear, a vector field.
 
     Parameters
     ----------
@@ -58,6 +60,8 @@ def blurred_stress(
         The apparatus function G.
     radius : ndarray, any shape
         Distances from the contact's axis, in m.
+    order : int
+        Zero for the normal stress, one for the shear.
 
     Returns
     -------
@@ -66,8 +70,12 @@ def blurred_stress(
     """
     nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, float(radius.max()))
     transform = kernel.transform(nodes.k)
-    spectra = np.stack([contact.base_spectrum(nodes.k) * transform for contact in contacts], axis=1)
-    return np.moveaxis(nodes.synthesise(spectra, radius), -1, 0)
+    transforms = [
+        contact.base_shear_spectrum(nodes.k) if order else contact.base_spectrum(nodes.k)
+        for contact in contacts
+    ]
+    spectra = np.stack([found * transform for found in transforms], axis=1)
+    return np.moveaxis(nodes.synthesise(spectra, radius, order=order), -1, 0)
 
 
 def disturbance(x: FloatArray, baseline: float, drift: float) -> FloatArray:

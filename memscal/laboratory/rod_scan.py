@@ -9,11 +9,17 @@ import numpy as np
 from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
 from memscal.laboratory.response import apparatus_function, blurred_stress, disturbance
+from memscal.laboratory.shear_channel import Disturbances, shear_channel
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, StressSensor
-from memscal.model.validation import require_non_negative, require_positive, require_range
+from memscal.model.validation import (
+    FloatArray,
+    require_non_negative,
+    require_positive,
+    require_range,
+)
 
 __all__ = ["simulate"]
 
@@ -37,6 +43,9 @@ def simulate(
     rod: Rod = PAPER_ROD,
     kernel: RadialKernel | None = None,
     conversion_constant: float = 1e-7,
+    channels: Sequence[str] = ("zz",),
+    shear_kernel: RadialKernel | None = None,
+    shear_conversion_constant: float = 5e-8,
     load: float | Sequence[float] = 1.0,
     half_range: float = 8e-3,
     points: int = 65,
@@ -65,6 +74,11 @@ def simulate(
         integral with their ``transform``, ``radial`` and ``describe``.
     conversion_constant : float
         A, in V/Pa.
+    channels : sequence of str
+        ``("zz", "xz")`` adds the tangential channel ``u_xz``, with G and A of its own and the same
+        disturbances as shares of its own largest signal.
+    shear_kernel, shear_conversion_constant
+        G (the paper's Gaussian where absent) and A (V/Pa) of that channel.
     load : float or sequence of float
         Load in N; several loads give one repeat of the scan for each.
     half_range : float
@@ -110,6 +124,7 @@ def simulate(
             "negative."
         )
     truth = apparatus_function(kernel)
+    shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
     loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
@@ -130,6 +145,14 @@ def simulate(
     u = clean + rng.normal(0.0, noise * largest, clean.shape)
     if not raster and row_loads.size == 1:
         u = u[0]
+    further: dict[str, FloatArray] = {}
+    known: dict[str, float | str] = {}
+    if shear is not None:
+        blurred = blurred_stress([contact], shear.kernel, radius, order=1)[0] / contact.load
+        sheared = blurred * shear.side(x - centre[0], radius)
+        rows = sheared * (loads[0] if raster else row_loads[:, None])
+        disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
+        further, known = shear.recorded(rows.reshape(u.shape), x, disturbed)
     varying = loads.size > 1
     return Scan(
         x=x,
@@ -137,6 +160,7 @@ def simulate(
         u_zz=u,
         u_zz_errors=np.full(u.shape, noise * largest) if state_noise and noise > 0 else None,
         normal_load=np.broadcast_to(row_loads[:, None], u.shape) if varying else None,
+        channels=further,
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=rod,
@@ -153,6 +177,7 @@ def simulate(
             "drift": drift * largest,
             "noise": noise * largest,
             "seed": float(seed),
+            **known,
         },
     )
 
