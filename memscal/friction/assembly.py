@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,14 +16,23 @@ from memscal.formats.contact_table import ContactTable
 from memscal.friction.cache import CacheFolder, family_key, find_table, keep_table
 from memscal.friction.family import ProfileFamily, bounded
 from memscal.friction.paths import LoadingPath, PathTables, solve_paths
-from memscal.friction.sensitivities import poisson_ratios, scaled_changes
+from memscal.friction.sensitivities import LogDerivatives, poisson_ratios, scaled_changes
 from memscal.mechanics.interface import Interface
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.model.validation import FloatArray, finite_vector, require_positive
 
-__all__ = ["FamilySetup", "base_wavenumbers", "parameter_values", "require_loads", "require_sphere"]
+__all__ = [
+    "STRONGER",
+    "FamilySetup",
+    "base_wavenumbers",
+    "parameter_values",
+    "require_loads",
+    "require_sphere",
+]
 
+#: Factor by which the law of an interface is made stronger to see what that changes.
+STRONGER = 1.2
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
 
@@ -102,14 +112,19 @@ class FamilySetup:
         values: FloatArray,
         scale: float,
         a_length: bool = False,
+        stronger: Sequence[LoadingPath] | None = None,
         notes: tuple[str, ...] = (),
     ) -> ProfileFamily:
-        """Return the family of some paths; ``a_length`` says whether its values are lengths."""
+        """Return the family of some paths.
+
+        ``a_length`` says whether its values are lengths; ``stronger`` are the paths with an
+        interface that is stronger by ``STRONGER``, where that makes a difference.
+        """
         key = family_key(paths, values, scale, self.wavenumbers.k)
         table = find_table(self.cache, key)
         if table is None:
             lengths = (values, scale) if a_length else None
-            table = self._calculated(paths, values, lengths)
+            table = self._calculated(paths, stronger, values, lengths)
             keep_table(self.cache, key, table)
         return ProfileFamily(
             name=name,
@@ -130,17 +145,23 @@ class FamilySetup:
     def _calculated(
         self,
         paths: Sequence[LoadingPath],
+        stronger: Sequence[LoadingPath] | None,
         values: FloatArray,
         lengths: tuple[FloatArray, float] | None,
     ) -> ContactTable:
         """Solve the paths and derive what follows from them."""
         ratios = poisson_ratios(self.film)
-        own, *sides = self._solved(paths, ratios)
+        # The strength of an interface counts beside a length of film or sphere alone.
+        uncertain = self.film.thickness_uncertainty or self.indenter.radius_uncertainty
+        own, strong, *sides = self._solved(paths, (uncertain and stronger) or paths, ratios)
         by_length = np.zeros_like(own.spectra)
         if lengths is not None:
             by_length = _by_log_value(own.spectra, *lengths)
+        by_strength = (strong.spectra - own.spectra) / math.log(STRONGER)
         changes: Mapping[str, FloatArray] = scaled_changes(
-            self.film, self.indenter, own.spectra, own.by_load, own.by_wavenumber, by_length
+            self.film,
+            self.indenter,
+            LogDerivatives(own.spectra, own.by_load, own.by_wavenumber, by_length, by_strength),
         )
         if ratios is not None:
             share = (self.film.poisson_ratio_uncertainty or 0.0) / (ratios[0] - ratios[1])
@@ -159,10 +180,14 @@ class FamilySetup:
         )
 
     def _solved(
-        self, paths: Sequence[LoadingPath], ratios: tuple[float, float] | None
+        self,
+        paths: Sequence[LoadingPath],
+        stronger: Sequence[LoadingPath],
+        ratios: tuple[float, float] | None,
     ) -> list[PathTables]:
-        """Solve the paths, and those of two other Poisson's ratios, where they are others."""
+        """Solve the paths, the stronger ones and those of other Poisson's ratios, each once."""
         groups = [list(paths)]
+        groups.append([p if p in paths else replace(p, derivatives=False) for p in stronger])
         for nu in ratios or ():
             film = replace(self.film, poisson_ratio=nu)
             own = nu == self.film.poisson_ratio

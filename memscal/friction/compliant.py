@@ -11,11 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.friction.assembly import FamilySetup, parameter_values
+from memscal.friction.assembly import STRONGER, FamilySetup, parameter_values
 from memscal.friction.cache import CacheFolder
 from memscal.friction.family import ProfileFamily
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
@@ -28,15 +27,16 @@ SLIP_LENGTHS = (0.0, 0.3e-6, 0.7e-6, 2e-6, 5e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.6e-4,
 """Slip lengths in m, from the rigid interface to the one that bears no shear."""
 
 #: Lengths of a normally compliant interface in units of the film's roughness.
-_LENGTHS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+_LENGTHS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0)
 #: Roughness in m where a film states none.
 _USUAL_ROUGHNESS = 2e-6
 #: Greenwood and Tripp's surfaces: asperity density times radius times roughness, and the ratio
 #: of radius and roughness.
 _ASPERITIES = 0.05
 _SLENDERNESS = 100.0
-#: Pressure at which mean planes meet, in units of the contact's modulus (exponential law).
-_MEETING = 1e-3
+#: Pressure at which mean planes meet, in units of the contact's modulus (exponential law): so
+#: light that no contact rests above them, and no depth is zero.
+_MEETING = 1e-6
 
 
 def elasto_plastic_family(
@@ -79,6 +79,7 @@ def elasto_plastic_family(
     --------
     The softer the interface, the nearer to the contact without friction:
 
+    >>> import numpy as np
     >>> from memscal.model.indenter import Sphere
     >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     >>> family = elasto_plastic_family(
@@ -153,6 +154,7 @@ def normal_compliance_family(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from memscal.model.indenter import Sphere
     >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     >>> family = normal_compliance_family(
@@ -173,7 +175,10 @@ def normal_compliance_family(
         raise InputError(
             "A length of the normal compliance is infinite: such a film bears no load."
         )
-    paths = [setup.path(friction=0.0, interface=_normal(law, film, float(v))) for v in values]
+    paths, stronger = (
+        [setup.path(friction=0.0, interface=_normal(law, film, float(v), s)) for v in values]
+        for s in (1.0, STRONGER)
+    )
     return setup.family(
         paths,
         name="normal-compliance",
@@ -181,6 +186,7 @@ def normal_compliance_family(
         values=values,
         scale=_natural_length(setup),
         a_length=True,
+        stronger=stronger if law == "greenwood-tripp" else None,
         notes=(_NORMAL_NOTES[law],),
     )
 
@@ -193,7 +199,7 @@ _NORMAL_NOTES = {
 }
 
 
-def _normal(law: str, film: ElasticFilm, length: float) -> Interface:
+def _normal(law: str, film: ElasticFilm, length: float, strength: float) -> Interface:
     if length == 0:
         return Interface()
     if law == "exponential":
@@ -202,7 +208,7 @@ def _normal(law: str, film: ElasticFilm, length: float) -> Interface:
             normal=ExponentialCompliance(decay_length=length, reference_pressure=meeting)
         )
     radius = _SLENDERNESS * length
-    density = _ASPERITIES / (radius * length)
+    density = strength * _ASPERITIES / (radius * length)
     return Interface(
         normal=GreenwoodTripp(roughness=length, asperity_density=density, asperity_radius=radius)
     )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from memscal.calibration.workers import worker_pool
-from memscal.errors import ConvergenceError, DomainError
+from memscal.errors import ConvergenceError, DomainError, MemscalError
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
@@ -21,9 +20,14 @@ __all__ = ["LoadingPath", "PathTables", "solve_paths"]
 
 #: Neighbours of each load on the path, relative to it: their difference is its derivative.
 _NEIGHBOURS = (0.98, 1.02)
-#: Rings where the interface yields: its contacts have no sharp edge, and twice as many change the
-#: base stress by less than 1e-3.  Between rigid surfaces they are doubled until 1e-4.
-_RINGS_OF_A_COMPLIANT_CONTACT = 96
+#: Rings from the axis to the largest contact; more crowd at the edges.  Three times as many change
+#: the base stress by less than 1e-4 of its maximum between rigid surfaces, and by less than 4e-4
+#: where the interface yields.
+_RINGS_OF_A_RIGID_CONTACT = 56
+_RINGS_OF_A_COMPLIANT_CONTACT = 72
+#: Tried in turn where the statuses of the rings do not settle: a film that sticks at once may find
+#: no edge between two rings, and does between others.
+_OTHER_RINGS = (80, 64, 48, 112)
 #: Relative step of the derivative by the wavenumber.
 _STRETCH = 1e-4
 
@@ -104,7 +108,8 @@ def _solve(path: LoadingPath, k: FloatArray) -> PathTables:
             np.array([contact.base_spectrum(k) for contact in contacts[first:][: loads.size]])
             for first in (loads.size, 2 * loads.size)
         )
-        by_load = (upper - lower) / math.log(_NEIGHBOURS[1] / _NEIGHBOURS[0])
+        # By P d/dP and not by the logarithm's own step: the force is then met exactly.
+        by_load = (upper - lower) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
         by_wavenumber = np.array([_by_log_wavenumber(contact, k) for contact in own])
     return PathTables(
         spectra,
@@ -123,22 +128,34 @@ def _by_log_wavenumber(contact: Contact, k: FloatArray) -> FloatArray:
 
 def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
     """Solve the contacts; an error names the loads and the interface that it was about."""
-    try:
-        return indent(
-            path.film,
-            path.indenter,
-            load=loads,
-            friction=path.friction,
-            # Without friction the way makes no difference, and the solution is remembered.
-            loading=path.loading if path.friction > 0 else "incremental",
-            interface=path.interface,
-            rings=None if path.interface.rigid else _RINGS_OF_A_COMPLIANT_CONTACT,
-        )
-    except (DomainError, ConvergenceError) as error:
-        largest = max(path.loads)
-        problem = (
-            f"The contact of a sphere of radius {path.indenter.radius * 1e3:.4g} mm cannot be "
-            f"calculated up to {largest:g} N, with friction {path.friction:g} and "
-            f"{path.loading} loading: {error.problem}"
-        )
-        raise type(error)(problem, why=error.why, cure=error.cure) from error
+    rigid = path.interface.rigid
+    usual = _RINGS_OF_A_RIGID_CONTACT if rigid else _RINGS_OF_A_COMPLIANT_CONTACT
+    counts = (usual, *_OTHER_RINGS)
+    for rings in counts:
+        try:
+            return indent(
+                path.film,
+                path.indenter,
+                load=loads,
+                friction=path.friction,
+                # Without friction the way makes no difference, and the solution is remembered.
+                loading=path.loading if path.friction > 0 else "incremental",
+                interface=path.interface,
+                rings=rings,
+            )
+        except ConvergenceError as error:
+            if rings == counts[-1]:
+                raise _named(path, error) from error
+        except DomainError as error:
+            raise _named(path, error) from error
+    raise AssertionError("one of the attempts returns or raises")
+
+
+def _named(path: LoadingPath, error: DomainError | ConvergenceError) -> MemscalError:
+    """Return the error with what it was about."""
+    problem = (
+        f"The contact of a sphere of radius {path.indenter.radius * 1e3:.4g} mm with a film of "
+        f"{path.film.thickness * 1e3:.4g} mm cannot be calculated up to {max(path.loads):g} N "
+        f"(friction {path.friction:g}, {path.loading} loading): {error.problem}"
+    )
+    return type(error)(problem, why=error.why, cure=error.cure)

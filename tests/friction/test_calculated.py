@@ -1,0 +1,242 @@
+"""Families of calculated profiles, against contacts that are solved one by one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from friction.calculated_cases import FILM, LOADS, REACH, SPHERE, apart, profiles
+
+from memscal.errors import DomainError, InputError
+from memscal.friction.calculated import (
+    FRICTIONS,
+    SLIP_LENGTHS,
+    amontons_family,
+    elasto_plastic_family,
+    normal_compliance_family,
+)
+from memscal.friction.family import ProfileFamily
+from memscal.mechanics.indent import indent
+from memscal.mechanics.interface import ExponentialCompliance, Interface
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod, Sphere
+from memscal.model.validation import FloatArray
+
+LENGTHS = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0]) * 1.82e-6
+
+Build = Callable[[ElasticFilm, Sphere, list[float], list[float]], ProfileFamily]
+
+
+def amontons(loading: str = "incremental") -> Build:
+    return lambda film, sphere, loads, values: amontons_family(
+        film, sphere, loads, friction=values, loading=loading, reach=REACH
+    )
+
+
+def elasto_plastic(friction: float) -> Build:
+    return lambda film, sphere, loads, values: elasto_plastic_family(
+        film, sphere, loads, friction=friction, slip_lengths=values, reach=REACH
+    )
+
+
+def normal(law: str) -> Build:
+    return lambda film, sphere, loads, values: normal_compliance_family(
+        film, sphere, loads, lengths=values, law=law, reach=REACH
+    )
+
+
+@pytest.mark.parametrize(
+    ("build", "grid", "between"),
+    [
+        (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
+        (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
+        (elasto_plastic(1.6), SLIP_LENGTHS, [0.15e-6, 1.3e-6, 7e-6, 6e-5, 3e-4]),
+        (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+        (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+    ],
+    ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"],
+)
+def test_interpolated_profiles_are_those_of_contacts_solved_between(
+    build: Build, grid: list[float], between: list[float]
+) -> None:
+    family = build(FILM, SPHERE, list(LOADS), list(grid))
+    solved = build(FILM, SPHERE, list(LOADS), between)
+    for index, value in enumerate(between):
+        member = family.at(value)
+        assert apart(family, member.spectra, solved.spectra[index]) < 1e-3
+        assert apart(family, member.by_load, solved.by_load[index]) < 2e-2
+
+
+@pytest.mark.parametrize(("friction", "loading"), [(0.2, "incremental"), (math.inf, "total")])
+def test_a_family_holds_the_contacts_that_indent_finds(friction: float, loading: str) -> None:
+    family = amontons_family(FILM, SPHERE, LOADS, friction=[friction], loading=loading, reach=REACH)
+    contacts = indent(FILM, SPHERE, load=LOADS, friction=friction, loading=loading)
+    truth = np.array([contact.base_spectrum(family.wavenumbers.k) for contact in contacts])
+    assert apart(family, family.spectra[0], truth) < 3e-4
+    depths = [contact.depth for contact in contacts]
+    np.testing.assert_allclose(family.depths[0], depths, rtol=2e-4)
+    assert np.all(family.convergence < 1e-3)
+
+
+CASES = {
+    "smooth": (amontons(), [0.0], 0.0),
+    "incremental": (amontons(), [0.2], 0.2),
+    "total": (amontons("total"), [0.4], 0.4),
+    "elasto-plastic": (elasto_plastic(1.6), list(SLIP_LENGTHS), 5e-6),
+    "exponential": (normal("exponential"), list(LENGTHS), 3.64e-6),
+    "greenwood-tripp": (normal("greenwood-tripp"), list(LENGTHS), 3.64e-6),
+}
+UNCERTAIN_FILM = replace(
+    FILM,
+    young_modulus_uncertainty=0.01 * FILM.young_modulus,
+    thickness_uncertainty=0.01 * FILM.thickness,
+    poisson_ratio_uncertainty=0.01,
+)
+UNCERTAIN_SPHERE = replace(SPHERE, radius_uncertainty=0.01 * SPHERE.radius)
+
+
+def stress(family: ProfileFamily, spectra: FloatArray) -> FloatArray:
+    return profiles(family, spectra, blurred=False)[0]
+
+
+def with_a_changed(source: str, share: float) -> tuple[ElasticFilm, Sphere]:
+    """The film and the sphere with one property larger by a share of itself."""
+    if source == "indenter_radius":
+        return FILM, replace(SPHERE, radius=SPHERE.radius * (1 + share))
+    return replace(FILM, **{source: getattr(FILM, source) * (1 + share)}), SPHERE
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_sensitivities_are_the_differences_of_contacts_with_other_properties(case: str) -> None:
+    (build, grid, value), load, step = CASES[case], 1.37, 0.004
+    family = build(UNCERTAIN_FILM, UNCERTAIN_SPHERE, [load], grid)
+    member = family.at(value)
+    for source in ("young_modulus", "thickness", "indenter_radius"):
+        upper, lower = (
+            build(*with_a_changed(source, share), [load], [value]) for share in (step, -step)
+        )
+        # Stated are 1 %; a film of another thickness has other wavenumbers.
+        truth = stress(upper, upper.spectra[0]) - stress(lower, lower.spectra[0])
+        truth *= 0.01 / (2 * step)
+        found = stress(family, member.changes[source])
+        assert np.max(np.abs(found - truth)) < 0.03 * np.max(np.abs(truth)), source
+    softer = build(replace(FILM, poisson_ratio=0.495), SPHERE, [load], [value])
+    truth = 2 * (member.spectra - softer.spectra[0])
+    assert apart(family, member.changes["poisson_ratio"], truth) < 0.06
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_derivatives_by_the_load_are_those_of_nearer_neighbours(case: str) -> None:
+    (build, _, value), load, step = CASES[case], 1.37, 0.005
+    family = build(FILM, SPHERE, [load], [value])
+    near = build(FILM, SPHERE, [load * (1 - step), load * (1 + step)], [value]).spectra[0]
+    truth = (near[1:] - near[:1]) / math.log((1 + step) / (1 - step))
+    assert apart(family, family.by_load[0], truth) < 0.01
+
+
+def test_whatever_changes_the_base_still_bears_the_load() -> None:
+    family = amontons_family(UNCERTAIN_FILM, UNCERTAIN_SPHERE, LOADS, friction=[0.2], reach=REACH)
+    squared = family.wavenumbers.k[:3] ** 2
+
+    def force(spectra: FloatArray) -> FloatArray:
+        return np.polynomial.polynomial.polyfit(squared, spectra[:, :3].T, 2)[0]
+
+    np.testing.assert_allclose(force(family.spectra[0]), LOADS, rtol=1e-6)
+    np.testing.assert_allclose(force(family.by_load[0]), LOADS, rtol=1e-6)
+    for source, change in family.changes.items():
+        assert np.max(np.abs(force(change[0]))) < 1e-6, source
+
+
+def test_only_stated_uncertainties_count() -> None:
+    film = replace(FILM, thickness_uncertainty=2e-5, poisson_ratio_uncertainty=0.0)
+    family = amontons_family(film, SPHERE, [0.34], friction=[0.0], reach=REACH)
+    assert set(family.changes) == {"thickness"}
+
+
+def test_a_slip_length_of_nothing_is_rigid_and_one_without_end_is_smooth() -> None:
+    family = elasto_plastic_family(
+        FILM, SPHERE, LOADS, friction=0.3, slip_lengths=[0, 1e-6, math.inf], reach=REACH
+    )
+    rigid = amontons_family(FILM, SPHERE, LOADS, friction=[0.0, 0.3], reach=REACH)
+    np.testing.assert_array_equal(family.spectra[0], rigid.spectra[1])
+    np.testing.assert_array_equal(family.spectra[2], rigid.spectra[0])
+    nearly = elasto_plastic_family(
+        FILM, SPHERE, LOADS, friction=0.3, slip_lengths=[1e-9, 1.0], reach=REACH
+    )
+    # A step between surfaces that yield does not end where a ring touches, and is less exact.
+    assert apart(family, nearly.spectra[0], family.spectra[0]) < 2e-3
+    assert apart(family, nearly.spectra[1], family.spectra[2]) < 1e-3
+
+
+def test_the_pressure_at_which_mean_planes_meet_does_not_reach_the_base() -> None:
+    # p1 exp(-d / l) with another p1 is the same law at another distance: only the depth shifts.
+    family = normal_compliance_family(FILM, SPHERE, LOADS, lengths=[4e-6], reach=REACH)
+    for meeting in (1e2, 3e4):
+        law = ExponentialCompliance(decay_length=4e-6, reference_pressure=meeting)
+        contacts = indent(FILM, SPHERE, load=LOADS, interface=Interface(normal=law), rings=72)
+        truth = np.array([contact.base_spectrum(family.wavenumbers.k) for contact in contacts])
+        assert apart(family, family.spectra[0], truth) < 3e-4
+
+
+def test_the_rough_film_scales_the_usual_lengths() -> None:
+    rough = replace(FILM, roughness_rms=1e-6)
+    family = normal_compliance_family(rough, SPHERE, [0.34], reach=REACH)
+    assert family.values[0] == 0
+    assert family.values[-1] == pytest.approx(8e-6)
+
+
+def test_loads_may_come_in_any_order_and_share_their_neighbours() -> None:
+    asked = [0.7, 0.34, 0.69]
+    family = amontons_family(FILM, SPHERE, asked, friction=[0.25], reach=REACH)
+    upward = amontons_family(FILM, SPHERE, sorted(asked), friction=[0.25], reach=REACH)
+    np.testing.assert_allclose(family.spectra[0], upward.spectra[0][[2, 0, 1]], rtol=1e-12)
+    assert family.loads.tolist() == asked
+
+
+def test_two_processes_find_the_same_bits_as_one() -> None:
+    asked = {"friction": [0.0, 0.3], "reach": REACH}
+    one = amontons_family(UNCERTAIN_FILM, SPHERE, [0.34], workers=1, **asked)
+    two = amontons_family(UNCERTAIN_FILM, SPHERE, [0.34], workers=2, **asked)
+    np.testing.assert_array_equal(one.spectra, two.spectra)
+    np.testing.assert_array_equal(one.by_load, two.by_load)
+    for source, change in one.changes.items():
+        np.testing.assert_array_equal(change, two.changes[source])
+
+
+def test_a_load_beyond_the_model_is_named() -> None:
+    with pytest.raises(DomainError, match=r"up to 300 N .*friction 0\.1"):
+        amontons_family(FILM, Sphere(radius=2e-3), [1.0, 300.0], friction=[0.1], reach=REACH)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"indenter": Rod(radius=1e-3)}, "sphere is needed"),
+        ({"loads": [0.34, -1.0]}, "load is -1 N"),
+        ({"loads": []}, "loads"),
+        ({"friction": [0.3, 0.1]}, "do not increase"),
+        ({"friction": [-0.1, 0.1]}, "none of them negative"),
+        ({"friction": []}, "none of them negative"),
+        ({"loading": "sudden"}, "loading is 'sudden'"),
+        ({"reach": 0.0}, "reach"),
+        ({"workers": 0}, "workers"),
+    ],
+)
+def test_a_request_that_makes_no_sense_is_refused(changed: dict[str, object], said: str) -> None:
+    request = {"indenter": SPHERE, "loads": [0.34], "friction": [0.1], "reach": REACH} | changed
+    film_indenter_loads = FILM, request.pop("indenter"), request.pop("loads")
+    with pytest.raises(InputError, match=said):
+        amontons_family(*film_indenter_loads, **request)  # type: ignore[arg-type]
+
+
+def test_laws_without_meaning_are_refused() -> None:
+    for friction in (0.0, math.inf, -1.0):
+        with pytest.raises(InputError, match="macroscopic"):
+            elasto_plastic_family(FILM, SPHERE, [0.34], friction=friction, reach=REACH)
+    with pytest.raises(InputError, match="infinite"):
+        normal_compliance_family(FILM, SPHERE, [0.34], lengths=[0, math.inf], reach=REACH)
+    with pytest.raises(InputError, match="law is"):
+        normal_compliance_family(FILM, SPHERE, [0.34], law="linear", reach=REACH)

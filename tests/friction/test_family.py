@@ -1,0 +1,129 @@
+"""A family between its values: bounded coordinate, interpolation, and what it refuses."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.errors import InputError
+from memscal.friction.family import ProfileFamily
+
+VALUES = np.array([0.0, 0.1, 0.3, 1.0, math.inf])
+LOADS = np.array([0.5, 1.0])
+NODES = Wavenumbers.covering(1e3, 1e-2)
+
+
+def saturating(value: float) -> float:
+    """A quantity that rises and levels off, as a stress does with friction."""
+    return 1 - math.exp(-6 * value) if math.isfinite(value) else 1.0
+
+
+def family() -> ProfileFamily:
+    rise = np.array([saturating(value) for value in VALUES])
+    shape = LOADS[:, None] * np.exp(-((NODES.k * 1e-3) ** 2))
+    spectra = (1 + 0.2 * rise)[:, None, None] * shape
+    number = np.ones((VALUES.size, LOADS.size))
+    return ProfileFamily(
+        name="amontons",
+        loading="incremental",
+        wavenumbers=NODES,
+        loads=LOADS,
+        values=VALUES,
+        scale=0.3,
+        spectra=spectra,
+        by_load=spectra / 2,
+        changes={"thickness": spectra / 100},
+        depths=number,
+        contact_radii=number,
+        convergence=number * 1e-4,
+    )
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-3, 0.3, 7.0, math.inf])
+def test_value_and_bounded_coordinate_are_inverse_to_each_other(value: float) -> None:
+    one = family()
+    assert 0 <= one.coordinate(value) <= 1
+    assert one.value_at(one.coordinate(value)) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize("index", range(VALUES.size))
+def test_at_a_value_of_its_own_a_family_gives_that_member(index: int) -> None:
+    one = family()
+    member = one.at(float(VALUES[index]))
+    np.testing.assert_allclose(member.spectra, one.spectra[index], rtol=1e-14)
+    np.testing.assert_allclose(member.by_load, one.by_load[index], rtol=1e-14)
+    np.testing.assert_allclose(
+        member.changes["thickness"], one.changes["thickness"][index], rtol=1e-14
+    )
+
+
+def test_between_its_values_a_family_that_rises_never_falls() -> None:
+    one = family()
+    passed = np.array([one.at(one.value_at(t)).spectra[0, 0] for t in np.linspace(0, 1, 101)])
+    assert np.all(np.diff(passed) >= -1e-15)
+    assert passed[-1] == pytest.approx(one.spectra[-1, 0, 0])
+
+
+def test_the_slope_of_a_member_is_the_derivative_by_the_coordinate() -> None:
+    one, t, step = family(), 0.37, 1e-5
+    above, below = (one.at(one.value_at(t + d)).spectra for d in (step, -step))
+    slope = one.at(one.value_at(t)).by_coordinate
+    np.testing.assert_allclose((above - below) / (2 * step), slope, rtol=1e-6)
+
+
+def test_a_family_is_not_extrapolated() -> None:
+    short = ProfileFamily(
+        **{
+            **{name: getattr(family(), name) for name in family().__dataclass_fields__},
+            "values": np.array([0.05, 0.1, 0.2, 0.3, 0.4]),
+        }
+    )
+    for beyond in (0.01, 0.5, math.inf):
+        with pytest.raises(InputError, match="does not reach"):
+            short.at(beyond)
+
+
+@pytest.mark.parametrize("wrong", [-0.1, math.nan])
+def test_a_value_that_is_none_is_refused(wrong: float) -> None:
+    with pytest.raises(InputError, match="not negative"):
+        family().coordinate(wrong)
+
+
+def test_some_of_the_loads_are_picked_in_the_order_given() -> None:
+    one = family()
+    assert one.only(1).loads.tolist() == [1.0]
+    turned = one.only([1, 0])
+    assert turned.loads.tolist() == [1.0, 0.5]
+    np.testing.assert_array_equal(turned.at(0.2).spectra, one.at(0.2).spectra[::-1])
+    np.testing.assert_array_equal(turned.changes["thickness"], one.changes["thickness"][:, ::-1])
+
+
+def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
+    one = family()
+    with pytest.raises(ValueError, match="read-only"):
+        one.spectra[0, 0, 0] = 0.0
+    with pytest.raises(TypeError):
+        one.changes["thickness"] = one.spectra  # type: ignore[index]
+    again = pickle.loads(pickle.dumps(one))
+    np.testing.assert_array_equal(again.at(0.2).spectra, one.at(0.2).spectra)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("values", np.array([0.0, 0.3, 0.1, 1.0, 2.0])),
+        ("values", np.array([-0.1, 0.0, 0.1, 1.0, 2.0])),
+        ("spectra", np.ones((5, 2, 3))),
+        ("changes", {"thickness": np.ones((5, 1, 3))}),
+        ("depths", np.ones((2, 5))),
+        ("scale", 0.0),
+    ],
+)
+def test_what_does_not_fit_together_is_refused(name: str, value: object) -> None:
+    with pytest.raises(InputError):
+        replace(family(), **{name: value})  # type: ignore[arg-type]
