@@ -1,0 +1,175 @@
+"""Contact tables that are kept in a folder: found whole, or not at all."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from memscal.errors import FormatError
+from memscal.formats import contact_table
+from memscal.formats.contact_table import (
+    ContactTable,
+    clear_contact_tables,
+    find_contact_table,
+    keep_contact_table,
+    table_key,
+)
+from memscal.formats.hdf5_writer import file_tree, write_tree
+from memscal.formats.tree import Group
+
+KEY = table_key({"load": 0.34})
+
+
+def table(values: int = 3) -> ContactTable:
+    rng = np.random.default_rng(1)
+    whole, part = (values, 2, 64), (values, 2)
+    return ContactTable(
+        value=np.append(np.arange(values - 1) / 3, np.inf),
+        load=np.array([0.34, 2.75]),
+        k=np.linspace(1.0, 1e4, 64),
+        spectra=rng.normal(size=whole),
+        by_load=rng.normal(size=whole),
+        changes={"thickness": rng.normal(size=whole), "poisson_ratio": rng.normal(size=whole)},
+        depth=np.full(part, np.nan),
+        contact_radius=rng.normal(size=part),
+        convergence=rng.normal(size=part),
+    )
+
+
+def entry(folder: Path, key: str = KEY) -> Path:
+    return folder / f"{key}.h5"
+
+
+def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_path: Path) -> None:
+    one = table()
+    assert keep_contact_table(tmp_path / "made" / "anew", KEY, one)
+    found = find_contact_table(tmp_path / "made" / "anew", KEY)
+    assert found is not None
+    for name in ("value", "load", "k", "spectra", "by_load", "depth", "contact_radius"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(one, name))
+    assert list(found.changes) == list(one.changes)
+    for source, change in one.changes.items():
+        np.testing.assert_array_equal(found.changes[source], change)
+
+
+def test_what_was_never_kept_is_not_found(tmp_path: Path) -> None:
+    assert find_contact_table(tmp_path, KEY) is None
+    assert find_contact_table(tmp_path / "no" / "folder", KEY) is None
+
+
+def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        keep_contact_table(tmp_path / folder, KEY, table())
+    assert entry(tmp_path / "one").read_bytes() == entry(tmp_path / "two").read_bytes()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
+def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share: float) -> None:
+    keep_contact_table(tmp_path, KEY, table())
+    data = entry(tmp_path).read_bytes()
+    entry(tmp_path).write_bytes(data[: int(share * len(data))])
+    assert find_contact_table(tmp_path, KEY) is None
+    assert keep_contact_table(tmp_path, KEY, table())
+    assert find_contact_table(tmp_path, KEY) is not None
+
+
+def test_a_number_that_was_changed_is_noticed(tmp_path: Path) -> None:
+    keep_contact_table(tmp_path, KEY, table())
+    with h5py.File(entry(tmp_path), "r+") as file:
+        file["/entry/contacts/load"][0] = 0.35
+    assert find_contact_table(tmp_path, KEY) is None
+
+
+def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path) -> None:
+    keep_contact_table(tmp_path, KEY, table())
+    data, one = entry(tmp_path).read_bytes(), table()
+    for place in np.linspace(0, len(data) - 1, 60).astype(int):
+        changed = bytearray(data)
+        changed[place] ^= 0xFF
+        entry(tmp_path).write_bytes(changed)
+        found = find_contact_table(tmp_path, KEY)
+        assert found is None or np.array_equal(found.spectra, one.spectra)
+
+
+def test_a_table_under_the_name_of_another_is_not_taken_for_it(tmp_path: Path) -> None:
+    other = table_key({"load": 2.75})
+    keep_contact_table(tmp_path, other, table())
+    entry(tmp_path, other).rename(entry(tmp_path))
+    assert find_contact_table(tmp_path, KEY) is None
+
+
+def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path) -> None:
+    write_tree(file_tree("memscal-scan", Group("NXentry", {"key": KEY})), entry(tmp_path))
+    assert find_contact_table(tmp_path, KEY) is None
+    keep_contact_table(tmp_path, KEY, table())
+    with h5py.File(entry(tmp_path), "r+") as file:
+        file.attrs["memscal_schema_version"] = "0.9.0"
+    assert find_contact_table(tmp_path, KEY) is None
+
+
+def test_a_name_that_is_no_key_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="not the key"):
+        find_contact_table(tmp_path, "../elsewhere")
+
+
+def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    assert not keep_contact_table(tmp_path / "file", KEY, table())
+    assert not keep_contact_table(tmp_path / "file" / "below", KEY, table())
+    assert find_contact_table(tmp_path / "file", KEY) is None
+    assert (tmp_path / "file").read_text() == "not a folder"
+
+
+def test_the_tables_used_longest_ago_make_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contact_table, "_MOST_ENTRIES", 3)
+    keys = [table_key({"number": number}) for number in range(4)]
+    for age, key in enumerate(keys[:3]):
+        keep_contact_table(tmp_path, key, table())
+        os.utime(entry(tmp_path, key), (1e9 + age, 1e9 + age))
+    assert find_contact_table(tmp_path, keys[0]) is not None  # used again
+    keep_contact_table(tmp_path, keys[3], table())
+    kept = {key for key in keys if entry(tmp_path, key).exists()}
+    assert kept == {keys[0], keys[2], keys[3]}
+
+
+def test_a_folder_keeps_to_its_bytes_but_always_holds_the_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contact_table, "_MOST_BYTES", 1)
+    for number in range(3):
+        keep_contact_table(tmp_path, table_key({"number": number}), table())
+    assert [path.name for path in tmp_path.iterdir()] == [f"{table_key({'number': 2})}.h5"]
+
+
+def test_clearing_removes_tables_and_nothing_else(tmp_path: Path) -> None:
+    keep_contact_table(tmp_path, KEY, table())
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "scan.h5").write_text("mine too")
+    (tmp_path / f"{table_key({'a': 'folder'})}.h5").mkdir()
+    assert clear_contact_tables(tmp_path) == 1
+    assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == [
+        "notes.txt",
+        "scan.h5",
+    ]
+    assert clear_contact_tables(tmp_path / "none") == 0
+
+
+def test_several_may_write_and_read_one_entry_at_a_time(tmp_path: Path) -> None:
+    small, large = table(3), replace(table(3), changes={})
+
+    def work(number: int) -> bool:
+        keep_contact_table(tmp_path, KEY, small if number % 2 else large)
+        found = find_contact_table(tmp_path, KEY)
+        return found is not None and np.array_equal(found.spectra, small.spectra)
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(work, range(24)))
+    assert [path.name for path in tmp_path.iterdir()] == [f"{KEY}.h5"]

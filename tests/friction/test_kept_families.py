@@ -1,0 +1,99 @@
+"""Families that are kept in a folder: the same numbers, for the same request only."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from friction.calculated_cases import FILM, REACH, SPHERE
+
+from memscal.friction import assembly
+from memscal.friction.calculated import amontons_family, normal_compliance_family
+from memscal.friction.family import ProfileFamily
+from memscal.model.film import ElasticFilm
+
+
+def calculated(cache: Path | None, film: ElasticFilm = FILM, **changed: object) -> ProfileFamily:
+    request = {"friction": [0.0, 0.3], "loading": "incremental", "reach": REACH} | changed
+    return amontons_family(film, SPHERE, [0.34], cache=cache, **request)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many paths each call solved."""
+    counts: list[int] = []
+    solve = assembly.solve_paths
+
+    def counted(paths: list[object], k: object, *, workers: int) -> object:
+        counts.append(len(paths))
+        return solve(paths, k, workers=workers)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(assembly, "solve_paths", counted)
+    return counts
+
+
+def test_a_kept_family_is_the_calculated_one_and_is_not_calculated_again(
+    tmp_path: Path, solved: list[int]
+) -> None:
+    film = replace(FILM, thickness_uncertainty=2e-5, poisson_ratio_uncertainty=0.01)
+    first, second = (calculated(tmp_path, film) for _ in range(2))
+    assert len(solved) == 1
+    for name in ("spectra", "by_load", "depths", "contact_radii", "convergence", "values"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+    assert list(first.changes) == list(second.changes) == ["thickness", "poisson_ratio"]
+    for source, change in first.changes.items():
+        np.testing.assert_array_equal(change, second.changes[source])
+    np.testing.assert_array_equal(first.at(0.1).spectra, second.at(0.1).spectra)
+
+
+def test_another_name_of_the_film_is_the_same_request(tmp_path: Path, solved: list[int]) -> None:
+    for name in ("", "film 7"):
+        calculated(tmp_path, replace(FILM, name=name))
+    assert len(solved) == 1
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"film": replace(FILM, thickness=1.999e-3)},
+        {"film": replace(FILM, young_modulus_uncertainty=1e5)},
+        {"loading": "total"},
+        {"friction": [0.0, 0.31]},
+        {"reach": 50e-3},
+    ],
+)
+def test_another_request_is_calculated(
+    tmp_path: Path, solved: list[int], changed: dict[str, object]
+) -> None:
+    calculated(tmp_path)
+    calculated(tmp_path, **changed)  # type: ignore[arg-type]
+    assert len(solved) == 2
+
+
+def test_two_laws_of_one_length_are_two_requests(tmp_path: Path, solved: list[int]) -> None:
+    for law in ("exponential", "greenwood-tripp"):
+        normal_compliance_family(
+            FILM, SPHERE, [0.34], lengths=[2e-6], law=law, reach=REACH, cache=tmp_path
+        )
+    assert len(solved) == 2
+
+
+def test_a_damaged_entry_is_calculated_anew(tmp_path: Path, solved: list[int]) -> None:
+    first = calculated(tmp_path)
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(path.read_bytes()[:1000])
+    np.testing.assert_array_equal(first.spectra, calculated(tmp_path).spectra)
+    calculated(tmp_path)
+    assert len(solved) == 2
+
+
+def test_without_a_folder_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    calculated(None)
+    assert list(tmp_path.iterdir()) == []
