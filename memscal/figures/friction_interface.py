@@ -12,6 +12,7 @@ from memscal.figures.friction_readings import draw_levels
 from memscal.figures.friction_scale import friction_axis, friction_position, lubricated_words
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.friction.compliance_results import InterfaceComparison, LawComparison
+from memscal.friction.family import FRICTION_SCALE
 from memscal.friction.results import FrictionComparison
 from memscal.model.validation import FloatArray
 
@@ -77,12 +78,12 @@ def length_position(length: ArrayLike) -> FloatArray:
     >>> length_position([0.0, 3e-6, np.inf])
     array([0. , 0.5, 1. ])
     """
-    return friction_position(0.3 * np.asarray(length, dtype=np.float64) / _MIDDLE)
+    return friction_position(FRICTION_SCALE * np.asarray(length, dtype=np.float64) / _MIDDLE)
 
 
 def _draw_lengths(axes: Axes, parts: dict[str, LawComparison]) -> None:
     for direction, part in parts.items():
-        rise = np.asarray(part.length.chi_square) - float(np.min(part.length.chi_square))
+        rise = np.asarray(part.length.deviance) - float(np.min(part.length.deviance))
         label = f"{direction}, {lubricated_words(part.lubrication)}"
         colour = COLOURS[_COLOURS[direction]]
         axes.plot(length_position(part.length.values), rise, color=colour, label=label)

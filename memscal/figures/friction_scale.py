@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.figures.style import COLOURS
+from memscal.friction.family import FRICTION_SCALE
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.validation import FloatArray
 
@@ -27,8 +28,8 @@ __all__ = [
     "on_axis",
 ]
 
-#: The friction coefficient in the middle of the axis.
-_MIDDLE = 0.3
+#: Radii closer than this, in m, count as one.
+_CLOSE = 1e-6
 _TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
 #: Marker and filling of a lubrication, so that both are told apart in grey.
 LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
@@ -47,7 +48,7 @@ def friction_position(friction: ArrayLike) -> FloatArray:
     mu = np.asarray(friction, dtype=np.float64)
     finite = np.isfinite(mu)
     bounded = np.where(finite, mu, 0.0)
-    return np.where(finite, bounded / (bounded + _MIDDLE), 1.0)
+    return np.where(finite, bounded / (bounded + FRICTION_SCALE), 1.0)
 
 
 def friction_axis(axes: Axes, which: Literal["x", "y"], label: str) -> None:
@@ -149,9 +150,6 @@ def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
     mirrored = np.concatenate([-inner[start:][::-1], inner])
     both = np.concatenate([known[:, start:][:, ::-1], known], axis=1)
     return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
-
-
-_CLOSE = 1e-6
 
 
 def _apart(r: FloatArray) -> Sequence[int]:
