@@ -1,0 +1,104 @@
+"""Families of tables that were calculated elsewhere."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from friction.calculated_cases import FILM, LOADS, REACH, SPHERE, apart
+
+from memscal.errors import InputError
+from memscal.friction.calculated import amontons_family, external_family
+from memscal.mechanics.indent import indent
+from memscal.model.stress import StressProfile
+
+FRICTIONS = (0.0, 0.3, math.inf)
+
+
+def tables(loading: str = "incremental") -> list[StressProfile]:
+    return [
+        replace(contact.profile(), loading=loading)
+        for mu in FRICTIONS
+        for contact in indent(FILM, SPHERE, load=LOADS, friction=mu, loading=loading)
+    ]
+
+
+def bare(profile: StressProfile) -> StressProfile:
+    """The table as another program may give it: numbers, load and friction."""
+    return StressProfile(
+        r=profile.r,
+        sigma_zz=profile.sigma_zz,
+        load=profile.load,
+        friction_coefficient=profile.friction_coefficient,
+    )
+
+
+def test_tables_of_our_own_contacts_give_our_own_family() -> None:
+    film = replace(FILM, thickness_uncertainty=2e-5)
+    ours = amontons_family(film, SPHERE, LOADS, friction=FRICTIONS, reach=REACH)
+    family = external_family(tables(), LOADS, reach=REACH, film=film)
+    assert family.name == "external"
+    assert family.loading == "incremental"
+    assert family.values.tolist() == list(FRICTIONS)
+    for index in range(len(FRICTIONS)):
+        assert apart(ours, family.spectra[index], ours.spectra[index]) < 3e-4
+        assert apart(ours, family.by_load[index], ours.by_load[index]) < 1e-3
+    np.testing.assert_array_equal(family.changes["thickness"], ours.changes["thickness"])
+    np.testing.assert_allclose(family.depths, ours.depths, rtol=1e-3)
+
+
+def test_a_table_serves_a_load_within_one_percent_in_proportion() -> None:
+    asked = [load * 1.008 for load in LOADS]
+    exact = external_family(tables(), LOADS, reach=REACH)
+    family = external_family(tables(), asked, reach=REACH)
+    np.testing.assert_allclose(family.spectra, 1.008 * exact.spectra, rtol=1e-12)
+    assert family.loads.tolist() == asked
+
+
+def test_the_order_of_the_tables_does_not_matter() -> None:
+    one = external_family(tables(), LOADS, reach=REACH)
+    other = external_family(tables()[::-1], LOADS, reach=REACH)
+    np.testing.assert_array_equal(one.spectra, other.spectra)
+
+
+def test_tables_that_say_nothing_of_film_and_sphere_count_as_proportional() -> None:
+    family = external_family([bare(one) for one in tables()], LOADS, reach=REACH)
+    ours = external_family(tables(), LOADS, reach=REACH)
+    np.testing.assert_array_equal(family.by_load, family.spectra)
+    assert dict(family.changes) == {}
+    assert "No film" in family.notes[0]
+    assert np.all(np.isnan(family.depths))
+    r = np.linspace(0.0, 8e-3, 30)
+    stress, truth = (one.wavenumbers.synthesise(one.spectra[1, 0], r) for one in (family, ours))
+    np.testing.assert_allclose(stress, truth, atol=1e-3 * truth.max())
+
+
+def test_every_missing_table_is_named() -> None:
+    given = [one for one in tables() if (one.load, one.friction_coefficient) != (2.75, 0.3)]
+    with pytest.raises(InputError, match=r"No table was given for 2\.75 N with friction 0\.3\."):
+        external_family(given, LOADS, reach=REACH)
+    with pytest.raises(InputError, match=r"1 N with friction 0; 1 N with friction 0\.3; 1 N"):
+        external_family(tables(), [0.34, 1.0], reach=REACH)
+
+
+def test_tables_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(InputError, match="both for"):
+        external_family([*tables(), tables()[0]], LOADS, reach=REACH)
+    with pytest.raises(InputError, match="one loading"):
+        external_family([*tables()[:-2], *tables("total")[-2:]], LOADS, reach=REACH)
+    with pytest.raises(InputError, match="No table"):
+        external_family([], LOADS, reach=REACH)
+
+
+def test_a_table_that_cannot_be_compared_is_refused() -> None:
+    one = tables()[0]
+    short = one.r < 2e-3
+    for changed, said in (
+        (replace(one, friction_coefficient=None), "does not say its friction"),
+        (replace(one, r=one.r[short], sigma_zz=one.sigma_zz[short], sigma_rz=None), "ends at"),
+        (replace(one, sigma_zz=one.sigma_zz * 1.1), "carries"),
+    ):
+        with pytest.raises(InputError, match=said):
+            external_family([changed], [one.load], reach=REACH)
