@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
+    from memscal.friction.procedure import compare
+    from memscal.friction.results import FrictionComparison
     from memscal.laboratory.experiment import Experiment, simulate_experiment
     from memscal.laboratory.rod_scan import simulate
     from memscal.measurement.application import measure_stress
@@ -45,6 +47,7 @@ _HOMES = {
     "Experiment": "memscal.laboratory.experiment",
     "ExponentialCompliance": "memscal.mechanics.interface",
     "FleetCalibration": "memscal.calibration.fleet",
+    "FrictionComparison": "memscal.friction.results",
     "GaussianMixture": "memscal.axisymmetry.kernels",
     "GreenwoodTripp": "memscal.mechanics.interface",
     "Interface": "memscal.mechanics.interface",
@@ -62,6 +65,7 @@ _HOMES = {
     "StressSensor": "memscal.model.scan",
     "calibrate": "memscal.calibration.procedure",
     "calibrate_many": "memscal.calibration.fleet",
+    "compare": "memscal.friction.procedure",
     "design": "memscal.planning.procedure",
     "indent": "memscal.mechanics.indent",
     "load_apparatus": "memscal.apparatus",
@@ -86,6 +90,7 @@ __all__ = [
     "Experiment",
     "ExponentialCompliance",
     "FleetCalibration",
+    "FrictionComparison",
     "GaussianMixture",
     "GreenwoodTripp",
     "Interface",
@@ -104,6 +109,7 @@ __all__ = [
     "__version__",
     "calibrate",
     "calibrate_many",
+    "compare",
     "design",
     "indent",
     "load_apparatus",

@@ -116,7 +116,7 @@ class LoadComparison:
     p0_max, p0_max_uncertainty : float
         Calculated frictionless maximum of G convolved with the base stress, in Pa.
     ratio, ratio_uncertainty : float
-        ``s_max / p0_max``: what A does to it cancels, as G is divided by it nowhere else.
+        ``s_max / p0_max``; the errors of A and G count together.
     calculated, calculated_errors : ndarray, shape (m, n)
         G convolved with the base stress at the profile's n radii for each of the m coefficients,
         and the standard uncertainty that G, film, indenter and common load bring, in Pa.

@@ -1,0 +1,144 @@
+"""What a comparison with calculated contacts tells its user."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from memscal.friction.family import ProfileFamily
+from memscal.friction.results import EffectiveFriction
+from memscal.measurement.measured_stress import MeasuredStress
+from memscal.model.apparatus import QualityCheck
+
+__all__ = ["comparison_messages"]
+
+#: Calculated contacts that are less certain than this share of their stress are named.
+_COARSE = 2e-3
+#: Coverage factor of 95 %.
+_EXPANDED = 1.96
+
+
+def comparison_messages(
+    measured: MeasuredStress,
+    families: Mapping[str, ProfileFamily],
+    joint: Mapping[str, Mapping[str, EffectiveFriction]],
+    checks: tuple[QualityCheck, ...],
+    macroscopic: tuple[float, float | None] | None,
+) -> tuple[str, ...]:
+    """Return the messages that accompany a comparison, the gravest first.
+
+    Those of the measured stress are among them.
+    """
+    own = [
+        *_failed(checks),
+        *_synthetic(measured),
+        *_loadings(joint),
+        *_against_macroscopic(joint, macroscopic),
+        *_calculated(families),
+        *_unstated(measured),
+    ]
+    return tuple(dict.fromkeys([*own, *measured.messages]))
+
+
+def _failed(checks: tuple[QualityCheck, ...]) -> Iterator[str]:
+    for one in checks:
+        if not one.passed:
+            yield (
+                f"Quality check {one.name} failed: {one.value:.3g} exceeds {one.limit:.3g}. "
+                f"{one.meaning}"
+            )
+
+
+def _synthetic(measured: MeasuredStress) -> Iterator[str]:
+    if any(scan.synthetic for scan in measured.scans):
+        yield "The scans are synthetic: nothing here was measured."
+
+
+def _loadings(joint: Mapping[str, Mapping[str, EffectiveFriction]]) -> Iterator[str]:
+    for lubrication, by_loading in joint.items():
+        if not {"incremental", "total"} <= by_loading.keys():
+            continue
+        first, second = by_loading["incremental"], by_loading["total"]
+        of = f"the {lubrication} loads" if lubrication else "the loads"
+        if first.value is None or second.value is None:
+            if (first.value is None) != (second.value is None):
+                yield (
+                    f"The definitions of the loading disagree for {of}: incremental loading gives "
+                    f"{in_words(first)}, total loading {in_words(second)}."
+                )
+            continue
+        apart = abs(first.value - second.value)
+        errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
+        if errors and apart > max(errors):
+            yield (
+                f"The definitions of the loading disagree for {of} by {apart:.2g}, more than one "
+                f"standard uncertainty: incremental loading gives {in_words(first)}, total "
+                f"loading {in_words(second)}."
+            )
+
+
+def _against_macroscopic(
+    joint: Mapping[str, Mapping[str, EffectiveFriction]],
+    macroscopic: tuple[float, float | None] | None,
+) -> Iterator[str]:
+    if macroscopic is None:
+        return
+    value, u = macroscopic
+    spread = _EXPANDED * (u or 0.0)
+    for lubrication, by_loading in joint.items():
+        if lubrication == "lubricated":
+            continue
+        for loading, found in by_loading.items():
+            low, high = found.interval.low, found.interval.high
+            if value + spread < low:
+                verdict = "is larger than the macroscopic one"
+            elif high is not None and value - spread > high:
+                verdict = "is smaller than the macroscopic one"
+            else:
+                verdict = "agrees with the macroscopic one"
+            words = f" ({loading} loading)" if loading else ""
+            yield f"The effective friction coefficient{words} {verdict}, {value:.3g}."
+
+
+def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[str]:
+    for loading, family in families.items():
+        known = family.convergence[np.isfinite(family.convergence)]
+        if known.size and float(known.max()) > _COARSE:
+            words = f" ({loading} loading)" if loading else ""
+            yield (
+                f"The calculated contacts{words} have converged to {float(known.max()):.1%} of "
+                "their stress only."
+            )
+        yield from family.notes
+
+
+def _unstated(measured: MeasuredStress) -> Iterator[str]:
+    """Name what no uncertainty is stated for: the intervals count nothing for it."""
+    names = []
+    for scan in measured.scans:
+        film = scan.film
+        stated = {
+            "Young's modulus": film.young_modulus_uncertainty,
+            "Poisson's ratio": film.poisson_ratio_uncertainty,
+            "film thickness": film.thickness_uncertainty,
+            f"{scan.indenter.shape} radius": scan.indenter.radius_uncertainty,
+            "load": scan.load_uncertainty,
+        }
+        names += [name for name, value in stated.items() if value is None]
+    if names:
+        yield (
+            f"No uncertainty is stated for {', '.join(dict.fromkeys(names))}: the intervals of "
+            "the friction coefficient count nothing for it."
+        )
+
+
+def in_words(found: EffectiveFriction) -> str:
+    """Return a coefficient with its interval, or its bound, in words."""
+    low, high = found.interval.low, found.interval.high
+    if high is None or math.isinf(high):
+        return f"at least {low:.2g}" if low > 0 else "no bound"
+    if found.value is None or low == 0:
+        return f"at most {high:.2g}"
+    return f"{found.value:.2g} ({low:.2g} to {high:.2g})"
