@@ -25,6 +25,9 @@ from memscal.model.indenter import Indenter
 DATA = Path(__file__).parents[2] / "calibration_data"
 README = (DATA / "README.md").read_text(encoding="utf-8")
 SCANS = ["rod_scan_33.h5", "rod_scan_65.h5", "rod_scan_three_loads.h5", "rod_scan_raster.h5"]
+EXPERIMENT = [
+    f"sphere_experiment/{name}.h5" for name in ("rod_scan", "sphere_dry", "sphere_lubricated")
+]
 TABLES = ["rod_scan_messy.csv", "rod_reference_fem.csv"]
 ARTIFACT = "rod_scan_65.apparatus.h5"
 
@@ -65,7 +68,8 @@ def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def calibrations() -> dict[str, memscal.Calibration]:
-    return {name: memscal.calibrate(memscal.read_scan(DATA / name)) for name in SCANS}
+    rods = [*SCANS, EXPERIMENT[0]]
+    return {name: memscal.calibrate(memscal.read_scan(DATA / name)) for name in rods}
 
 
 @pytest.fixture(scope="module")
@@ -90,18 +94,22 @@ def stated(item: ElasticFilm | Indenter) -> dict[str, float]:
 
 def test_the_folder_holds_what_its_readme_lists_and_is_small() -> None:
     listed = set(re.findall(r"^\| `([^`]+)`", README, flags=re.MULTILINE))
-    shipped = {path.name for path in DATA.iterdir() if path.suffix in {".h5", ".csv"}}
-    assert shipped == listed == {*SCANS, *TABLES, ARTIFACT}
-    assert sum(path.stat().st_size for path in DATA.iterdir() if path.is_file()) < 1_000_000
+    shipped = {
+        path.relative_to(DATA).as_posix()
+        for path in DATA.rglob("*")
+        if path.suffix in {".h5", ".csv"}
+    }
+    assert shipped == listed == {*SCANS, *EXPERIMENT, *TABLES, ARTIFACT}
+    assert sum(path.stat().st_size for path in DATA.rglob("*") if path.is_file()) < 1_000_000
 
 
-@pytest.mark.parametrize("name", [*SCANS, ARTIFACT])
+@pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT, ARTIFACT])
 def test_every_hdf5_file_is_in_order(name: str) -> None:
     assert [finding for finding in check(DATA / name) if not finding.passed] == []
 
 
 def test_every_file_says_that_it_is_synthetic() -> None:
-    for name in SCANS:
+    for name in (*SCANS, *EXPERIMENT):
         scan = memscal.read_scan(DATA / name)
         assert scan.synthetic
         assert "synthetic" in scan.title.lower()
@@ -111,7 +119,7 @@ def test_every_file_says_that_it_is_synthetic() -> None:
     assert any("synthetic" in message for message in messages)
 
 
-@pytest.mark.parametrize("name", SCANS)
+@pytest.mark.parametrize("name", [*SCANS, EXPERIMENT[0]])
 def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(
     name: str, calibrations: dict[str, memscal.Calibration]
 ) -> None:
@@ -147,15 +155,24 @@ def test_lines_loads_and_raster_give_the_same_conversion_constant(
     assert abs(one.conversion_constant - other.conversion_constant) < 4 * expected
 
 
-@pytest.mark.parametrize("name", SCANS)
+@pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT])
 def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -> None:
     shipped, made = memscal.read_scan(DATA / name), memscal.read_scan(rebuilt / name)
-    for field in ("x", "y", "u_zz", "u_zz_errors", "normal_load"):
+    arrays = ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors")
+    for field in arrays:
         expected, found = getattr(shipped, field), getattr(made, field)
         assert (expected is None) == (found is None), field
         if expected is not None:
             assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
-    for field in ("load", "load_uncertainty", "sensor", "title", "notes"):
+    for field in (
+        "load",
+        "load_uncertainty",
+        "lubrication",
+        "lubricant",
+        "sensor",
+        "title",
+        "notes",
+    ):
         assert getattr(made, field) == getattr(shipped, field), field
     for field in ("film", "indenter"):
         assert stated(getattr(made, field)) == pytest.approx(stated(getattr(shipped, field)))
@@ -165,6 +182,27 @@ def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -
     for name, value in shipped.synthetic.items():
         expected = value if isinstance(value, str) else pytest.approx(value, rel=1e-9)
         assert made.synthetic[name] == expected, name
+
+
+def test_the_contacts_of_the_experiment_are_what_its_readme_says() -> None:
+    dry, lubricated = (memscal.read_scan(DATA / name) for name in EXPERIMENT[1:])
+    for scan, loads, friction in (
+        (dry, [0.34, 0.69, 1.37, 2.75], 0.2),
+        (lubricated, [0.69, 2.75], 0),
+    ):
+        assert scan.synthetic is not None
+        assert scan.synthetic["friction"] == friction
+        assert_allclose(np.diff(scan.x), 0.5e-3)
+        assert_allclose(scan.normal_load, np.repeat(loads, 2)[:, None] * np.ones(33))
+        assert_allclose(scan.normal_load_errors, 0.02 * scan.normal_load)
+        assert_allclose(scan.x_errors, 10e-6)
+        # The truth is a contact that the mechanics solve, seen by the sensor at its own place.
+        contacts = memscal.indent(scan.film, scan.indenter, load=loads, friction=friction)
+        tops = [contact.max_base_stress for contact in contacts]
+        signal = np.ptp(scan.u_zz, axis=1).reshape(-1, 2).mean(axis=1) / 1e-7
+        assert np.all((signal > 0.85 * np.array(tops)) & (signal < np.array(tops)))
+    assert (dry.lubrication, lubricated.lubrication) == ("dry", "lubricated")
+    assert dry.film == lubricated.film == memscal.read_scan(DATA / EXPERIMENT[0]).film
 
 
 def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt: Path) -> None:
