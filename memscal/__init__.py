@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
+    from memscal.formats.stress import read_stress
     from memscal.friction.procedure import compare
     from memscal.friction.results import FrictionComparison
     from memscal.laboratory.experiment import Experiment, simulate_experiment
@@ -73,6 +74,7 @@ _HOMES = {
     "monte_carlo": "memscal.calibration.monte_carlo",
     "read_reference": "memscal.formats.reference",
     "read_scan": "memscal.formats.scan",
+    "read_stress": "memscal.formats.stress",
     "restore": "memscal.measurement.procedure",
     "simulate": "memscal.laboratory.rod_scan",
     "simulate_experiment": "memscal.laboratory.experiment",
@@ -117,6 +119,7 @@ __all__ = [
     "monte_carlo",
     "read_reference",
     "read_scan",
+    "read_stress",
     "restore",
     "simulate",
     "simulate_experiment",

@@ -22,7 +22,9 @@ from memscal.formats.schema import (
     REFERENCE_SCHEMA,
     SCAN_SCHEMA,
     SCHEMA_ATTRIBUTE,
+    STRESS_SCHEMA,
 )
+from memscal.formats.stress import PROFILE_ARRAYS, PROFILE_NUMBERS, profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.verify import altered
 
@@ -32,6 +34,7 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
     SCAN_SCHEMA: scan_from,
     REFERENCE_SCHEMA: profile_from,
     ARTIFACT_SCHEMA: artifact_from,
+    STRESS_SCHEMA: stress_from,
 }
 _ARRAYS = {
     SCAN_SCHEMA: {
@@ -46,6 +49,7 @@ _ARRAYS = {
         "/entry/transfer_function": "k modulus modulus_errors window",
         "/entry/reconvolution": "x u_zz u_zz_errors u_zz_predicted u_zz_gaussian residual",
     },
+    STRESS_SCHEMA: {},
 }
 _FILM = "young_modulus poisson_ratio thickness roughness_rms"
 _PROFILE = "load depth contact_radius stick_radius friction_coefficient loading"
@@ -61,6 +65,11 @@ _QUANTITIES = {
         "/entry/transfer_function": "resolved_wavenumber",
         "/entry/indenter": "shape radius load",
         "/entry/sample/film": _FILM,
+    },
+    STRESS_SCHEMA: {
+        "/entry/indenter": "shape radius",
+        "/entry/sample/film": _FILM,
+        "/entry/sensor": "conversion_constant",
     },
 }
 _PROVENANCE = {
@@ -169,8 +178,11 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 
 
 def _digest(file: SafeFile, schema: str) -> Finding:
-    """Only an artifact must have a digest: scans and references may come from other programs."""
-    if schema != ARTIFACT_SCHEMA and file.attribute("/", DIGEST_ATTRIBUTE) is None:
+    """Results must have a digest: scans and references may come from other programs."""
+    if (
+        schema not in (ARTIFACT_SCHEMA, STRESS_SCHEMA)
+        and file.attribute("/", DIGEST_ATTRIBUTE) is None
+    ):
         return Finding("digest", True, "None: the file was written by another program.")
     problem = altered(file)
     if problem:
@@ -193,6 +205,7 @@ def _schema(file: SafeFile) -> str:
 def _quantities(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:
     names = json_value(file, "/entry/parameters/names", list, [])
     groups = {"/entry/parameters": " ".join(map(str, names)), **_QUANTITIES[schema]}
+    groups |= dict.fromkeys(profile_paths(file), PROFILE_NUMBERS)
     for group, listed in groups.items():
         for name in listed.split():
             path = f"{group}/{name}"
@@ -223,7 +236,8 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
 
 
 def _arrays(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:
-    for group, listed in _ARRAYS[schema].items():
+    groups = _ARRAYS[schema] | dict.fromkeys(profile_paths(file), PROFILE_ARRAYS)
+    for group, listed in groups.items():
         for name in listed.split():
             path = f"{group}/{name}"
             if not file.has(path):

@@ -35,6 +35,8 @@ _DIMENSIONS = {
     "drift": "voltage",
     "noise": "voltage",
     "load": "force",
+    "force": "force",
+    "maximum": "stress",
     "seed": "dimensionless",
     # The truth of a simulated experiment: film and indenter, their contact, and what went wrong.
     "young_modulus": "stress",

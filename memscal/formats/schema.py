@@ -11,12 +11,14 @@ __all__ = [
     "SCAN_SCHEMA",
     "SCHEMA_ATTRIBUTE",
     "SCHEMA_VERSION",
+    "STRESS_SCHEMA",
     "VERSION_ATTRIBUTE",
 ]
 
 SCAN_SCHEMA = "memscal-scan"
 REFERENCE_SCHEMA = "memscal-reference"
 ARTIFACT_SCHEMA = "memscal-artifact"
+STRESS_SCHEMA = "memscal-stress"
 SCHEMA_VERSION = "1.0.0"
 
 SCHEMA_ATTRIBUTE = "memscal_schema"

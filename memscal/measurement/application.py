@@ -20,6 +20,7 @@ from memscal.measurement.single_profile import measured_profile
 from memscal.measurement.stress_checks import stress_checks
 from memscal.measurement.usable_scan import require_ends, require_points
 from memscal.model.apparatus import QualityCheck
+from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan
 
 __all__ = ["measure_stress"]
@@ -74,7 +75,7 @@ def measure_stress(
     >>> abs(profile.force - profile.load) < 3 * profile.force_uncertainty
     True
     """
-    known = apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
+    known, artifact = _opened(apparatus)
     scans = (scan,) if isinstance(scan, Scan) else tuple(scan)
     _require_scans(scans)
     require_covariance(known)
@@ -83,7 +84,8 @@ def measure_stress(
         for one in scans
         for text in accept_mismatches(one, known, place_of(one), override=override)
     )
-    profiles = tuple(_measure(part, known) for one in scans for part in single_loads(one))
+    parts = [single_loads(one) for one in scans]
+    profiles = tuple(_measure(part, known) for of_scan in parts for part in of_scan)
     checks = stress_checks(profiles)
     return MeasuredStress(
         profiles=profiles,
@@ -93,7 +95,21 @@ def measure_stress(
         messages=tuple(_messages(profiles, known, checks, overridden)),
         overridden=overridden,
         configuration={"override": bool(override)},
+        artifact=artifact,
+        parts=tuple(len(of_scan) for of_scan in parts),
     )
+
+
+def _opened(
+    apparatus: ApparatusFunction | str | PathLike[str],
+) -> tuple[ApparatusFunction, SourceFile | None]:
+    if isinstance(apparatus, ApparatusFunction):
+        return apparatus, None
+    from memscal.formats.hdf5_reader import open_hdf5
+
+    known = load_apparatus(apparatus)
+    with open_hdf5(apparatus) as file:
+        return known, file.source
 
 
 def _require_scans(scans: tuple[Scan, ...]) -> None:

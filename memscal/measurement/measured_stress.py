@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from memscal.measurement.restoration import Restoration
 from memscal.measurement.single_loads import SingleLoad
 from memscal.model.apparatus import QualityCheck
 from memscal.model.notation import format_measured
+from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
@@ -164,6 +166,10 @@ class MeasuredStress:
         Mismatches of artifact and scan that were accepted.
     configuration : mapping
         Options of the procedure.
+    artifact : SourceFile, optional
+        The file of the apparatus function, where it was read from one.
+    parts : tuple of int
+        How many profiles each scan has.
     """
 
     profiles: tuple[MeasuredProfile, ...]
@@ -173,6 +179,8 @@ class MeasuredStress:
     messages: tuple[str, ...]
     overridden: tuple[str, ...]
     configuration: Mapping[str, Any]
+    artifact: SourceFile | None = None
+    parts: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
         """Return the loads and the state of the checks."""
@@ -185,3 +193,24 @@ class MeasuredStress:
     def passed(self) -> bool:
         """Whether every quality check passed."""
         return all(check.passed for check in self.checks)
+
+    def scan_of(self, profile: MeasuredProfile) -> int:
+        """Return which of the scans a profile comes from, counted from zero."""
+        number = self.profiles.index(profile)
+        return int(np.searchsorted(np.cumsum(self.parts), number, side="right"))
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the measured stress to a file (memscal-stress).
+
+        Two measurements of the same files with the same options give the same bytes while
+        ``SOURCE_DATE_EPOCH`` is set.
+
+        Raises
+        ------
+        OutputError
+            If the file exists and ``overwrite`` is false, or cannot be written.
+        """
+        from memscal.formats.stress import write_stress
+        from memscal.measurement.record import stress_record
+
+        write_stress(stress_record(self), path, overwrite=overwrite)

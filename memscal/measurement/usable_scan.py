@@ -24,7 +24,10 @@ def require_points(part: SingleLoad, signal: ContactSignal) -> None:
         If every point is missing (NaN), or a run of them is longer than the contact's radius.
     """
     scan = part.scan
-    known = np.isfinite(scan.u_zz if scan.normal_load is None else scan.u_zz * scan.normal_load)
+    known = np.ones_like(scan.u_zz, dtype=np.bool_)
+    for values in (scan.u_zz, scan.normal_load):
+        if values is not None:
+            known &= np.isfinite(values)
     if not known.any():
         raise InputError(
             f"{place_of(scan, part)}: all {known.size} points are missing (NaN).",
@@ -60,7 +63,7 @@ def require_ends(part: SingleLoad, signal: ContactSignal, centre: FloatArray) ->
     scan = part.scan
     known = np.isfinite(scan.u_zz)
     if scan.y is None:
-        x = scan.x[np.reshape(known, (-1, scan.x.size)).any(axis=0)]
+        x = scan.x[known.reshape(-1, scan.x.size).any(axis=0)]
         along = centre[0 if scan.direction == "x" else 1]
         ends = [abs(float(x.min() - along)), abs(float(x.max() - along))]
     else:

@@ -1,0 +1,275 @@
+"""memscal-stress: the stress that a calibrated sensor measured, load by load, as HDF5."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import numpy as np
+
+from memscal.errors import FormatError
+from memscal.formats.fields import (
+    json_value,
+    optional_array,
+    optional_scalar,
+    optional_text,
+    require_array,
+    require_scalar,
+    require_schema,
+    require_text,
+)
+from memscal.formats.hdf5_reader import SafeFile, open_hdf5
+from memscal.formats.hdf5_writer import file_tree, write_tree
+from memscal.formats.json_text import to_json
+from memscal.formats.parameters import budget_group, read_budget
+from memscal.formats.parts import (
+    indenter_group,
+    instrument_group,
+    read_film,
+    read_round_indenter,
+    read_sensor,
+    sample_group,
+)
+from memscal.formats.process import process_group, quality_group, read_process, read_quality
+from memscal.formats.schema import STRESS_SCHEMA
+from memscal.formats.tree import Group, Node, count, si
+from memscal.formats.verify import altered
+from memscal.model.provenance import SourceFile
+from memscal.model.stress_record import StressRecord, StressRecordProfile
+from memscal.model.validation import FloatArray
+
+__all__ = [
+    "PROFILE_ARRAYS",
+    "PROFILE_NUMBERS",
+    "profile_paths",
+    "read_stress",
+    "stress_from",
+    "write_stress",
+]
+
+#: Numbers and arrays of one profile that ``memscal inspect`` lists.
+PROFILE_NUMBERS = "load lubrication force maximum centre centre_y baseline contact_radius"
+PROFILE_ARRAYS = "r x y s_zz s_zz_errors covariance"
+
+_BUDGET = {"force": "force", "maximum": "stress"}
+_PREFIX = "covariance_"
+# The covariance's second axis has its own name: netCDF tools want each dimension once.
+_AXES = ("r", "r_prime")
+
+
+def read_stress(path: str | os.PathLike[str]) -> StressRecord:
+    """Read measured stress from a memscal-stress file.
+
+    Parameters
+    ----------
+    path : path
+        The file; units in it are converted to SI.
+
+    Returns
+    -------
+    StressRecord
+
+    Raises
+    ------
+    FormatError, UnitError, UnsafeFileError, SchemaVersionError
+        If the file does not hold measured stress that this version can read, or was changed
+        since it was written (its content digest no longer fits).
+    """
+    with open_hdf5(path) as file:
+        return stress_from(file)
+
+
+def stress_from(file: SafeFile) -> StressRecord:
+    """Read the measured stress of an open memscal-stress file."""
+    require_schema(file, STRESS_SCHEMA)
+    problem = altered(file)
+    if problem:
+        raise FormatError(
+            f"{file.name} was changed after it was written: {problem}",
+            why="Measured stress is used only as it was measured.",
+            cure="Get the original file, or run memscal apply again.",
+        )
+    paths = profile_paths(file)
+    if not paths:
+        raise FormatError(
+            f"{file.where('/entry/profiles')} names no profile.",
+            why="It lists the groups that hold one.",
+        )
+    inputs = {
+        str(name): SourceFile(
+            require_text(file, f"/entry/inputs/{name}/file_name"),
+            require_text(file, f"/entry/inputs/{name}/checksum"),
+        )
+        for name in json_value(file, "/entry/inputs/names", list, [])
+    }
+    return StressRecord(
+        profiles=tuple(_read_profile(file, path) for path in paths),
+        film=read_film(file, "/entry/sample/film"),
+        indenter=read_round_indenter(file, "/entry/indenter"),
+        sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
+        conversion_constant=require_scalar(
+            file, "/entry/sensor/conversion_constant", "voltage per stress"
+        ),
+        conversion_constant_uncertainty=require_scalar(
+            file, "/entry/sensor/conversion_constant_errors", "voltage per stress"
+        ),
+        checks=read_quality(file, "/entry/quality"),
+        overridden=tuple(str(text) for text in json_value(file, "/entry/overridden", list, [])),
+        artifact=inputs.pop("artifact", None),
+        scans=tuple(inputs.values()),
+        process=read_process(file, "/entry/process"),
+    )
+
+
+def write_stress(
+    record: StressRecord, path: str | os.PathLike[str], *, overwrite: bool = False
+) -> None:
+    """Write measured stress as a memscal-stress file, whole or not at all.
+
+    Parameters
+    ----------
+    record : StressRecord
+        The profiles and where they come from; :meth:`memscal.MeasuredStress.save` makes it.
+    path : path
+        The file.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the file exists or cannot be written.
+    """
+    write_tree(file_tree(STRESS_SCHEMA, _entry(record)), path, overwrite=overwrite)
+
+
+def profile_paths(file: SafeFile) -> list[str]:
+    """Return the paths of the groups that hold a profile each; none in another schema's file."""
+    return [f"/entry/{name}" for name in json_value(file, "/entry/profiles", list, [])]
+
+
+def _entry(record: StressRecord) -> Group:
+    names = [f"profile_{i + 1}" for i in range(len(record.profiles))]
+    sensor = record.sensor.name
+    a, u_a = record.conversion_constant, record.conversion_constant_uncertainty
+    children: dict[str, Node] = {
+        "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
+        "profiles": to_json("profiles", names),
+        **{
+            name: _profile_group(profile)
+            for name, profile in zip(names, record.profiles, strict=True)
+        },
+        "sensor": Group(
+            "NXcollection",
+            {
+                "conversion_constant": si(a, "voltage per stress"),
+                "conversion_constant_errors": si(u_a, "voltage per stress"),
+            },
+        ),
+        "quality": quality_group(record.checks),
+        "overridden": to_json("overridden", list(record.overridden)),
+        "sample": sample_group(record.film),
+        "instrument": instrument_group(record.sensor),
+        "indenter": indenter_group(record.indenter),
+        "inputs": _inputs_group(record),
+        "process": process_group(record.process),
+    }
+    return Group("NXentry", children, {"default": names[-1]})
+
+
+def _inputs_group(record: StressRecord) -> Group:
+    inputs = {} if record.artifact is None else {"artifact": record.artifact}
+    inputs |= {f"scan_{i + 1}": source for i, source in enumerate(record.scans)}
+    groups: dict[str, Node] = {
+        name: Group(
+            "NXnote",
+            {"file_name": source.file_name, "checksum": source.sha256, "algorithm": "sha256"},
+        )
+        for name, source in inputs.items()
+    }
+    return Group("NXcollection", {"names": to_json("inputs", list(inputs)), **groups})
+
+
+def _profile_group(profile: StressRecordProfile) -> Group:
+    centre, spread = profile.centre, profile.centre_uncertainty
+    children: dict[str, Node] = {
+        "r": si(profile.r, "length", ("r",)),
+        "r_prime": si(profile.r, "length", ("r_prime",)),
+        "x": si(profile.x, "length", ("r",)),
+        "y": si(profile.y, "length", ("r",)),
+        "s_zz": si(profile.s_zz, "stress", ("r",)),
+        "s_zz_errors": si(profile.s_zz_errors, "stress", ("r",)),
+        "covariance": si(profile.covariance, "stress squared", _AXES),
+        "sources": to_json("sources", list(profile.covariances)),
+        **{
+            _PREFIX + source: si(values, "stress squared", _AXES)
+            for source, values in profile.covariances.items()
+        },
+        "scan": count(profile.scan + 1),
+        "load": si(profile.load, "force"),
+        "force": si(profile.force, "force"),
+        "force_errors": si(profile.uncertainty("force"), "force"),
+        "maximum": si(profile.maximum, "stress"),
+        "maximum_errors": si(profile.uncertainty("maximum"), "stress"),
+        "centre": si(centre[0], "length"),
+        "centre_errors": si(spread[0], "length"),
+        "centre_y": si(centre[1], "length"),
+        "centre_y_errors": si(spread[1], "length"),
+        "baseline": si(profile.baseline, "voltage"),
+        "baseline_errors": si(profile.baseline_uncertainty, "voltage"),
+        "contact_radius": si(profile.contact_radius, "length"),
+        "budget": budget_group(profile.budget, _BUDGET),
+    }
+    if profile.load_uncertainty is not None:
+        children["load_errors"] = si(profile.load_uncertainty, "force")
+    if profile.lubrication:
+        children["lubrication"] = profile.lubrication
+    return Group("NXdata", children, {"signal": "s_zz", "axes": ("r",)})
+
+
+def _read_profile(file: SafeFile, path: str) -> StressRecordProfile:
+    def number(name: str, dimension: str) -> float:
+        return require_scalar(file, f"{path}/{name}", dimension)
+
+    def array(name: str, dimension: str, shape: tuple[int, ...]) -> FloatArray:
+        values = require_array(file, f"{path}/{name}", dimension)
+        if values.shape != shape:
+            raise FormatError(
+                f"{file.where(path)}/{name} has shape {values.shape}, but r gives {shape}."
+            )
+        return values
+
+    r = require_array(file, f"{path}/r", "length", ndim=1)
+    n = r.size
+    stored = json_value(file, f"{path}/sources", list, [])
+    covariances: Mapping[str, FloatArray] = {
+        str(source): array(f"{_PREFIX}{source}", "stress squared", (n, n)) for source in stored
+    }
+    budget = read_budget(file, f"{path}/budget")
+    if not covariances or not budget.keys() >= _BUDGET.keys():
+        raise FormatError(
+            f"{file.where(path)} states no covariance of its stress, or no budget.",
+            why="Measured stress without uncertainty means little.",
+        )
+    y = optional_array(file, f"{path}/y", "length", ndim=1)
+    return StressRecordProfile(
+        load=number("load", "force"),
+        load_uncertainty=optional_scalar(file, f"{path}/load_errors", "force"),
+        lubrication=optional_text(file, f"{path}/lubrication"),
+        scan=int(number("scan", "dimensionless")) - 1,
+        r=r,
+        x=array("x", "length", (n,)),
+        y=np.zeros(n) if y is None else y,
+        s_zz=array("s_zz", "stress", (n,)),
+        covariances=covariances,
+        force=number("force", "force"),
+        maximum=number("maximum", "stress"),
+        budget=budget,
+        centre=np.array([number("centre", "length"), number("centre_y", "length")]),
+        centre_uncertainty=np.array(
+            [number("centre_errors", "length"), number("centre_y_errors", "length")]
+        ),
+        baseline=number("baseline", "voltage"),
+        baseline_uncertainty=number("baseline_errors", "voltage"),
+        contact_radius=number("contact_radius", "length"),
+    )
