@@ -120,20 +120,21 @@ class PriorChoice:
 
 @dataclass(frozen=True, eq=False)
 class InterfaceLength:
-    """A length over which the interface yields, by profile likelihood: never a bare number.
+    r"""A length over which the interface yields, by profile likelihood: never a bare number.
 
     Parameters
     ----------
     value : float or None
-        Length of least chi-square, in m; ``None`` where the data give no more than a bound.
+        Length of largest likelihood, in m; ``None`` where the data give no more than a bound.
     standard_uncertainty : float or None
         Half of the interval of 68.3 %, in m; ``None`` where that has an open end.
     interval : Interval
         Lengths that the data do not exclude, in m; from 0 where a rigid interface is one of them.
     reason : str
         Why there is no value, in words; empty where there is one.
-    values, chi_square : ndarray, shape (m,)
-        The profile likelihood: lengths in m, and chi-square along them.
+    values, deviance : ndarray, shape (m,)
+        The profile likelihood: lengths in m, and :math:`-2\ln p(u | \theta)` along them, up to a
+        constant: chi-square with the determinant of its covariance.
     """
 
     value: float | None
@@ -141,14 +142,14 @@ class InterfaceLength:
     interval: Interval
     reason: str
     values: FloatArray
-    chi_square: FloatArray
+    deviance: FloatArray
 
     @property
     def best(self) -> float:
-        """Length of least chi-square in m, ``inf`` included: to draw, not to report."""
+        """Length of largest likelihood in m, ``inf`` included: to draw, not to report."""
         if self.value is not None:
             return self.value
-        return float(self.values[self.chi_square.argmin()])
+        return float(self.values[self.deviance.argmin()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +209,9 @@ class LawComparison:
 
     @property
     def yielding_preferred(self) -> bool:
-        """Whether the law that yields has the largest evidence."""
-        return self.laws[-1].log_evidence >= max(law.log_evidence for law in self.laws)
+        """Whether there is positive evidence for the law that yields against every other."""
+        others = max(law.log_evidence for law in self.laws[:-1])
+        return 2 * (self.laws[-1].log_evidence - others) >= _WORDS[0][0]
 
 
 @dataclass(frozen=True, eq=False)

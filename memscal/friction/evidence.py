@@ -63,15 +63,16 @@ class Tables:
 
     def together(self) -> Tables:
         """Return the groups as one, of shape (M, 1): one parameter for all of them."""
-        return Tables(*(np.sum(part, axis=1, keepdims=True) for part in self._parts))
+        return Tables(*(np.sum(part, axis=1, keepdims=True) for part in self.parts))
 
     def group(self, index: int | Sequence[int]) -> Tables:
         """Return some of the groups, as one."""
         chosen = np.atleast_1d(np.asarray(index, dtype=np.intp))
-        return Tables(*(part[:, chosen] for part in self._parts)).together()
+        return Tables(*(part[:, chosen] for part in self.parts)).together()
 
     @property
-    def _parts(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def parts(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Squares, pulls, grips and volumes."""
         return self.squares, self.pulls, self.grips, self.volumes
 
 
@@ -106,13 +107,14 @@ def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
     [-1.351293, 0.4]
     """
     squares, q = tables.squares, tables.pulls.shape[-1]
-    # One factorisation gives both: the last pivot of M bordered by g is chi-square.
+    # One factorisation gives both: the last pivot of M bordered by g is chi-square (plus one, so
+    # that data without any misfit do not make it singular).
     bordered = np.empty((*squares.shape, q + 1, q + 1))
     bordered[..., :q, :q] = tables.grips + np.eye(q)
     bordered[..., q, :q] = bordered[..., :q, q] = tables.pulls
-    bordered[..., q, q] = squares
+    bordered[..., q, q] = squares + 1
     pivots = np.einsum("...ii->...i", np.linalg.cholesky(bordered))
-    chi_square = pivots[..., q] ** 2
+    chi_square = np.maximum(pivots[..., q] ** 2 - 1, 0.0)
     volume = 2 * np.log(pivots[..., :q]).sum(axis=-1) + tables.volumes
     return -(chi_square + volume) / 2, chi_square
 
@@ -173,9 +175,9 @@ def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) ->
     )
     logs, before = np.zeros(paths), np.zeros(paths)
     for step, (table, weight) in enumerate(zip(tables, weights, strict=True)):
-        one = Tables(*(part[None, :, 0] for part in table._parts))
+        one = Tables(*(part[None, :, 0] for part in table.parts))
         both = Tables(
-            *(old[:, None] + new for old, new in zip(known._parts, one._parts, strict=True))
+            *(old[:, None] + new for old, new in zip(known.parts, one.parts, strict=True))
         )
         with np.errstate(divide="ignore"):
             joint = log_likelihood(both)[0] + np.log(weight)
@@ -186,7 +188,7 @@ def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) ->
         cumulated = np.cumsum(np.exp(joint - expected[:, None]), axis=1)
         drawn = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
         drawn = np.minimum(drawn, weight.size - 1)
-        known = Tables(*(part[np.arange(paths), drawn] for part in both._parts))
+        known = Tables(*(part[np.arange(paths), drawn] for part in both.parts))
         before = log_likelihood(known)[0]
     mean = float(_log_sum(logs) - np.log(paths))
     spread = np.std(np.exp(logs - mean)) / np.sqrt(paths)
