@@ -115,12 +115,18 @@ def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
         else:
             groups.append([end])
     for group in groups:
-        names = [friction_name(mu) for _, mu in group]
-        text = names[0] if len(names) == 1 else f"{names[0]} – {names[-1]}"
-        if group is groups[-1]:
-            text = rf"$\mu$ = {text}"
         height = float(np.mean([value for value, _ in group]))
+        text = _group_name([mu for _, mu in group])
         axes.annotate(
-            text, (x, height), (7, 0), textcoords="offset points", va="center", fontsize=6.5,
-            color=friction_colours(group[-1][1])[0],
+            text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
+            (x, height), (7, 0), textcoords="offset points", va="center", fontsize=6.5,
+            color=friction_colours(max(mu for _, mu in group))[0],
         )  # fmt: skip
+
+
+def _group_name(group: list[float]) -> str:
+    """Return one name for curves that end together."""
+    low, high = min(group), max(group)
+    if low == high:
+        return friction_name(low)
+    return f"≥ {friction_name(low)}" if np.isinf(high) else f"{friction_name(low)}–{high:.3g}"

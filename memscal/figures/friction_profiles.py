@@ -29,6 +29,8 @@ __all__ = ["draw_profiles", "draw_residuals", "friction_set_figure", "profile_fi
 _FINE = 241
 _DECADES = 3.3
 _EXPANDED = 2.0
+#: How strongly points are drawn that do not stand clear of zero.
+_PALE = 0.25
 _LEAST_LIMIT, _LARGEST_LIMIT = 3.5, 12.0
 _SHOWN = (0.0, 0.05, 0.1, 0.2, 0.3, np.inf)
 #: Panels of a row of loads: with more, only the smallest, the largest and those between fit.
@@ -84,8 +86,9 @@ def draw_profiles(
     logarithmic: bool = False,
 ) -> None:
     """Draw measured points with their uncertainties, and the calculated limits through them."""
-    colours = load_colours(len(loads))
-    for one, colour in zip(loads, colours, strict=True):
+    colours = load_colours(found)
+    for one in loads:
+        colour = colours[one.load]
         r = np.linspace(0.0, one.profile.r[-1], _FINE)
         limits = on_axis(one.profile.r, one.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
@@ -119,14 +122,19 @@ def _say_what(axes: Axes, found: FrictionComparison, one: LoadComparison) -> Non
 
 
 def _points(axes: Axes, one: LoadComparison, colour: str, label: str, logarithmic: bool) -> None:
-    """Draw the measured points; on a logarithmic scale those that are not above 0 are left out."""
-    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+    """Draw the measured points.
+
+    On a logarithmic scale those that are not above 0 are left out, and those that are less than
+    twice their uncertainty are pale: they say no more than that the stress has decayed.
+    """
     r, s, u = (np.asarray(v) for v in (one.profile.r, one.profile.s_zz, one.profile.s_zz_errors))
-    shown = s > 0 if logarithmic else np.ones(s.size, dtype=bool)
-    _errorbar(
-        axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA,
-        colour=colour, marker=marker, filled=filled, label=label,
-    )  # fmt: skip
+    clear = s > _EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
+    for shown, strength in ((clear, 1.0), (~clear & (s > 0), _PALE)):
+        if shown.any():
+            _errorbar(
+                axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA, one,
+                colour=colour, label=label, strength=strength,
+            )  # fmt: skip
 
 
 def _errorbar(
@@ -134,17 +142,17 @@ def _errorbar(
     x: FloatArray,
     y: FloatArray,
     u: FloatArray,
+    one: LoadComparison,
     *,
     colour: str,
-    marker: str,
-    filled: bool,
-    label: str,
+    label: str = "",
+    strength: float = 1.0,
 ) -> None:
+    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
     style: dict[str, Any] = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
     face = colour if filled else "white"
-    axes.errorbar(
-        x, y, u, fmt=marker, color=colour, mfc=face, label=label or "_points", **style
-    )  # fmt: skip
+    style |= {"label": label or "_points", "alpha": None if strength == 1.0 else strength}
+    axes.errorbar(x, y, u, fmt=marker, color=colour, mfc=face, **style)
 
 
 def draw_residuals(
@@ -153,7 +161,9 @@ def draw_residuals(
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    for one, colour in zip(loads, load_colours(len(loads)), strict=True):
+    colours = load_colours(found)
+    for one in loads:
+        colour = colours[one.load]
         z = (one.profile.s_zz - one.calculated[index]) / one.profile.s_zz_errors
         marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
         (points,) = axes.plot(one.profile.r / MM, z, marker, color=colour, ms=2.5, mew=0.6)
@@ -257,14 +267,14 @@ def _draw_differences(axes: Axes, found: FrictionComparison, one: LoadComparison
         change = (one.calculated[i] - one.calculated[0])[None, :]
         colour = friction_colours(found.friction[i])[0]
         axes.plot(r / MM, on_axis(one.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
-    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
     _errorbar(
         axes,
         one.profile.r / MM,
         (one.profile.s_zz - one.calculated[0]) / unit,
         one.profile.s_zz_errors / unit,
-        colour=COLOURS["measured"], marker=marker, filled=filled, label="",
-    )  # fmt: skip
+        one,
+        colour=COLOURS["measured"],
+    )
 
 
 def _draw_best(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
@@ -273,7 +283,7 @@ def _draw_best(axes: Axes, found: FrictionComparison, one: LoadComparison) -> No
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.plot(one.profile.r / MM, z, "o", color=COLOURS["measured"], ms=2.5)
-    label = rf"$\mu$ = {friction_name(found.friction[best])}"
+    label = rf"least $\chi^2$: $\mu$ = {friction_name(found.friction[best])}"
     axes.annotate(
         label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7
     )  # fmt: skip

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -37,6 +39,8 @@ _ASIDE = 0.008
 #: Differences of chi-square that bound 68.3 % and 95 % of one parameter.
 _LEVELS = ((1.0, "68 %"), (3.84, "95 %"))
 _HIGHEST = 12.0
+#: Entries in one line of a legend.
+_ENTRIES = 7
 
 
 def effective_friction_figure(found: FrictionComparison) -> Figure:
@@ -67,7 +71,7 @@ def effective_friction_figure(found: FrictionComparison) -> Figure:
         for axes, letter in zip(panels.flat, "abcdef", strict=False):
             panel_letter(axes, letter)
             axes.label_outer()
-        _one_legend(figure, panels[0, 0])
+        _one_legend(figure, panels.flat)
     return figure
 
 
@@ -149,9 +153,20 @@ def _name_panel(axes: Axes, lubrication: str, loading: str) -> None:
     axes.set_title(words, fontsize=8, loc="left")
 
 
-def _one_legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(handles))
+def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
+    """Put what any of the panels shows above them all, each thing once."""
+    shown: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            shown.setdefault(label, handle)
+    loads = sorted((label for label in shown if label.endswith(" N")), key=_newtons)
+    order = [*loads, *(label for label in shown if label not in loads)]
+    handles = [shown[label] for label in order]
+    figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), _ENTRIES))
+
+
+def _newtons(label: str) -> float:
+    return float(label.removesuffix(" N"))
 
 
 def likelihood_figure(found: FrictionComparison) -> Figure:
@@ -182,7 +197,7 @@ def likelihood_figure(found: FrictionComparison) -> Figure:
         for axes, letter in zip(panels.flat, "abcdef", strict=False):
             panel_letter(axes, letter)
             axes.label_outer()
-        _one_legend(figure, panels[0, 0])
+        _one_legend(figure, panels.flat)
     return figure
 
 
@@ -195,8 +210,9 @@ def draw_likelihood(
     """Draw chi-square above its least value of each load and of all loads together."""
     loading = main_loading(found, loading)
     loads = chosen(found, loading, lubrication)
-    for one, colour in zip(loads, load_colours(len(loads)), strict=True):
-        _draw_curve(axes, one.by_profile, colour, f"{one.load:.3g} N", 1.0)
+    colours = load_colours(found)
+    for one in loads:
+        _draw_curve(axes, one.by_profile, colours[one.load], f"{one.load:.3g} N", 1.0)
     joint = found.joint[loads[0].lubrication][loading]
     _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
     draw_levels(axes)

@@ -74,12 +74,15 @@ def friction_colours(friction: ArrayLike) -> list[str]:
     return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
 
 
-def load_colours(count: int) -> list[str]:
-    """Return colours that get darker with the load, also in grey."""
+def load_colours(found: FrictionComparison) -> dict[float, str]:
+    """Return a colour for each load: darker with the load, also in grey, the same in all panels."""
     import matplotlib as mpl
 
-    shades = mpl.colormaps["viridis_r"](np.linspace(0.2, 1.0, max(count, 1)))
-    return [mpl.colors.to_hex(shade) for shade in shades] if count > 1 else [COLOURS["deconvolved"]]
+    loads = sorted({one.load for of_it in found.loads.values() for one in of_it})
+    if len(loads) == 1:
+        return {loads[0]: COLOURS["deconvolved"]}
+    shades = mpl.colormaps["viridis_r"](np.linspace(0.2, 1.0, len(loads)))
+    return {load: mpl.colors.to_hex(shade) for load, shade in zip(loads, shades, strict=True)}
 
 
 def lubricated_words(lubrication: str) -> str:

@@ -79,8 +79,25 @@ def test_a_logarithmic_scale_shows_every_positive_stress_of_three_decades(
     axes = profile_figure(found).axes[1]
     low, high = axes.get_ylim()
     assert high / low > 1e3
-    for (_, s, _), profile in zip(bars(axes), found.measured.profiles, strict=False):
-        np.testing.assert_allclose(s, profile.s_zz[profile.s_zz > 0] * 1e-3)
+    drawn = np.sort(np.concatenate([s for _, s, _ in bars(axes)]))
+    measured = [one.profile.s_zz for one in found.loads["total"] if one.lubrication == "dry"]
+    expected = np.concatenate(measured)
+    np.testing.assert_allclose(drawn, np.sort(expected[expected > 0]) * 1e-3)
+
+
+def test_a_load_has_one_colour_in_all_panels() -> None:
+    found = comparison()
+    fewer = {name: loads[:-2] for name, loads in found.loads.items()}
+    object.__setattr__(found, "loads", fewer)
+    panels = likelihood_figure(found).axes
+    colours = [
+        {line.get_label(): line.get_color() for line in axes.lines if "N" in line.get_label()}
+        for axes in panels
+    ]
+    for of_panel in colours:
+        assert of_panel.items() <= colours[0].items()
+    assert len(colours[-1]) == len(LOADS) - 2
+    assert len(set(colours[0].values())) == len(LOADS)
 
 
 def test_a_set_of_coefficients_is_drawn_less_the_frictionless_profile(
