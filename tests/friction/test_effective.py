@@ -1,0 +1,106 @@
+"""The effective friction coefficient over many cheap experiments: coverage, bounds, budgets."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from friction.linear_contacts import FRICTIONS, Laboratory
+from scipy.stats import binom, kstest
+
+from memscal.friction.effective import fine_values, with_loading
+from memscal.friction.results import EffectiveFriction
+
+SEEDS = 60
+CHANCE = 1e-4
+TRUTHS = (0.0, 0.1, 0.2, 0.3)
+
+
+@lru_cache
+def laboratory() -> Laboratory:
+    return Laboratory.of()
+
+
+@lru_cache
+def found(friction: float) -> list[EffectiveFriction]:
+    first = 1000 * round(100 * min(friction, 9.0))
+    return [laboratory().drawn(friction, first + seed).effective([0, 1]) for seed in range(SEEDS)]
+
+
+def test_intervals_hold_the_truth_in_ninety_to_ninety_eight_percent() -> None:
+    held = [one.interval.holds(mu) for mu in TRUTHS for one in found(mu)]
+    low, high = binom.ppf([CHANCE, 1 - CHANCE], len(held), [0.90, 0.98])
+    assert low <= sum(held) <= high
+
+
+@pytest.mark.parametrize("friction", TRUTHS)
+def test_no_coefficient_is_left_out_of_its_interval(friction: float) -> None:
+    held = sum(one.interval.holds(friction) for one in found(friction))
+    assert held >= binom.ppf(CHANCE, SEEDS, 0.94)
+
+
+@pytest.mark.parametrize("friction", [1.0, np.inf])
+def test_a_large_coefficient_gives_a_lower_bound_and_no_number(friction: float) -> None:
+    bounds = [one for one in found(friction) if one.value is None]
+    # Full stick is excluded by chance as seldom as any true value.
+    assert len(bounds) >= binom.ppf(CHANCE, SEEDS, 0.95)
+    for one in bounds:
+        assert one.interval.high is None
+        assert "lower bound" in one.reason
+        assert not one.budget
+        assert one.standard_uncertainty is None
+        assert one.interval.low > 0.1
+
+
+def test_chi_square_is_as_large_as_its_degrees_say() -> None:
+    chances = [one.p_value for mu in (0.1, 0.2) for one in found(mu)]
+    assert kstest(chances, "uniform").pvalue > CHANCE
+
+
+def test_values_scatter_as_their_uncertainties_say() -> None:
+    apart = [
+        (one.value - 0.1) / one.standard_uncertainty
+        for one in found(0.1)
+        if one.value is not None and one.standard_uncertainty is not None
+    ]
+    assert len(apart) > 0.9 * SEEDS
+    spread = np.sqrt(np.mean(np.square(apart)))
+    assert abs(spread - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
+
+
+def test_the_budget_is_the_uncertainty_where_the_likelihood_is_a_parabola() -> None:
+    for one in found(0.1):
+        if one.standard_uncertainty is not None:
+            whole = np.linalg.norm(list(one.budget.values()))
+            assert whole == pytest.approx(one.standard_uncertainty, rel=0.35)
+
+
+def test_all_loads_together_tell_more_than_each() -> None:
+    confronted = laboratory().drawn(0.1, seed=1)
+    joint, single = confronted.effective([0, 1]), confronted.effective([0])
+    assert joint.interval.high is not None
+    width = joint.interval.high - joint.interval.low
+    assert single.interval.high is None or single.interval.high - single.interval.low > width
+    assert joint.degrees == 2 * (33 - 3) - 1
+
+
+def test_lubricated_contacts_reach_no_friction() -> None:
+    reached = sum(one.interval.low == 0 for one in found(0.0))
+    assert reached >= binom.ppf(CHANCE, SEEDS, 0.95)
+
+
+def test_the_fine_values_hold_those_that_were_calculated() -> None:
+    values = fine_values(laboratory().family)
+    assert set(FRICTIONS) <= set(values.tolist())
+    assert np.all(np.diff(values) > 0)
+    assert 190 < values.size < 220
+
+
+def test_the_other_loading_adds_a_rectangle() -> None:
+    first, second = found(0.1)[0], found(0.2)[0]
+    assert first.value is not None
+    assert second.value is not None
+    expected = abs(first.value - second.value) / np.sqrt(12)
+    assert with_loading(first, second).budget["loading"] == pytest.approx(expected)
+    assert "loading" not in with_loading(first, None).budget

@@ -1,0 +1,81 @@
+"""Intervals of a profile likelihood with two ends of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from memscal.friction.interval import Profiled, profiled, reason_of
+
+COORDINATES = np.linspace(0.0, 1.0, 101)
+
+
+def value_at(t: float) -> float:
+    return float("inf") if t == 1 else 0.3 * t / (1 - t)
+
+
+def parabola(best: float, sigma: float) -> Profiled:
+    return profiled(COORDINATES, 7.0 + ((COORDINATES - best) / sigma) ** 2, value_at)
+
+
+@pytest.mark.parametrize("sigma", [0.002, 0.02, 0.1])
+@pytest.mark.parametrize("best", [0.4, 0.4037])
+def test_the_ends_of_a_parabola_are_known(best: float, sigma: float) -> None:
+    found = parabola(best, sigma)
+    assert found.best == pytest.approx(value_at(best), rel=1e-3)
+    assert found.least == pytest.approx(7.0, abs=1e-6)
+    assert found.interval.low == pytest.approx(value_at(best - 1.959964 * sigma), rel=1e-3)
+    assert found.interval.high == pytest.approx(value_at(best + 1.959964 * sigma), rel=1e-3)
+    assert found.standard_uncertainty == pytest.approx(
+        (value_at(best + sigma) - value_at(best - sigma)) / 2, rel=2e-3
+    )
+    assert not found.open_low
+    assert not found.open_high
+    assert reason_of(found, np.inf) == ""
+
+
+def test_an_interval_that_reaches_full_stick_is_a_lower_bound() -> None:
+    found = parabola(0.9, 0.1)
+    assert found.interval.high is None
+    assert found.interval.low == pytest.approx(value_at(0.704), rel=1e-2)
+    assert found.interval.holds(float("inf"))
+    assert "lower bound" in reason_of(found, np.inf)
+    assert "full stick" in reason_of(found, np.inf)
+    assert "20" in reason_of(found, 20.0)
+
+
+def test_an_interval_that_reaches_no_friction_begins_there() -> None:
+    found = parabola(0.05, 0.1)
+    assert found.interval.low == 0
+    assert found.interval.high == pytest.approx(value_at(0.246), rel=1e-2)
+    assert found.standard_uncertainty is None
+    assert reason_of(found, np.inf) == ""
+
+
+def test_a_best_value_beyond_an_end_is_that_end() -> None:
+    assert parabola(-0.2, 0.1).best == 0
+    assert parabola(1.2, 0.1).best == float("inf")
+
+
+def test_a_flat_likelihood_identifies_nothing() -> None:
+    found = parabola(0.5, 10.0)
+    assert (found.interval.low, found.interval.high) == (0, None)
+    assert "not identifiable" in reason_of(found, np.inf)
+
+
+def test_what_is_flat_beyond_a_value_bounds_from_below_only() -> None:
+    """The shape of the real thing: chi-square falls to a value, and stays."""
+    fall = 60 * np.maximum(0.5 - COORDINATES, 0) ** 2 * 100
+    found = profiled(COORDINATES, fall, value_at)
+    assert found.interval.high is None
+    assert found.interval.low == pytest.approx(value_at(0.5 - np.sqrt(3.84 / 6000)), rel=1e-2)
+
+
+def test_a_lower_level_gives_a_narrower_interval() -> None:
+    chi_square = ((COORDINATES - 0.4) / 0.1) ** 2
+    wide, narrow = (
+        profiled(COORDINATES, chi_square, value_at, level=level).interval for level in (0.95, 0.6)
+    )
+    assert wide.high is not None
+    assert narrow.high is not None
+    assert wide.low < narrow.low < narrow.high < wide.high

@@ -1,0 +1,142 @@
+"""Chi-square with nuisances against the same computed by dense matrices, and its uncertainties."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from friction.linear_contacts import FRICTIONS, Laboratory, bare_points
+
+from memscal.friction.effective import Confrontation
+from memscal.friction.evidence import log_likelihood
+from memscal.friction.likelihood import likelihood
+from memscal.friction.predicted import Predicted, members_of, predict
+
+CORRELATED = {"white": 0.0, "correlated": 0.6}
+
+
+@pytest.fixture(params=CORRELATED)
+def laboratory(request: pytest.FixtureRequest) -> Laboratory:
+    return Laboratory.of(points=bare_points(correlation=CORRELATED[request.param]))
+
+
+def dense(found: Confrontation, value: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Residual, covariance without flat parameters, and flat columns, over all loads."""
+    members = members_of(found.family, np.array([value]))
+    predicted = [
+        predict(points, found.sensor, members, load)
+        for load, points in zip(found.loads, found.points, strict=True)
+    ]
+    residual = np.concatenate(
+        [points.u - p.signal[0] for points, p in zip(found.points, predicted, strict=True)]
+    )
+    sizes = [points.u.size for points in found.points]
+    noise, flat = np.zeros((sum(sizes),) * 2), np.zeros((sum(sizes), 3 * len(sizes)))
+    for i, (points, p) in enumerate(zip(found.points, predicted, strict=True)):
+        rows = slice(sum(sizes[:i]), sum(sizes[: i + 1]))
+        inner = np.eye(points.u.size) if points.correlation is None else points.correlation
+        block = np.outer(points.noise, points.noise) * inner
+        block += np.diag((p.by_load[0] * points.load_errors) ** 2)
+        block += np.diag((p.slope[0] * points.x_errors) ** 2)
+        noise[rows, rows] = block
+        flat[rows, 3 * i : 3 * i + 3] = np.column_stack(
+            [points.flat, p.slope[0] * np.sign(points.offset)]
+        )
+    shared = np.concatenate([joined(p) for p in predicted])
+    return residual, noise + shared @ shared.T, flat
+
+
+def joined(found: Predicted) -> np.ndarray:
+    return np.concatenate([column[0] for column in found.columns.values()], axis=1)
+
+
+def generalised(residual: np.ndarray, covariance: np.ndarray, flat: np.ndarray) -> float:
+    """Chi-square of generalised least squares: by its normal equations."""
+    inverse = np.linalg.inv(covariance)
+    scale = np.abs(flat).max(axis=0)
+    columns = flat / scale
+    best = np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ residual)
+    left = residual - columns @ best
+    return float(left @ inverse @ left)
+
+
+def test_chi_square_is_that_of_generalised_least_squares(laboratory: Laboratory) -> None:
+    found = laboratory.drawn(0.15, seed=1)
+    chi_square = found.at(FRICTIONS, 0)
+    whole = found.whole.chi_square[np.isin(found.members.values, FRICTIONS)]
+    for i, value in enumerate(FRICTIONS):
+        assert whole[i] == pytest.approx(generalised(*dense(found, value)), rel=1e-6)
+    assert chi_square.shape == FRICTIONS.shape
+
+
+def test_one_load_of_several_is_that_load_alone(laboratory: Laboratory) -> None:
+    found = laboratory.drawn(0.15, seed=2)
+    alone = likelihood(found.points[1:], found.sensor, found.members, [1])
+    assert found.whole.only([1]).chi_square == pytest.approx(alone.chi_square, rel=1e-9)
+
+
+def test_the_squares_of_the_budget_add_up_to_the_variance(laboratory: Laboratory) -> None:
+    found = laboratory.drawn(0.15, seed=3)
+    i = int(np.argmin(np.abs(found.members.values - 0.15)))
+    budget = found.whole.budget(i)
+    assert set(budget) == {
+        "noise", "load_scatter", "position", "apparatus", "thickness", "load",
+    }  # fmt: skip
+    assert sum(part**2 for part in budget.values()) == pytest.approx(
+        1 / found.whole.information[i], rel=1e-9
+    )
+
+
+def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
+    laboratory = Laboratory.of()
+    points = [
+        replace(points, u=laboratory.predicted(0.15, load).signal[0])
+        for load, points in enumerate(laboratory.points)
+    ]
+    at, step = laboratory.family.coordinate(0.15), 2e-3
+    values = np.array([laboratory.family.value_at(at + shift) for shift in (-step, 0, step)])
+    members = members_of(laboratory.family, values)
+    found = likelihood(points, laboratory.sensor, members, [0, 1])
+    curvature = (found.chi_square[0] + found.chi_square[2]) / (2 * step**2)
+    assert found.chi_square[1] == pytest.approx(0.0, abs=1e-9)
+    assert curvature == pytest.approx(found.information[1], rel=0.02)
+
+
+def test_baseline_drift_and_a_shift_of_the_centre_change_nothing() -> None:
+    laboratory = Laboratory.of()
+    found = laboratory.drawn(0.2, seed=5)
+    points = found.points[0]
+    there = laboratory.predicted(0.2, 0, replace(points, offset=points.offset + 10e-6))
+    here = laboratory.predicted(0.2, 0)
+    u = points.u + there.signal[0] - here.signal[0] + points.flat @ np.array([3e-3, -2e-3])
+    moved = likelihood([replace(points, u=u)], found.sensor, found.members, [0])
+    before = found.whole.only([0]).chi_square
+    held = [replace(points, u=u, free_centre=False)]
+    fixed = likelihood(held, found.sensor, found.members, [0]).chi_square
+    moves = np.abs(moved.chi_square - before).max()
+    assert moves < 0.3 < np.abs(fixed - before).max()
+
+
+def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
+    laboratory = Laboratory.of(
+        points=replace(bare_points(), log_load=0.1 * (-1.0) ** np.arange(33))
+    )
+    found = laboratory.drawn(0.2, seed=6)
+    ignored = [replace(points, log_load=np.zeros(33)) for points in found.points]
+    wrong = likelihood(ignored, found.sensor, found.members, [0, 1])
+    assert found.whole.chi_square.min() < 100 < wrong.chi_square.min()
+
+
+def test_the_tables_of_the_evidence_hold_the_same_chi_square(laboratory: Laboratory) -> None:
+    whole = laboratory.drawn(0.1, seed=7).whole
+    chi_square = log_likelihood(whole.tables().together())[1][:, 0]
+    assert chi_square == pytest.approx(whole.chi_square, rel=1e-6)
+
+
+def test_repeats_tell_more_than_one_line() -> None:
+    once = Laboratory.of().drawn(0.15, seed=8)
+    often = Laboratory.of(points=bare_points(repeats=4)).drawn(0.15, seed=8)
+    i = int(np.argmin(np.abs(once.members.values - 0.15)))
+    assert often.whole.information[i] > once.whole.information[i]
+    assert often.whole.degrees == 2 * (4 * 33 - 3)
