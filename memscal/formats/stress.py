@@ -213,13 +213,14 @@ def _profile_group(profile: StressRecordProfile) -> Group:
         "maximum_errors": si(profile.uncertainty("maximum"), "stress"),
         "centre": si(centre[0], "length"),
         "centre_errors": si(spread[0], "length"),
-        "centre_y": si(centre[1], "length"),
-        "centre_y_errors": si(spread[1], "length"),
         "baseline": si(profile.baseline, "voltage"),
         "baseline_errors": si(profile.baseline_uncertainty, "voltage"),
         "contact_radius": si(profile.contact_radius, "length"),
         "budget": budget_group(profile.budget, _BUDGET),
     }
+    if spread[1] > 0:
+        children["centre_y"] = si(centre[1], "length")
+        children["centre_y_errors"] = si(spread[1], "length")
     if profile.load_uncertainty is not None:
         children["load_errors"] = si(profile.load_uncertainty, "force")
     if profile.lubrication:
@@ -238,6 +239,11 @@ def _read_profile(file: SafeFile, path: str) -> StressRecordProfile:
                 f"{file.where(path)}/{name} has shape {values.shape}, but r gives {shape}."
             )
         return values
+
+    def along(first: str, second: str) -> FloatArray:
+        # A line does not tell where its centre lies across it.
+        across = optional_scalar(file, f"{path}/{second}", "length")
+        return np.array([number(first, "length"), across or 0.0])
 
     r = require_array(file, f"{path}/r", "length", ndim=1)
     n = r.size
@@ -265,10 +271,8 @@ def _read_profile(file: SafeFile, path: str) -> StressRecordProfile:
         force=number("force", "force"),
         maximum=number("maximum", "stress"),
         budget=budget,
-        centre=np.array([number("centre", "length"), number("centre_y", "length")]),
-        centre_uncertainty=np.array(
-            [number("centre_errors", "length"), number("centre_y_errors", "length")]
-        ),
+        centre=along("centre", "centre_y"),
+        centre_uncertainty=along("centre_errors", "centre_y_errors"),
         baseline=number("baseline", "voltage"),
         baseline_uncertainty=number("baseline_errors", "voltage"),
         contact_radius=number("contact_radius", "length"),

@@ -104,7 +104,7 @@ def _all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
     mean, spread = pooled_force(profiles)
     allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
     return check(
-        "applied_force",
+        "applied_force_all",
         abs(mean - 1) / allowed,
         _MEAN_LIMIT,
         f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "

@@ -37,7 +37,7 @@ def require_points(part: SingleLoad, signal: ContactSignal) -> None:
     if scan.y is not None:
         return
     order = np.argsort(scan.x)
-    x, measured = scan.x[order], known.reshape(-1, scan.x.size).any(axis=0)[order]
+    x, measured = scan.x[order], (known.reshape(-1, scan.x.size).sum(axis=0) > 0)[order]
     places = np.flatnonzero(measured)
     missing = np.diff(places) - 1
     gaps = np.where(missing > 0, np.diff(x[places]), 0.0)

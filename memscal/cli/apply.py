@@ -1,0 +1,123 @@
+"""``memscal apply``: contact scans and a calibrated sensor to measured stress."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.options import FILE, force_option, json_option
+from memscal.cli.output import emit_json, message, note, warn
+from memscal.cli.progress import working
+from memscal.cli.targets import FigurePath, beside, prove_writable
+
+if TYPE_CHECKING:
+    from memscal.measurement.measured_stress import MeasuredStress
+
+__all__ = ["command"]
+
+EXAMPLES = """\b
+Examples:
+  memscal apply sensor.apparatus.h5 sphere.h5
+  memscal apply sensor.apparatus.h5 dry.h5 lubricated.h5 -o sphere.stress.h5 --figure sphere.png
+  memscal apply sensor.apparatus.h5 sphere.h5 --json --force
+"""
+
+
+@click.command("apply", epilog=EXAMPLES)
+@click.argument("artifact", type=FILE)
+@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    metavar="OUT",
+    help="File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5.",
+)
+@click.option(
+    "--override",
+    is_flag=True,
+    help="Go on although sensor, channel or film of artifact and scan differ: recorded in the "
+    "output.",
+)
+@click.option(
+    "--figure",
+    "figures",
+    type=FigurePath(),
+    multiple=True,
+    metavar="FILE.png|svg|pdf",
+    help="Draw the profiles of all loads, linear and logarithmic. May be repeated.",
+)
+@json_option
+@force_option
+@debug_option
+def command(
+    artifact: Path,
+    scans: tuple[Path, ...],
+    output: Path | None,
+    override: bool,
+    figures: tuple[Path, ...],
+    as_json: bool,
+    force: bool,
+) -> int:
+    """Turn contact SCANs into measured stress with a calibrated sensor (ARTIFACT).
+
+    For each load of each scan, finds centre and baseline and gives the profile S_zz = U/A at the
+    base of the film with its standard uncertainty, its maximum, and its total force, which is held
+    against the applied load. It is the stress as the sensor blurs it: compare it with calculated
+    stress by memscal compare.
+
+    A failed quality check is exit code 1: the result is written all the same.
+    """
+    from memscal.formats.scan import read_scan
+
+    data = [read_scan(path) for path in scans]
+    written = output or beside(scans[0], ".stress.h5")
+    prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
+
+    from memscal.measurement.application import measure_stress
+
+    with working("Measuring"):
+        found = measure_stress(data, artifact, override=override)
+    with working("Drawing"):
+        ready = _rendered(found, figures)
+    found.save(written, overwrite=force)
+    if ready:
+        from memscal.formats.atomic import atomic_write_bytes
+
+        for path, content in ready.items():
+            atomic_write_bytes(path, content, overwrite=force)
+    return _tell(found, written, [written, *figures], as_json)
+
+
+def _rendered(found: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, bytes]:
+    if not figures:
+        return {}
+    from memscal.figures.measured_stress import measured_stress_figure
+    from memscal.figures.render import figure_format, render_figure
+
+    figure = measured_stress_figure(found)
+    return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}
+
+
+def _tell(found: MeasuredStress, output: Path, files: list[Path], as_json: bool) -> int:
+    """Print the results and the messages; return the exit code."""
+    from memscal.cli.apply_view import stress_json, stress_tables
+    from memscal.cli.tables import emit_tables
+
+    if as_json:
+        emit_json(stress_json(found, output))
+    else:
+        emit_tables(*stress_tables(found))
+    for text in found.messages:
+        (warn if text.startswith(("Quality check", "Overridden")) else note)(text)
+    for path in files:
+        message(f"Written: {path}")
+    failed = [check.name.replace("_", " ") for check in found.checks if not check.passed]
+    if not failed:
+        return DONE
+    count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
+    warn(f"{count} failed ({', '.join(failed)}).")
+    return CHECK_FAILED

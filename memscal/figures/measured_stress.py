@@ -1,0 +1,128 @@
+"""Measured stress of several loads: linear beside logarithmic, over three decades."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from memscal.figures.quantities import KPA, MM
+from memscal.figures.style import house_style, new_figure, panel_letter
+from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
+
+__all__ = ["measured_stress_figure"]
+
+_EXPANDED = 1.96
+_DECADES = 1e-3
+#: Okabe and Ito's colours once more, one for each load, from the smallest up.
+_LOADS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#0072B2", "#7B3F8C", "#6B6B6B")
+_SAME_LOAD = 0.05
+_CURVE = 301
+
+
+def measured_stress_figure(found: MeasuredStress) -> Figure:
+    """Draw the measured profiles of all loads.
+
+    Parameters
+    ----------
+    found : MeasuredStress
+        What was measured.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Panel a, stress against the distance from the centre; b, the same over three decades.
+        Bars are 95 %; in b, points that are not told from zero are pale and have none.  Lines are
+        the restored stress, blurred by G; ticks at the top mark the radius of the frictionless
+        contact.
+    """
+    with house_style():
+        figure = new_figure(3.6)
+        panels = figure.subplots(1, 2)
+        for axes, letter in zip(panels, "ab", strict=True):
+            for profile, colour in _coloured(found):
+                _draw(axes, profile, colour, told=axes is panels[1])
+            axes.set_xlabel("distance from the centre (mm)")
+            axes.set_ylabel(r"measured stress $S_{zz}$ (kPa)")
+            axes.set_xlim(left=0.0)
+            panel_letter(axes, letter)
+        panels[0].axhline(0.0, color="0.8", lw=0.5, zorder=0)
+        top = max(profile.s_zz.max() for profile in found.profiles) / KPA
+        panels[1].set_yscale("log")
+        panels[1].set_ylim(_DECADES * top, 1.6 * top)
+        panels[1].yaxis.set_major_formatter("{x:g}")
+        _legend(figure, found)
+    return figure
+
+
+def _coloured(found: MeasuredStress) -> Iterator[tuple[MeasuredProfile, str]]:
+    """Yield each profile with the colour of its load."""
+    levels: list[float] = []
+    for load in sorted(profile.load for profile in found.profiles):
+        if not levels or load > levels[-1] * (1 + _SAME_LOAD):
+            levels.append(load)
+    for profile in found.profiles:
+        level = int(np.argmin(np.abs(np.log(np.array(levels) / profile.load))))
+        yield profile, _LOADS[level % len(_LOADS)]
+
+
+def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, told: bool) -> None:
+    """Draw a profile; if ``told``, points that are not told from zero are pale, without bars.
+
+    On a logarithmic axis their bars have no lower end.
+    """
+    lubricated = profile.lubrication == "lubricated"
+    r = np.linspace(0.0, float(profile.r[-1]), _CURVE)
+    curve = profile.restoration.blurred_stress(r) / KPA
+    axes.plot(r / MM, curve, color=colour, lw=0.8, ls="--" if lubricated else "-", alpha=0.7)
+    bars = _EXPANDED * profile.s_zz_errors
+    shown = profile.s_zz > bars if told else np.ones(profile.r.size, dtype=np.bool_)
+    look: dict[str, Any] = {
+        "marker": "s" if lubricated else "o",
+        "ls": "none",
+        "color": colour,
+        "mew": 0.7,
+    }
+    look |= {"ms": 2.6, "mfc": "white" if lubricated else colour}
+    axes.errorbar(
+        profile.r[shown] / MM,
+        profile.s_zz[shown] / KPA,
+        yerr=bars[shown] / KPA,
+        elinewidth=0.6,
+        **look,
+    )
+    axes.plot(profile.r[~shown] / MM, profile.s_zz[~shown] / KPA, alpha=0.3, **look)
+    radius = profile.contact_radius / MM
+    axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=":" if lubricated else "-")
+
+
+def _legend(figure: Figure, found: MeasuredStress) -> None:
+    """Name loads by colour and states by mark, once for both panels."""
+    handles, seen = [], set()
+    for profile, colour in sorted(_coloured(found), key=lambda pair: pair[0].load):
+        if colour not in seen:
+            seen.add(colour)
+            handles.append(Line2D([], [], color=colour, lw=2.0, label=f"{profile.load:.3g} N"))
+    for state in dict.fromkeys(profile.lubrication for profile in found.profiles):
+        lubricated = state == "lubricated"
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color="0.2",
+                lw=0.8,
+                marker="s" if lubricated else "o",
+                ms=3.2,
+                mfc="white" if lubricated else "0.2",
+                ls="--" if lubricated else "-",
+                label=f"{state or 'measured'}, ±1.96u",
+            )
+        )
+    radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
+    figure.legend(
+        handles=[*handles, radius], loc="outside upper center", ncols=min(len(handles) + 1, 7)
+    )
