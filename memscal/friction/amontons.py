@@ -30,6 +30,7 @@ def amontons_family(
     reach: float,
     cache: CacheFolder = None,
     workers: int = 1,
+    order: int = 0,
 ) -> ProfileFamily:
     r"""Return the base stresses of a sphere on a film for a range of friction coefficients.
 
@@ -51,6 +52,8 @@ def amontons_family(
         Folder in which families are kept from one run to the next; without it nothing is written.
     workers : int
         Processes that share the work; the result is the same, bit for bit.
+    order : int
+        Zero for the normal stress at the base; one for its shear, which a tangential channel sees.
 
     Returns
     -------
@@ -77,7 +80,9 @@ def amontons_family(
     >>> (maxima / 1e3).round(1)
     array([27.7, 30.9])
     """
-    setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    setup = FamilySetup.of(
+        film, indenter, loads, reach=reach, cache=cache, workers=workers, order=order
+    )
     values = parameter_values("friction coefficients", friction)
     if loading not in ("incremental", "total"):
         raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')

@@ -53,6 +53,8 @@ class FamilySetup:
         Where families are kept.
     workers : int
         Processes that share the work.
+    order : int
+        Zero for the normal stress, one for the shear.
     """
 
     film: ElasticFilm
@@ -61,6 +63,7 @@ class FamilySetup:
     wavenumbers: Wavenumbers
     cache: CacheFolder
     workers: int
+    order: int = 0
 
     @classmethod
     def of(
@@ -72,6 +75,7 @@ class FamilySetup:
         reach: float,
         cache: CacheFolder,
         workers: int,
+        order: int = 0,
     ) -> FamilySetup:
         """Check what was asked for.
 
@@ -88,6 +92,7 @@ class FamilySetup:
             base_wavenumbers(film.thickness, reach),
             cache,
             workers,
+            order,
         )
 
     def path(
@@ -101,6 +106,7 @@ class FamilySetup:
             friction=friction,
             loading=loading,
             interface=interface or Interface(),
+            order=self.order,
         )
 
     def family(
@@ -140,6 +146,7 @@ class FamilySetup:
             contact_radii=table.contact_radius,
             convergence=table.convergence,
             notes=notes,
+            order=self.order,
         )
 
     def _calculated(

@@ -37,6 +37,8 @@ def family_key(
     plain = [asdict(path) for path in paths]
     for path in plain:
         path["film"].pop("name")
+        if path["order"] == 0:
+            path.pop("order")
     for path, own in zip(plain, paths, strict=True):
         path["law"] = type(own.interface.normal).__name__
     return table_key(

@@ -106,6 +106,9 @@ class ProfileFamily:
         Largest change under refinement, relative to the largest stress; NaN where not known.
     notes : tuple of str
         What was assumed, in words.
+    order : int
+        Zero for the normal stress; one for the shear, whose transforms are
+        :math:`2\pi\int\tau\,J_1(kr)\,r\,dr`.
 
     Raises
     ------
@@ -142,6 +145,7 @@ class ProfileFamily:
     contact_radii: FloatArray
     convergence: FloatArray
     notes: tuple[str, ...] = field(default=())
+    order: int = 0
 
     def __post_init__(self) -> None:
         arrays = ("loads", "values", "spectra", "by_load")

@@ -48,6 +48,8 @@ class LoadingPath:
         ``"incremental"`` or ``"total"``.
     derivatives : bool
         Whether the derivatives by load and wavenumber are wanted too.
+    order : int
+        Zero for the normal stress at the base, one for the shear.
     """
 
     film: ElasticFilm
@@ -57,6 +59,7 @@ class LoadingPath:
     loading: str = "incremental"
     interface: Interface = field(default_factory=Interface)
     derivatives: bool = True
+    order: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,16 +104,16 @@ def _solve(path: LoadingPath, k: FloatArray) -> PathTables:
     found = _contacts(path, visited.ravel()[order])
     contacts = [found[place] for place in np.argsort(order)]
     own = contacts[: loads.size]
-    spectra = np.array([contact.base_spectrum(k) for contact in own])
+    spectra = np.array([_spectrum(path, contact, k) for contact in own])
     by_load = by_wavenumber = np.zeros_like(spectra)
     if path.derivatives:
         lower, upper = (
-            np.array([contact.base_spectrum(k) for contact in contacts[first:][: loads.size]])
+            np.array([_spectrum(path, each, k) for each in contacts[first:][: loads.size]])
             for first in (loads.size, 2 * loads.size)
         )
         # By P d/dP and not by the logarithm's own step: the force is then met exactly.
         by_load = (upper - lower) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
-        by_wavenumber = np.array([_by_log_wavenumber(contact, k) for contact in own])
+        by_wavenumber = np.array([_by_log_wavenumber(path, contact, k) for contact in own])
     return PathTables(
         spectra,
         by_load,
@@ -121,9 +124,13 @@ def _solve(path: LoadingPath, k: FloatArray) -> PathTables:
     )
 
 
-def _by_log_wavenumber(contact: Contact, k: FloatArray) -> FloatArray:
-    above, below = (contact.base_spectrum(k * (1 + step)) for step in (_STRETCH, -_STRETCH))
+def _by_log_wavenumber(path: LoadingPath, contact: Contact, k: FloatArray) -> FloatArray:
+    above, below = (_spectrum(path, contact, k * (1 + step)) for step in (_STRETCH, -_STRETCH))
     return (above - below) / (2 * _STRETCH)
+
+
+def _spectrum(path: LoadingPath, contact: Contact, k: FloatArray) -> FloatArray:
+    return contact.base_shear_spectrum(k) if path.order else contact.base_spectrum(k)
 
 
 def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:

@@ -4,6 +4,9 @@ At a distance R from the centre, and for a load :math:`P` about the nominal :mat
 
 .. math:: u = A\,(G \otimes \sigma)(R) + A\,\frac{\partial (G \otimes \sigma)}{\partial \ln P}
     \ln\frac{P}{P_j}.
+
+Of a tangential channel it is the component of a vector field, by transforms of order one, and
+changes its sign with the side of the centre.
 """
 
 from __future__ import annotations
@@ -36,13 +39,15 @@ class Sensor:
     """A sensor at the nodes of a family.
 
     ``transfer`` (K,): transform of A G, in V/Pa; ``changes`` (K, q): its independent changes by
-    one standard uncertainty; ``conversion_constant``: A, in V/Pa.
+    one standard uncertainty; ``conversion_constant``: A, in V/Pa; ``order``: zero, or one of a
+    tangential channel.
     """
 
     wavenumbers: Wavenumbers
     transfer: FloatArray
     changes: FloatArray
     conversion_constant: float
+    order: int = 0
 
     @property
     def of_shape(self) -> Sensor:
@@ -114,18 +119,23 @@ def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float)
     nodes = family.wavenumbers
     middle = family.spectra[family.values.size // 2]
     changes = apparatus_changes(apparatus, nodes.k)
-    kernel = j0(np.multiply.outer(np.linspace(0.0, reach, _RADII), nodes.k)) * nodes.weights
-    felt = np.concatenate([(kernel * (row / row[0])) @ changes for row in middle])
+    bessel = j1 if family.order else j0
+    kernel = bessel(np.multiply.outer(np.linspace(0.0, reach, _RADII), nodes.k)) * nodes.weights
+    largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
+    shapes = middle / largest[:, None]
+    felt = np.concatenate([(kernel * row) @ changes for row in shapes])
     if changes.shape[1]:
         _, sizes, axes = np.linalg.svd(felt, full_matrices=False)
         changes = changes @ axes[sizes > _UNFELT * sizes[0]].T
     a = apparatus.conversion_constant
-    return Sensor(nodes, a * sensor_transfer(apparatus, nodes.k), changes, a)
+    return Sensor(nodes, a * sensor_transfer(apparatus, nodes.k), changes, a, family.order)
 
 
 def predict(points: LoadPoints, sensor: Sensor, members: Members, load: int) -> Predicted:
     """Return what the sensor reads at the points of one load, by the load's index."""
     bessel = _Bessel(points.radius, sensor.wavenumbers)
+    if sensor.order:
+        bessel = _VectorBessel(points.radius, sensor.wavenumbers, np.sign(points.offset))
     spectra, transfer = members.spectra[:, load], sensor.transfer
     by_load = bessel.values(transfer * members.by_load[:, load])
     slope = bessel.slopes(transfer * spectra)
@@ -146,7 +156,7 @@ def predict(points: LoadPoints, sensor: Sensor, members: Members, load: int) -> 
 
 @dataclass(frozen=True, eq=False)
 class _Bessel:
-    """Inverse transforms at distances (n,) in m; repeats share theirs."""
+    """Inverse transforms at distances (n,) in m, and their slopes; repeats share theirs."""
 
     radius: FloatArray
     wavenumbers: Wavenumbers
@@ -172,3 +182,27 @@ class _Bessel:
     def _odd(self) -> FloatArray:
         phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
         return np.asarray(-j1(phase) * self.wavenumbers.weights * self.wavenumbers.k)
+
+
+@dataclass(frozen=True, eq=False)
+class _VectorBessel(_Bessel):
+    """The same of a vector's component, of order one; ``sign`` (n,): the side of the centre."""
+
+    sign: FloatArray
+
+    def values(self, spectra: FloatArray) -> FloatArray:
+        return np.asarray(self.sign * super().values(spectra))
+
+    def slopes(self, spectra: FloatArray) -> FloatArray:
+        return np.asarray(self.sign * super().slopes(spectra))
+
+    @cached_property
+    def _even(self) -> FloatArray:
+        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
+        return np.asarray(j1(phase) * self.wavenumbers.weights)
+
+    @cached_property
+    def _odd(self) -> FloatArray:
+        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
+        turn = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
+        return np.asarray((j0(phase) - turn) * self.wavenumbers.weights * self.wavenumbers.k)
