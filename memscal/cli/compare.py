@@ -167,6 +167,7 @@ def command(
             interface=interface,
             override=override,
             cache=kept,
+            workers=_workers(),
         )
     with working("Drawing"):
         ready = files.rendered(found)
@@ -175,6 +176,13 @@ def command(
     for path in files.paths:
         message(f"Written: {path}")
     return _judged(found)
+
+
+def _workers() -> int:
+    """Return how many processes calculate contacts: two where there are two cores."""
+    import os
+
+    return min(2, os.cpu_count() or 1)
 
 
 def _check_usage(

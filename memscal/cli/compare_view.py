@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import groupby
 
 from memscal.cli.calibration_view import checks_table
 from memscal.cli.friction_text import bounded_text, friction_name, percent
 from memscal.cli.interface_view import interface_tables
 from memscal.cli.tables import Table
 from memscal.figures.quantities import KPA, MM
-from memscal.friction.results import EffectiveFriction, FrictionComparison
+from memscal.friction.results import EffectiveFriction, FrictionComparison, LoadComparison
+from memscal.model.apparatus import QualityCheck
 from memscal.model.notation import format_measured
 
 __all__ = ["comparison_notes", "comparison_tables"]
 
-#: Coefficients in one table of chi-square: more would not fit in 100 columns.
-_COLUMNS = 9
+_LABELS = ("", "state", "load (N)")
+#: No table is wider than this many columns of text.
+_WIDTH = 98
 #: From here on chi-square is written without a decimal, and as a power of ten.
 _WIDE, _LONG = 100, 1e5
 
@@ -31,7 +35,7 @@ def comparison_tables(found: FrictionComparison) -> list[Table]:
         _macroscopic_table(found),
         _lubrication_table(found),
         *([] if found.interface is None else interface_tables(found.interface)),
-        checks_table(found.checks),
+        _checks_table(found.checks),
     ]
 
 
@@ -68,19 +72,23 @@ def _maxima_table(found: FrictionComparison) -> Table:
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"
     )
-    head = ["lubrication", "load (N)", "force (N)", "S_max (kPa)", "p0_max (kPa)", "S_max/p0_max"]
+    head = [*_LABELS, "force (N)", "S_max (kPa)", "p0_max (kPa)", "S_max/p0_max"]
     rows = [
         [
-            one.lubrication or "not stated",
-            f"{one.load:.4g}",
+            *_labels(i, one),
             _pm(one.profile.force, one.profile.force_uncertainty),
             _pm(one.s_max / KPA, one.s_max_uncertainty / KPA),
             _pm(one.p0_max / KPA, one.p0_max_uncertainty / KPA),
             _pm(one.ratio, one.ratio_uncertainty),
         ]
-        for one in first
+        for i, one in enumerate(first, start=1)
     ]
     return Table(title, head, rows)
+
+
+def _labels(number: int, one: LoadComparison) -> tuple[str, str, str]:
+    """Return number, state and load of a profile; checks and messages use the number."""
+    return str(number), one.lubrication or "not stated", f"{one.load:.4g}"
 
 
 def _pm(value: float, uncertainty: float) -> str:
@@ -93,25 +101,27 @@ def _friction_table(found: FrictionComparison, loading: str) -> Table:
     level = percent(of_all[0][loading].interval.level) if of_all else "95 %"
     way = f"{loading} loading" if loading else "profiles as given"
     title = f"Effective friction coefficient, {way} [{level} interval]"
-    head = ["lubrication", "load (N)", "by the maximum", "by the profile", "χ²/ν", "p", "bracketed"]
+    head = [*_LABELS, "by the maximum", "by the profile", "χ²/ν", "p", "bracketed"]
     rows = []
     for lubrication, by_loading in found.joint.items():
-        name = lubrication or "not stated"
-        of_it = [one for one in found.loads[loading] if one.lubrication == lubrication]
+        of_it = [
+            (i, one)
+            for i, one in enumerate(found.loads[loading], start=1)
+            if one.lubrication == lubrication
+        ]
         rows += [
             [
-                name,
-                f"{one.load:.4g}",
+                *_labels(i, one),
                 bounded_text(one.by_maximum),
                 bounded_text(one.by_profile),
                 *_fit(one.by_profile),
                 f"{100 * one.bracketed:.0f} %",
             ]
-            for one in of_it
+            for i, one in of_it
         ]
         if len(of_it) > 1:
-            joint = by_loading[loading]
-            rows.append([name, "all", "", bounded_text(joint), *_fit(joint), ""])
+            joint, name = by_loading[loading], lubrication or "not stated"
+            rows.append(["", name, "all", "", bounded_text(joint), *_fit(joint), ""])
     return Table(title, head, rows)
 
 
@@ -125,16 +135,30 @@ def _chi_square_tables(found: FrictionComparison, loading: str) -> Iterator[Tabl
     """Return chi-square of each load against each calculated profile, in as few tables as fit."""
     loads = found.loads[loading]
     way = f"{loading} loading" if loading else "profiles as given"
-    for start in range(0, found.friction.size, _COLUMNS):
-        part = range(start, min(start + _COLUMNS, found.friction.size))
-        head = ["lubrication", "load (N)", "ν"]
-        head += [friction_name(float(found.friction[i])) for i in part]
-        rows = [
-            [one.lubrication or "not stated", f"{one.load:.4g}", f"{one.degrees}"]
-            + [_short(float(one.chi_square[i])) for i in part]
-            for one in loads
-        ]
-        yield Table(f"χ² of each profile against friction coefficients, {way}", head, rows)
+    labels = [[*_labels(i, one), f"{one.degrees}"] for i, one in enumerate(loads, start=1)]
+    head = [*_LABELS, "ν"]
+    columns = [
+        [friction_name(float(mu)), *(_short(float(one.chi_square[i])) for one in loads)]
+        for i, mu in enumerate(found.friction)
+    ]
+    room = _WIDTH - sum(2 + max(map(len, column)) for column in zip(head, *labels, strict=True))
+    for part in _fitting(columns, room):
+        values = zip(*(column[1:] for column in part), strict=True)
+        rows = [[*label, *row] for label, row in zip(labels, values, strict=True)]
+        title = f"χ² of each profile against friction coefficients, {way}"
+        yield Table(title, [*head, *(column[0] for column in part)], rows)
+
+
+def _fitting(columns: Sequence[list[str]], room: int) -> Iterator[list[list[str]]]:
+    """Divide columns among tables none of which is wider than there is room for."""
+    part: list[list[str]] = []
+    for column in columns:
+        widths = [2 + max(map(len, kept)) for kept in (*part, column)]
+        if part and sum(widths) > room:
+            yield part
+            part = []
+        part.append(column)
+    yield part
 
 
 def _short(chi_square: float) -> str:
@@ -190,6 +214,31 @@ def _against(joint: EffectiveFriction, value: float) -> str:
     if joint.interval.holds(value):
         return f"within the {level} interval"
     return ("below" if value < joint.interval.low else "above") + f" the {level} interval"
+
+
+def _checks_table(checks: Sequence[QualityCheck]) -> Table:
+    """Return what failed, and of checks that were made of each profile the closest to failing."""
+    shown: list[QualityCheck] = []
+    for name, of_it in groupby(sorted(checks, key=_kind_in(checks)), key=_kind):
+        group = list(of_it)
+        passed = [check for check in group if check.passed]
+        shown += [check for check in group if not check.passed]
+        if passed:
+            worst = max(passed, key=lambda check: check.value / check.limit)
+            many = f"{name}, worst of {len(passed)}" if len(passed) > 1 else worst.name
+            shown.append(replace(worst, name=many))
+    return checks_table(shown)
+
+
+def _kind(check: QualityCheck) -> str:
+    """Return a check's name without the number of its profile."""
+    return check.name.rstrip("0123456789").rstrip("_")
+
+
+def _kind_in(checks: Sequence[QualityCheck]) -> Callable[[QualityCheck], int]:
+    """Return an order in which checks of one kind follow each other, kinds as they came."""
+    order = list(dict.fromkeys(_kind(check) for check in checks))
+    return lambda check: order.index(_kind(check))
 
 
 def _lubrication_table(found: FrictionComparison) -> Table:

@@ -63,9 +63,12 @@ def bounded_text(found: Bounded, scale: float = 1.0) -> str:
 
 
 def _rounded(value: float, low: float, high: float) -> str:
-    """Return a value and its interval: two digits of half the interval if it begins with 1 or 2."""
-    half = (high - low) / 2
-    places = max(0, -math.floor(math.log10(half / 3))) if half > 0 else 3
+    """Return a value and its interval, with the digits that its closer end deserves.
+
+    Two digits of the distance to it if that begins with 1 or 2, one otherwise.
+    """
+    sides = [side for side in (value - low, high - value) if side > 0]
+    places = max(0, -math.floor(math.log10(min(sides) / 3))) if sides else 3
     ends = (f"{end:.{places}f}" if end > 0 else "0" for end in (low, high))
     return f"{value:.{places}f} [{', '.join(ends)}]"
 

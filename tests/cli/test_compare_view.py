@@ -14,6 +14,7 @@ from memscal.cli.compare_json import comparison_json
 from memscal.cli.compare_view import comparison_notes, comparison_tables
 from memscal.cli.friction_text import bounded_text
 from memscal.friction.results import EffectiveFriction, FrictionComparison, Interval
+from memscal.model.apparatus import QualityCheck
 from memscal.model.provenance import SourceFile
 
 ARTIFACT = SourceFile("sensor.apparatus.h5", "cd" * 32)
@@ -56,6 +57,7 @@ def as_json(found: FrictionComparison) -> dict[str, Any]:
         (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
         (reading(None, 0.2451, None), "above 0.24 (95 %)"),
         (reading(None, 12.51, None), "above 12 (95 %)"),
+        (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
         (reading(0.0, 0.0, 0.0123), "below 0.013 (95 %)"),
         (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
         (reading(None, 0.0, 0.31), "below 0.31 (95 %)"),
@@ -84,22 +86,37 @@ def test_every_load_has_both_readings_by_both_loadings(found: FrictionComparison
     for loading in ("incremental", "total"):
         title = f"Effective friction coefficient, {loading} loading"
         (table,) = (t for t in comparison_tables(found) if t.title.startswith(title))
-        of_each = [row for row in table.rows if row[1] != "all"]
+        of_each = [row for row in table.rows if row[2] != "all"]
         assert len(table.rows) - len(of_each) == 2  # dry and lubricated
         for row, one in zip(of_each, found.loads[loading], strict=True):
-            assert row[2:4] == [bounded_text(one.by_maximum), bounded_text(one.by_profile)]
+            assert row[3:5] == [bounded_text(one.by_maximum), bounded_text(one.by_profile)]
 
 
 def test_chi_square_stands_for_every_calculated_coefficient(found: FrictionComparison) -> None:
     tables = [t for t in comparison_tables(found) if t.title.startswith("χ² of each profile")]
-    heads = [name for table in tables for name in table.head[3:]]
+    heads = [name for table in tables for name in table.head[4:]]
     assert heads == 2 * [f"{mu:g}" for mu in FRICTION]
 
 
 def test_coefficients_that_do_not_fit_in_one_table_go_on_in_the_next() -> None:
-    found = comparison(loadings=("total",), friction_grid=np.linspace(0.0, 1.0, 20))
+    grid = np.linspace(0.0, 1.0, 30)
+    found = comparison(loadings=("total",), friction_grid=grid)
     tables = [t for t in comparison_tables(found) if t.title.startswith("χ² of each profile")]
-    assert [len(table.head) - 3 for table in tables] == [9, 9, 2]
+    assert len(tables) > 1
+    assert [name for table in tables for name in table.head[4:]] == [f"{mu:.4g}" for mu in grid]
+    assert max(map(len, printed(found).splitlines())) < 100
+
+
+def test_checks_of_each_profile_are_told_by_the_worst_and_failures_one_by_one() -> None:
+    def check(name: str, value: float) -> QualityCheck:
+        return QualityCheck(name, value, 1.0, value <= 1.0, "meaning")
+
+    checks = [check("force_1", 0.3), check("noise_1", 0.2), check("force_2", 0.8)]
+    table = comparison_tables(comparison(checks=tuple(checks)))[-1]
+    assert [row[:2] for row in table.rows] == [("force, worst of 2", "0.8"), ("noise 1", "0.2")]
+    failing = comparison_tables(comparison(checks=(*checks, check("force_3", 1.4))))[-1]
+    assert [row[0] for row in failing.rows] == ["force 3", "force, worst of 2", "noise 1"]
+    assert failing.marked == {0}
 
 
 def test_a_bound_has_its_reason_and_no_budget(sticking: FrictionComparison) -> None:
