@@ -41,6 +41,9 @@ Examples:
   memscal import raster.csv -o raster.h5 --x 1 --y 2 --x-unit um --u 5 --u-unit V
       --repeats average --grid-tolerance 0.2 --load-column 4
       --radius 0.5 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
+  memscal import sphere.csv -o dry.h5 --x x --x-unit mm --u U --u-unit mV --load-column "load set"
+      --repeat "load set" --repeat pass --load-scatter 2 --lubrication dry
+      --indenter sphere --radius 60 --young-modulus 1.9 --poisson-ratio 0.5 --thickness 1.5
   memscal import fem.csv -o rod.h5 --format reference --r r --r-unit mm
       --sigma S33 --sigma-unit MPa --sign -1 --load 1
   memscal import fem.vtu -o rod.h5 --format reference --r-unit mm
@@ -61,7 +64,7 @@ _SIGNS = ("u_sign", "sign", "shear_sign")
 _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
-    "scan": [*_SCAN_NAMES, "load_scatter", *_SENSOR_NAMES.values()],
+    "scan": [*_SCAN_NAMES, "load_scatter", "position_error", *_SENSOR_NAMES.values()],
     "reference": import_reference.NAMES,
 }
 _NEEDED = ("x", "x_unit", "u", "u_unit")
@@ -85,7 +88,13 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @click.option("--u", metavar="COLUMN", help="Scan: column of the normal channel's voltage.")
 @click.option("--u-unit", metavar="UNIT", help="Scan: unit of the voltages, such as mV.")
 @click.option("--y", metavar="COLUMN", help="Raster scan: column of the second position.")
-@click.option("--repeat", metavar="COLUMN", help="Scan: column that numbers the repeats.")
+@click.option(
+    "--repeat",
+    metavar="COLUMN",
+    multiple=True,
+    help="Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
+    "line, such as of the load that was set and of the pass.",
+)
 @click.option("--u-xz", metavar="COLUMN", help="Scan: column of the channel xz.")
 @click.option("--u-yz", metavar="COLUMN", help="Scan: column of the channel yz.")
 @click.option("--load", type=Quantity("N"), help="Normal load, in N.")
@@ -103,6 +112,11 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
     type=Quantity("percent", open_low=False),
     help="Scan: standard uncertainty of each point's own load, independent from point to point, "
     "in percent: a weight set down by hand.",
+)
+@click.option(
+    "--position-error",
+    type=Quantity("um", open_low=False),
+    help="Scan: standard uncertainty of each position, independent from point to point, in um.",
 )
 @click.option(
     "--lubrication",
@@ -166,6 +180,7 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
     the readings (places found, points missing, repeats averaged) is printed, and kept in the
     notes of the file.
     """
+    given["repeat"] = given["repeat"] or None
     _check_usage(table, kind, given)
     given |= {name: int(given[name]) for name in _SIGNS if given[name] is not None}
     prove_writable([output], force=force, inputs=[table])
@@ -231,6 +246,7 @@ def _scan(path: Path, given: dict[str, Any]) -> ImportedScan:
         path,
         **_given(given, [*_SCAN_NAMES, *_TABLE_NAMES]),
         load_scatter=si(given["load_scatter"], -2),
+        x_error=si(given["position_error"], -6),
         film=film,
         indenter=indenter,
         sensor=StressSensor(**labels),

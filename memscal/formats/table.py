@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +15,16 @@ from memscal.formats.reference_profile import ImportedProfile
 from memscal.formats.reference_table import read_reference_table
 from memscal.formats.units import to_si
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import RoundIndenter
+from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan, StressSensor
 from memscal.model.validation import FloatArray
 
 __all__ = ["ImportedProfile", "ImportedScan", "read_reference_table", "read_scan_table"]
 
 Column = str | int
+
+#: Loads of one line that differ by more than this share were hardly meant to be one.
+_MIXED = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +46,14 @@ def read_scan_table(
     indenter: RoundIndenter,
     load: float | None = None,
     y: Column | None = None,
-    repeat: Column | None = None,
+    repeat: Column | Sequence[Column] | None = None,
     u_xz: Column | None = None,
     u_yz: Column | None = None,
     load_column: Column | None = None,
     load_unit: str = "N",
     load_uncertainty: float | None = None,
     load_scatter: float | None = None,
+    x_error: float | None = None,
     lubrication: str = "",
     lubricant: str = "",
     u_scale: float | None = None,
@@ -80,8 +85,10 @@ def read_scan_table(
         Nominal load in N; by default the median of ``load_column``.
     y : str or int, optional
         Column of the second position, for a raster.
-    repeat : str or int, optional
+    repeat : str or int, or several, optional
         Column that numbers the repeats; without it equal positions are counted in file order.
+        Of several columns each combination is a line: of the load that was set and of the pass,
+        where a table holds several of both.
     u_xz, u_yz, load_column : str or int, optional
         Columns of further channels (in ``u_unit``) and of the load at each point.
     load_unit : str
@@ -91,6 +98,8 @@ def read_scan_table(
     load_scatter : float, optional
         Relative standard uncertainty of each point's own load, independent from point to point,
         as of a weight that is set down by hand.
+    x_error : float, optional
+        Standard uncertainty of each position, independent from point to point, in m.
     lubrication, lubricant : str
         ``"dry"`` or ``"lubricated"``, and with what; empty if not stated.
     u_scale : float, optional
@@ -168,7 +177,7 @@ def read_scan_table(
         columns,
         xs=to_si(table.column(x), x_unit, "length", table.where(x)),
         ys=None if y is None else to_si(table.column(y), x_unit, "length", table.where(y)),
-        numbers=None if repeat is None else table.column(repeat),
+        numbers=None if repeat is None else _lines(table, repeat, notes),
         tolerance=grid_tolerance,
         averaged=repeats == "average",
         notes=notes,
@@ -177,9 +186,12 @@ def read_scan_table(
     loads = fields.pop("normal_load", None)
     if load_scatter is not None and loads is None:
         loads = np.full(fields["u_zz"].shape, load)
+    if loads is not None and placed.y is None:
+        notes += _mixed_loads(loads, indenter)
     scan = Scan(
         x=placed.x,
         y=placed.y,
+        x_errors=None if x_error is None else np.full(placed.x.size, x_error),
         u_zz=fields.pop("u_zz"),
         u_zz_errors=placed.errors,
         normal_load=loads,
@@ -197,6 +209,38 @@ def read_scan_table(
         source=table.source,
     )
     return ImportedScan(scan, tuple(notes))
+
+
+def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) -> FloatArray:
+    """Number the line of each row: by one column, or by the combinations of several."""
+    columns = [repeat] if isinstance(repeat, str | int) else list(repeat)
+    values = np.stack([table.column(column) for column in columns])
+    if len(columns) == 1:
+        return np.asarray(values[0])
+    known = np.isfinite(values).all(axis=0)
+    found, number = np.unique(values[:, known], axis=1, return_inverse=True)
+    lines = np.full(known.size, np.nan)
+    lines[known] = 1 + number.reshape(-1)  # NumPy 2.0 kept an axis here
+    named = " and ".join(repr(column) for column in columns)
+    notes.append(f"{found.shape[1]} lines: one for each combination of the columns {named}.")
+    return lines
+
+
+def _mixed_loads(loads: FloatArray, indenter: RoundIndenter) -> list[str]:
+    """Warn of lines at several loads: only a rod's voltage is proportional to its load."""
+    lines = np.atleast_2d(loads)
+    known = lines[np.isfinite(lines).any(axis=1)]
+    low, high = np.nanmin(known, axis=1), np.nanmax(known, axis=1)
+    mixed = high - low > _MIXED * np.nanmedian(known, axis=1)
+    if isinstance(indenter, Rod) or not mixed.any():
+        return []
+    i = int(np.argmax(mixed))
+    text = (
+        f"Warning: The loads of a line go from {low[i]:.4g} to {high[i]:.4g} N, but each load has "
+        "a profile of its own. Name the column of the loads that were set among those that number "
+        'the repeats (repeat=("set load", "pass"); --repeat "set load" --repeat pass).'
+    )
+    return [text]
 
 
 def _voltage(table: Table, column: Column, unit: str, scale: float | None) -> FloatArray:

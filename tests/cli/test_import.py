@@ -130,6 +130,37 @@ def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(
     assert (refused.code, "averaged" in refused.err) == (3, True)
 
 
+def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path) -> None:
+    x, sets, passes = np.arange(9.0), (2.0, 0.5), (1, 2)
+    rows = np.array([(p, s, place, 10 * s + p) for p in passes for s in sets for place in x])
+    rows = np.delete(rows, 4, axis=0)  # a contact that was never made
+    write_table(folder / "sphere.csv", "pass,set,position,voltage", rows)
+    sphere = [*COLUMNS, *SET_UP[2:], "--indenter", "sphere", "--load-column", "set"]
+    both = ["--repeat", "set", "--repeat", "pass", "--position-error", 5]
+    done = run("import", "sphere.csv", "-o", "sphere.h5", *sphere, *both)
+    assert done.code == 0, done.err
+    scan = memscal.read_scan("sphere.h5")
+    assert scan.u_zz.shape == (4, 9)
+    assert np.isnan(scan.u_zz).sum() == 1
+    assert scan.normal_load is not None
+    np.testing.assert_array_equal(np.nanmedian(scan.normal_load, axis=1), [0.5, 0.5, 2.0, 2.0])
+    np.testing.assert_allclose(np.nanmedian(scan.u_zz, axis=1), [6e-3, 7e-3, 21e-3, 22e-3])
+    np.testing.assert_allclose(scan.x_errors, np.full(9, 5e-6))
+
+
+def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(
+    run: Run, folder: Path
+) -> None:
+    rows = np.array([(s, place, s) for s in (0.5, 2.0) for place in range(9)])
+    write_table(folder / "mixed.csv", "set,position,voltage", rows[[0, 10, 2, 12, 4, 14]])
+    loads = [*COLUMNS, *SET_UP[2:], "--load-column", "set"]
+    sphere = run("import", "mixed.csv", "-o", "sphere.h5", *loads, "--indenter", "sphere")
+    assert sphere.code == 0, sphere.err
+    assert "--repeat" in sphere.err
+    rod = run("import", "mixed.csv", "-o", "rod.h5", *loads)
+    assert (rod.code, "--repeat" in rod.err) == (0, False)
+
+
 def test_a_fem_table_becomes_a_reference(run: Run, folder: Path) -> None:
     film = memscal.simulate().film
     profile = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=1.0).profile()
