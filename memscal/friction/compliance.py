@@ -15,36 +15,21 @@ the interface yields normally.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
 from memscal.friction.cache import CacheFolder
-from memscal.friction.compliance_results import (
-    BayesFactor,
-    InterfaceComparison,
-    InterfaceLaw,
-    LawComparison,
-    PriorChoice,
-)
+from memscal.friction.compliance_results import InterfaceComparison, LawComparison
 from memscal.friction.family import ProfileFamily
-from memscal.friction.implied import implied_friction
-from memscal.friction.interface_length import interface_length
-from memscal.friction.law_curves import (
-    LawCurve,
-    Measured,
-    curve,
-    of_one_value,
-    one_of_all,
-    one_of_each,
-)
+from memscal.friction.law_curves import Measured
 from memscal.friction.law_families import LawFamilies
-from memscal.friction.load_points import load_points
+from memscal.friction.load_points import LoadPoints, load_points
 from memscal.friction.predicted import sensor_of
-from memscal.friction.priors import Prior, bounded_prior, log_uniform_prior, uniform_prior
+from memscal.friction.weighed_laws import weigh_normal_compliance, weigh_slip_length
 from memscal.model.validation import require_positive
 
 if TYPE_CHECKING:
@@ -52,17 +37,8 @@ if TYPE_CHECKING:
 
 __all__ = ["InterfaceComparison", "compare_interface"]
 
-#: Slip lengths that are thought possible: of the order of the roughness of surfaces that touch.
-_SLIP_LENGTHS = (1e-7, 1e-4)
-#: Other ranges of them, whose Bayes factors are stated beside.
-_OTHER_SLIP_LENGTHS = ((1e-6, 1e-5), (1e-8, 1e-3))
-#: Over these the likelihood is looked at.
-_WIDEST, _DECADES = _OTHER_SLIP_LENGTHS[-1], 81
-#: Lengths of the normal law, as shares of the largest that was calculated.
-_NORMAL_SHARES = (1e-2, 1.0)
 #: Chance of a misfit below which a law is not believed.
 _MISFIT = 1e-3
-_UM = 1e-6
 
 
 def compare_interface(
@@ -72,6 +48,8 @@ def compare_interface(
     macroscopic: float,
     macroscopic_uncertainty: float | None = None,
     amontons: ProfileFamily | None = None,
+    slipping: ProfileFamily | None = None,
+    yielding: ProfileFamily | None = None,
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> InterfaceComparison:
@@ -89,8 +67,11 @@ def compare_interface(
     macroscopic_uncertainty : float, optional
         Its standard uncertainty.  The difference of contacts at :math:`\mu` and :math:`\mu + u`
         becomes one of the systematic changes of the fit.
-    amontons : ProfileFamily, optional
-        Incremental contacts of Amontons' law, if they are known, at all dry loads at least.
+    amontons, slipping, yielding : ProfileFamily, optional
+        Calculated contacts, if they are known: of Amontons' law, incremental, from 0 to ``inf``;
+        of the elasto-plastic law at the macroscopic coefficient, with its uncertainty among the
+        changes; and without friction and normally compliant.  Each is calculated where it is not
+        given, or has no load within 1 % of a measured one.
     cache, workers
         As for :func:`memscal.friction.amontons.amontons_family`.
 
@@ -115,11 +96,18 @@ def compare_interface(
     calculated = LawFamilies(profiles, cache, workers)
     tangential = normal = None
     if dry:
-        slipping = calculated.slipping(dry, macroscopic, macroscopic_uncertainty)
         rigid = calculated.rigid(dry, amontons)
-        tangential = _tangential(dry, apparatus, rigid, slipping, macroscopic)
+        elastic = calculated.slipping(dry, macroscopic, macroscopic_uncertainty, slipping)
+        tangential = weigh_slip_length(
+            _measured(dry, apparatus, rigid),
+            _measured(dry, apparatus, elastic),
+            macroscopic=macroscopic,
+            lubrication=dry[0].part.lubrication,
+        )
     if wet:
-        normal = _normal(wet, apparatus, calculated.yielding(wet))
+        normal = weigh_normal_compliance(
+            _measured(wet, apparatus, calculated.yielding(wet, yielding))
+        )
     messages = _messages(tangential, normal, macroscopic_uncertainty, dry)
     return InterfaceComparison((macroscopic, macroscopic_uncertainty), tangential, normal, messages)
 
@@ -128,102 +116,16 @@ def _measured(
     profiles: Sequence[MeasuredProfile], apparatus: ApparatusFunction, family: ProfileFamily
 ) -> Measured:
     reach = max(float(profile.r[-1]) for profile in profiles)
-    points = [load_points(profile) for profile in profiles]
+    points = [
+        _about(load_points(profile), math.log(profile.load / load))
+        for profile, load in zip(profiles, family.loads, strict=True)
+    ]
     return Measured(points, sensor_of(apparatus, family, reach), family)
 
 
-def _tangential(
-    profiles: Sequence[MeasuredProfile],
-    apparatus: ApparatusFunction,
-    rigid: ProfileFamily,
-    slipping: ProfileFamily,
-    macroscopic: float,
-) -> LawComparison:
-    amontons, elastic = (_measured(profiles, apparatus, f) for f in (rigid, slipping))
-    prior = bounded_prior(rigid.scale, f"uniform in mu/(mu + {rigid.scale:g})")
-    slip_prior = _log_prior("slip length", *_SLIP_LENGTHS)
-    one = curve(amontons)
-    each = [curve(amontons, load=j) for j in range(len(profiles))]
-    along = curve(elastic, also=np.geomspace(*_WIDEST, _DECADES))
-    laws = [one_of_all("effective Amontons, one coefficient", one, prior, amontons.degrees)]
-    if len(profiles) > 1:
-        laws.append(
-            one_of_each("effective Amontons, one for each load", each, prior, amontons.degrees)
-        )
-    name = f"elasto-plastic at {macroscopic:g}, slip length"
-    laws.append(one_of_all(name, along, slip_prior, elastic.degrees))
-    length = interface_length(along, slipping, "slip length")
-    return LawComparison(
-        lubrication=profiles[0].part.lubrication,
-        loads=np.array([profile.load for profile in profiles]),
-        laws=tuple(laws),
-        factors=_factors(laws),
-        length=length,
-        priors=_other_priors(one, along, prior, slip_prior, slipping.scale),
-        implied=implied_friction(amontons, elastic, length, macroscopic),
-    )
-
-
-def _normal(
-    profiles: Sequence[MeasuredProfile], apparatus: ApparatusFunction, family: ProfileFamily
-) -> LawComparison:
-    measured = _measured(profiles, apparatus, family)
-    largest = float(family.values[-1])
-    low, high = (share * largest for share in _NORMAL_SHARES)
-    prior = _log_prior("length", low, high)
-    others = (
-        _log_prior("length", low / 10, high),
-        uniform_prior(high, f"length uniform up to {high / _UM:.3g} um"),
-    )
-    found = curve(measured, also=np.geomspace(low / 10, high, 61))
-    rigid = of_one_value("rigid, frictionless", found, 0, measured.degrees)
-    yielding = one_of_all("normal compliance, length", found, prior, measured.degrees)
-    return LawComparison(
-        lubrication=profiles[0].part.lubrication,
-        loads=np.array([profile.load for profile in profiles]),
-        laws=(rigid, yielding),
-        factors=_factors([rigid, yielding]),
-        length=interface_length(found, family, "length of the normal law"),
-        priors=tuple(
-            PriorChoice(p.words, found.log_evidence(p) - rigid.log_evidence)
-            for p in (prior, *others)
-        ),
-    )
-
-
-def _log_prior(what: str, low: float, high: float) -> Prior:
-    words = f"{what} log-uniform from {low / _UM:.3g} to {high / _UM:.3g} um"
-    return log_uniform_prior(low, high, words)
-
-
-def _other_priors(
-    rigid: LawCurve, slipping: LawCurve, of_friction: Prior, of_length: Prior, scale: float
-) -> tuple[PriorChoice, ...]:
-    """Weigh the slip length against one coefficient under the usual priors and under others."""
-    pairs = [(of_length, of_friction)]
-    pairs += [(_log_prior("slip length", *ends), of_friction) for ends in _OTHER_SLIP_LENGTHS]
-    words = f"slip length uniform in l/(l + {scale / _UM:.3g} um)"
-    pairs.append((bounded_prior(scale, words), of_friction))
-    pairs.append((of_length, uniform_prior(2.0, "coefficient uniform from 0 to 2")))
-    pairs.append((of_length, log_uniform_prior(0.01, 10, "coefficient log-uniform, 0.01 to 10")))
-    return tuple(
-        PriorChoice(
-            (of_one if of_mu is of_friction else of_mu).words,
-            slipping.log_evidence(of_one) - rigid.log_evidence(of_mu),
-        )
-        for of_one, of_mu in pairs
-    )
-
-
-def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
-    """Weigh the last law against each of the others."""
-    *others, last = laws
-    return tuple(
-        BayesFactor(last.name, law.name, last.log_evidence - law.log_evidence)
-        if last.log_evidence >= law.log_evidence
-        else BayesFactor(law.name, last.name, law.log_evidence - last.log_evidence)
-        for law in others
-    )
+def _about(points: LoadPoints, shift: float) -> LoadPoints:
+    """Count the loads of points from that of the calculated contact."""
+    return replace(points, log_load=points.log_load + shift)
 
 
 def _messages(
