@@ -1,0 +1,175 @@
+"""Evidence against closed forms: Gaussians are integrated exactly, whatever is free in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from memscal.errors import InputError
+from memscal.friction.compliance_results import BayesFactor
+from memscal.friction.evidence import (
+    Tables,
+    evidence_of_each,
+    evidence_of_one,
+    log_likelihood,
+)
+from memscal.friction.priors import Prior, bounded_prior, log_uniform_prior, uniform_prior
+
+LOG_2PI = float(np.log(2 * np.pi))
+
+
+def tables(residual: np.ndarray, systematic: np.ndarray, noise: np.ndarray) -> Tables:
+    """Return what one group tells at one value: residual (n,), columns (n, q), noise (n,)."""
+    r, d = residual / noise, systematic / noise[:, None]
+    return Tables(
+        np.array([[r @ r]]), (d.T @ r)[None, None], (d.T @ d)[None, None],
+        np.array([[2 * np.log(noise).sum()]]),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    residual, systematic = rng.normal(size=12), rng.normal(size=(12, 3))
+    noise = rng.uniform(0.3, 2.0, 12)
+
+    found, chi_square = log_likelihood(tables(residual, systematic, noise))
+
+    covariance = np.diag(noise**2) + systematic @ systematic.T
+    expected = multivariate_normal(cov=covariance).logpdf(residual)
+    assert found.item() - 6 * LOG_2PI == pytest.approx(expected, rel=1e-10)
+    assert chi_square.item() == pytest.approx(residual @ np.linalg.solve(covariance, residual))
+
+
+def test_a_law_that_makes_data_less_certain_pays_for_it() -> None:
+    # Data as the noise alone has them: the larger systematic change has the smaller chi-square,
+    # and the smaller likelihood.
+    residual, noise = np.array([1.0, -1.0, 1.0, -1.0, 1.0]), np.ones(5)
+    sizes = [log_likelihood(tables(residual, np.full((5, 1), s), noise)) for s in (0.1, 10.0)]
+    (narrow, narrow_square), (wide, wide_square) = sizes
+    assert wide_square.item() < narrow_square.item()
+    assert wide.item() < narrow.item()
+
+
+def test_data_without_any_misfit_have_no_chi_square() -> None:
+    _, chi_square = log_likelihood(tables(np.zeros(4), np.ones((4, 1)), np.ones(4)))
+    assert chi_square.item() == pytest.approx(0.0, abs=1e-12)
+
+
+class Linear:
+    """Loads whose stress is in proportion to a parameter of each, with systematic changes."""
+
+    def __init__(self, seed: int, loads: int) -> None:
+        rng = np.random.default_rng(seed)
+        x = np.linspace(0, 1, 25)
+        self.noise = 0.01
+        self.shapes = [np.exp(-(x**2) * (1 + 0.2 * j)) for j in range(loads)]
+        waves = np.stack([np.cos(k * x) / (1 + k) for k in range(6)], axis=1)
+        scale = np.array([0.03, 0.01, 0, 0, 0, 0])
+        self.columns = [np.outer(s, scale) + 0.005 * waves for s in self.shapes]
+        change = rng.normal(size=6)
+        self.data = [
+            (0.3 + 0.05 * j) * s + d @ change + rng.normal(0, self.noise, x.size)
+            for j, (s, d) in enumerate(zip(self.shapes, self.columns, strict=True))
+        ]
+
+    def exact(self) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return the evidence under flat priors of density one, the best values, their errors."""
+        n = self.shapes[0].size
+        design = np.zeros((n * len(self.shapes), len(self.shapes)))
+        for j, shape in enumerate(self.shapes):
+            design[j * n : (j + 1) * n, j] = shape
+        columns, data = np.vstack(self.columns), np.concatenate(self.data)
+        covariance = self.noise**2 * np.eye(data.size) + columns @ columns.T
+        information = design.T @ np.linalg.solve(covariance, design)
+        best = np.linalg.solve(information, design.T @ np.linalg.solve(covariance, data))
+        left = data - design @ best
+        square = left @ np.linalg.solve(covariance, left)
+        log = -(square + np.linalg.slogdet(covariance)[1]) / 2
+        log += (len(self.shapes) * LOG_2PI - np.linalg.slogdet(information)[1]) / 2
+        return log, best, np.sqrt(np.diag(np.linalg.inv(information)))
+
+    def along(self, load: int, nodes: np.ndarray) -> Tables:
+        """Return what a load tells at values of its parameter."""
+        residuals = self.data[load] - np.outer(nodes, self.shapes[load])
+        each = [tables(r, self.columns[load], np.full(r.size, self.noise)) for r in residuals]
+        return Tables(
+            *(np.concatenate(parts) for parts in zip(*(t.parts for t in each), strict=True))
+        )
+
+
+@pytest.mark.parametrize("loads", [1, 2, 4])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(
+    seed: int, loads: int
+) -> None:
+    # The systematic changes correlate the parameters: alone each is known ten times worse.
+    model = Linear(seed, loads)
+    exact, best, errors = model.exact()
+    along, weights = [], []
+    for load in range(loads):
+        nodes = np.linspace(best[load] - 6 * errors[load], best[load] + 6 * errors[load], 241)
+        along.append(model.along(load, nodes))
+        weights.append(np.gradient(nodes))
+    found = evidence_of_each(along, weights)
+    assert found.log == pytest.approx(exact, abs=0.02)
+    assert found.error < 0.2
+    assert evidence_of_each(along, weights) == found
+
+
+def test_one_parameter_is_integrated_over_its_prior() -> None:
+    nodes = np.linspace(-8, 8, 161)
+    found = evidence_of_one(-(nodes**2) / 2, np.full(161, 0.1 / 16))
+    assert found.log == pytest.approx(LOG_2PI / 2 - np.log(16))
+
+
+def test_every_load_needs_its_prior() -> None:
+    with pytest.raises(InputError, match="2 priors"):
+        evidence_of_each([], [np.ones(1), np.ones(1)])
+
+
+def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence() -> None:
+    # A likelihood that is narrow about 1: its evidence goes with the prior's density there.
+    values = np.geomspace(1e-3, 1e3, 4001)
+    edges = np.concatenate([values[:1], np.sqrt(values[1:] * values[:-1]), values[-1:]])
+    log = -((np.log(values) / 0.05) ** 2) / 2
+    two, three = (
+        evidence_of_one(log, log_uniform_prior(0.1, high, "").weights(edges)).log
+        for high in (10.0, 100.0)
+    )
+    assert two - three == pytest.approx(np.log(3 / 2), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "prior",
+    [bounded_prior(0.3, "b"), log_uniform_prior(0.01, 10, "l"), uniform_prior(2.0, "u")],
+    ids=lambda prior: prior.words,
+)
+def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior) -> None:
+    edges = np.concatenate([[0.0], np.geomspace(1e-3, 50, 40), [np.inf]])
+    weights = prior.weights(edges)
+    assert np.all(weights >= 0)
+    assert weights.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (2.5, "not worth more than a bare mention"),
+        (3.0, "positive"),
+        (19.0, "positive"),
+        (21.0, "strong"),
+        (140.0, "strong"),
+        (151.0, "very strong"),
+    ],
+)
+def test_words_for_a_bayes_factor_are_those_of_kass_and_raftery(factor: float, words: str) -> None:
+    # Their table: 1 to 3, 3 to 20, 20 to 150, above 150.
+    assert BayesFactor("one", "other", float(np.log(factor))).words == words
+
+
+def test_a_bayes_factor_beyond_all_numbers_is_infinite() -> None:
+    assert BayesFactor("one", "other", 5000.0).value == np.inf
