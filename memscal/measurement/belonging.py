@@ -32,8 +32,15 @@ def accept_mismatches(
     Raises
     ------
     InputError
-        If something differs and ``override`` is false.
+        If something differs and ``override`` is false, or the artifact is of a tangential channel.
     """
+    if apparatus.order:
+        raise InputError(
+            f"The artifact is of the tangential channel {apparatus.sensor.channel}, but {place} is "
+            "to be read as normal stress.",
+            why="A shear is no normal stress: this cannot be overridden.",
+            cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
+        )
     found = mismatches(scan, apparatus)
     if found and not override:
         raise InputError(
