@@ -22,7 +22,7 @@ __all__ = ["draw_maxima", "maxima_figure"]
 _SHOWN = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, np.inf)
 #: Labels at the ends of curves keep this share of the panel's height apart.
 _APART = 0.045
-_ROOM = 0.19
+_ROOM = 0.22
 
 
 def maxima_figure(found: FrictionComparison) -> Figure:

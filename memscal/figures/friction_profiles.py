@@ -14,7 +14,7 @@ from memscal.figures.friction_scale import (
     chosen,
     friction_colours,
     friction_name,
-    load_colours,
+    load_looks,
     lubricated_words,
     main_loading,
     on_axis,
@@ -86,15 +86,14 @@ def draw_profiles(
     logarithmic: bool = False,
 ) -> None:
     """Draw measured points with their uncertainties, and the calculated limits through them."""
-    colours = load_colours(found)
+    looks = load_looks(found)
     for one in loads:
-        colour = colours[one.load]
+        colour, name = looks[one.load]
         r = np.linspace(0.0, one.profile.r[-1], _FINE)
         limits = on_axis(one.profile.r, one.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
         axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
-        label = "" if logarithmic else f"{one.load:.3g} N"
-        _points(axes, one, colour, label, logarithmic)
+        _points(axes, one, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
         top = max(float(one.profile.s_zz.max()) for one in loads) / KPA
         axes.set_yscale("log")
@@ -161,9 +160,9 @@ def draw_residuals(
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    colours = load_colours(found)
+    looks = load_looks(found)
     for one in loads:
-        colour = colours[one.load]
+        colour, _ = looks[one.load]
         z = (one.profile.s_zz - one.calculated[index]) / one.profile.s_zz_errors
         marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
         (points,) = axes.plot(one.profile.r / MM, z, marker, color=colour, ms=2.5, mew=0.6)

@@ -15,7 +15,7 @@ from memscal.figures.friction_scale import (
     chosen,
     friction_axis,
     friction_position,
-    load_colours,
+    load_looks,
     lubricated_words,
     main_loading,
 )
@@ -210,9 +210,9 @@ def draw_likelihood(
     """Draw chi-square above its least value of each load and of all loads together."""
     loading = main_loading(found, loading)
     loads = chosen(found, loading, lubrication)
-    colours = load_colours(found)
+    looks = load_looks(found)
     for one in loads:
-        _draw_curve(axes, one.by_profile, colours[one.load], f"{one.load:.3g} N", 1.0)
+        _draw_curve(axes, one.by_profile, *looks[one.load], 1.0)
     joint = found.joint[loads[0].lubrication][loading]
     _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
     draw_levels(axes)

@@ -22,12 +22,14 @@ __all__ = [
     "friction_colours",
     "friction_name",
     "friction_position",
-    "load_colours",
+    "load_looks",
     "lubricated_words",
     "main_loading",
     "on_axis",
 ]
 
+#: Loads up to this multiple of another one look alike.
+_ALIKE = 1.05
 #: Radii closer than this, in m, count as one.
 _CLOSE = 1e-6
 _TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
@@ -74,15 +76,29 @@ def friction_colours(friction: ArrayLike) -> list[str]:
     return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
 
 
-def load_colours(found: FrictionComparison) -> dict[float, str]:
-    """Return a colour for each load: darker with the load, also in grey, the same in all panels."""
+def load_looks(found: FrictionComparison) -> dict[float, tuple[str, str]]:
+    """Return colour and name of each load: darker as it grows, also in grey, alike in all panels.
+
+    Loads within 5 % of each other, such as those of recorded repeats, look alike.
+    """
     import matplotlib as mpl
 
-    loads = sorted({one.load for of_it in found.loads.values() for one in of_it})
-    if len(loads) == 1:
-        return {loads[0]: COLOURS["deconvolved"]}
-    shades = mpl.colormaps["viridis_r"](np.linspace(0.2, 1.0, len(loads)))
-    return {load: mpl.colors.to_hex(shade) for load, shade in zip(loads, shades, strict=True)}
+    groups: list[list[float]] = []
+    for load in sorted({one.load for of_it in found.loads.values() for one in of_it}):
+        if groups and load <= _ALIKE * groups[-1][0]:
+            groups[-1].append(load)
+        else:
+            groups.append([load])
+    shades = mpl.colormaps["viridis_r"](np.linspace(0.2, 1.0, len(groups)))
+    colours = [mpl.colors.to_hex(shade) for shade in shades]
+    if len(groups) == 1:
+        colours = [COLOURS["deconvolved"]]
+    names = [f"{np.mean(group):.3g} N" for group in groups]
+    return {
+        load: (colour, name)
+        for group, colour, name in zip(groups, colours, names, strict=True)
+        for load in group
+    }
 
 
 def lubricated_words(lubrication: str) -> str:

@@ -16,7 +16,7 @@ from memscal.figures.friction_interface import interface_figure, length_position
 from memscal.figures.friction_maxima import maxima_figure
 from memscal.figures.friction_profiles import friction_set_figure, profile_figure
 from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
-from memscal.figures.friction_scale import friction_position, on_axis
+from memscal.figures.friction_scale import friction_position, load_looks, on_axis
 from memscal.figures.render import render_figure
 from memscal.friction.results import FrictionComparison
 
@@ -172,6 +172,13 @@ def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionCompariso
         t, rise = (np.asarray(values) for values in curves[label].get_data())
         np.testing.assert_allclose(rise, reading.chi_square - reading.least, atol=1e-9)
         assert t[np.argmin(rise)] == pytest.approx(float(friction_position(reading.best)))
+
+
+def test_loads_that_were_recorded_look_as_their_neighbours() -> None:
+    looks = load_looks(comparison(loads=(1.36, 1.37, 2.75), lubrications=("dry",)))
+    assert looks[1.36] == looks[1.37]
+    assert looks[1.37] != looks[2.75]
+    assert looks[2.75][1] == "2.75 N"
 
 
 def test_an_axis_of_friction_is_monotone_and_ends_at_infinity() -> None:
