@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from memscal.formats.stress import read_stress
     from memscal.friction.procedure import compare
     from memscal.friction.results import FrictionComparison
+    from memscal.friction.tangential import ShearComparison, compare_shear
     from memscal.laboratory.experiment import Experiment, simulate_experiment
     from memscal.laboratory.rod_scan import simulate
     from memscal.measurement.application import measure_stress
@@ -60,6 +61,7 @@ _HOMES = {
     "Restoration": "memscal.measurement.restoration",
     "Rod": "memscal.model.indenter",
     "Scan": "memscal.model.scan",
+    "ShearComparison": "memscal.friction.tangential",
     "SmoothedDisc": "memscal.axisymmetry.kernels",
     "Sphere": "memscal.model.indenter",
     "StressProfile": "memscal.model.stress",
@@ -67,6 +69,7 @@ _HOMES = {
     "calibrate": "memscal.calibration.procedure",
     "calibrate_many": "memscal.calibration.fleet",
     "compare": "memscal.friction.procedure",
+    "compare_shear": "memscal.friction.tangential",
     "design": "memscal.planning.procedure",
     "indent": "memscal.mechanics.indent",
     "load_apparatus": "memscal.apparatus",
@@ -104,6 +107,7 @@ __all__ = [
     "Restoration",
     "Rod",
     "Scan",
+    "ShearComparison",
     "SmoothedDisc",
     "Sphere",
     "StressProfile",
@@ -112,6 +116,7 @@ __all__ = [
     "calibrate",
     "calibrate_many",
     "compare",
+    "compare_shear",
     "design",
     "indent",
     "load_apparatus",
