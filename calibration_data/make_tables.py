@@ -1,4 +1,4 @@
-"""Make the two tables of this folder, which no memscal command makes: run by make.sh."""
+"""Make the tables of this folder, which no memscal command makes: run by make.sh."""
 
 from __future__ import annotations
 
@@ -90,6 +90,60 @@ def finite_element_reference(path: Path) -> None:
     write_table(path, comments, ("r (mm)", "S33 (MPa)", "S13 (MPa)"), rows)
 
 
+def own_experiment(folder: Path) -> None:
+    """Write an experiment on another film, with another sensor and another sphere, as tables.
+
+    They are those of the notebook on a user's own data.
+    """
+    sphere = memscal.Sphere(radius=60e-3)
+    made = memscal.simulate_experiment(
+        film=memscal.ElasticFilm(young_modulus=1.9e6, poisson_ratio=0.5, thickness=1.5e-3),
+        rod=memscal.Rod(radius=0.3e-3),
+        sphere=sphere,
+        kernel=memscal.GaussianMixture(sigmas=(0.48e-3,)),
+        conversion_constant=3.5e-8,
+        rod_load=0.5,
+        rod_repeats=2,
+        loads=(0.4, 0.8, 1.6),
+        lubricated_loads=(0.4, 1.6),
+        friction=0.12,
+        spacing=0.4e-3,
+        repeats=2,
+        load_scatter=0.01,
+        centre=(-0.31e-3, 0.0),
+        seed=60,
+    )
+    about = (
+        "SYNTHETIC: calculated from a known truth, not measured. " + READ_ME,
+        "Truth: A = 3.5e-5 mV/Pa, centre -0.31 mm; G is a Gaussian of 0.48 mm; noise 0.5 % of the",
+        "largest signal. Film: E = 1.9 MPa, nu = 0.5, h = 1.5 mm.",
+    )
+    folder.mkdir(exist_ok=True)
+    rod = [
+        (str(line + 1), f"{x * 1e3:.3f}", f"{u * 1e3:.5f}")
+        for line, readings in enumerate(made.rod.u_zz)
+        for x, u in zip(made.rod.x, readings, strict=True)
+    ]
+    truth = "Rod: radius 0.3 mm, load 0.5 N."
+    write_table(folder / "rod.csv", (*about, truth), ("pass", "x (mm)", "U (mV)"), rod)
+    for name, scan, friction in (("dry", made.dry, 0.12), ("lubricated", made.lubricated, 0.0)):
+        assert scan.normal_load is not None
+        rows = [
+            (f"{load:g}", str(line % 2 + 1), f"{x * 1e3:.3f}", f"{u * 1e3:.5f}")
+            for line, (loads, readings) in enumerate(zip(scan.normal_load, scan.u_zz, strict=True))
+            for x, load, u in zip(scan.x, loads, readings, strict=True)
+        ]
+        if name == "dry":
+            rows[40] = (*rows[40][:-1], "")  # a reading that was lost
+            del rows[100]  # a contact that was never made
+        truth = (
+            f"Sphere: radius 60 mm; loads scatter by 1 %, positions by 10 um; mu = {friction:g}."
+        )
+        header = ("set load (N)", "pass", "x (mm)", "U (mV)")
+        write_table(folder / f"sphere_{name}.csv", (*about, truth), header, rows)
+
+
 if __name__ == "__main__":
     messy_scan(HERE / "rod_scan_messy.csv")
     finite_element_reference(HERE / "rod_reference_fem.csv")
+    own_experiment(HERE / "tables")

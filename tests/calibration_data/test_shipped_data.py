@@ -28,7 +28,8 @@ SCANS = ["rod_scan_33.h5", "rod_scan_65.h5", "rod_scan_three_loads.h5", "rod_sca
 EXPERIMENT = [
     f"sphere_experiment/{name}.h5" for name in ("rod_scan", "sphere_dry", "sphere_lubricated")
 ]
-TABLES = ["rod_scan_messy.csv", "rod_reference_fem.csv"]
+OWN = [f"tables/{name}.csv" for name in ("rod", "sphere_dry", "sphere_lubricated")]
+TABLES = ["rod_scan_messy.csv", "rod_reference_fem.csv", *OWN]
 ARTIFACT = "rod_scan_65.apparatus.h5"
 
 
@@ -232,6 +233,19 @@ def test_the_tables_are_what_their_generator_makes(generator: ModuleType, tmp_pa
         made, shipped = tmp_path / name, DATA / name
         # A last digit may be rounded the other way by another version of a library.
         assert_allclose(numbers(made), numbers(shipped), rtol=0, atol=places)
+    generator.own_experiment(tmp_path / "tables")
+    for name in OWN:
+        assert_allclose(numbers(tmp_path / name), numbers(DATA / name), rtol=0, atol=1.1e-5)
+
+
+def test_the_table_of_dry_contacts_becomes_a_scan_with_a_line_for_each_load_and_pass(
+    imported: Path,
+) -> None:
+    scan = memscal.read_scan(imported / "dry.h5")
+    assert (scan.u_zz.shape, scan.lubrication) == ((6, 33), "dry")
+    assert np.isnan(scan.u_zz).sum() == 2
+    assert scan.normal_load is not None
+    assert_allclose(np.nanmedian(scan.normal_load, axis=1), [0.4, 0.4, 0.8, 0.8, 1.6, 1.6])
 
 
 def test_the_messy_table_is_messy_and_still_gives_its_truth(imported: Path) -> None:
