@@ -23,7 +23,7 @@ from memscal.model.indenter import Indenter
 
 __all__ = ["SLIP_LENGTHS", "elasto_plastic_family", "normal_compliance_family"]
 
-SLIP_LENGTHS = (0.0, 0.3e-6, 0.7e-6, 2e-6, 5e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.6e-4, 5e-4, math.inf)
+SLIP_LENGTHS = (0.0, 0.15e-6, 0.5e-6, 1.5e-6, 4e-6, 1e-5, 3e-5, 1e-4, 4e-4, math.inf)
 """Slip lengths in m, from the rigid interface to the one that bears no shear."""
 
 #: Lengths of a normally compliant interface in units of the film's roughness.

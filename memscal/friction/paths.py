@@ -21,7 +21,7 @@ __all__ = ["LoadingPath", "PathTables", "solve_paths"]
 #: Neighbours of each load on the path, relative to it: their difference is its derivative.
 _NEIGHBOURS = (0.98, 1.02)
 #: Rings from the axis to the largest contact; more crowd at the edges.  Three times as many change
-#: the base stress by less than 1e-4 of its maximum between rigid surfaces, and by less than 4e-4
+#: the base stress by less than 1e-4 of its maximum between rigid surfaces, and by less than 7e-4
 #: where the interface yields.
 _RINGS_OF_A_RIGID_CONTACT = 56
 _RINGS_OF_A_COMPLIANT_CONTACT = 72

@@ -53,7 +53,7 @@ def normal(law: str) -> Build:
     [
         (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
         (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
-        (elasto_plastic(1.6), SLIP_LENGTHS, [0.15e-6, 1.3e-6, 7e-6, 6e-5, 3e-4]),
+        (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
         (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
         (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
     ],
@@ -85,7 +85,7 @@ CASES = {
     "smooth": (amontons(), [0.0], 0.0),
     "incremental": (amontons(), [0.2], 0.2),
     "total": (amontons("total"), [0.4], 0.4),
-    "elasto-plastic": (elasto_plastic(1.6), list(SLIP_LENGTHS), 5e-6),
+    "elasto-plastic": (elasto_plastic(1.6), list(SLIP_LENGTHS), 2.5e-6),
     "exponential": (normal("exponential"), list(LENGTHS), 3.64e-6),
     "greenwood-tripp": (normal("greenwood-tripp"), list(LENGTHS), 3.64e-6),
 }
