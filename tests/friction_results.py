@@ -239,11 +239,12 @@ def _laws(
         InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120, 0.3)
         for name, value in zip(names, evidence, strict=True)
     )
+    better, worse = sorted((-1, 0), key=lambda i: -evidence[i])
     return LawComparison(
         lubrication=lubrication,
         loads=np.array(LOADS),
         laws=laws,
-        factors=(BayesFactor(names[-1], names[0], abs(evidence[-1] - evidence[0])),),
+        factors=(BayesFactor(names[better], names[worse], abs(evidence[-1] - evidence[0])),),
         length=InterfaceLength(
             length, 0.1 * length, Interval(inside[0], inside[-1]), "", lengths, chi_square
         ),

@@ -21,7 +21,7 @@ class Bounded(Protocol):
     def interval(self) -> Interval: ...
 
 
-def bounded_text(found: Bounded, scale: float = 1.0) -> str:
+def bounded_text(found: Bounded, scale: float = 1.0, unit: str = "") -> str:
     """Return a value with its interval, or the bound that is left of it; never a bare number.
 
     Bounds are rounded outward, so that what is said is not more than what was found.
@@ -32,6 +32,8 @@ def bounded_text(found: Bounded, scale: float = 1.0) -> str:
         What was found.
     scale : float
         SI units in the unit that is shown.
+    unit : str
+        Its name; empty for a number without one.
 
     Examples
     --------
@@ -46,20 +48,25 @@ def bounded_text(found: Bounded, scale: float = 1.0) -> str:
     'below 0.013 (95 %)'
     >>> bounded_text(found(None, 0.0, None))
     'not identifiable'
+    >>> bounded_text(found(None, 0.0, 1.23e-6), 1e-6, "um")
+    'below 1.3 um (95 %)'
     """
+    tail = f" {unit}" if unit else ""
     low, high = found.interval.low / scale, found.interval.high
     level = percent(found.interval.level)
     if high is None:
         if low <= 0:
             return "not identifiable"
+        bound = _outward(low, math.floor)
         if found.value is None:
-            return f"above {_outward(low, math.floor)} ({level})"
-        return f"{found.value / scale:.2g} [{_outward(low, math.floor)}, ∞]"
+            return f"above {bound}{tail} ({level})"
+        return f"{found.value / scale:.2g} [{bound}, ∞]{tail}"
     high /= scale
-    if found.value is None or (found.value <= 0 and low <= 0):
-        bound = f"below {_outward(high, math.ceil)} ({level})"
-        return bound if low <= 0 else f"[{low:.2g}, {high:.2g}] ({level})"
-    return _rounded(found.value / scale, low, high)
+    if low <= 0 and (found.value is None or found.value <= 0):
+        return f"below {_outward(high, math.ceil)}{tail} ({level})"
+    if found.value is None:
+        return f"[{_outward(low, math.floor)}, {_outward(high, math.ceil)}]{tail} ({level})"
+    return f"{_rounded(found.value / scale, low, high)}{tail}"
 
 
 def _rounded(value: float, low: float, high: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from memscal.cli.friction_text import bounded_text, friction_name
+from memscal.cli.friction_text import bounded_text, friction_name, percent
 from memscal.cli.output import finite
 from memscal.cli.tables import Table
 from memscal.friction.compliance_results import (
@@ -31,7 +31,7 @@ def interface_tables(found: InterfaceComparison) -> list[Table]:
     tables = []
     for direction, part in _parts(found).items():
         tables.append(_law_table(direction, part))
-        tables.append(_length_table(direction, part))
+        tables += [_length_table(direction, part), _priors_table(part)]
         if part.implied is not None:
             tables.append(_implied_table(part))
     return tables
@@ -41,7 +41,7 @@ def _law_table(direction: str, part: LawComparison) -> Table:
     best = max(law.log_evidence for law in part.laws)
     title = (
         f"Laws of the {part.lubrication or 'contact'} interface, {direction}: "
-        "evidence over all loads"
+        "evidence over all loads, below the best"
     )
     rows = [
         [
@@ -64,26 +64,28 @@ def _best(part: LawComparison, law: InterfaceLaw) -> str:
 
 
 def _length_table(direction: str, part: LawComparison) -> Table:
-    """Return the length by which the interface yields, and who is favoured."""
-    words = "slip length" if direction == "tangential" else "length of the normal law"
-    rows = [[words, f"{_length(part.length)}"]]
-    rows += [
-        [
-            f"{factor.favoured} against {factor.against}",
-            f"Bayes factor {_factor(factor.value)}: {factor.words}",
-        ]
-        for factor in part.factors
-    ]
-    rows += [
-        [f"under another prior: {prior.prior}", f"ln of the Bayes factor {prior.log_factor:.1f}"]
-        for prior in part.priors
-    ]
-    return Table(f"What yields, {direction}", ("", ""), rows)
+    """Return the length by which the interface yields, and how the evidence stands."""
+    words = "slip length" if direction == "tangential" else "length"
+    found = bounded_text(part.length, _UM, "um")
+    rows = []
+    for factor in part.factors:
+        yielding = factor.favoured == part.laws[-1].name
+        rows.append(
+            [
+                factor.against if yielding else factor.favoured,
+                _factor(factor.value),
+                f"{'for' if yielding else 'against'} it, {factor.words}",
+            ]
+        )
+    level = f" [{percent(part.length.interval.level)} interval]" if "[" in found else ""
+    title = f"The law that yields, {words} {found}{level}, against the others"
+    return Table(title, ["law", "Bayes factor", "evidence"], rows)
 
 
-def _length(length: InterfaceLength) -> str:
-    text = bounded_text(length, _UM)
-    return text if text == "not identifiable" else f"{text} um"
+def _priors_table(part: LawComparison) -> Table:
+    rows = [[prior.prior, f"{prior.log_factor:.1f}"] for prior in part.priors]
+    title = f"The same against {part.laws[0].name}, under other priors"
+    return Table(title, ["prior", "ln of the Bayes factor"], rows)
 
 
 def _factor(value: float) -> str:

@@ -1,0 +1,285 @@
+"""``memscal compare``: from files to friction; exit codes, refusals, and what it writes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from console import Run, names
+from friction_results import comparison, interface_comparison
+from spheres import known_apparatus
+
+import memscal
+from memscal.cli.failures import CHECK_FAILED
+from memscal.cli.user_cache import cache_from, user_cache_folder
+from memscal.laboratory.experiment import simulate_experiment
+from memscal.model.scan import Scan, StressSensor
+
+CHECKED, USAGE, REFUSED, NOT_WRITTEN = CHECK_FAILED, 2, 3, 4
+MU = 0.15
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a calibrated sensor, dry and lubricated contacts, and calculated contacts."""
+    folder = tmp_path_factory.mktemp("bench")
+    known = known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.005)
+    made = simulate_experiment(loads=(1.37, 2.75), lubricated_loads=(2.75,), friction=MU, seed=3)
+    sensor = made.dry.sensor
+    replace(known, sensor=sensor, film=made.dry.film).save(folder / "sensor.apparatus.h5")
+    memscal.write_scan(made.dry, folder / "dry.h5")
+    assert made.lubricated is not None
+    memscal.write_scan(made.lubricated, folder / "lubricated.h5")
+    return folder
+
+
+@pytest.fixture
+def compare(run: Run, bench: Path, folder: Path) -> Callable[..., Any]:
+    """Compare the bench's scans in an empty folder, with a cache that the tests share."""
+
+    def compare_(*arguments: object, scans: tuple[str, ...] = ("dry.h5",)) -> Any:
+        files = [bench / "sensor.apparatus.h5", *(bench / name for name in scans)]
+        assert folder == Path.cwd()
+        return run("compare", *files, "--cache", bench / "cache", *arguments)
+
+    return compare_
+
+
+QUICK = ("--friction", 0, "--friction", 0.15, "--friction", "inf", "--loading", "incremental")
+
+
+@pytest.fixture
+def made_by_hand(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Let the comparison give a result made by hand, and remember what it was asked."""
+
+    def give(found: Any = None, asked: dict[str, Any] | None = None) -> None:
+        def compare(*_: object, **options: Any) -> Any:
+            if asked is not None:
+                asked.update(options)
+            return comparison(lubrications=("dry",), loads=(1.37,)) if found is None else found
+
+        monkeypatch.setattr("memscal.friction.procedure.compare", compare)
+
+    return give
+
+
+def test_it_finds_the_friction_of_an_experiment_from_its_files(
+    compare: Callable[..., Any], folder: Path
+) -> None:
+    done = compare(*QUICK, "--json", scans=("dry.h5", "lubricated.h5"))
+    assert done.code in (0, CHECKED), done.err
+    told = done.json
+    assert [scan["file_name"] for scan in told["scans"]] == ["dry.h5", "lubricated.h5"]
+    by_lubrication = {found["lubrication"]: found for found in told["joint"]}
+    dry, lubricated = (by_lubrication[name]["interval"] for name in ("dry", "lubricated"))
+    # Three standard uncertainties in place of two: this is one seed, and a rule for all of them.
+    assert dry["low"] - 0.1 < MU < dry["high"] + 0.1
+    assert lubricated["low"] < 0.05
+    for load in told["loads"]:
+        assert load["S_max"]["standard_uncertainty"] > 0
+        assert load["S_max"]["value"] == pytest.approx(
+            load["ratio"]["value"] * load["p0_max"]["value"]
+        )
+        assert len(load["by_loading"]["incremental"]["profiles"]) >= 3
+    assert names(folder) == []
+
+
+def test_tables_name_every_load_and_stand_within_a_hundred_columns(
+    compare: Callable[..., Any],
+) -> None:
+    done = compare(*QUICK)
+    assert max(map(len, done.out.splitlines())) < 100
+    for words in ("1.37", "2.75", "S_max/p0_max", "by the profile", "Quality checks", "χ²"):
+        assert words in done.out
+
+
+def test_a_second_run_takes_the_contacts_from_the_cache(
+    compare: Callable[..., Any], bench: Path
+) -> None:
+    first = compare(*QUICK, "--json")
+    kept = {path.name: path.stat().st_ino for path in (bench / "cache").iterdir()}
+    assert kept
+    second = compare(*QUICK, "--json")
+    assert {path.name: path.stat().st_ino for path in (bench / "cache").iterdir()} == kept
+    assert first.out == second.out
+
+
+def test_a_damaged_cache_is_made_anew(compare: Callable[..., Any], bench: Path) -> None:
+    first = compare(*QUICK, "--json")
+    for path in (bench / "cache").iterdir():
+        path.write_bytes(b"not a table")
+    assert compare(*QUICK, "--json").out == first.out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"sensor": StressSensor(name="another", channel="zz")}, "sensor"),
+        ({"sensor": StressSensor(name="a simulated sensor", channel="xz")}, "channel"),
+        ({"film": memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=3e-3)},
+         "film"),
+    ],
+)  # fmt: skip
+def test_another_sensor_channel_or_film_is_refused_and_both_are_named(
+    run: Run, bench: Path, folder: Path, change: dict[str, Any], words: str
+) -> None:
+    scan = replace(memscal.read_scan(bench / "dry.h5"), **change)
+    memscal.write_scan(scan, folder / "other.h5")
+    done = run("compare", bench / "sensor.apparatus.h5", "other.h5", "--no-cache", *QUICK)
+    refused(done, words)
+
+
+def refused(done: Any, words: str) -> None:
+    assert done.code == REFUSED, (done.code, done.err)
+    assert done.out == ""
+    assert done.err.startswith("Error: ")
+    assert "Traceback" not in done.err
+    assert words in done.err
+
+
+def test_a_rod_scan_is_refused(run: Run, bench: Path, folder: Path) -> None:
+    memscal.write_scan(memscal.simulate(seed=1), folder / "rod.h5")
+    done = run("compare", bench / "sensor.apparatus.h5", "rod.h5", "--no-cache")
+    refused(done, "rod")
+    assert "calibrate" in done.err
+
+
+def test_files_in_the_wrong_order_are_refused(run: Run, bench: Path) -> None:
+    done = run("compare", bench / "dry.h5", bench / "sensor.apparatus.h5", "--no-cache")
+    refused(done, "memscal-artifact")
+
+
+def without(scan: Scan, kept: np.ndarray) -> Scan:
+    """Return a scan of some of its positions."""
+    names_ = ("u_zz", "u_zz_errors", "normal_load", "normal_load_errors", "x_errors", "x")
+    given = {name: getattr(scan, name) for name in names_}
+    return replace(scan, **{n: v[..., kept] for n, v in given.items() if v is not None})
+
+
+def test_a_scan_that_does_not_come_down_to_its_baseline_is_refused(
+    run: Run, bench: Path, folder: Path
+) -> None:
+    scan = memscal.read_scan(bench / "dry.h5")
+    memscal.write_scan(without(scan, np.abs(scan.x) < 3e-3), folder / "narrow.h5")
+    done = run("compare", bench / "sensor.apparatus.h5", "narrow.h5", "--no-cache", *QUICK)
+    refused(done, "narrow.h5, 1.37 N, dry")
+
+
+def test_a_run_of_missing_points_is_refused_with_its_place(
+    run: Run, bench: Path, folder: Path
+) -> None:
+    scan = memscal.read_scan(bench / "dry.h5")
+    u = scan.u_zz.copy()
+    u[1, 8:24] = np.nan
+    memscal.write_scan(replace(scan, u_zz=u), folder / "gap.h5")
+    done = run("compare", bench / "sensor.apparatus.h5", "gap.h5", "--no-cache", *QUICK)
+    refused(done, "16 neighbouring points are missing")
+
+
+@pytest.mark.parametrize("missing", ["sensor.apparatus.h5", "dry.h5"])
+def test_a_missing_file_is_refused_by_its_name(
+    run: Run, bench: Path, folder: Path, missing: str
+) -> None:
+    files = {name: bench / name for name in ("sensor.apparatus.h5", "dry.h5")}
+    files[missing] = folder / "missing.h5"
+    done = run("compare", *files.values(), "--no-cache")
+    refused(done, "missing.h5")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--friction", "-0.1"], "of at least 0"),
+        (["--friction", "0.1", "--friction", "0.1"], "twice"),
+        (["--loading", "sideways"], "incremental"),
+        (["--macroscopic-uncertainty", "0.1"], "--macroscopic"),
+        (["--interface"], "--macroscopic"),
+        (["--reference", "a.h5", "--friction", "0", "--friction", "inf"], "--reference"),
+        (["--cache", "here", "--no-cache"], "not both"),
+        (["--figure", "table.txt"], ".png"),
+    ],
+)
+def test_options_that_do_not_go_together_are_exit_code_2(
+    run: Run, bench: Path, arguments: list[str], words: str
+) -> None:
+    done = run("compare", bench / "sensor.apparatus.h5", bench / "dry.h5", *arguments)
+    assert done.code == USAGE
+    assert done.out == ""
+    assert words in done.err
+
+
+def test_a_failed_check_is_exit_code_1_and_the_results_are_printed(
+    compare: Callable[..., Any], made_by_hand: Callable[..., None]
+) -> None:
+    made_by_hand(comparison(lubrications=("dry",), failed=True))
+    done = compare()
+    assert done.code == CHECKED
+    assert "bracketing" in done.err
+    assert "Effective friction coefficient" in done.out
+
+
+def test_the_options_reach_the_comparison(
+    compare: Callable[..., Any], made_by_hand: Callable[..., None], bench: Path
+) -> None:
+    asked: dict[str, Any] = {}
+    made_by_hand(asked=asked)
+    compare("--macroscopic", 1.6, "--macroscopic-uncertainty", 0.2, "--interface", "--override")
+    assert asked["loading"] == ("incremental", "total")
+    assert asked["friction"] is None
+    assert (asked["macroscopic"], asked["macroscopic_uncertainty"]) == (1.6, 0.2)
+    assert asked["interface"]
+    assert asked["override"]
+    assert asked["cache"] == bench / "cache"
+
+
+def test_one_page_and_all_figures_are_written(
+    compare: Callable[..., Any], made_by_hand: Callable[..., None], folder: Path
+) -> None:
+    made_by_hand(comparison(lubrications=("dry",), loads=(1.37,), interface=interface_comparison()))
+    options = ("--macroscopic", 1.6, "--interface", "--figures", "drawn", "--figure-format", "svg")
+    done = compare("--figure", "page.png", *options)
+    assert done.code == 0, done.err
+    assert (folder / "page.png").read_bytes().startswith(b"\x89PNG")
+    assert names(folder / "drawn") == [
+        "effective-friction.svg", "friction-set-dry.svg", "interface.svg", "likelihood.svg",
+        "maxima.svg", "profiles-dry.svg",
+    ]  # fmt: skip
+    assert "Written: drawn/maxima.svg" in done.err.replace("\\", "/")
+
+
+def test_nothing_is_overwritten_without_force(
+    compare: Callable[..., Any], made_by_hand: Callable[..., None], folder: Path
+) -> None:
+    made_by_hand()
+    (folder / "drawn").mkdir()
+    (folder / "drawn" / "maxima.png").write_bytes(b"mine")
+    assert compare("--figures", "drawn").code == NOT_WRITTEN
+    assert names(folder / "drawn") == ["maxima.png"]
+    assert (folder / "drawn" / "maxima.png").read_bytes() == b"mine"
+    assert compare("--figures", "drawn", "--force").code == 0
+    assert (folder / "drawn" / "maxima.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_folder_that_cannot_be_made_is_known_before_computing(
+    compare: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reached(*_: object, **__: object) -> None:
+        raise AssertionError("The comparison was reached.")
+
+    monkeypatch.setattr("memscal.friction.procedure.compare", reached)
+    assert compare("--figures", "no/such/folder").code == NOT_WRITTEN
+
+
+def test_the_cache_is_the_users_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert user_cache_folder() == tmp_path / "memscal" / "contacts"
+    assert cache_from(None, no_cache=True) is None
+    assert cache_from(tmp_path, no_cache=False) == tmp_path
+    # A relative one is to be ignored, by the specification.
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert user_cache_folder() == tmp_path / ".cache" / "memscal" / "contacts"
