@@ -93,8 +93,13 @@ class Laboratory:
         members = members_of(self.family, np.array([friction]))
         return predict(points or self.points[load], self.sensor, members, load)
 
-    def drawn(self, friction: float, seed: int, *, systematic: bool = True) -> Confrontation:
+    def drawn(self, friction: float, seed: int) -> Confrontation:
         """Draw everything that the likelihood counts, and hold it against the family."""
+        measured = self.measured(friction, seed)
+        return confront(self.family, self.sensor, measured, range(len(measured)))
+
+    def measured(self, friction: float, seed: int, *, systematic: bool = True) -> list[LoadPoints]:
+        """Draw the voltages of every load."""
         rng = np.random.default_rng(seed)
         common: dict[str, np.ndarray] = {}
         measured = []
@@ -108,7 +113,7 @@ class Laboratory:
             u = u + points.flat @ rng.normal(0.0, 1e-3, 2)
             u = u + found.slope[0] * points.side * rng.normal(0.0, 10e-6)
             measured.append(replace(points, u=u))
-        return confront(self.family, self.sensor, measured, range(len(measured)))
+        return measured
 
 
 def noise_of(points: LoadPoints, found: Predicted, rng: np.random.Generator) -> np.ndarray:

@@ -1,0 +1,260 @@
+"""compare(): from scans and an artifact to friction, its checks, and what it refuses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import memscal
+from memscal.errors import InputError
+from memscal.friction.amontons import amontons_family
+from memscal.friction.family import ProfileFamily
+from memscal.friction.procedure import compare_measured
+from memscal.laboratory.experiment import Experiment
+from memscal.model.scan import Scan, StressSensor
+
+FRICTION = (0.0, 0.1, 0.2, 0.3, math.inf)
+LOADINGS = ("incremental", "total")
+TRUTH = 0.2
+
+
+@pytest.fixture(scope="module")
+def made() -> Experiment:
+    return memscal.simulate_experiment(friction=TRUTH, loads=[0.69, 2.75], seed=11)
+
+
+@pytest.fixture(scope="module")
+def apparatus(made: Experiment) -> memscal.ApparatusFunction:
+    return memscal.calibrate(made.rod, method="evidence").apparatus
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("contacts")
+
+
+@pytest.fixture(scope="module")
+def found(
+    made: Experiment, apparatus: memscal.ApparatusFunction, kept: Path
+) -> memscal.FrictionComparison:
+    return memscal.compare(
+        [made.dry, made.lubricated],
+        apparatus,
+        friction=FRICTION,
+        macroscopic=1.6,
+        macroscopic_uncertainty=0.1,
+        cache=kept,
+    )
+
+
+@pytest.fixture(scope="module")
+def families(made: Experiment, kept: Path) -> dict[str, ProfileFamily]:
+    """The contacts of the comparison, from its folder."""
+    family = amontons_family(
+        made.dry.film,
+        made.dry.indenter,
+        [0.69, 2.75],
+        friction=FRICTION,
+        reach=24e-3,
+        cache=kept,
+    )
+    return {"incremental": family}
+
+
+def scaled(scan: Scan, factor: float, noise: float = 1.0) -> Scan:
+    assert scan.u_zz_errors is not None
+    return replace(scan, u_zz=factor * scan.u_zz, u_zz_errors=noise * scan.u_zz_errors)
+
+
+def failed(found: memscal.FrictionComparison) -> set[str]:
+    return {check.name for check in found.checks if not check.passed}
+
+
+def test_every_load_meets_every_loading(found: memscal.FrictionComparison) -> None:
+    assert found.loadings == LOADINGS
+    for loading in LOADINGS:
+        kinds = [(one.lubrication, one.load) for one in found.loads[loading]]
+        assert kinds == [("dry", 0.69), ("dry", 2.75), ("lubricated", 0.69), ("lubricated", 2.75)]
+        assert {one.loading for one in found.loads[loading]} == {loading}
+    assert {kind: set(by) for kind, by in found.joint.items()} == {
+        "dry": set(LOADINGS),
+        "lubricated": set(LOADINGS),
+    }
+    assert "dry, incremental: " in repr(found)
+
+
+def test_what_is_calculated_is_the_contact_blurred_by_g(
+    found: memscal.FrictionComparison, apparatus: memscal.ApparatusFunction, made: Experiment
+) -> None:
+    one = found.loads["incremental"][1]
+    r = np.linspace(0.0, 30e-3, 1200)
+    contact = memscal.indent(made.dry.film, made.dry.indenter, load=2.75, friction=0.3)
+    blurred = apparatus.convolve(r, contact.base_stress(r))
+    expected = np.interp(one.profile.r, r, blurred)
+    assert one.calculated[FRICTION.index(0.3)] == pytest.approx(expected, abs=1e-3 * blurred[0])
+    assert one.p_max[FRICTION.index(0.3)] == pytest.approx(blurred[0], rel=1e-3)
+    assert one.p0_max == one.p_max[0]
+    assert one.ratio == pytest.approx(one.s_max / one.p0_max)
+
+
+def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(
+    found: memscal.FrictionComparison,
+) -> None:
+    for one in found.loads["total"]:
+        assert one.chi_square.shape == one.p_values.shape == (len(FRICTION),)
+        assert one.chi_square.min() >= one.by_profile.least - 1e-6
+        assert one.degrees == one.by_profile.degrees + 1
+        where = [int(np.flatnonzero(one.by_profile.values == mu)[0]) for mu in FRICTION]
+        assert one.by_profile.chi_square[where] == pytest.approx(one.chi_square)
+
+
+def test_lubricated_contacts_are_found_frictionless_and_dry_ones_not(
+    found: memscal.FrictionComparison,
+) -> None:
+    for loading in LOADINGS:
+        assert found.joint["lubricated"][loading].interval.low == 0
+        assert found.joint["dry"][loading].interval.low > 0
+    (light, heavy) = found.dry_against_lubricated
+    assert (light.load, heavy.load) == (0.69, 2.75)
+    assert heavy.p_value < 1e-3
+    assert heavy.relative > 3 * heavy.relative_uncertainty
+
+
+def test_no_value_comes_without_interval_and_budget(found: memscal.FrictionComparison) -> None:
+    readings = [
+        reading
+        for loads in found.loads.values()
+        for one in loads
+        for reading in (one.by_maximum, one.by_profile)
+    ] + [reading for by in found.joint.values() for reading in by.values()]
+    for reading in readings:
+        if reading.value is None:
+            assert reading.reason
+            assert not reading.budget
+        else:
+            assert reading.interval.holds(reading.value)
+            assert {"noise", "apparatus", "young_modulus", "thickness", "load"} <= set(
+                reading.budget
+            )
+
+
+def test_a_clean_experiment_passes_its_checks_of_friction(
+    found: memscal.FrictionComparison,
+) -> None:
+    names = {check.name for check in found.checks}
+    assert {
+        "applied_force_1",
+        "profile_chi_square_4",
+        "bracketing_1",
+        "joint_chi_square_dry",
+        "joint_chi_square_lubricated",
+        "lubricated_frictionless",
+    } <= names
+    assert "lubricated_frictionless" not in failed(found)
+
+
+def test_the_messages_say_synthetic_and_hold_the_macroscopic_coefficient_against_it(
+    found: memscal.FrictionComparison,
+) -> None:
+    text = "\n".join(found.messages)
+    assert "synthetic" in text
+    assert "than the macroscopic one, 1.6" in text
+
+
+def test_a_stress_beyond_full_stick_fails_checks(
+    made: Experiment,
+    apparatus: memscal.ApparatusFunction,
+    families: dict[str, ProfileFamily],
+) -> None:
+    """A gain of 30 % that the rod scan did not have."""
+    wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
+    found = compare_measured(memscal.measure_stress(wrong, apparatus), families)
+    assert "lubricated_frictionless" in failed(found)
+    assert found.joint["dry"]["incremental"].value is None
+
+
+def test_noise_that_is_understated_fails_the_chi_square(
+    made: Experiment,
+    apparatus: memscal.ApparatusFunction,
+    families: dict[str, ProfileFamily],
+) -> None:
+    wrong = scaled(made.dry, 1.0, noise=0.25)
+    found = compare_measured(memscal.measure_stress(wrong, apparatus), families)
+    assert "joint_chi_square_dry" in failed(found)
+    assert found.joint["dry"]["incremental"].p_value < 1e-6
+
+
+def test_profiles_from_elsewhere_take_the_place_of_ours(
+    made: Experiment, apparatus: memscal.ApparatusFunction
+) -> None:
+    tables = [
+        contact.profile()
+        for mu in (0.0, 0.3)
+        for contact in memscal.indent(
+            made.dry.film, made.dry.indenter, load=[0.69, 2.75], friction=mu
+        )
+    ]
+    found = memscal.compare(made.dry, apparatus, references=tables)
+    (reading,) = found.joint["dry"].values()
+    assert found.friction.tolist() == [0.0, 0.3]
+    assert reading.interval.low > 0
+
+
+def test_a_rod_scan_is_refused(made: Experiment, apparatus: memscal.ApparatusFunction) -> None:
+    with pytest.raises(InputError, match=r"made with a rod, not with a sphere[\s\S]*calibrate"):
+        memscal.compare(made.rod, apparatus)
+
+
+def test_an_artifact_of_another_channel_or_sensor_is_refused_unless_overridden(
+    made: Experiment, apparatus: memscal.ApparatusFunction, kept: Path
+) -> None:
+    other = replace(made.dry, sensor=StressSensor(name="another", channel="zz"))
+    with pytest.raises(InputError, match="another"):
+        memscal.compare(other, apparatus)
+    channel = replace(made.dry, sensor=StressSensor(name="a simulated sensor", channel="xz"))
+    with pytest.raises(InputError, match="xz"):
+        memscal.compare(channel, apparatus)
+    found = memscal.compare(
+        other, apparatus, friction=FRICTION, loading="incremental", override=True, cache=kept
+    )
+    assert found.measured.overridden
+
+
+def test_scans_of_different_films_or_spheres_are_refused(
+    made: Experiment, apparatus: memscal.ApparatusFunction
+) -> None:
+    film = replace(made.dry.film, young_modulus=2.3e6)
+    with pytest.raises(InputError, match="another film or sphere"):
+        memscal.compare([made.lubricated, replace(made.dry, film=film)], apparatus)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"friction": [0.2]}, "nothing to choose from"),
+        ({"loading": ()}, "No loading"),
+        ({"loading": "sideways"}, "sideways"),
+        ({"interface": True}, "macroscopic friction coefficient is not given"),
+        ({"macroscopic_uncertainty": 0.1}, "macroscopic friction coefficient is not given"),
+        ({"macroscopic": -0.1}, "macroscopic"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(
+    made: Experiment,
+    apparatus: memscal.ApparatusFunction,
+    options: dict[str, object],
+    words: str,
+) -> None:
+    with pytest.raises(InputError, match=words):
+        memscal.compare(made.lubricated, apparatus, **options)
+
+
+def test_what_is_no_scan_is_refused(apparatus: memscal.ApparatusFunction) -> None:
+    with pytest.raises(InputError, match="not a Scan"):
+        memscal.compare(["sphere_dry.h5"], apparatus)  # type: ignore[list-item]
+    with pytest.raises(InputError, match="No scan"):
+        memscal.compare([], apparatus)

@@ -1,0 +1,109 @@
+"""Dry against lubricated voltages: nothing where there is nothing, and what friction adds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from friction.linear_contacts import CONVERSION, Laboratory, bare_points
+from scipy.stats import kstest
+
+from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
+from memscal.friction.load_points import LoadPoints
+from memscal.friction.predicted import members_of
+from memscal.friction.results import DryAgainstLubricated
+
+CHANCE = 1e-4
+PAIRS = 60
+LOAD = 1
+
+
+def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
+    """What a comparison reads of a measured profile."""
+    stress = points.u / CONVERSION
+    apparatus = SimpleNamespace(
+        conversion_constant=CONVERSION,
+        parameters=SimpleNamespace(uncertainty=lambda _: 0.01 * CONVERSION),
+    )
+    noise = np.diag((points.noise / CONVERSION) ** 2)
+    return SimpleNamespace(
+        part=SimpleNamespace(lubrication=lubrication, load=load),
+        restoration=SimpleNamespace(apparatus=apparatus),
+        load=load,
+        x=points.offset,
+        s_zz=stress,
+        covariances={"noise": noise, "conversion_constant": 1e-4 * np.outer(stress, stress)},
+        maximum=float(stress.max()),
+        maximum_budget={"noise": 100.0, "apparatus": 500.0},
+    )
+
+
+def compared(
+    friction: float, seed: int, *, correlation: float = 0.0, shift: float = 0.0
+) -> DryAgainstLubricated | None:
+    laboratory = Laboratory.of(points=bare_points(correlation=correlation))
+    dry = laboratory.measured(friction, 2 * seed, systematic=False)[LOAD]
+    wet = laboratory.measured(0.0, 2 * seed + 1, systematic=False)[LOAD]
+    if shift:
+        there = replace(wet, offset=wet.offset + shift)
+        moved = (
+            laboratory.predicted(0.0, LOAD, there).signal
+            - laboratory.predicted(0.0, LOAD, wet).signal
+        )
+        wet = replace(there, u=wet.u + moved[0])
+    return dry_against_lubricated(
+        (profile(dry, "dry"), profile(wet, "lubricated")),
+        (dry, wet),
+        laboratory.sensor,
+        members_of(laboratory.family, np.zeros(1)),
+        (LOAD, LOAD),
+    )
+
+
+def every(friction: float, **options: float) -> list[DryAgainstLubricated]:
+    found = [compared(friction, seed, **options) for seed in range(PAIRS)]
+    return [one for one in found if one is not None]
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"correlation": 0.6}, {"shift": 0.1e-3}], ids=["plain", "correlated", "shifted"]
+)
+def test_two_frictionless_scans_differ_by_chance(options: dict[str, float]) -> None:
+    found = every(0.0, **options)
+    assert len(found) == PAIRS
+    assert kstest([one.p_value for one in found], "uniform").pvalue > CHANCE
+    assert all(one.degrees == 33 - 3 for one in found)
+
+
+def test_friction_shows() -> None:
+    found = every(0.2)
+    assert np.mean([one.p_value < 1e-3 for one in found]) > 0.9
+    assert np.mean([one.maximum for one in found]) > 0
+
+
+def test_an_error_of_the_conversion_constant_scales_the_difference_alone() -> None:
+    one = compared(0.2, 1)
+    assert one is not None
+    noise = np.sqrt(2) * bare_points().noise[0] / CONVERSION
+    assert one.difference_errors == pytest.approx(np.hypot(noise, 0.01 * one.difference))
+    assert one.maximum_uncertainty == pytest.approx(
+        np.hypot(0.01 * one.maximum, np.sqrt(2) * 100.0)
+    )
+
+
+def test_scans_without_common_places_are_not_compared() -> None:
+    assert compared(0.0, 1, shift=0.25e-3) is None
+
+
+def test_pairs_are_of_one_load_dry_and_lubricated() -> None:
+    points = bare_points()
+    profiles = [
+        profile(points, "dry", 0.5),
+        profile(points, "dry", 2.0),
+        profile(points, "lubricated", 2.02),
+        profile(points, "", 0.5),
+    ]
+    assert lubricated_pairs(profiles) == [(1, 2)]
