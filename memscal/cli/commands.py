@@ -15,7 +15,7 @@ __all__ = ["COMMANDS", "SETTINGS", "memscal"]
 COMMANDS = {
     "calibrate": ("calibrate", "Find a sensor's apparatus function from a rod scan."),
     "reference": ("reference", "Solve the stress at the base of a film under an indenter."),
-    "apply": ("apply", "Turn contact scans into measured stress with a calibrated sensor."),
+    "apply": ("apply", "Turn contact scans into measured stress, load by load."),
     "restore": ("restore", "Restore the stress at the base of a film from a scan."),
     "compare": ("compare", "Compare measured with calculated stress: effective friction."),
     "design": ("design", "Predict the uncertainties of a scan before it is made."),
