@@ -172,7 +172,7 @@ def command(
     with working("Drawing"):
         ready = files.rendered(found)
     files.write(ready, force=force)
-    _tell(found, _source(artifact), files.paths, as_json)
+    _tell(found, artifact, tables, files.paths, as_json)
     for path in files.paths:
         message(f"Written: {path}")
     return _judged(found)
@@ -234,7 +234,11 @@ def _source(path: Path) -> SourceFile:
 
 
 def _tell(
-    found: FrictionComparison, artifact: SourceFile, files: list[Path], as_json: bool
+    found: FrictionComparison,
+    artifact: Path,
+    references: list[StressProfile],
+    files: list[Path],
+    as_json: bool,
 ) -> None:
     """Print the results and the messages."""
     from memscal.cli.compare_json import comparison_json
@@ -242,7 +246,8 @@ def _tell(
     from memscal.cli.tables import emit_tables
 
     if as_json:
-        emit_json(comparison_json(found, artifact, files))
+        sources = [profile.source for profile in references]
+        emit_json(comparison_json(found, _source(artifact), sources, files))
     else:
         emit_tables(*comparison_tables(found))
     for text in comparison_notes(found):

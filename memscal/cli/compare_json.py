@@ -23,7 +23,10 @@ __all__ = ["comparison_json"]
 
 
 def comparison_json(
-    found: FrictionComparison, artifact: SourceFile, files: Sequence[Path] = ()
+    found: FrictionComparison,
+    artifact: SourceFile,
+    references: Sequence[SourceFile | None] = (),
+    files: Sequence[Path] = (),
 ) -> dict[str, Any]:
     """Return the object that ``compare --json`` prints; its form is part of the contract.
 
@@ -34,6 +37,7 @@ def comparison_json(
         "schema_version": "1",
         "artifact": _file(artifact),
         "scans": [_file(scan.source) | {"lubrication": scan.lubrication} for scan in _scans(found)],
+        "references": [_file(source) for source in references],
         "figures": [str(path) for path in files],
         "loads": [
             _load(i, found, next(iter(found.loads.values()))[i])

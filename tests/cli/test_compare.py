@@ -16,7 +16,9 @@ from spheres import known_apparatus
 import memscal
 from memscal.cli.failures import CHECK_FAILED
 from memscal.cli.user_cache import cache_from, user_cache_folder
+from memscal.laboratory.contact_scan import PAPER_SPHERE
 from memscal.laboratory.experiment import simulate_experiment
+from memscal.laboratory.rod_scan import PAPER_FILM
 from memscal.model.scan import Scan, StressSensor
 
 CHECKED, USAGE, REFUSED, NOT_WRITTEN = CHECK_FAILED, 2, 3, 4
@@ -86,6 +88,26 @@ def test_it_finds_the_friction_of_an_experiment_from_its_files(
         )
         assert len(load["by_loading"]["incremental"]["profiles"]) >= 3
     assert names(folder) == []
+
+
+def test_profiles_calculated_elsewhere_take_the_place_of_ours(
+    compare: Callable[..., Any], folder: Path
+) -> None:
+    tables = []
+    for friction in (0.0, 0.3, float("inf")):
+        contact = memscal.indent(PAPER_FILM, PAPER_SPHERE, load=2.75, friction=friction)
+        memscal.write_reference(contact.profile(), folder / f"fem_{friction:g}.h5")
+        tables += ["--reference", f"fem_{friction:g}.h5"]
+    done = compare(*tables, "--json", scans=("lubricated.h5",))
+    assert done.code in (0, CHECKED), done.err
+    told = done.json
+    assert [table["file_name"] for table in told["references"]] == tables[1::2]
+    (load,) = told["loads"]
+    (by_loading,) = load["by_loading"].values()
+    coefficients = [profile["friction_coefficient"] for profile in by_loading["profiles"]]
+    assert coefficients == [0.0, 0.3, None]
+    chi_square = [profile["chi2"] for profile in by_loading["profiles"]]
+    assert chi_square[0] < chi_square[1]  # it is lubricated
 
 
 def test_tables_name_every_load_and_stand_within_a_hundred_columns(
