@@ -1,9 +1,10 @@
 r"""The quality checks of a measured stress: force against load, and those of each profile.
 
-The force is the transform of the restored stress at :math:`k = 0`, where :math:`\hat G = 1`: a G
-that is too wide or too narrow leaves it as it is.  So does a film of another thickness, whose
-transfer function is one there, too, but for what lies beyond the scan.  The force checks A and
-load; the shape of the profile (chi-square) checks G and film.
+The force is the transform of the restored stress at :math:`k = 0`, where :math:`\hat G = 1` and
+the film's transfer function is one: a G that is too wide, or a film whose thickness is not what is
+stated, leaves it as it is, but for what lies beyond the scan.  So does their combination, a sensor
+calibrated under a film 5 % thicker than stated: its G comes out a tenth too wide, its A as it is.
+What the force tells is A, gain and load.
 
 All loads together tell more than each: with force over load :math:`q_j`, independent
 uncertainties :math:`u_j` and common ones :math:`c_j` (A, film, stage, common load), the mean
@@ -33,9 +34,9 @@ _NEGLIGIBLE_FORCE = 0.01
 #: ... of the mean of several, whose shapes differ.
 _NEGLIGIBLE_MEAN = 0.005
 _FORCE = (
-    "It does not depend on the shape of G, and hardly on the film's thickness. A failure means "
-    "that A or the gain of the channel, the load, or the unit of one of them is wrong; a wrong "
-    "film thickness or width of G shows in chi_square and reconvolution instead."
+    "A failure means that A or the gain of the channel, the load, or the unit of one of them is "
+    "wrong. It does not depend on the shape of G nor on the film's thickness, and tells nothing "
+    "of them: a film thickness that is wrong widens the G of the calibration, by which it is seen."
 )
 #: Of a restoration's own checks, the force's is made here.
 _REPLACED = "restored_force"

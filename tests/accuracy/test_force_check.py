@@ -1,0 +1,67 @@
+"""The force check over whole experiments: false alarms, and what it sees of a mistake.
+
+Everything is drawn that a laboratory does not know: noise, the loads and their scale, positions,
+film, radii.  Set MEMSCAL_FULL_STUDY for 60 experiments a case in place of 5.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import memscal
+from memscal.measurement.stress_checks import pooled_force
+
+pytestmark = pytest.mark.accuracy
+
+EXPERIMENTS = 60 if os.environ.get("MEMSCAL_FULL_STUDY") else 5
+CHANCE = 1e-3
+#: Repeats and loads that are known well enough to see five percent.
+CAREFUL = {"repeats": 3, "load_uncertainty": 0.003}
+
+
+@lru_cache
+def study(**mistake: Any) -> list[tuple[float, float, int, float]]:
+    """Force over load, its uncertainty, failed force checks, and width of G, of each."""
+    found = []
+    for seed in range(EXPERIMENTS):
+        scans = memscal.simulate_experiment(seed=seed, draw_inputs=True, **CAREFUL, **mistake)
+        sensor = memscal.calibrate(scans.rod, method="evidence").apparatus
+        measured = memscal.measure_stress([scans.dry, scans.lubricated], sensor)
+        alarms = [c for c in measured.checks if "applied_force" in c.name and not c.passed]
+        ratio, spread = pooled_force(measured.profiles)
+        found.append((ratio, spread, len(alarms), sensor.gaussian_sigma))
+    return found
+
+
+def alarmed(**mistake: Any) -> int:
+    return sum(alarms > 0 for _, _, alarms, _ in study(**mistake))
+
+
+def test_clean_experiments_seldom_alarm() -> None:
+    # One check at 95 % and six at 99.7 %.
+    assert alarmed() <= binom.ppf(1 - CHANCE, EXPERIMENTS, 0.065)
+
+
+def test_the_pooled_force_has_the_error_that_it_states() -> None:
+    z = np.array([(ratio - 1) / np.hypot(spread, 0.005) for ratio, spread, _, _ in study()])
+    assert np.mean(z**2) < 1 + 4 * np.sqrt(2 / z.size)
+
+
+@pytest.mark.parametrize("gain", [1 / 1.05, 1.05])
+def test_a_gain_that_is_wrong_by_five_percent_is_seen(gain: float) -> None:
+    assert alarmed(gain=gain) >= binom.ppf(CHANCE, EXPERIMENTS, 0.9)
+
+
+def test_a_film_five_percent_thicker_than_stated_is_not_seen_by_force_but_by_the_width_of_g() -> (
+    None
+):
+    thick = {"thickness_factor": 1.05}
+    assert alarmed(**thick) <= binom.ppf(1 - CHANCE, EXPERIMENTS, 0.1)
+    wider = np.array([s[3] for s in study(**thick)]) / np.array([s[3] for s in study()])
+    assert np.all(wider > 1.05)

@@ -1,0 +1,247 @@
+"""Measured stress is the pressed contact's, blurred, as far as its uncertainty says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from contacts import CENTRE, LOADS, contact_scan, measured
+from scans import CONVERSION, EXACT_FILM, SIGMA
+from spheres import GAUSSIAN, known_apparatus, pressed
+
+import memscal
+from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.errors import DomainError, FitError, InputError
+from memscal.measurement.measured_stress import MeasuredProfile
+from memscal.model.provenance import SourceFile
+from memscal.model.scan import Scan, StressSensor
+
+QUIET = {"noise": 0.0, "load_scatter": 0.0, "position_error": 0.0}
+SEEDS = 5
+SENSOR = known_apparatus()
+
+
+def blurred(load: float, r: np.ndarray, friction: float = 0.0) -> np.ndarray:
+    """The contact's base stress convolved with the Gaussian by its transform, in closed form."""
+    nodes = Wavenumbers.covering(40 / EXACT_FILM.thickness, 30e-3)
+    spectrum = pressed(load, friction).base_spectrum(nodes.k) * GAUSSIAN.transform(nodes.k)
+    return np.asarray(nodes.synthesise(spectrum, r))
+
+
+def reduced(profile: MeasuredProfile) -> float:
+    """Chi-square of a profile against the truth by its full covariance, over its points."""
+    off = profile.s_zz - blurred(profile.load, profile.r)
+    return float(off @ np.linalg.solve(profile.covariance, off)) / off.size
+
+
+def test_without_noise_the_profiles_are_the_calculated_ones() -> None:
+    found = measured(**QUIET, state_noise=False)
+    assert found.passed, found.messages
+    assert [profile.load for profile in found.profiles] == list(LOADS)
+    for profile in found.profiles:
+        truth = blurred(profile.load, profile.r)
+        np.testing.assert_allclose(profile.s_zz, truth, atol=4e-3 * truth.max())
+        assert profile.maximum == pytest.approx(
+            float(blurred(profile.load, np.zeros(1))[0]), rel=4e-3
+        )
+        assert profile.centre[0] == pytest.approx(CENTRE, abs=2e-6)
+        assert np.all(np.diff(profile.r) >= 0)
+
+
+def test_the_stated_covariance_is_that_of_the_errors() -> None:
+    values = [reduced(profile) for seed in range(SEEDS) for profile in measured(seed).profiles]
+    # 33 points each; the scan's own baseline and centre take a few of them.
+    assert np.mean(values) == pytest.approx(1.0, abs=4 * np.sqrt(2 / (33 * len(values))) + 0.12)
+
+
+def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
+    z = []
+    for seed in range(SEEDS):
+        for profile in measured(seed).profiles:
+            truth = float(blurred(profile.load, np.zeros(1))[0])
+            z.append((profile.maximum - truth) / profile.maximum_uncertainty)
+            z.append((profile.force - profile.load) / profile.force_uncertainty)
+    spread = np.sqrt(2 / len(z))
+    # The force's uncertainty allows for shapes that a sphere does not have.
+    assert 0.3 < np.mean(np.square(z)) < 1 + 4 * spread
+
+
+def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum() -> None:
+    exact, found = measured(3), measured(3, conversion_uncertainty=0.02)
+    for before, after in zip(exact.profiles, found.profiles, strict=True):
+        part = after.covariances["conversion_constant"]
+        np.testing.assert_allclose(part, 4e-4 * np.outer(after.s_zz, after.s_zz), rtol=1e-9)
+        np.testing.assert_allclose(
+            after.covariance - part, before.covariance, rtol=0.05, atol=1e-4 * part.max()
+        )
+        assert after.maximum_budget["apparatus"] == pytest.approx(0.02 * after.maximum, rel=0.02)
+
+
+def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum() -> None:
+    scan = contact_scan(1)
+    right = memscal.measure_stress(scan, known_apparatus(width_uncertainty=0.05))
+    kernel = memscal.GaussianMixture((1.0,), (1.05 * SIGMA,))
+    wrong = memscal.measure_stress(scan, known_apparatus(kernel))
+    for a, b in zip(right.profiles, wrong.profiles, strict=True):
+        assert abs(a.maximum - b.maximum) < 0.005 * a.maximum
+        assert a.maximum_budget["apparatus"] < 0.005 * a.maximum
+
+
+def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() -> None:
+    for profile in measured(2).profiles:
+        found, a = profile.restoration, CONVERSION
+        nodes = found.posterior.nodes
+        sigma = found.posterior.covariance[nodes:, nodes:]
+        # Columns by differences: a shifted centre moves every point on the blurred profile.
+        step = 1e-6
+        towards = np.sign(profile.x - profile.centre[0])
+        slope = blurred_slope(profile, step) * towards
+        xi = 2 * (profile.x - profile.x.min()) / np.ptp(profile.x) - 1
+        columns = np.column_stack([slope, -np.ones_like(xi) / a, -xi / a])
+        joint = columns @ sigma @ columns.T
+        stated = profile.covariances["centre"] + profile.covariances["baseline"]
+        np.testing.assert_allclose(stated, joint, atol=0.02 * np.abs(joint).max())
+        for source in ("centre", "baseline"):
+            values = np.linalg.eigvalsh(profile.covariances[source])
+            assert values.min() > -1e-9 * values.max()
+
+
+def blurred_slope(profile: MeasuredProfile, step: float) -> np.ndarray:
+    restored = profile.restoration
+    above, below = (restored.blurred_stress(profile.r + s) for s in (step, -step))
+    return np.asarray((above - below) / (2 * step))
+
+
+def test_recorded_loads_off_the_nominal_one_are_corrected() -> None:
+    options = {**QUIET, "load_scatter": 0.03, "record_loads": True, "load_reading": 0.0}
+    found = measured(4, **options, state_noise=False)
+    for profile in found.profiles:
+        truth = blurred(profile.load, profile.r)
+        np.testing.assert_allclose(profile.s_zz, truth, atol=5e-3 * truth.max())
+    # Without its record the same scatter is noise.
+    blind = measured(4, **{**options, "record_loads": False}, state_noise=False)
+    off = [np.abs(p.s_zz - blurred(p.load, p.r)).max() / p.maximum for p in blind.profiles]
+    assert min(off) > 0.01
+
+
+def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
+    ratios = []
+    for seed in range(SEEDS):
+        scan = contact_scan(seed)
+        assert scan.u_zz_errors is not None
+        found = memscal.measure_stress(replace(scan, u_zz_errors=None), SENSOR)
+        truth = float(scan.u_zz_errors[0, 0])
+        ratios += [float(p.electronic_noise.min()) / truth for p in found.profiles]
+        names = {check.name.rpartition("_")[0] for check in found.checks}
+        assert not names & {"chi_square", "noise_as_stated"}
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.15)
+    assert 0.5 < min(ratios) <= max(ratios) < 1.7
+
+
+def test_repeats_at_one_position_are_averaged() -> None:
+    once, thrice = measured(5), measured(5, repeats=3)
+    for few, many in zip(once.profiles, thrice.profiles, strict=True):
+        assert many.r.size == few.r.size == 33
+        ratio = np.diag(few.covariances["noise"]) / np.diag(many.covariances["noise"])
+        assert np.median(ratio) == pytest.approx(3.0, rel=0.25)
+
+
+def test_a_rod_is_measured_like_a_sphere() -> None:
+    scan = memscal.simulate(seed=2, points=33)
+    [profile] = memscal.measure_stress(scan, SENSOR).profiles
+    assert abs(profile.force - 1.0) < 4 * profile.force_uncertainty
+
+
+def test_profiles_of_several_scans_know_theirs() -> None:
+    found = memscal.measure_stress(
+        [contact_scan(1), contact_scan(2, load=(0.69,), lubrication="lubricated")], SENSOR
+    )
+    assert [found.scan_of(profile) for profile in found.profiles] == [0, 0, 0, 0, 1]
+    assert [p.lubrication for p in found.profiles] == ["dry"] * 4 + ["lubricated"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sensor": StressSensor(name="another", channel="zz")}, 'sensor "another".*"a simulated'),
+        ({"sensor": StressSensor(name="a simulated sensor", channel="xz")}, "channel xz.*zz"),
+        ({"film": replace(EXACT_FILM, thickness=2.2e-3)}, r"thickness 2\.2 mm.*2 mm"),
+        ({"film": replace(EXACT_FILM, young_modulus=3e6)}, "young modulus 3 MPa.*2.2 MPa"),
+        ({"film": replace(EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
+    ],
+)
+def test_what_does_not_belong_together_is_refused_by_both_names(
+    changes: dict[str, object], words: str
+) -> None:
+    scan = replace(contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=rf"s\.h5 does not belong to the artifact: .*{words}"):
+        memscal.measure_stress(scan, SENSOR)
+
+
+def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
+    named = replace(SENSOR, film=replace(EXACT_FILM, name="film 1"))
+    scan = replace(contact_scan(load=(1.37,)), film=replace(EXACT_FILM, name="film 2"))
+    with pytest.raises(InputError, match='film "film 2" in the scan, "film 1" in the artifact'):
+        memscal.measure_stress(scan, named)
+    found = memscal.measure_stress(scan, named, override=True)
+    assert len(found.overridden) == 1
+    assert "film 2" in found.overridden[0]
+    assert any(text.startswith("Overridden: ") for text in found.messages)
+    assert found.configuration["override"] is True
+
+
+def test_films_that_agree_within_their_uncertainties_are_one() -> None:
+    film = replace(EXACT_FILM, thickness=2.08e-3, thickness_uncertainty=0.05e-3)
+    found = memscal.measure_stress(replace(contact_scan(load=(1.37,)), film=film), SENSOR)
+    assert found.overridden == ()
+
+
+def spoilt(row: int, columns: slice) -> Scan:
+    scan = contact_scan()
+    u = scan.u_zz.copy()
+    u[row, columns] = np.nan
+    return replace(scan, u_zz=u, source=SourceFile("gaps.h5", ""))
+
+
+def test_a_load_without_voltages_is_refused_by_its_name() -> None:
+    with pytest.raises(InputError, match=r"gaps\.h5, 0\.69 N, dry: all 33 points are missing"):
+        memscal.measure_stress(spoilt(1, slice(None)), SENSOR)
+
+
+def test_a_gap_of_a_contact_s_radius_is_refused_with_its_size_and_place() -> None:
+    with pytest.raises(InputError, match=r"1\.37 N, dry: 9 neighbouring points .* -2 to 2 mm"):
+        memscal.measure_stress(spoilt(2, slice(12, 21)), SENSOR)
+
+
+def test_a_few_missing_points_are_no_gap() -> None:
+    found = memscal.measure_stress(spoilt(3, slice(14, 16)), SENSOR)
+    assert found.profiles[3].r.size == 31
+    assert any("2 points of the scan are missing" in text for text in found.messages)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_scan_that_never_comes_down_to_its_baseline_is_refused(friction: float) -> None:
+    short = contact_scan(spacing=0.22e-3, friction=friction, load=(0.69, 2.75))
+    with pytest.raises(FitError, match=r"0\.69 N, dry: the scan ends .* still has \d+% of its max"):
+        memscal.measure_stress(short, SENSOR)
+
+
+def test_a_scan_that_ends_on_one_side_of_the_contact_is_refused() -> None:
+    with pytest.raises(FitError, match="the scan ends"):
+        memscal.measure_stress(contact_scan(load=(2.75,), centre=(6e-3, 0.0)), SENSOR)
+
+
+def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
+    scan = contact_scan(load=(1.37,))
+    assert scan.normal_load is not None
+    heavy = replace(scan, normal_load=scan.normal_load * 1e6, source=SourceFile("heavy.h5", ""))
+    with pytest.raises(DomainError, match=r"heavy\.h5, 1\.37e\+06 N, dry"):
+        memscal.measure_stress(heavy, SENSOR)
+
+
+def test_what_is_no_scan_is_refused() -> None:
+    with pytest.raises(InputError, match="given a str"):
+        memscal.measure_stress(["sphere.h5"], SENSOR)  # type: ignore[list-item]
+    with pytest.raises(InputError, match="no scan"):
+        memscal.measure_stress([], SENSOR)

@@ -1,0 +1,92 @@
+"""The force check: what it sees, what it does not, and how often it is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from contacts import contact_scan, measured
+from scans import EXACT_FILM, SIGMA
+from spheres import known_apparatus
+
+import memscal
+from memscal.measurement.measured_stress import MeasuredStress
+from memscal.measurement.stress_checks import pooled_force
+
+SENSOR = known_apparatus()
+QUIET = {"noise": 0.001, "load_scatter": 0.002, "position_error": 0.0}
+
+
+def ratios(found: MeasuredStress) -> np.ndarray:
+    return np.array([profile.force / profile.load for profile in found.profiles])
+
+
+def failed(found: MeasuredStress) -> set[str]:
+    return {check.name for check in found.checks if not check.passed}
+
+
+def test_there_is_a_check_for_each_load_and_one_for_all() -> None:
+    names = [check.name for check in measured(0).checks if "force" in check.name]
+    assert names == [*(f"applied_force_{i}" for i in (1, 2, 3, 4)), "applied_force_all"]
+    values = {check.name: check for check in measured(0).checks}
+    assert len(values) == len(measured(0).checks)
+    assert values["applied_force_3"].meaning.startswith("1.37 N, dry: ")
+    for name in names:
+        p = values[name].p_value
+        assert p is not None
+        assert (p > 0.05) == (values[name].value < 1.96)
+
+
+def test_one_profile_has_no_check_of_all() -> None:
+    names = {check.name for check in measured(0, load=(1.37,)).checks}
+    assert "applied_force_1" in names
+    assert "applied_force_all" not in names
+
+
+@pytest.mark.parametrize("share", [-0.2, 0.2])
+def test_the_force_does_not_depend_on_the_width_of_g(share: float) -> None:
+    scan = contact_scan(1, **QUIET)
+    kernel = memscal.GaussianMixture((1.0,), ((1 + share) * SIGMA,))
+    right = ratios(memscal.measure_stress(scan, SENSOR))
+    wrong = ratios(memscal.measure_stress(scan, known_apparatus(kernel)))
+    np.testing.assert_allclose(wrong, right, atol=0.01)
+    assert abs(np.mean(wrong - right)) < 0.006
+
+
+def test_the_force_does_not_depend_on_the_thickness_of_the_film() -> None:
+    scan = contact_scan(1, **QUIET)
+    thicker = replace(scan, film=replace(EXACT_FILM, thickness=1.05 * EXACT_FILM.thickness))
+    found = memscal.measure_stress(thicker, SENSOR, override=True)
+    right = ratios(memscal.measure_stress(scan, SENSOR))
+    np.testing.assert_allclose(ratios(found), right, atol=0.01)
+
+
+@pytest.mark.parametrize("gain", [1 / 1.05, 1.05])
+def test_a_gain_that_is_wrong_by_five_percent_is_seen(gain: float) -> None:
+    scan = contact_scan(2, **QUIET)
+    assert scan.u_zz_errors is not None
+    wrong = replace(scan, u_zz=gain * scan.u_zz, u_zz_errors=gain * scan.u_zz_errors)
+    found = memscal.measure_stress(wrong, SENSOR)
+    assert "applied_force_all" in failed(found)
+    np.testing.assert_allclose(
+        ratios(found), gain * ratios(memscal.measure_stress(scan, SENSOR)), rtol=2e-3
+    )
+
+
+def test_all_profiles_together_tell_more_than_one_until_a_is_all_that_is_left() -> None:
+    found = measured(3, conversion_uncertainty=0.01)
+    single = [p.force_budget["scan"] / p.load for p in found.profiles]
+    _, spread = pooled_force(found.profiles)
+    assert 0.01 < spread < np.hypot(min(single), 0.01)
+    own = 1 / np.sqrt(np.sum(np.array(single) ** -2.0))
+    assert spread == pytest.approx(np.hypot(own, 0.01), rel=0.03)
+
+
+def test_a_common_error_of_the_loads_does_not_average_out() -> None:
+    one, four = (
+        pooled_force(measured(3, load=loads, load_uncertainty=0.03).profiles)[1]
+        for loads in ((2.75,), (0.34, 0.69, 1.37, 2.75))
+    )
+    assert four > 0.03
+    assert one > four
