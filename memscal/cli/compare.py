@@ -255,9 +255,15 @@ def _tell(
 
 
 def _judged(found: FrictionComparison) -> int:
-    failed = [check.name.replace("_", " ") for check in found.checks if not check.passed]
-    if not failed:
+    from memscal.cli.compare_view import failures
+
+    count = sum(not check.passed for check in found.checks)
+    if not count:
         return DONE
-    count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
-    warn(f"{count} failed ({', '.join(failed)}).")
+    named = [
+        f"{kind.replace('_', ' ')} {' '.join(numbers)}".strip()
+        for kind, numbers in failures(found.checks).items()
+    ]
+    counted = "A quality check" if count == 1 else f"{count} quality checks"
+    warn(f"{counted} failed ({', '.join(named)}).")
     return CHECK_FAILED

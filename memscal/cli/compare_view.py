@@ -16,7 +16,7 @@ from memscal.friction.results import EffectiveFriction, FrictionComparison, Load
 from memscal.model.apparatus import QualityCheck
 from memscal.model.notation import format_measured
 
-__all__ = ["comparison_notes", "comparison_tables"]
+__all__ = ["comparison_notes", "comparison_tables", "failures"]
 
 _LABELS = ("", "state", "load (N)")
 #: No table is wider than this many columns of text.
@@ -40,11 +40,40 @@ def comparison_tables(found: FrictionComparison) -> list[Table]:
 
 
 def comparison_notes(found: FrictionComparison) -> Iterator[str]:
-    """Return what a user should know, each thing once."""
-    said = dict.fromkeys([*found.messages, *_reasons(found)])
+    """Return what a user should know, each thing once; what failed of several profiles, once."""
+    said = dict.fromkeys([*_once_a_kind(found), *_reasons(found)])
     if found.interface is not None:
         said |= dict.fromkeys(found.interface.messages)
     yield from said
+
+
+def failures(checks: Sequence[QualityCheck]) -> dict[str, list[str]]:
+    """Return the numbers of the profiles that failed, by kind of check; none of a single one."""
+    failed: dict[str, list[str]] = {}
+    for check in checks:
+        if not check.passed:
+            number = check.name.removeprefix(_kind(check)).lstrip("_")
+            failed.setdefault(_kind(check), []).extend([number] if number else [])
+    return failed
+
+
+def _once_a_kind(found: FrictionComparison) -> Iterator[str]:
+    """Return the messages; of a check that failed for several profiles, the first one."""
+    failed = failures(found.checks)
+    repeated = {
+        f"Quality check {kind}_{number} failed": numbers
+        for kind, numbers in failed.items()
+        for number in numbers
+    }
+    told: set[tuple[str, ...]] = set()
+    for text in found.messages:
+        numbers = repeated.get(text.partition(":")[0], [])
+        key = (text.partition(":")[0].rpartition("_")[0], *numbers)
+        if len(numbers) < 2:
+            yield text
+        elif key not in told:
+            told.add(key)
+            yield f"{text} The same of profiles {', '.join(numbers[1:])}."
 
 
 def _reasons(found: FrictionComparison) -> Iterator[str]:

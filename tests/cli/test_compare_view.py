@@ -119,6 +119,18 @@ def test_checks_of_each_profile_are_told_by_the_worst_and_failures_one_by_one() 
     assert failing.marked == {0}
 
 
+def test_what_failed_of_several_profiles_is_told_once_with_their_numbers() -> None:
+    failed = [QualityCheck(f"force_{i}", 2.0, 1.0, False, "meaning") for i in (1, 2, 4)]
+    alone = QualityCheck("noise_3", 2.0, 1.0, False, "meaning")
+    messages = [f"Quality check {check.name} failed: 2 exceeds 1." for check in (*failed, alone)]
+    told = comparison(checks=(*failed, alone), messages=("A note.", *messages))
+    assert list(comparison_notes(told)) == [
+        "A note.",
+        "Quality check force_1 failed: 2 exceeds 1. The same of profiles 2, 4.",
+        "Quality check noise_3 failed: 2 exceeds 1.",
+    ]
+
+
 def test_a_bound_has_its_reason_and_no_budget(sticking: FrictionComparison) -> None:
     text = printed(sticking)
     assert "above" in text
