@@ -95,7 +95,8 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, told: bool) -> N
         elinewidth=0.6,
         **look,
     )
-    axes.plot(profile.r[~shown] / MM, profile.s_zz[~shown] / KPA, alpha=0.3, **look)
+    if not shown.all():
+        axes.plot(profile.r[~shown] / MM, profile.s_zz[~shown] / KPA, alpha=0.3, **look)
     radius = profile.contact_radius / MM
     axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=":" if lubricated else "-")
 

@@ -1,0 +1,149 @@
+"""``memscal apply``: what it prints, what it writes, and its exit codes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from console import Run, names
+from contacts import contact_scan
+from spheres import known_apparatus
+
+import memscal
+from memscal.cli.failures import CHECK_FAILED
+from memscal.errors import InputError
+
+LOADS = (0.69, 2.75)
+REFUSED, EXISTS, USAGE = 3, 4, 2
+
+
+@pytest.fixture
+def artifact(folder: Path) -> Path:
+    path = folder / "sensor.apparatus.h5"
+    known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01).save(path)
+    return path
+
+
+@pytest.fixture
+def dry(folder: Path) -> Path:
+    path = folder / "dry.h5"
+    memscal.write_scan(contact_scan(1, load=LOADS), path)
+    return path
+
+
+@pytest.fixture
+def lubricated(folder: Path) -> Path:
+    path = folder / "lubricated.h5"
+    memscal.write_scan(contact_scan(2, load=LOADS[:1], lubrication="lubricated"), path)
+    return path
+
+
+def test_it_prints_a_line_for_each_load_of_each_scan(
+    run: Run, artifact: Path, dry: Path, lubricated: Path, folder: Path
+) -> None:
+    done = run("apply", artifact, dry, lubricated)
+    assert done.code == 0, done.err
+    for words in ("0.69 N  dry", "2.75 N  dry", "0.69 N  lubricated", "kPa", "applied force all"):
+        assert words in done.out
+    assert "Written: " in done.err
+    assert "dry.stress.h5" in names(folder)
+
+
+def test_the_file_names_its_inputs_and_holds_the_profiles(
+    run: Run, artifact: Path, dry: Path, lubricated: Path, folder: Path
+) -> None:
+    assert run("apply", artifact, dry, lubricated, "-o", "out.h5").code == 0
+    found = memscal.read_stress(folder / "out.h5")
+    measured = memscal.measure_stress([memscal.read_scan(p) for p in (dry, lubricated)], artifact)
+    for mine, its in zip(found.profiles, measured.profiles, strict=True):
+        np.testing.assert_allclose(mine.s_zz, its.s_zz, rtol=1e-9)
+        assert mine.uncertainty("maximum") == pytest.approx(its.maximum_uncertainty)
+    assert found.artifact is not None
+    assert found.artifact.file_name == "sensor.apparatus.h5"
+    assert [source.file_name for source in found.scans] == ["dry.h5", "lubricated.h5"]
+    assert [profile.scan for profile in found.profiles] == [0, 0, 1]
+    assert run("check", "out.h5").code == 0
+    assert "memscal-stress" in run("inspect", "out.h5").out
+
+
+def test_json_holds_the_same_numbers(run: Run, artifact: Path, dry: Path) -> None:
+    done = run("apply", artifact, dry, "--json")
+    measured = memscal.measure_stress(memscal.read_scan(dry), artifact)
+    for mine, its in zip(done.json["profiles"], measured.profiles, strict=True):
+        assert mine["force"]["value"] == pytest.approx(its.force)
+        assert mine["maximum"]["standard_uncertainty"] == pytest.approx(
+            its.maximum_uncertainty * 1e-3
+        )
+        np.testing.assert_allclose(mine["stress"]["s_zz_kpa"], its.s_zz * 1e-3)
+        assert mine["scan"] == "dry.h5"
+    assert {c["name"] for c in done.json["checks"]} == {c.name for c in measured.checks}
+    assert done.json["output"] == str(dry.with_name("dry.stress.h5"))
+
+
+def test_a_wrong_gain_fails_the_check_and_the_exit_code_says_so(
+    run: Run, artifact: Path, folder: Path
+) -> None:
+    scan = contact_scan(1, load=LOADS, noise=0.001, load_scatter=0.0)
+    memscal.write_scan(replace(scan, u_zz=1.2 * scan.u_zz), folder / "gain.h5")
+    done = run("apply", artifact, "gain.h5")
+    assert done.code == CHECK_FAILED
+    assert "FAILED: applied force" in done.out
+    assert "A or the gain of the channel" in done.err
+    assert "gain.stress.h5" in names(folder)
+
+
+def test_another_film_is_refused_and_an_override_is_recorded(
+    run: Run, artifact: Path, folder: Path
+) -> None:
+    scan = contact_scan(1, load=LOADS)
+    film = replace(scan.film, thickness=2.1e-3)
+    memscal.write_scan(replace(scan, film=film), folder / "other.h5")
+    done = run("apply", artifact, "other.h5")
+    assert done.code == REFUSED
+    for words in ("other.h5", "2.1 mm in the scan", "2 mm in the artifact", "--override"):
+        assert words in done.err
+    assert "other.stress.h5" not in names(folder)
+    done = run("apply", artifact, "other.h5", "--override")
+    assert "Overridden: other.h5: film thickness" in done.err
+    found = memscal.read_stress(folder / "other.stress.h5")
+    assert "thickness" in found.overridden[0]
+    assert found.process.configuration == {"override": True}
+
+
+def test_an_existing_output_is_kept_without_force(
+    run: Run, artifact: Path, dry: Path, folder: Path
+) -> None:
+    (folder / "dry.stress.h5").write_text("mine")
+    assert run("apply", artifact, dry).code == EXISTS
+    assert (folder / "dry.stress.h5").read_text() == "mine"
+    assert run("apply", artifact, dry, "--force").code == 0
+    assert h5py.is_hdf5(folder / "dry.stress.h5")
+
+
+def test_an_input_is_never_overwritten(run: Run, artifact: Path, dry: Path) -> None:
+    before = dry.read_bytes()
+    assert run("apply", artifact, dry, "-o", dry, "--force").code == EXISTS
+    assert dry.read_bytes() == before
+
+
+def test_files_of_another_kind_are_refused(run: Run, artifact: Path, dry: Path) -> None:
+    assert "memscal-artifact" in run("apply", dry, dry).err
+    assert "memscal-scan" in run("apply", artifact, artifact).err
+    assert run("apply", artifact).code == USAGE
+    assert run("apply", artifact, "absent.h5").code == REFUSED
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_a_figure_is_drawn(run: Run, artifact: Path, dry: Path, folder: Path, suffix: str) -> None:
+    assert run("apply", artifact, dry, "--figure", f"f.{suffix}").code == 0
+    assert (folder / f"f.{suffix}").stat().st_size > 1000
+
+
+def test_python_and_the_command_refuse_alike(artifact: Path) -> None:
+    scan = contact_scan(1, load=LOADS)
+    film = replace(scan.film, thickness=2.1e-3)
+    with pytest.raises(InputError, match="does not belong to the artifact"):
+        memscal.measure_stress(replace(scan, film=film), artifact)
