@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ EXAMPLES = """\b
 Examples:
   memscal compare sensor.apparatus.h5 dry.h5
   memscal compare sensor.apparatus.h5 dry.h5 lubricated.h5 --macroscopic 1.6 --figure friction.pdf
-  memscal compare sensor.apparatus.h5 dry.h5 --friction 0 --friction 0.2 --friction inf --json
+  memscal compare sensor.apparatus.h5 dry.h5 --friction 0.1 --friction 0.2 --json
   memscal compare sensor.apparatus.h5 dry.h5 --loading incremental --interface --macroscopic 1.6
   memscal compare sensor.apparatus.h5 dry.h5 --reference fem0.h5 --reference fem03.h5
 """
@@ -43,8 +44,9 @@ Examples:
     type=_COEFFICIENT,
     multiple=True,
     metavar="MU",
-    help="Friction coefficient to calculate profiles for; inf: the film sticks wherever it is "
-    "touched. Repeated: at least two.  [default: nine, from 0 to inf]",
+    help="Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
+    "wherever it is touched); between them profiles are interpolated. Repeated: several.  "
+    "[default: nine between 0 and inf]",
 )
 @click.option(
     "--loading",
@@ -159,7 +161,7 @@ def command(
         found = compare(
             data,
             known,
-            friction=friction or None,
+            friction=_coefficients(friction),
             loading=loadings or ("incremental", "total"),
             references=tables or None,
             macroscopic=macroscopic,
@@ -178,6 +180,11 @@ def command(
     return _judged(found)
 
 
+def _coefficients(given: tuple[float, ...]) -> tuple[float, ...] | None:
+    """Return coefficients in their order, from none to full stick; ``None`` for the usual ones."""
+    return tuple(sorted({0.0, *given, math.inf})) if given else None
+
+
 def _workers() -> int:
     """Return how many processes calculate contacts: two where there are two cores."""
     import os
@@ -194,11 +201,6 @@ def _check_usage(
     interface: bool,
 ) -> None:
     """Refuse options that do not go together, before anything is read."""
-    if len(friction) == 1 and not references:
-        raise click.UsageError(
-            "One --friction is nothing to choose from: repeat it, such as --friction 0 "
-            "--friction 0.2 --friction inf."
-        )
     for name, values in (("friction", friction), ("loading", loadings)):
         twice = [value for value in values if values.count(value) > 1]
         if twice:
@@ -242,7 +244,8 @@ def _tell(
 ) -> None:
     """Print the results and the messages."""
     from memscal.cli.compare_json import comparison_json
-    from memscal.cli.compare_view import comparison_notes, comparison_tables
+    from memscal.cli.compare_notes import comparison_notes
+    from memscal.cli.compare_view import comparison_tables
     from memscal.cli.tables import emit_tables
 
     if as_json:
@@ -255,7 +258,7 @@ def _tell(
 
 
 def _judged(found: FrictionComparison) -> int:
-    from memscal.cli.compare_view import failures
+    from memscal.cli.compare_notes import failures
 
     count = sum(not check.passed for check in found.checks)
     if not count:

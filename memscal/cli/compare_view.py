@@ -1,4 +1,4 @@
-"""A comparison of measured with calculated stress as tables and notes for people."""
+"""A comparison of measured with calculated stress as tables for people."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import groupby
 
 from memscal.cli.calibration_view import checks_table
+from memscal.cli.compare_notes import kind, which
 from memscal.cli.friction_text import bounded_text, friction_name, percent
 from memscal.cli.interface_view import interface_tables
 from memscal.cli.tables import Table
@@ -16,7 +17,7 @@ from memscal.friction.results import EffectiveFriction, FrictionComparison, Load
 from memscal.model.apparatus import QualityCheck
 from memscal.model.notation import format_measured
 
-__all__ = ["comparison_notes", "comparison_tables", "failures"]
+__all__ = ["comparison_tables"]
 
 _LABELS = ("", "state", "load (N)")
 #: No table is wider than this many columns of text.
@@ -37,60 +38,6 @@ def comparison_tables(found: FrictionComparison) -> list[Table]:
         *([] if found.interface is None else interface_tables(found.interface)),
         _checks_table(found.checks),
     ]
-
-
-def comparison_notes(found: FrictionComparison) -> Iterator[str]:
-    """Return what a user should know, each thing once; what failed of several profiles, once."""
-    said = dict.fromkeys([*_once_a_kind(found), *_reasons(found)])
-    if found.interface is not None:
-        said |= dict.fromkeys(found.interface.messages)
-    yield from said
-
-
-def failures(checks: Sequence[QualityCheck]) -> dict[str, list[str]]:
-    """Return the numbers of the profiles that failed, by kind of check; none of a single one."""
-    failed: dict[str, list[str]] = {}
-    for check in checks:
-        if not check.passed:
-            number = check.name.removeprefix(_kind(check)).lstrip("_")
-            failed.setdefault(_kind(check), []).extend([number] if number else [])
-    return failed
-
-
-def _once_a_kind(found: FrictionComparison) -> Iterator[str]:
-    """Return the messages; of a check that failed for several profiles, the first one."""
-    failed = failures(found.checks)
-    repeated = {
-        f"Quality check {kind}_{number} failed": numbers
-        for kind, numbers in failed.items()
-        for number in numbers
-    }
-    told: set[tuple[str, ...]] = set()
-    for text in found.messages:
-        numbers = repeated.get(text.partition(":")[0], [])
-        key = (text.partition(":")[0].rpartition("_")[0], *numbers)
-        if len(numbers) < 2:
-            yield text
-        elif key not in told:
-            told.add(key)
-            yield f"{text} The same of profiles {', '.join(numbers[1:])}."
-
-
-def _reasons(found: FrictionComparison) -> Iterator[str]:
-    """Return why the coefficient of all loads together has no value, where it has none."""
-    for lubrication, by_loading in found.joint.items():
-        for loading, joint in by_loading.items():
-            if joint.reason:
-                yield f"{_capital(_which(lubrication, loading))}, all loads: {joint.reason}"
-
-
-def _which(lubrication: str, loading: str) -> str:
-    words = [lubrication or "lubrication not stated", f"{loading} loading" if loading else ""]
-    return ", ".join(word for word in words if word)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _maxima_table(found: FrictionComparison) -> Table:
@@ -201,7 +148,7 @@ def _short(chi_square: float) -> str:
 def _budget_table(found: FrictionComparison) -> Table:
     """Return what each source adds to the uncertainty of the coefficient of all loads."""
     columns = {
-        _which(lubrication, loading).removesuffix(" loading"): joint
+        which(lubrication, loading).removesuffix(" loading"): joint
         for lubrication, by_loading in found.joint.items()
         for loading, joint in by_loading.items()
         if joint.value is not None and joint.budget
@@ -231,7 +178,7 @@ def _macroscopic_table(found: FrictionComparison) -> Table:
     value, u = found.macroscopic
     title = f"Beside the macroscopic friction coefficient, {format_measured(value, u)}"
     rows = [
-        [_which(lubrication, loading), bounded_text(joint), _against(joint, value)]
+        [which(lubrication, loading), bounded_text(joint), _against(joint, value)]
         for lubrication, by_loading in found.joint.items()
         for loading, joint in by_loading.items()
     ]
@@ -248,7 +195,7 @@ def _against(joint: EffectiveFriction, value: float) -> str:
 def _checks_table(checks: Sequence[QualityCheck]) -> Table:
     """Return what failed, and of checks that were made of each profile the closest to failing."""
     shown: list[QualityCheck] = []
-    for name, of_it in groupby(sorted(checks, key=_kind_in(checks)), key=_kind):
+    for name, of_it in groupby(sorted(checks, key=_kind_in(checks)), key=kind):
         group = list(of_it)
         passed = [check for check in group if check.passed]
         shown += [check for check in group if not check.passed]
@@ -259,15 +206,10 @@ def _checks_table(checks: Sequence[QualityCheck]) -> Table:
     return checks_table(shown)
 
 
-def _kind(check: QualityCheck) -> str:
-    """Return a check's name without the number of its profile."""
-    return check.name.rstrip("0123456789").rstrip("_")
-
-
 def _kind_in(checks: Sequence[QualityCheck]) -> Callable[[QualityCheck], int]:
     """Return an order in which checks of one kind follow each other, kinds as they came."""
-    order = list(dict.fromkeys(_kind(check) for check in checks))
-    return lambda check: order.index(_kind(check))
+    order = list(dict.fromkeys(kind(check) for check in checks))
+    return lambda check: order.index(kind(check))
 
 
 def _lubrication_table(found: FrictionComparison) -> Table:

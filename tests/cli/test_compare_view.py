@@ -11,7 +11,8 @@ import pytest
 from friction_results import FRICTION, LOADS, comparison, interface_comparison
 
 from memscal.cli.compare_json import comparison_json
-from memscal.cli.compare_view import comparison_notes, comparison_tables
+from memscal.cli.compare_notes import comparison_notes
+from memscal.cli.compare_view import comparison_tables
 from memscal.cli.friction_text import bounded_text
 from memscal.friction.results import EffectiveFriction, FrictionComparison, Interval
 from memscal.model.apparatus import QualityCheck
@@ -129,6 +130,16 @@ def test_what_failed_of_several_profiles_is_told_once_with_their_numbers() -> No
         "Quality check force_1 failed: 2 exceeds 1. The same of profiles 2, 4.",
         "Quality check noise_3 failed: 2 exceeds 1.",
     ]
+
+
+def test_a_wide_gap_between_coefficients_and_a_missing_frictionless_profile_are_told() -> None:
+    def notes(*friction: float) -> str:
+        return " ".join(comparison_notes(comparison(friction_grid=np.array(friction))))
+
+    assert "between the friction coefficients 0 and 0.2" in notes(0.0, 0.2, 0.3, math.inf)
+    assert "p0_max is that of friction 0.1" in notes(0.1, 0.2, 0.3, math.inf)
+    # Past the friction at which a contact sticks nearly wholly, little changes.
+    assert notes(*FRICTION) == notes(0.0, 0.1, 0.2, 0.3, math.inf) == ""
 
 
 def test_a_bound_has_its_reason_and_no_budget(sticking: FrictionComparison) -> None:
