@@ -225,7 +225,7 @@ def friction_set_figure(
             axes.set_ylabel(label)
         figure.align_ylabels(panels[:, 0])
         figure.supxlabel("distance from the centre (mm)", fontsize=8)
-        _legend_of_friction(figure, found, lubricated_words(loads[0].lubrication), loading)
+        _legend_of_friction(figure, found, loads[0].lubrication, loading)
     return figure
 
 
@@ -254,7 +254,7 @@ def _draw_set(axes: Axes, found: FrictionComparison, one: LoadComparison) -> Non
         curve = on_axis(one.profile.r, one.calculated[[i]], r)[0]
         axes.plot(r / MM, curve / KPA, color=friction_colours(found.friction[i])[0], lw=0.9)
     _points(axes, one, COLOURS["measured"], "", False)
-    axes.set_xlim(0, r[-1] / MM)
+    axes.set_xlim(0, 1.03 * r[-1] / MM)
     axes.set_ylim(bottom=0)
 
 
@@ -281,7 +281,17 @@ def _draw_best(axes: Axes, found: FrictionComparison, one: LoadComparison) -> No
     z = (one.profile.s_zz - one.calculated[best]) / one.profile.s_zz_errors
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    axes.plot(one.profile.r / MM, z, "o", color=COLOURS["measured"], ms=2.5)
+    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+    black = COLOURS["measured"]
+    axes.plot(
+        one.profile.r / MM,
+        z,
+        marker,
+        color=black,
+        ms=2.5,
+        mew=0.6,
+        mfc=black if filled else "white",
+    )
     label = rf"least $\chi^2$: $\mu$ = {friction_name(found.friction[best])}"
     axes.annotate(
         label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7
@@ -305,8 +315,11 @@ def _legend_of_friction(
                label=rf"$\mu$ = {friction_name(found.friction[i])}")
         for i in _shown_indices(found)
     ]  # fmt: skip
-    words = f"measured, {lubrication}"
-    point = Line2D([], [], color="k", marker="o", ms=3, ls="none", label=words)
+    marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
+    point = Line2D(
+        [], [], color="k", marker=marker, ms=3, mfc="k" if filled else "white", ls="none"
+    )
+    point.set_label(f"measured, {lubricated_words(lubrication)}")
     title = f"{loading} loading" if loading else "profiles as given"
     figure.legend(
         handles=[point, *handles], loc="outside upper center", ncols=len(handles) + 1, title=title,
