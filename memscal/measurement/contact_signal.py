@@ -25,6 +25,8 @@ __all__ = ["ContactSignal", "contact_signal"]
 
 _LARGEST_KH = 20.0
 _LOAD_STEP = 0.02
+#: Enough for 1e-4 of the derivative, in half the time that convergence to 1e-4 takes.
+_RINGS = 24
 #: Distances at which the profile is tabulated, out to the scan's width.
 _DISTANCES = 401
 
@@ -62,7 +64,7 @@ def contact_signal(part: SingleLoad, apparatus: ApparatusFunction) -> ContactSig
     scan, load = part.scan, part.load
     loads = load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
     try:
-        contacts = indent(scan.film, scan.indenter, load=loads)
+        contacts = indent(scan.film, scan.indenter, load=loads, rings=_RINGS)
     except DomainError as failure:
         raise DomainError(
             f"{place_of(scan, part)}: {failure.problem}",
