@@ -1,0 +1,208 @@
+"""Laws of the interface weighed by what was calculated: each is found where it is the truth."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from friction.interface_points import (
+    LOADS,
+    MACROSCOPIC,
+    PAPER,
+    PRECISE,
+    Precision,
+    amontons,
+    measured,
+    read_without_error,
+    sensor,
+    slipping,
+    yielding,
+)
+
+from memscal.errors import InputError
+from memscal.friction.compliance import compare_interface
+from memscal.friction.compliance_results import LawComparison
+from memscal.friction.family import ProfileFamily
+from memscal.friction.likelihood import likelihood
+from memscal.friction.predicted import members_of
+from memscal.friction.weighed_laws import weigh_normal_compliance, weigh_slip_length
+
+
+@lru_cache
+def weighed(truth: str, value: float, precision: Precision = PRECISE) -> LawComparison:
+    family = {"rigid": amontons, "slipping": slipping}[truth]()
+    points = read_without_error(family, value, precision)
+    return weigh_slip_length(
+        measured(points, amontons()), measured(points, slipping()), macroscopic=MACROSCOPIC
+    )
+
+
+def relative_uncertainty(length: float, precision: Precision) -> float:
+    """Return what the likelihood's slope tells about a slip length, everything else free."""
+    family = slipping()
+    points = read_without_error(family, length, precision)
+    found = measured(points, family)
+    members = members_of(family, np.array([length]))
+    curve = likelihood(points, found.sensor, members, range(len(LOADS)))
+    t = family.coordinate(length)
+    return float(1 / np.sqrt(curve.information[0])) / (t * (1 - t))
+
+
+@pytest.mark.parametrize("length", [7e-6, 16e-6, 50e-6])
+def test_a_slip_length_is_found_where_it_is_the_truth(length: float) -> None:
+    found = weighed("slipping", length)
+    assert found.yielding_preferred
+    assert all(factor.favoured == found.laws[-1].name for factor in found.factors)
+    assert found.length.value == pytest.approx(length, rel=0.05)
+    assert found.length.interval.holds(length)
+    assert found.laws[-1].least == pytest.approx(0.0, abs=0.5)
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.2])
+def test_an_effective_coefficient_is_found_where_it_is_the_truth(friction: float) -> None:
+    found = weighed("rigid", friction)
+    assert not found.yielding_preferred
+    one, each, slip = found.laws
+    assert one.log_evidence > each.log_evidence > slip.log_evidence
+    assert one.best[0] == pytest.approx(friction, abs=0.01)
+    assert each.best == pytest.approx([friction] * len(LOADS), abs=0.02)
+
+
+def test_more_freedom_is_charged_by_occams_factor() -> None:
+    # Both explain the data without a misfit: the law of four parameters pays for them.
+    one, each, _ = weighed("rigid", 0.2).laws
+    assert each.least == pytest.approx(one.least, abs=0.5)
+    assert each.log_occam < one.log_occam < 0
+
+
+def test_a_rigid_interface_at_full_stick_gives_an_upper_bound_of_the_slip_length() -> None:
+    found = weighed("rigid", math.inf)
+    assert not found.yielding_preferred
+    assert found.length.value is None
+    assert found.length.interval.low == 0
+    assert found.length.interval.high is not None
+    assert 0 < found.length.interval.high < 5e-6
+    assert "upper bound" in found.length.reason
+
+
+def test_without_friction_a_slip_length_has_no_upper_bound() -> None:
+    found = weighed("rigid", 0.0)
+    assert found.length.value is None
+    assert found.length.interval.high is None
+    assert "lower bound" in found.length.reason
+
+
+def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load() -> None:
+    implied = weighed("slipping", 16e-6).implied
+    assert implied is not None
+    assert np.all(np.diff(implied.friction, axis=0) > 0)
+    # A longer slip length means less friction.
+    assert np.all(np.diff(implied.friction, axis=1) < 0)
+    # A rigid interface of that friction gives the same stress on the axis.
+    gauge = sensor(amontons())
+    for load, friction in enumerate(implied.friction[:, 1]):
+        rigid = amontons().at(float(friction)).spectra[load]
+        yields = slipping().at(weighed("slipping", 16e-6).length.best).spectra[load]
+        on_axis = [
+            float(amontons().wavenumbers.synthesise(gauge.transfer * own, np.array(0.0)))
+            for own in (rigid, yields)
+        ]
+        assert on_axis[0] == pytest.approx(on_axis[1], rel=1e-4)
+
+
+def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() -> None:
+    found = weighed("slipping", 16e-6)
+    implied, length = found.implied, found.length.value
+    assert implied is not None
+    assert length is not None
+    radii = [
+        float(np.interp(slipping().coordinate(length), slipping().coordinates, r))
+        for r in slipping().contact_radii.T
+    ]
+    pressure = np.array(LOADS) / (np.pi * np.array(radii) ** 2)
+    assert implied.pressures == pytest.approx(pressure)
+    assert implied.stiffnesses[:, 1] == pytest.approx(MACROSCOPIC * pressure / length)
+
+
+@pytest.mark.parametrize(
+    ("length", "precision", "expected"),
+    [
+        (4e-6, PAPER, 0.63),
+        (16e-6, PAPER, 0.47),
+        (4e-6, PRECISE, 0.20),
+        (16e-6, PRECISE, 0.095),
+        (40e-6, PRECISE, 0.083),
+    ],
+)
+def test_how_well_a_slip_length_can_be_known_is_what_the_documentation_says(
+    length: float, precision: Precision, expected: float
+) -> None:
+    assert relative_uncertainty(length, precision) == pytest.approx(expected, rel=0.15)
+
+
+def test_the_papers_slip_length_cannot_be_known_to_a_fifth_from_data_like_the_papers() -> None:
+    assert relative_uncertainty(1.82e-6, PAPER) > 0.7
+    assert relative_uncertainty(1.82e-6, PRECISE) > 0.2
+
+
+def test_the_interval_is_as_wide_as_the_slope_of_the_likelihood_says() -> None:
+    found = weighed("slipping", 16e-6).length
+    assert found.standard_uncertainty is not None
+    expected = relative_uncertainty(16e-6, PRECISE) * 16e-6
+    assert found.standard_uncertainty == pytest.approx(expected, rel=0.15)
+
+
+def test_an_uncertain_macroscopic_coefficient_makes_the_slip_length_as_uncertain() -> None:
+    # Where nothing slips the law knows friction over slip length only: a change of one by a
+    # tenth is undone by a change of the other.
+    from dataclasses import replace
+
+    exact = slipping()
+    t = exact.coordinates[:, None, None]
+    slope = np.stack([exact.at(float(v)).by_coordinate for v in exact.values])
+    change = -0.1 * t * (1 - t) * slope
+    doubtful = replace(exact, changes={**exact.changes, "macroscopic_friction": change})
+    points = read_without_error(exact, 16e-6, PRECISE)
+    found = weigh_slip_length(
+        measured(points, amontons()), measured(points, doubtful), macroscopic=MACROSCOPIC
+    ).length
+    assert found.standard_uncertainty is not None
+    alone = weighed("slipping", 16e-6).length.standard_uncertainty
+    assert alone is not None
+    assert found.standard_uncertainty == pytest.approx(math.hypot(alone, 1.6e-6), rel=0.1)
+
+
+def test_the_bayes_factor_depends_on_the_prior_as_its_density_does() -> None:
+    found = weighed("slipping", 16e-6)
+    known = {prior.prior: prior.log_factor for prior in found.priors}
+    three = known["slip length log-uniform from 0.1 to 100 um"]
+    five = known["slip length log-uniform from 0.01 to 1e+03 um"]
+    assert three == pytest.approx(found.factors[0].log_factor)
+    assert three - five == pytest.approx(math.log(5 / 3), abs=0.02)
+
+
+def normal(truth: ProfileFamily, value: float) -> LawComparison:
+    points = read_without_error(truth, value, PRECISE)
+    return weigh_normal_compliance(measured(points, yielding()))
+
+
+def test_a_rigid_lubricated_interface_gives_an_upper_bound() -> None:
+    found = normal(yielding(), 0.0)
+    assert not found.yielding_preferred
+    assert found.length.value is None
+    assert found.length.interval.low == 0
+    assert found.length.interval.high is not None
+    assert "upper bound" in found.length.reason
+
+
+def test_a_normal_compliance_is_found_where_it_is_the_truth() -> None:
+    found = normal(yielding(), 2e-6)
+    assert found.yielding_preferred
+    assert found.length.value == pytest.approx(2e-6, rel=0.05)
+
+
+def test_nothing_measured_is_refused() -> None:
+    with pytest.raises(InputError, match="No measured profile"):
+        compare_interface([], None, macroscopic=1.6)  # type: ignore[arg-type]
