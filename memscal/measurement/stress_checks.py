@@ -35,8 +35,11 @@ _NEGLIGIBLE_FORCE = 0.01
 _NEGLIGIBLE_MEAN = 0.005
 _FORCE = (
     "A failure means that A or the gain of the channel, the load, or the unit of one of them is "
-    "wrong. It does not depend on the shape of G nor on the film's thickness, and tells nothing "
-    "of them: a film thickness that is wrong widens the G of the calibration, by which it is seen."
+    "wrong."
+)
+_BLIND = (
+    " It does not depend on the shape of G nor on the film's thickness, and tells nothing of them: "
+    "a film thickness that is wrong shows as another width of G in the calibration."
 )
 #: Of a restoration's own checks, the force's is made here.
 _REPLACED = "restored_force"
@@ -110,7 +113,7 @@ def _all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
         _MEAN_LIMIT,
         f"Total force over applied load, the weighted mean of {len(profiles)} profiles: "
         f"{mean:.4f}, with a standard uncertainty of {allowed:.2g}, in units of which its "
-        "difference from one is counted. " + _FORCE,
+        "difference from one is counted. " + _FORCE + _BLIND,
         _two_sided((mean - 1) / allowed),
     )
 
