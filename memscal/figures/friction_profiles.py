@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from memscal.figures.friction_points import EXPANDED, draw_errorbar, draw_points, share_limits
 from memscal.figures.friction_scale import (
     LUBRICATIONS,
     chosen,
@@ -22,16 +22,11 @@ from memscal.figures.friction_scale import (
 from memscal.figures.quantities import KPA, MM
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.friction.results import FrictionComparison, LoadComparison
-from memscal.model.validation import FloatArray
 
 __all__ = ["draw_profiles", "draw_residuals", "friction_set_figure", "profile_figure"]
 
 _FINE = 241
 _DECADES = 3.3
-_EXPANDED = 2.0
-#: How strongly points are drawn that do not stand clear of zero.
-_PALE = 0.25
-_LEAST_LIMIT, _LARGEST_LIMIT = 3.5, 12.0
 _SHOWN = (0.0, 0.05, 0.1, 0.2, 0.3, np.inf)
 #: Panels of a row of loads: with more, only the smallest, the largest and those between fit.
 _MOST_LOADS = 4
@@ -72,7 +67,7 @@ def profile_figure(
         draw_profiles(panels[0, 1], found, loads, logarithmic=True)
         for axes, index in zip(panels[1], (0, -1), strict=True):
             draw_residuals(axes, found, loads, index)
-        _share_limits(panels[1])
+        share_limits(panels[1])
         for axes, letter in zip(panels.flat, "abcd", strict=True):
             panel_letter(axes, letter)
     return figure
@@ -93,7 +88,7 @@ def draw_profiles(
         limits = on_axis(one.profile.r, one.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
         axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
-        _points(axes, one, colour, "" if logarithmic else name, logarithmic)
+        draw_points(axes, one, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
         top = max(float(one.profile.s_zz.max()) for one in loads) / KPA
         axes.set_yscale("log")
@@ -120,45 +115,11 @@ def _say_what(axes: Axes, found: FrictionComparison, one: LoadComparison) -> Non
     )
 
 
-def _points(axes: Axes, one: LoadComparison, colour: str, label: str, logarithmic: bool) -> None:
-    """Draw the measured points.
-
-    On a logarithmic scale those that are not above 0 are left out, and those that are less than
-    twice their uncertainty are pale: they say no more than that the stress has decayed.
-    """
-    r, s, u = (np.asarray(v) for v in (one.profile.r, one.profile.s_zz, one.profile.s_zz_errors))
-    clear = s > _EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
-    for shown, strength in ((clear, 1.0), (~clear & (s > 0), _PALE)):
-        if shown.any():
-            _errorbar(
-                axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA, one,
-                colour=colour, label=label, strength=strength,
-            )  # fmt: skip
-
-
-def _errorbar(
-    axes: Axes,
-    x: FloatArray,
-    y: FloatArray,
-    u: FloatArray,
-    one: LoadComparison,
-    *,
-    colour: str,
-    label: str = "",
-    strength: float = 1.0,
-) -> None:
-    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
-    style: dict[str, Any] = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
-    face = colour if filled else "white"
-    style |= {"label": label or "_points", "alpha": None if strength == 1.0 else strength}
-    axes.errorbar(x, y, u, fmt=marker, color=colour, mfc=face, **style)
-
-
 def draw_residuals(
     axes: Axes, found: FrictionComparison, loads: Sequence[LoadComparison], index: int
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
-    axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
+    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     looks = load_looks(found)
     for one in loads:
@@ -169,19 +130,6 @@ def draw_residuals(
         points.set_markerfacecolor(colour if filled else "white")
     axes.set_xlabel("distance from the centre (mm)")
     axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(found.friction[index])}}})/u$")
-
-
-def _share_limits(panels: Sequence[Axes]) -> None:
-    """Give residual panels one scale that shows every point, and at least the band."""
-    sizes = [
-        np.abs(np.asarray(line.get_ydata()))
-        for axes in panels
-        for line in axes.lines
-        if line.get_marker() not in ("None", "", None)
-    ]
-    limit = max(_LEAST_LIMIT, 1.1 * float(np.max(np.concatenate(sizes))))
-    for axes in panels:
-        axes.set_ylim(-limit, limit)
 
 
 def friction_set_figure(
@@ -218,7 +166,7 @@ def friction_set_figure(
             _draw_set(column[0], found, one)
             _draw_differences(column[1], found, one)
             _draw_best(column[2], found, one)
-        _share_limits(panels[2])
+        share_limits(panels[2])
         _share_differences(panels[1])
         words = ("stress (kPa)", "beyond frictionless\n(% of its maximum)", "residual / $u$")
         for axes, label in zip(panels[:, 0], words, strict=True):
@@ -253,7 +201,7 @@ def _draw_set(axes: Axes, found: FrictionComparison, one: LoadComparison) -> Non
     for i in _shown_indices(found):
         curve = on_axis(one.profile.r, one.calculated[[i]], r)[0]
         axes.plot(r / MM, curve / KPA, color=friction_colours(found.friction[i])[0], lw=0.9)
-    _points(axes, one, COLOURS["measured"], "", False)
+    draw_points(axes, one, COLOURS["measured"], "", False)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
     axes.set_ylim(bottom=0)
 
@@ -266,7 +214,7 @@ def _draw_differences(axes: Axes, found: FrictionComparison, one: LoadComparison
         change = (one.calculated[i] - one.calculated[0])[None, :]
         colour = friction_colours(found.friction[i])[0]
         axes.plot(r / MM, on_axis(one.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
-    _errorbar(
+    draw_errorbar(
         axes,
         one.profile.r / MM,
         (one.profile.s_zz - one.calculated[0]) / unit,
@@ -279,7 +227,7 @@ def _draw_differences(axes: Axes, found: FrictionComparison, one: LoadComparison
 def _draw_best(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
     best = int(np.argmin(one.chi_square))
     z = (one.profile.s_zz - one.calculated[best]) / one.profile.s_zz_errors
-    axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0)
+    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
     black = COLOURS["measured"]
