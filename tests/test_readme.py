@@ -16,6 +16,7 @@ ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^```console\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 SPHERE = next(block for block in COMMANDS if "reference sphere" in block)
+CHAIN = next(block for block in COMMANDS if "--experiment sphere" in block)
 EXAMPLES = re.findall(r"^```python\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 
 
@@ -25,6 +26,18 @@ def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(ROOT / "calibration_data", tmp_path / "calibration_data")
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+def numbers(line: str) -> list[float]:
+    return [float(text) for text in NUMBER.findall(line)]
+
+
+def words(line: str) -> list[str]:
+    """What is left of a line of a table without its numbers and rules."""
+    return NUMBER.sub("", line).replace("-", "").split()
 
 
 def test_set_up_takes_exactly_two_commands() -> None:
@@ -73,6 +86,32 @@ def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
         # Depths, radii and stresses; the last digit of another machine may differ.
         numbers = [[float(cell) for cell in line.split()[:6]] for line in (ours, theirs)]
         assert numbers[0] == pytest.approx(numbers[1], rel=2e-3)
+
+
+def test_the_way_from_contacts_to_friction_prints_what_is_shown(
+    fresh_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The whole chain, from files only; in a cache of its own, so that it starts from cold."""
+    monkeypatch.setenv("XDG_CACHE_HOME", os.fspath(fresh_folder / "cache"))
+    installed = Path(sys.executable).with_name("memscal")
+    printed: dict[str, list[str]] = {}
+    for line in CHAIN.strip().splitlines():
+        _, *arguments = shlex.split(line)
+        run = subprocess.run(
+            [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
+        )
+        assert run.returncode == 0, run.stderr
+        printed[arguments[0]] = run.stdout.splitlines()
+    for name in ("contacts.stress.h5", "contacts.png", "friction.png"):
+        assert (fresh_folder / name).is_file()
+    applied, compared = README.split(CHAIN)[1].split("```text\n")[1:3]
+    for command, shown in (("apply", applied), ("compare", compared)):
+        expected = shown.split("\n```")[0].splitlines()
+        assert len(expected) > 8
+        for ours, theirs in zip(printed[command], expected, strict=False):
+            assert words(ours) == words(theirs)
+            # The last digit of another machine may differ.
+            assert numbers(ours) == pytest.approx(numbers(theirs), rel=0.02, abs=0.02)
 
 
 @pytest.mark.usefixtures("fresh_folder")
