@@ -1,0 +1,33 @@
+"""Speed of the likelihood of contacts: all values at once against one by one."""
+
+from __future__ import annotations
+
+from statistics import median
+
+import numpy as np
+import pytest
+from friction.linear_contacts import Laboratory
+from timing import once
+
+from memscal.friction.effective import fine_values
+from memscal.friction.likelihood import likelihood
+from memscal.friction.predicted import members_of
+
+
+@pytest.mark.benchmark
+def test_a_whole_profile_likelihood_costs_less_than_its_values_one_by_one() -> None:
+    laboratory = Laboratory.of()
+    points = laboratory.measured(0.2, seed=1)
+    values = fine_values(laboratory.family)
+    members = members_of(laboratory.family, values)
+    single = [members_of(laboratory.family, np.array([value])) for value in values]
+
+    def together() -> None:
+        assert likelihood(points, laboratory.sensor, members, [0, 1]).chi_square.all()
+
+    def one_by_one() -> None:
+        for one in single:
+            assert likelihood(points, laboratory.sensor, one, [0, 1]).chi_square.all()
+
+    pairs = [(once(one_by_one), once(together)) for _ in range(3)]
+    assert median(apart / whole for apart, whole in pairs) > 3
