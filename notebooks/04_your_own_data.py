@@ -113,8 +113,8 @@ run(
 # %% [markdown]
 # Two kinds of error of the load are told apart. `--load-uncertainty` is common to all contacts, as
 # that of the balance: it moves every stress alike. It is in N at the nominal load of the scan, and
-# in proportion at the others. `--load-scatter`, in percent, is each contact's own, as of a lens that
-# is set down by hand: it is noise, and repeats average it.
+# in proportion at the others. `--load-scatter`, in percent, is each contact's own, as of a lens
+# that is set down by hand: it is noise, and repeats average it.
 #
 # Read the notes. They say how many places and lines were found, what is missing, and how far a
 # reading lies from its place. Had the load that was set not been named among the columns of
