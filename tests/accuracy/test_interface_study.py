@@ -1,0 +1,127 @@
+"""Virtual experiments whose interface is known: which law is preferred, and its slip length.
+
+Set MEMSCAL_FULL_STUDY for 40 experiments of each kind in place of 3.  All inputs are drawn from
+their stated uncertainties.  An experiment like the paper's does not tell a slip length to better
+than a factor; *precise* ones, of less noise, with loads that are recorded and with more repeats,
+do.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import memscal
+from memscal.friction.calculated import amontons_family, elasto_plastic_family
+from memscal.friction.compliance import compare_interface
+from memscal.friction.compliance_results import LawComparison
+from memscal.friction.family import ProfileFamily
+from memscal.laboratory.contact_scan import PAPER_LOADS, PAPER_SPHERE
+from memscal.laboratory.rod_scan import PAPER_FILM
+from memscal.mechanics.interface import Interface
+
+pytestmark = pytest.mark.accuracy
+
+SEEDS = 40 if os.environ.get("MEMSCAL_FULL_STUDY") else 3
+CHANCE = 1e-3
+MACROSCOPIC = 1.6
+SLIP_LENGTH = 16e-6
+_REACH = 12e-3
+
+PRECISE: dict[str, Any] = {
+    "noise": 0.001,
+    "record_loads": True,
+    "load_reading": 0.002,
+    "position_error": 2e-6,
+    "repeats": 9,
+}
+PAPER: dict[str, Any] = {"noise": 0.003, "repeats": 3}
+
+
+@lru_cache
+def rigid() -> ProfileFamily:
+    """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
+    return amontons_family(PAPER_FILM, PAPER_SPHERE, PAPER_LOADS, reach=_REACH)
+
+
+@lru_cache
+def slipping() -> ProfileFamily:
+    return elasto_plastic_family(
+        PAPER_FILM, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, reach=_REACH
+    )
+
+
+@lru_cache
+def weighed(friction: float, slip_length: float, precise: bool, seed: int) -> LawComparison:
+    """Make, calibrate and measure one experiment, and weigh laws of its dry interface."""
+    interface = Interface(slip_length=slip_length) if slip_length else None
+    made = memscal.simulate_experiment(
+        friction=friction,
+        interface=interface,
+        draw_inputs=True,
+        # Every kind of experiment has seeds of its own: shared ones would be unlucky together.
+        seed=round(1e5 * friction + 1e9 * slip_length) * 1000 + 500 * precise + seed,
+        **(PRECISE if precise else PAPER),
+    )
+    apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
+    found = compare_interface(
+        memscal.measure_stress([made.dry], apparatus).profiles,
+        apparatus,
+        macroscopic=MACROSCOPIC,
+        amontons=rigid(),
+        slipping=slipping(),
+    ).tangential
+    assert found is not None
+    return found
+
+
+def experiments(
+    friction: float, slip_length: float = 0.0, *, precise: bool = True
+) -> list[LawComparison]:
+    return [weighed(friction, slip_length, precise, seed) for seed in range(SEEDS)]
+
+
+def enough(share: float) -> int:
+    """Fewest successes that chance allows of a share."""
+    return int(binom.ppf(CHANCE, SEEDS, share))
+
+
+def test_a_slip_length_is_preferred_where_it_is_the_truth() -> None:
+    found = experiments(MACROSCOPIC, SLIP_LENGTH)
+    assert sum(one.yielding_preferred for one in found) >= enough(0.98)
+
+
+def test_an_effective_coefficient_is_not_given_up_where_it_is_the_truth() -> None:
+    for friction in (0.1, 0.2):
+        found = experiments(friction)
+        assert sum(not one.yielding_preferred for one in found) >= enough(0.98)
+
+
+def test_the_slip_length_is_that_which_was_put_in() -> None:
+    # Stated: 10 %.  The spread over experiments is 13 %: the contacts' own numerical errors and
+    # what is not linear in film and sensor come on top.
+    found = experiments(MACROSCOPIC, SLIP_LENGTH)
+    ratios = np.array([one.length.best for one in found]) / SLIP_LENGTH
+    assert np.sum(np.abs(ratios - 1) <= 0.20) >= enough(0.75)
+    assert np.sum(np.abs(ratios - 1) <= 0.35) >= enough(0.95)
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.12 + 0.2 / math.sqrt(SEEDS))
+
+
+def test_the_effective_coefficient_grows_with_the_load() -> None:
+    for one in experiments(MACROSCOPIC, SLIP_LENGTH):
+        assert one.implied is not None
+        assert np.all(np.diff(one.implied.friction[:, 1]) > 0)
+        assert one.implied.friction[-1, 1] > 1.5 * one.implied.friction[0, 1]
+
+
+def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor() -> None:
+    for one in experiments(MACROSCOPIC, 1.82e-6, precise=False):
+        length = one.length
+        high = math.inf if length.interval.high is None else length.interval.high
+        assert high > 3 * max(length.interval.low, 0.2e-6)
