@@ -6,10 +6,9 @@ import math
 from typing import Protocol
 
 from memscal.friction.results import Interval
+from memscal.model.notation import format_bound
 
 __all__ = ["bounded_text", "friction_name", "percent"]
-
-_DIGITS = 2
 
 
 class Bounded(Protocol):
@@ -57,15 +56,17 @@ def bounded_text(found: Bounded, scale: float = 1.0, unit: str = "") -> str:
     if high is None:
         if low <= 0:
             return "not identifiable"
-        bound = _outward(low, math.floor)
+        bound = format_bound(low, upper=False)
         if found.value is None:
             return f"above {bound}{tail} ({level})"
         return f"{found.value / scale:.2g} [{bound}, ∞]{tail}"
     high /= scale
     if low <= 0 and (found.value is None or found.value <= 0):
-        return f"below {_outward(high, math.ceil)}{tail} ({level})"
+        return f"below {format_bound(high, upper=True)}{tail} ({level})"
     if found.value is None:
-        return f"[{_outward(low, math.floor)}, {_outward(high, math.ceil)}]{tail} ({level})"
+        return (
+            f"[{format_bound(low, upper=False)}, {format_bound(high, upper=True)}]{tail} ({level})"
+        )
     return f"{_rounded(found.value / scale, low, high)}{tail}"
 
 
@@ -78,18 +79,6 @@ def _rounded(value: float, low: float, high: float) -> str:
     places = max(0, -math.floor(math.log10(min(sides) / 3))) if sides else 3
     ends = (f"{end:.{places}f}" if end > 0 else "0" for end in (low, high))
     return f"{value:.{places}f} [{', '.join(ends)}]"
-
-
-def _outward(bound: float, direction: object) -> str:
-    """Round a bound to two digits: down (``math.floor``) or up (``math.ceil``)."""
-    if bound <= 0:
-        return "0"
-    place = _DIGITS - 1 - math.floor(math.log10(bound))
-    round_ = math.floor if direction is math.floor else math.ceil
-    shifted = bound * 10.0**place
-    nearest = round(shifted)
-    digits = nearest if abs(shifted - nearest) < 1e-9 else round_(shifted)
-    return f"{digits * 10.0**-place:.{max(place, 0)}f}"
 
 
 def friction_name(friction: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -58,21 +58,7 @@ def effective_friction_figure(found: FrictionComparison) -> Figure:
         the maximum and by the whole profile with intervals (arrows where one side is open), the
         interval of all loads together as a band, and the macroscopic coefficient.
     """
-    lubrications = list(found.joint)
-    with house_style():
-        figure = new_figure(0.6 + 2.7 * len(lubrications))
-        panels = figure.subplots(
-            len(lubrications), len(found.loadings), sharex=True, sharey=True, squeeze=False
-        )
-        for row, lubrication in zip(panels, lubrications, strict=True):
-            for axes, loading in zip(row, found.loadings, strict=True):
-                draw_effective(axes, found, lubrication, loading)
-                _name_panel(axes, lubrication, loading)
-        for axes, letter in zip(panels.flat, "abcdef", strict=False):
-            panel_letter(axes, letter)
-            axes.label_outer()
-        _one_legend(figure, panels.flat)
-    return figure
+    return _panels(found, draw_effective, 2.7)
 
 
 def draw_effective(
@@ -148,6 +134,29 @@ def _draw_macroscopic(axes: Axes, given: tuple[float, float | None] | None) -> N
         axes.axhspan(low, high, color=COLOURS["muted"], alpha=0.15, lw=0)
 
 
+def _panels(
+    found: FrictionComparison,
+    draw: Callable[[Axes, FrictionComparison, str, str], None],
+    height: float,
+) -> Figure:
+    """Draw a row of ``height`` inches for each lubrication, a panel for each loading."""
+    lubrications = list(found.joint)
+    with house_style():
+        figure = new_figure(0.6 + height * len(lubrications))
+        panels = figure.subplots(
+            len(lubrications), len(found.loadings), sharex=True, sharey=True, squeeze=False
+        )
+        for row, lubrication in zip(panels, lubrications, strict=True):
+            for axes, loading in zip(row, found.loadings, strict=True):
+                draw(axes, found, lubrication, loading)
+                _name_panel(axes, lubrication, loading)
+        for axes, letter in zip(panels.flat, "abcdef", strict=False):
+            panel_letter(axes, letter)
+            axes.label_outer()
+        _one_legend(figure, panels.flat)
+    return figure
+
+
 def _name_panel(axes: Axes, lubrication: str, loading: str) -> None:
     words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
     axes.set_title(words, fontsize=8, loc="left")
@@ -184,21 +193,7 @@ def likelihood_figure(found: FrictionComparison) -> Figure:
         its least value against the coefficient, of each load's profile and of all together, with
         the levels that bound 68.3 % and 95 %.
     """
-    lubrications = list(found.joint)
-    with house_style():
-        figure = new_figure(0.6 + 2.4 * len(lubrications))
-        panels = figure.subplots(
-            len(lubrications), len(found.loadings), sharex=True, sharey=True, squeeze=False
-        )
-        for row, lubrication in zip(panels, lubrications, strict=True):
-            for axes, loading in zip(row, found.loadings, strict=True):
-                draw_likelihood(axes, found, lubrication, loading)
-                _name_panel(axes, lubrication, loading)
-        for axes, letter in zip(panels.flat, "abcdef", strict=False):
-            panel_letter(axes, letter)
-            axes.label_outer()
-        _one_legend(figure, panels.flat)
-    return figure
+    return _panels(found, draw_likelihood, 2.4)
 
 
 def draw_likelihood(

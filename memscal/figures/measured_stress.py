@@ -43,7 +43,9 @@ def measured_stress_figure(found: MeasuredStress) -> Figure:
     with house_style():
         figure = new_figure(3.6)
         panels = figure.subplots(1, 2)
-        for axes, letter in zip(panels, "ab", strict=True):
+        scales = ("linear scale", "logarithmic scale, three decades")
+        for axes, letter, scale in zip(panels, "ab", scales, strict=True):
+            axes.set_title(scale, fontsize=8, loc="left")
             for profile, colour in _coloured(found):
                 _draw(axes, profile, colour, told=axes is panels[1])
             axes.set_xlabel("distance from the centre (mm)")

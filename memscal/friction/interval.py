@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from memscal.friction.results import Interval
+from memscal.model.notation import format_bound
 from memscal.model.validation import FloatArray
 
 __all__ = ["Profiled", "profiled", "reason_of"]
@@ -154,7 +155,8 @@ def reason_of(found: Profiled, last: float, what: str = "friction coefficient") 
             f"The {what} is not identifiable: no friction and {end} agree with the data "
             "equally well."
         )
+    bound = format_bound(found.interval.low, upper=False)
     return (
-        f"The {what} is not identifiable above {found.interval.low:.2g}: every larger one, {end} "
-        "included, agrees with the data as well. This is a lower bound."
+        f"The {what} is not identifiable above {bound}: every larger one, {end} included, agrees "
+        "with the data as well. This is a lower bound."
     )

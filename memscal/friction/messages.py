@@ -11,6 +11,7 @@ from memscal.friction.family import ProfileFamily
 from memscal.friction.results import EffectiveFriction
 from memscal.measurement.measured_stress import MeasuredStress
 from memscal.model.apparatus import QualityCheck
+from memscal.model.notation import format_bound
 
 __all__ = ["comparison_messages"]
 
@@ -96,6 +97,8 @@ def _against_macroscopic(
                 verdict = "is larger than the macroscopic one"
             elif high is not None and value - spread > high:
                 verdict = "is smaller than the macroscopic one"
+            elif high is None:
+                verdict = "has no upper bound, so that it does not contradict the macroscopic one"
             else:
                 verdict = "agrees with the macroscopic one"
             words = f" ({loading} loading)" if loading else ""
@@ -138,7 +141,8 @@ def in_words(found: EffectiveFriction) -> str:
     """Return a coefficient with its interval, or its bound, in words."""
     low, high = found.interval.low, found.interval.high
     if high is None or math.isinf(high):
-        return f"at least {low:.2g}" if low > 0 else "no bound"
+        return f"at least {format_bound(low, upper=False)}" if low > 0 else "no bound"
+    above = format_bound(high, upper=True)
     if found.value is None or low == 0:
-        return f"at most {high:.2g}"
-    return f"{found.value:.2g} ({low:.2g} to {high:.2g})"
+        return f"at most {above}"
+    return f"{found.value:.2g} ({format_bound(low, upper=False)} to {above})"

@@ -48,7 +48,7 @@ def accept_mismatches(
             why="An apparatus function holds for one channel of one sensor, as it was calibrated "
             "under its film.",
             cure="Give the artifact of this sensor and film. If they are the same under other "
-            "names, override it (override=True; memscal apply ... --override): that is recorded.",
+            "names, override it (override=True; --override on the command line): that is recorded.",
         )
     return tuple(f"{place}: {text}" for text in found)
 

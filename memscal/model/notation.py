@@ -7,7 +7,7 @@ from decimal import Decimal, localcontext
 
 from memscal.errors import InputError
 
-__all__ = ["format_measured"]
+__all__ = ["format_bound", "format_measured"]
 
 # Outside these powers of ten a factor reads better than a row of zeros.
 _PLAIN_EXPONENTS = range(-3, 5)
@@ -100,3 +100,31 @@ def _two_digits(spread: Decimal) -> Decimal:
     for _ in range(2):
         spread = spread.quantize(Decimal(1).scaleb(spread.adjusted() - 1))
     return spread
+
+
+def format_bound(bound: float, *, upper: bool) -> str:
+    """Write a bound to two digits, rounded outward: no more is said than was found.
+
+    Parameters
+    ----------
+    bound : float
+        A bound of something that is not negative.
+    upper : bool
+        Whether it is an upper bound, which is rounded up; a lower one is rounded down.
+
+    Examples
+    --------
+    >>> format_bound(0.2471, upper=False), format_bound(0.0123, upper=True)
+    ('0.24', '0.013')
+    >>> format_bound(0.2, upper=False), format_bound(0.0, upper=False)
+    ('0.20', '0')
+    """
+    if bound <= 0:
+        return "0"
+    place = 1 - math.floor(math.log10(bound))
+    shifted = bound * 10.0**place
+    nearest = round(shifted)
+    # A bound that has two digits only stays what it is.
+    outward = math.ceil(shifted) if upper else math.floor(shifted)
+    digits = nearest if abs(shifted - nearest) < 1e-9 else outward
+    return f"{digits * 10.0**-place:.{max(place, 0)}f}"
