@@ -104,8 +104,8 @@ def test_an_effective_coefficient_is_not_given_up_where_it_is_the_truth() -> Non
 
 
 def test_the_slip_length_is_that_which_was_put_in() -> None:
-    # Stated: 10 %.  The spread over experiments is 13 %: the contacts' own numerical errors and
-    # what is not linear in film and sensor come on top.
+    # Stated: 10 %.  The spread over experiments is 12 %, as A G and the contacts depend on the same
+    # film, which the likelihood does not know: docs/friction.md.
     found = experiments(MACROSCOPIC, SLIP_LENGTH)
     ratios = np.array([one.length.best for one in found]) / SLIP_LENGTH
     assert np.sum(np.abs(ratios - 1) <= 0.20) >= enough(0.75)
@@ -121,7 +121,9 @@ def test_the_effective_coefficient_grows_with_the_load() -> None:
 
 
 def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor() -> None:
+    wide = 0
     for one in experiments(MACROSCOPIC, 1.82e-6, precise=False):
-        length = one.length
-        high = math.inf if length.interval.high is None else length.interval.high
-        assert high > 3 * max(length.interval.low, 0.2e-6)
+        interval = one.length.interval
+        high = math.inf if interval.high is None else interval.high
+        wide += high > 3 * max(interval.low, 0.2e-6)
+    assert wide >= enough(0.95)
