@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, force_option, json_option
 from memscal.cli.output import emit_json, message, note, warn
 from memscal.cli.progress import working
@@ -105,6 +105,7 @@ def _rendered(found: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, by
 def _tell(found: MeasuredStress, output: Path, files: list[Path], as_json: bool) -> int:
     """Print the results and the messages; return the exit code."""
     from memscal.cli.apply_view import stress_json, stress_tables
+    from memscal.cli.quality_view import exit_code_of
     from memscal.cli.tables import emit_tables
 
     if as_json:
@@ -115,9 +116,4 @@ def _tell(found: MeasuredStress, output: Path, files: list[Path], as_json: bool)
         (warn if text.startswith(("Quality check", "Overridden")) else note)(text)
     for path in files:
         message(f"Written: {path}")
-    failed = [check.name.replace("_", " ") for check in found.checks if not check.passed]
-    if not failed:
-        return DONE
-    count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
-    warn(f"{count} failed ({', '.join(failed)}).")
-    return CHECK_FAILED
+    return exit_code_of(found.checks)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from memscal.cli.calibration_view import checks_table
 from memscal.cli.output import finite
+from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
 from memscal.figures.quantities import KPA, MM, MV
 from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
@@ -39,16 +39,7 @@ def stress_json(found: MeasuredStress, output: Path) -> dict[str, Any]:
         "force_over_load": {"value": finite(ratio), "standard_uncertainty": finite(spread)},
         "profiles": [_profile_json(found, profile) for profile in found.profiles],
         "overridden": list(found.overridden),
-        "checks": [
-            {
-                "name": check.name,
-                "value": finite(check.value),
-                "limit": finite(check.limit),
-                "passed": check.passed,
-                "p_value": None if check.p_value is None else finite(check.p_value),
-            }
-            for check in found.checks
-        ],
+        "checks": checks_json(found.checks),
         "warnings": list(found.messages),
     }
 

@@ -9,7 +9,7 @@ import click
 
 from memscal.cli.calibration_outputs import Outputs
 from memscal.cli.calibration_setup import artifact_beside, chosen_method, correlation
-from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.failures import DONE, debug_option
 from memscal.cli.options import FILE, force_option, json_option
 from memscal.cli.output import emit_json, message, note, warn
 from memscal.cli.progress import working
@@ -285,23 +285,19 @@ def _tell(
 ) -> int:
     """Print the results and the messages; return the exit code."""
     from memscal.cli.calibration_view import calibration_json, calibration_tables
+    from memscal.cli.quality_view import exit_code_of
     from memscal.cli.tables import emit_tables
 
     if as_json:
         emit_json(calibration_json(found, outputs.artifact) | _further_json(swept, drawn))
     else:
         emit_tables(*calibration_tables(found), *_further_tables(swept, drawn))
-    failed = [check.name for check in found.apparatus.checks if not check.passed]
     for text in found.apparatus.process.messages:
         (warn if text.startswith("Quality check") else note)(text)
     for path in outputs.paths:
         message(f"Written: {path}")
-    if not failed:
-        return DONE
-    named = ", ".join(name.replace("_", " ") for name in failed)
-    count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
-    warn(f"{count} failed ({named}). {outputs.artifact.name} was written and is marked so.")
-    return CHECK_FAILED
+    checks = found.apparatus.checks
+    return exit_code_of(checks, then=f" {outputs.artifact.name} was written and is marked so.")
 
 
 def _further_json(swept: Sweep | None, drawn: MonteCarlo | None) -> dict[str, Any]:

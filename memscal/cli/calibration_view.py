@@ -9,18 +9,18 @@ from typing import Any
 from memscal.calibration.procedure import Calibration
 from memscal.calibration.solution import Misfit
 from memscal.cli.output import finite
+from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
 from memscal.estimation.points import ScanPoints
 from memscal.figures.quantities import MM, PER_MM, measured_text, shown_quantity
 from memscal.mechanics.contact import Contact
-from memscal.model.apparatus import ParameterSet, QualityCheck
+from memscal.model.apparatus import ParameterSet
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
 __all__ = [
     "calibration_json",
     "calibration_tables",
-    "checks_table",
     "rehearsal_json",
     "rehearsal_table",
 ]
@@ -53,16 +53,7 @@ def calibration_json(found: Calibration, artifact: Path) -> dict[str, Any]:
             "chi2_reduced": finite(deconvolved.chi2_reduced),
             "gaussian_chi2_reduced": finite(gaussian.chi2_reduced),
         },
-        "checks": [
-            {
-                "name": check.name,
-                "value": finite(check.value),
-                "limit": finite(check.limit),
-                "passed": check.passed,
-                "p_value": None if check.p_value is None else finite(check.p_value),
-            }
-            for check in apparatus.checks
-        ],
+        "checks": checks_json(apparatus.checks),
         "warnings": list(apparatus.process.messages),
     }
 
@@ -105,22 +96,6 @@ def calibration_tables(found: Calibration) -> list[Table]:
 
 def _misfit(misfit: Misfit) -> str:
     return f"rms {misfit.relative_rms:.2%} of the largest signal, χ²/ν = {misfit.chi2_reduced:.3g}"
-
-
-def checks_table(checks: Sequence[QualityCheck]) -> Table:
-    """Return quality checks with value and limit, and the chance of such a value where known."""
-    rows = [
-        (
-            check.name.replace("_", " "),
-            f"{check.value:.3g}",
-            f"{check.limit:.3g}",
-            "" if check.p_value is None else f"{check.p_value:.2g}",
-            "passed" if check.passed else "FAILED",
-        )
-        for check in checks
-    ]
-    failed = frozenset(i for i, check in enumerate(checks) if not check.passed)
-    return Table("Quality checks", ("check", "value", "limit", "p", "result"), rows, failed)
 
 
 def rehearsal_json(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from memscal.cli.compare_outputs import FigureFiles
-from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, Quantity, force_option, json_option
 from memscal.cli.output import emit_json, message, note, warn
 from memscal.cli.progress import working
@@ -259,14 +259,9 @@ def _tell(
 
 def _judged(found: FrictionComparison) -> int:
     from memscal.cli.compare_notes import failures
+    from memscal.cli.quality_view import exit_code_of
 
-    count = sum(not check.passed for check in found.checks)
-    if not count:
-        return DONE
     named = [
-        f"{kind.replace('_', ' ')} {' '.join(numbers)}".strip()
-        for kind, numbers in failures(found.checks).items()
+        f"{kind} {' '.join(numbers)}".strip() for kind, numbers in failures(found.checks).items()
     ]
-    counted = "A quality check" if count == 1 else f"{count} quality checks"
-    warn(f"{counted} failed ({', '.join(named)}).")
-    return CHECK_FAILED
+    return exit_code_of(found.checks, named)

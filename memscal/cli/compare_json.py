@@ -9,6 +9,7 @@ from typing import Any
 
 from memscal.cli.interface_view import interface_json
 from memscal.cli.output import finite
+from memscal.cli.quality_view import checks_json
 from memscal.figures.quantities import KPA
 from memscal.friction.results import (
     DryAgainstLubricated,
@@ -51,16 +52,7 @@ def comparison_json(
         "dry_against_lubricated": [_difference(one) for one in found.dry_against_lubricated],
         "interface": None if found.interface is None else interface_json(found.interface),
         "macroscopic": None if found.macroscopic is None else _quantity(*found.macroscopic, "1"),
-        "checks": [
-            {
-                "name": check.name,
-                "value": finite(check.value),
-                "limit": finite(check.limit),
-                "passed": check.passed,
-                "p_value": None if check.p_value is None else finite(check.p_value),
-            }
-            for check in found.checks
-        ],
+        "checks": checks_json(found.checks),
         "overridden": list(found.measured.overridden),
         "warnings": list(found.messages),
     }

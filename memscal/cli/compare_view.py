@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 
-from memscal.cli.calibration_view import checks_table
 from memscal.cli.compare_notes import kind, which
 from memscal.cli.friction_text import bounded_text, friction_name, percent
 from memscal.cli.interface_view import interface_tables
+from memscal.cli.quality_view import checks_table
 from memscal.cli.tables import Table
 from memscal.figures.quantities import KPA, MM
 from memscal.friction.results import EffectiveFriction, FrictionComparison, LoadComparison

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from memscal.cli.calibration_view import checks_table
 from memscal.cli.output import finite
+from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
 from memscal.figures.quantities import KPA, MM, MV, PER_MM
 from memscal.measurement.comparison import Comparison
@@ -67,16 +67,7 @@ def restoration_json(
             "sigma_zz_errors_kpa": [finite(u / KPA) for u in errors],
         },
         "calculated": None if compared is None else _comparison_json(compared),
-        "checks": [
-            {
-                "name": check.name,
-                "value": finite(check.value),
-                "limit": finite(check.limit),
-                "passed": check.passed,
-                "p_value": None if check.p_value is None else finite(check.p_value),
-            }
-            for check in found.checks
-        ],
+        "checks": checks_json(found.checks),
         "warnings": list(found.messages),
     }
 

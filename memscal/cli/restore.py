@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import CHECK_FAILED, DONE, debug_option
+from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, force_option, json_option
 from memscal.cli.output import emit_json, message, note, warn
 from memscal.cli.progress import working
@@ -135,6 +135,7 @@ def _tell(
     as_json: bool,
 ) -> int:
     """Print the results and the messages; return the exit code."""
+    from memscal.cli.quality_view import exit_code_of
     from memscal.cli.restoration_view import restoration_json, restoration_tables
     from memscal.cli.tables import emit_tables
 
@@ -146,9 +147,4 @@ def _tell(
         (warn if text.startswith("Quality check") else note)(text)
     for path in files:
         message(f"Written: {path}")
-    failed = [check.name.replace("_", " ") for check in found.checks if not check.passed]
-    if not failed:
-        return DONE
-    count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
-    warn(f"{count} failed ({', '.join(failed)}).")
-    return CHECK_FAILED
+    return exit_code_of(found.checks)
