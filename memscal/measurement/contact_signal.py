@@ -1,14 +1,16 @@
 r"""The voltage of a calculated contact, and how it follows the load: what a scan is prepared with.
 
-Under a curved indenter the stress is not proportional to the load.  The frictionless contact at
-:math:`P` and :math:`P(1 \pm 2\,\%)` gives :math:`\partial U/\partial\ln P`, by which points that
-were measured at a somewhat different load are brought to the nominal one, and by which the scatter
-of the loads becomes noise of the voltage.  Friction changes this derivative by a few percent of
-itself: of a correction of a few percent, nothing.
+Under a curved indenter the stress is not proportional to the load.  Contacts at :math:`P` and
+:math:`P(1 \pm 2\,\%)` give :math:`\partial U/\partial\ln P`, by which points that were measured
+at a somewhat different load are brought to the nominal one, and by which the scatter of the loads
+becomes noise of the voltage.  A contact that sticks is stiffer, and its derivative larger, by up to
+40 % on the axis: between the frictionless contact and the one that sticks, the derivative is taken
+where the measured voltage on the axis is.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +21,7 @@ from memscal.errors import DomainError
 from memscal.measurement.posterior import sensor_transfer
 from memscal.measurement.single_loads import SingleLoad, place_of
 from memscal.mechanics.indent import indent
+from memscal.model.indenter import Rod
 from memscal.model.validation import FloatArray
 
 __all__ = ["ContactSignal", "contact_signal"]
@@ -33,10 +36,11 @@ _DISTANCES = 401
 
 @dataclass(frozen=True, eq=False)
 class ContactSignal:
-    """The frictionless contact at a nominal load as the sensor reports it.
+    """The contact at a nominal load as the sensor reports it, without friction and sticking.
 
-    ``r`` (n,): distances from the centre, in m; ``voltage`` and ``by_load`` (n,): the voltage and
-    its derivative by the logarithm of the load, in V; ``contact_radius`` in m.
+    ``r`` (n,): distances from the centre, in m; ``voltage`` and ``by_load`` (2, n): the voltages of
+    both and their derivatives by the logarithm of the load, in V; ``contact_radius`` in m, without
+    friction.
     """
 
     r: FloatArray
@@ -44,17 +48,32 @@ class ContactSignal:
     by_load: FloatArray
     contact_radius: float
 
-    def slope(self, distance: FloatArray) -> FloatArray:
-        """Derivative of the voltage by the logarithm of the load, at distances in m, in V."""
-        return np.asarray(np.interp(distance, self.r, self.by_load))
+    def slope(self, distance: FloatArray, sticking: float = 0.0) -> FloatArray:
+        """Derivative of the voltage by the logarithm of the load, at distances in m, in V.
+
+        ``sticking``: how far from the frictionless contact to the one that sticks.
+        """
+        between = (1 - sticking) * self.by_load[0] + sticking * self.by_load[1]
+        return np.asarray(np.interp(distance, self.r, between))
+
+    def sticking(self, distance: float, voltage: float) -> float:
+        """How far from the frictionless voltage to the sticking one a measured one is, 0 to 1.
+
+        At a distance in m near the axis, where friction raises the stress.
+        """
+        free, stuck = (float(np.interp(distance, self.r, each)) for each in self.voltage)
+        return min(max((voltage - free) / (stuck - free), 0.0), 1.0) if stuck > free else 0.0
 
     def share(self, distance: float) -> float:
-        """Voltage at a distance (m) over the largest."""
-        return float(np.interp(distance, self.r, self.voltage) / self.voltage.max())
+        """Frictionless voltage at a distance (m) over the largest."""
+        free = self.voltage[0]
+        return float(np.interp(distance, self.r, free) / free.max())
 
 
 def contact_signal(part: SingleLoad, apparatus: ApparatusFunction) -> ContactSignal:
-    """Calculate the frictionless contact of a part at its nominal load, and near it.
+    """Calculate the contacts of a part at its nominal load, and near it.
+
+    One that is lubricated, and a rod's, has no friction to be told from.
 
     Raises
     ------
@@ -63,8 +82,12 @@ def contact_signal(part: SingleLoad, apparatus: ApparatusFunction) -> ContactSig
     """
     scan, load = part.scan, part.load
     loads = load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
+    slides = part.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
     try:
-        contacts = indent(scan.film, scan.indenter, load=loads, rings=_RINGS)
+        contacts = [
+            indent(scan.film, scan.indenter, load=loads, friction=friction, rings=_RINGS)
+            for friction in ((0.0,) if slides else (0.0, math.inf))
+        ]
     except DomainError as failure:
         raise DomainError(
             f"{place_of(scan, part)}: {failure.problem}",
@@ -75,6 +98,9 @@ def contact_signal(part: SingleLoad, apparatus: ApparatusFunction) -> ContactSig
     r = np.linspace(0.0, 1.5 * width, _DISTANCES)
     nodes = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, 3 * width)
     through = apparatus.conversion_constant * sensor_transfer(apparatus, nodes.k)
-    spectra = np.stack([through * contact.base_spectrum(nodes.k) for contact in contacts], axis=1)
-    below, at, above = nodes.synthesise(spectra, r).T
-    return ContactSignal(r, at, (above - below) / (2 * _LOAD_STEP), contacts[1].contact_radius)
+    spectra = [through * contact.base_spectrum(nodes.k) for path in contacts for contact in path]
+    voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T.reshape(-1, loads.size, r.size)
+    # Where there is no friction to be told, both are the frictionless contact.
+    below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
+    slope = (above - below) / (2 * _LOAD_STEP)
+    return ContactSignal(r, at, slope, contacts[0][1].contact_radius)

@@ -65,7 +65,7 @@ def prepared_scan(
     for _ in range(_ROUNDS):
         points = measured_points(prepared.scan)
         estimate, _ = gaussian_pressure(prepared.scan, apparatus, points)
-        slope = signal.slope(_distance(scan, estimate.centre))
+        slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
         of_load = _load_noise(part, slope)
         electronic, found = _stated(scan), False
         if scan.u_zz_errors is None and of_load.any():
@@ -74,6 +74,13 @@ def prepared_scan(
         level = _at_nominal(part, slope)
         prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, found)
     return prepared
+
+
+def _sticking(estimate: ProfileEstimate, signal: ContactSignal) -> float:
+    """How far the measured voltage nearest to the axis is on the way to a contact that sticks."""
+    nearest = int(np.argmin(estimate.distance))
+    voltage = float((estimate.predicted - estimate.background)[nearest])
+    return signal.sticking(float(estimate.distance[nearest]), voltage)
 
 
 def _stated(scan: Scan) -> FloatArray:

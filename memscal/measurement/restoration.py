@@ -176,11 +176,14 @@ class Restoration:
 
     @property
     def chi_square(self) -> float:
-        """Sum of the squared residuals over the noise, outliers at their weight."""
-        stated = self.points.u_errors
-        noise = self.noise if stated is None else stated
-        weight = self.posterior.estimate.outlier_weight
-        return float(np.sum(weight * (self.residual / noise) ** 2))
+        """Sum of the squared residuals over the noise, outliers at their weight.
+
+        A noise that is stated is taken at its word, with what uncertain positions add to it.
+        """
+        estimate = self.posterior.estimate
+        stated = self.points.u_errors is not None
+        noise = estimate.noise / estimate.noise_scale if stated else self.noise
+        return float(np.sum(estimate.outlier_weight * (self.residual / noise) ** 2))
 
     @property
     def measured_stress(self) -> FloatArray:

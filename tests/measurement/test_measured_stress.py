@@ -113,14 +113,19 @@ def blurred_slope(profile: MeasuredProfile, step: float) -> np.ndarray:
     return np.asarray((above - below) / (2 * step))
 
 
-def test_recorded_loads_off_the_nominal_one_are_corrected() -> None:
+@pytest.mark.parametrize("friction", [0.0, 0.15, np.inf])
+def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> None:
+    """A contact that sticks follows its load by up to 40 % more than one that slides."""
     options = {**QUIET, "load_scatter": 0.03, "record_loads": True, "load_reading": 0.0}
-    found = measured(4, **options, state_noise=False)
+    found = measured(4, **options, state_noise=False, friction=friction)
     for profile in found.profiles:
-        truth = blurred(profile.load, profile.r)
-        np.testing.assert_allclose(profile.s_zz, truth, atol=5e-3 * truth.max())
-    # Without its record the same scatter is noise.
-    blind = measured(4, **{**options, "record_loads": False}, state_noise=False)
+        truth = blurred(profile.load, profile.r, friction)
+        np.testing.assert_allclose(profile.s_zz, truth, atol=2e-3 * truth.max())
+
+
+def test_a_scatter_of_the_loads_is_noise_unless_they_are_recorded() -> None:
+    options = {**QUIET, "load_scatter": 0.03, "load_reading": 0.0}
+    blind = measured(4, **options, record_loads=False, state_noise=False)
     off = [np.abs(p.s_zz - blurred(p.load, p.r)).max() / p.maximum for p in blind.profiles]
     assert min(off) > 0.01
 
