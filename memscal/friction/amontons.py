@@ -51,7 +51,7 @@ def amontons_family(
     cache : path, optional
         Folder in which families are kept from one run to the next; without it nothing is written.
     workers : int
-        Processes that share the work; the result is the same, bit for bit.
+        Processes that share the work; the result is the same to rounding.
     order : int
         Zero for the normal stress at the base; one for its shear, which a tangential channel sees.
 
