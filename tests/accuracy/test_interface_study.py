@@ -1,15 +1,16 @@
 """Virtual experiments whose interface is known: which law is preferred, and its slip length.
 
-Set MEMSCAL_FULL_STUDY for 40 experiments of each kind in place of 3.  All inputs are drawn from
+Set MEMSCAL_FULL_STUDY for 40 experiments of each kind in place of 2.  All inputs are drawn from
 their stated uncertainties.  An experiment like the paper's does not tell a slip length to better
 than a factor; *precise* ones, of less noise, with loads that are recorded and with more repeats,
-do.
+do; those on a film that is *known* better than the paper's do within 20 %.
 """
 
 from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -25,10 +26,11 @@ from memscal.friction.family import ProfileFamily
 from memscal.laboratory.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.laboratory.rod_scan import PAPER_FILM
 from memscal.mechanics.interface import Interface
+from memscal.model.film import ElasticFilm
 
 pytestmark = pytest.mark.accuracy
 
-SEEDS = 40 if os.environ.get("MEMSCAL_FULL_STUDY") else 3
+SEEDS = 40 if os.environ.get("MEMSCAL_FULL_STUDY") else 2
 CHANCE = 1e-3
 MACROSCOPIC = 1.6
 SLIP_LENGTH = 16e-6
@@ -41,50 +43,64 @@ PRECISE: dict[str, Any] = {
     "position_error": 2e-6,
     "repeats": 9,
 }
-PAPER: dict[str, Any] = {"noise": 0.003, "repeats": 3}
+KINDS: dict[str, dict[str, Any]] = {
+    "paper": {"noise": 0.003, "repeats": 3},
+    "precise": PRECISE,
+    "known": {**PRECISE, "load_uncertainty": 0.003},
+}
+KNOWN_FILM = replace(
+    PAPER_FILM,
+    young_modulus_uncertainty=0.005 * PAPER_FILM.young_modulus,
+    thickness_uncertainty=0.0025 * PAPER_FILM.thickness,
+    poisson_ratio_uncertainty=0.001,
+)
 
 
 @lru_cache
-def rigid() -> ProfileFamily:
+def rigid(film: ElasticFilm) -> ProfileFamily:
     """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
-    return amontons_family(PAPER_FILM, PAPER_SPHERE, PAPER_LOADS, reach=_REACH)
+    return amontons_family(film, PAPER_SPHERE, PAPER_LOADS, reach=_REACH)
 
 
 @lru_cache
-def slipping() -> ProfileFamily:
+def slipping(film: ElasticFilm) -> ProfileFamily:
     return elasto_plastic_family(
-        PAPER_FILM, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, reach=_REACH
+        film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, reach=_REACH
     )
 
 
 @lru_cache
-def weighed(friction: float, slip_length: float, precise: bool, seed: int) -> LawComparison:
+def weighed(friction: float, slip_length: float, kind: str, seed: int) -> LawComparison:
     """Make, calibrate and measure one experiment, and weigh laws of its dry interface."""
     interface = Interface(slip_length=slip_length) if slip_length else None
+    film = KNOWN_FILM if kind == "known" else PAPER_FILM
     made = memscal.simulate_experiment(
+        film=film,
         friction=friction,
         interface=interface,
         draw_inputs=True,
         # Every kind of experiment has seeds of its own: shared ones would be unlucky together.
-        seed=round(1e5 * friction + 1e9 * slip_length) * 1000 + 500 * precise + seed,
-        **(PRECISE if precise else PAPER),
+        seed=round(1e5 * friction + 1e9 * slip_length) * 1000
+        + 250 * list(KINDS).index(kind)
+        + seed,
+        **KINDS[kind],
     )
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
     found = compare_interface(
         memscal.measure_stress([made.dry], apparatus).profiles,
         apparatus,
         macroscopic=MACROSCOPIC,
-        amontons=rigid(),
-        slipping=slipping(),
+        amontons=rigid(film),
+        slipping=slipping(film),
     ).tangential
     assert found is not None
     return found
 
 
 def experiments(
-    friction: float, slip_length: float = 0.0, *, precise: bool = True
+    friction: float, slip_length: float = 0.0, kind: str = "precise"
 ) -> list[LawComparison]:
-    return [weighed(friction, slip_length, precise, seed) for seed in range(SEEDS)]
+    return [weighed(friction, slip_length, kind, seed) for seed in range(SEEDS)]
 
 
 def enough(share: float) -> int:
@@ -92,8 +108,9 @@ def enough(share: float) -> int:
     return int(binom.ppf(CHANCE, SEEDS, share))
 
 
-def test_a_slip_length_is_preferred_where_it_is_the_truth() -> None:
-    found = experiments(MACROSCOPIC, SLIP_LENGTH)
+@pytest.mark.parametrize("kind", ["precise", "known"])
+def test_a_slip_length_is_preferred_where_it_is_the_truth(kind: str) -> None:
+    found = experiments(MACROSCOPIC, SLIP_LENGTH, kind)
     assert sum(one.yielding_preferred for one in found) >= enough(0.98)
 
 
@@ -103,7 +120,16 @@ def test_an_effective_coefficient_is_not_given_up_where_it_is_the_truth() -> Non
         assert sum(not one.yielding_preferred for one in found) >= enough(0.98)
 
 
-def test_the_slip_length_is_that_which_was_put_in() -> None:
+def test_on_a_known_film_the_slip_length_is_recovered_within_a_fifth() -> None:
+    found = experiments(MACROSCOPIC, SLIP_LENGTH, "known")
+    ratios = np.array([one.length.best for one in found]) / SLIP_LENGTH
+    assert np.sum(np.abs(ratios - 1) <= 0.20) >= enough(0.95)
+    assert sum(one.length.interval.holds(SLIP_LENGTH) for one in found) >= enough(0.93)
+    # They scatter by 8 %.
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 + 3.3 * 0.08 / math.sqrt(SEEDS))
+
+
+def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
     # Stated: 10 %.  The spread over experiments is 12 %, as A G and the contacts depend on the same
     # film, which the likelihood does not know: docs/friction.md.
     found = experiments(MACROSCOPIC, SLIP_LENGTH)
@@ -122,7 +148,7 @@ def test_the_effective_coefficient_grows_with_the_load() -> None:
 
 def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor() -> None:
     wide = 0
-    for one in experiments(MACROSCOPIC, 1.82e-6, precise=False):
+    for one in experiments(MACROSCOPIC, 1.82e-6, "paper"):
         interval = one.length.interval
         high = math.inf if interval.high is None else interval.high
         wide += high > 3 * max(interval.low, 0.2e-6)
