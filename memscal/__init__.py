@@ -16,6 +16,15 @@ if TYPE_CHECKING:
     from memscal.calibration.fleet import FleetCalibration, calibrate_many
     from memscal.calibration.monte_carlo import MonteCarlo, monte_carlo
     from memscal.calibration.procedure import Calibration, calibrate
+    from memscal.deconvolution.fourier_ratio import (
+        Field,
+        Quotient,
+        divide,
+        fit_gaussian,
+        lift,
+        normalise,
+        reconvolve,
+    )
     from memscal.errors import MemscalError
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
@@ -40,6 +49,13 @@ if TYPE_CHECKING:
     from memscal.planning.procedure import design
 
 _HOMES = {
+    "reconvolve": "memscal.deconvolution.fourier_ratio",
+    "normalise": "memscal.deconvolution.fourier_ratio",
+    "lift": "memscal.deconvolution.fourier_ratio",
+    "fit_gaussian": "memscal.deconvolution.fourier_ratio",
+    "divide": "memscal.deconvolution.fourier_ratio",
+    "Quotient": "memscal.deconvolution.fourier_ratio",
+    "Field": "memscal.deconvolution.fourier_ratio",
     "ApparatusFunction": "memscal.apparatus",
     "Calibration": "memscal.calibration.procedure",
     "Cone": "memscal.model.indenter",
@@ -94,6 +110,7 @@ __all__ = [
     "ElasticFilm",
     "Experiment",
     "ExponentialCompliance",
+    "Field",
     "FleetCalibration",
     "FrictionComparison",
     "GaussianMixture",
@@ -104,6 +121,7 @@ __all__ = [
     "MemscalError",
     "MonteCarlo",
     "Profile",
+    "Quotient",
     "Restoration",
     "Rod",
     "Scan",
@@ -118,13 +136,18 @@ __all__ = [
     "compare",
     "compare_shear",
     "design",
+    "divide",
+    "fit_gaussian",
     "indent",
+    "lift",
     "load_apparatus",
     "measure_stress",
     "monte_carlo",
+    "normalise",
     "read_reference",
     "read_scan",
     "read_stress",
+    "reconvolve",
     "restore",
     "simulate",
     "simulate_experiment",

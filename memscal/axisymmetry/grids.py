@@ -20,11 +20,20 @@ from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
 from memscal.model.validation import FloatArray
 
-__all__ = ["EvenGrid", "FieldGrid", "Lattice", "cut", "lift"]
+__all__ = ["EvenGrid", "FieldGrid", "Lattice", "cut", "on_grid"]
+
+
+#: Directions over which a field of a lattice is averaged.
+_DIRECTIONS = 64
 
 
 class FieldGrid(Protocol):
     """What deconvolution asks of a grid."""
+
+    @property
+    def axes(self) -> tuple[FloatArray, FloatArray]:
+        """Positions along x and along y of the whole plane, in m."""
+        ...
 
     @property
     def radius(self) -> FloatArray:
@@ -55,6 +64,14 @@ class FieldGrid(Protocol):
 
     def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
         """Convolve a field that :meth:`inverse` returned with a lifted field."""
+        ...
+
+    def integrate(self, field: FloatArray) -> float:
+        """Integral of a field over the plane."""
+        ...
+
+    def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Radii, in m, and the radial profile of a field there."""
         ...
 
     def to_period(self, field: FloatArray) -> FloatArray:
@@ -93,6 +110,12 @@ class EvenGrid:
     def axis(self) -> FloatArray:
         """Half axis from 0, shape (count,), in m."""
         return self.spacing * np.arange(self.count, dtype=np.float64)
+
+    @property
+    def axes(self) -> tuple[FloatArray, FloatArray]:
+        """Positions along x and along y of the whole plane, shape (2 count - 1,), in m."""
+        whole = np.concatenate([-self.axis[:0:-1], self.axis])
+        return whole, whole
 
     @property
     def wavenumber_axis(self) -> FloatArray:
@@ -136,6 +159,10 @@ class EvenGrid:
         sides = np.full(field.shape[0], 2.0)
         sides[0] = 1.0
         return float(sides @ field @ sides * self.cell_area)
+
+    def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Radii and values along the half axis."""
+        return self.axis, field[0]
 
     def to_period(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to one period: 2 (count - 1) points, the axis at the first."""
@@ -189,6 +216,11 @@ class Lattice:
             )
 
     @property
+    def axes(self) -> tuple[FloatArray, FloatArray]:
+        """Positions along x and along y, in m."""
+        return self.x, self.y
+
+    @property
     def spacing(self) -> tuple[float, float]:
         """Distances of neighbouring points along y and x, in m."""
         return float(self.y[1] - self.y[0]), float(self.x[1] - self.x[0])
@@ -233,6 +265,24 @@ class Lattice:
         """Convolve a kernel centred on the central point with a field of the lattice."""
         spectrum = self.transfer(kernel) * self.forward(field)
         return np.asarray(scipy.fft.irfft2(spectrum, s=field.shape) / self.cell_area)
+
+    def integrate(self, field: FloatArray) -> float:
+        """Integral of a field over the lattice."""
+        return float(field.sum() * self.cell_area)
+
+    def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Radii along half of x, and the mean over directions there, by cubic splines.
+
+        Beyond the plane its edge is continued.
+        """
+        from scipy.ndimage import map_coordinates
+
+        r = self.x[self.x.size // 2 :]
+        angle = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+        rows = (np.multiply.outer(r, np.sin(angle)) - self.y[0]) / (self.y[1] - self.y[0])
+        columns = (np.multiply.outer(r, np.cos(angle)) - self.x[0]) / (self.x[1] - self.x[0])
+        samples = map_coordinates(field, [rows, columns], order=3, mode="nearest")
+        return r, np.asarray(samples.mean(axis=1))
 
     def refined(self, kernel: FloatArray, factor: int) -> tuple[Lattice, FloatArray]:
         """Interpolate a centred kernel to a finer lattice about 0, by its Fourier series.
@@ -280,8 +330,10 @@ class Lattice:
         return image
 
 
-def lift(profile: Callable[[FloatArray], FloatArray], grid: FieldGrid, step: float) -> FloatArray:
-    """Lift a radial profile to the axisymmetric field on a grid.
+def on_grid(
+    profile: Callable[[FloatArray], FloatArray], grid: FieldGrid, step: float
+) -> FloatArray:
+    """Values of an axisymmetric function on a grid.
 
     The profile is tabulated every ``step`` (m) out to the grid's corner and interpolated
     by an even cubic spline, whose error falls with the fourth power of the step.
@@ -293,5 +345,5 @@ def lift(profile: Callable[[FloatArray], FloatArray], grid: FieldGrid, step: flo
 
 
 def cut(field: FloatArray, grid: EvenGrid, r: FloatArray) -> FloatArray:
-    """Cut an even field along its axis: the inverse of :func:`lift`, at radii ``r`` (m)."""
+    """Cut an even field along its axis: the inverse of :func:`on_grid`, at radii ``r`` (m)."""
     return radial_spline(grid.axis, field[0])(r)

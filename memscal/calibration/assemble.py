@@ -94,28 +94,28 @@ def _further_scans(solution: Solution) -> dict[str, Any]:
 
 
 def _field(solution: Solution, results: Results) -> ApparatusField:
-    view = solution.quotient.kernel.view
+    g = solution.deconvolution.g
     errors = np.sqrt(np.diag(results.radial_covariance))
-    radius = np.hypot.outer(view.y, view.x)
-    return ApparatusField(view.x, view.y, view.plane, np.interp(radius, view.r, errors))
+    radius = np.hypot.outer(g.y, g.x)
+    return ApparatusField(g.x, g.y, g.image, np.interp(radius, g.r, errors))
 
 
 def _radial(solution: Solution, results: Results) -> ApparatusRadial:
-    view = solution.quotient.kernel.view
+    g = solution.deconvolution.g
     covariance = results.radial_covariance
-    gaussian = unit_gaussian(view.r, solution.estimate.gaussian.sigma)
+    gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
     errors = np.sqrt(np.diag(covariance))
     with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
     scale = errors * results.parameters.uncertainty("conversion_constant")
     correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
-    return ApparatusRadial(view.r, view.radial, errors, gaussian, covariance, correlation)
+    return ApparatusRadial(g.r, g.radial, errors, gaussian, covariance, correlation)
 
 
 def _transfer(solution: Solution, results: Results) -> TransferFunction:
-    fields, division = solution.fields, solution.quotient.division
-    a = solution.quotient.kernel.conversion_constant
-    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(division.field)) / a)
-    window = fields.along_axis(division.window)[1]
+    fields, deconvolution = solution.fields, solution.deconvolution
+    a, quotient = deconvolution.conversion_constant, deconvolution.quotient
+    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(quotient.values)) / a)
+    window = fields.along_axis(quotient.window)[1]
     return TransferFunction(k, modulus, results.transfer_errors, window, solution.band.resolved)
 
 
@@ -137,7 +137,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
         x=sorted_(place),
         u_zz=sorted_(points.u),
         u_zz_errors=sorted_(estimate.noise),
-        u_zz_predicted=sorted_(solution.quotient.predicted),
+        u_zz_predicted=sorted_(solution.deconvolution.predicted),
         u_zz_gaussian=sorted_(estimate.gaussian.predicted),
-        residual=sorted_(points.u - solution.quotient.predicted),
+        residual=sorted_(points.u - solution.deconvolution.predicted),
     )

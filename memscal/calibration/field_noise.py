@@ -47,20 +47,20 @@ def field_noise(solution: Solution, wavenumbers: FloatArray) -> FieldNoise | Non
     wavenumbers : ndarray, shape (p,)
         Where the transfer function is stated, in rad/m.
     """
-    estimate, kernel = solution.estimate, solution.quotient.kernel
+    estimate, deconvolution = solution.estimate, solution.deconvolution
     if not estimate.points.planar or estimate.points.scans > 1:
         return None
     k, weights = estimate.model.k, estimate.model.reference.wavenumbers.weights
     fields = solution.fields
     # Where both vanish, window and reference are divided on the grid, not interpolated apart.
-    axis, window = fields.along_axis(solution.quotient.division.window)
-    reference = fields.along_axis(np.abs(fields.grid.forward(fields.reference)))[1]
+    axis, window = fields.along_axis(deconvolution.quotient.window)
+    reference = fields.along_axis(np.abs(fields.grid.forward(fields.stress.values)))[1]
     ratio = np.divide(window, reference, out=np.zeros_like(window), where=window > 0)
     amplified = solution.band.noise * np.interp(k, axis, ratio, right=0.0)
-    area = fields.grid.cell_area * fields.voltage.size
-    columns = j0(np.multiply.outer(kernel.view.r, k)) * (np.sqrt(weights / area) * amplified)
+    area = fields.grid.cell_area * fields.voltage.values.size
+    columns = j0(np.multiply.outer(deconvolution.g.r, k)) * (np.sqrt(weights / area) * amplified)
     return FieldNoise(
         conversion_constant=float(amplified[0]),
-        radial=columns / kernel.conversion_constant,
-        transfer=np.interp(wavenumbers, k, amplified) / kernel.conversion_constant,
+        radial=columns / deconvolution.conversion_constant,
+        transfer=np.interp(wavenumbers, k, amplified) / deconvolution.conversion_constant,
     )

@@ -9,8 +9,9 @@ from typing import Protocol
 import numpy as np
 import scipy.fft
 
-from memscal.axisymmetry.grids import EvenGrid, FieldGrid, cut, lift
-from memscal.deconvolution.problem import NOISE_RATIO, DivisionProblem, KernelProfile
+from memscal.axisymmetry.grids import EvenGrid, FieldGrid, cut, on_grid
+from memscal.deconvolution.fourier_ratio import Field
+from memscal.deconvolution.problem import NOISE_RATIO, KernelProfile
 from memscal.estimation.band import Band
 from memscal.estimation.constrained import constrained_profile
 from memscal.estimation.profile_estimate import ProfileEstimate
@@ -19,10 +20,9 @@ from memscal.model.validation import FloatArray
 __all__ = [
     "Fields",
     "GridChoice",
-    "KernelView",
     "LineFields",
     "choose_grid",
-    "division_problem",
+    "constrained_kernel",
     "taper",
 ]
 
@@ -50,21 +50,6 @@ class GridChoice:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class KernelView:
-    """A kernel on its support: the plane, a radial cut, and its integral there.
-
-    ``x``, ``y`` in m; ``plane`` (y, x); ``r`` in m with ``radial``; ``integral`` over the plane.
-    """
-
-    x: FloatArray
-    y: FloatArray
-    plane: FloatArray
-    r: FloatArray
-    radial: FloatArray
-    integral: float
-
-
 class Fields(Protocol):
     """Both fields on one grid, with the ways back from the grid."""
 
@@ -74,13 +59,13 @@ class Fields(Protocol):
         ...
 
     @property
-    def voltage(self) -> FloatArray:
-        """Voltage per newton on the grid, in V/N."""
+    def voltage(self) -> Field:
+        """Voltage per newton, in V/N."""
         ...
 
     @property
-    def reference(self) -> FloatArray:
-        """Base stress per newton on the grid, in 1/m^2."""
+    def stress(self) -> Field:
+        """Base stress per newton, in 1/m^2."""
         ...
 
     @property
@@ -96,7 +81,7 @@ class Fields(Protocol):
         """Values of a field at the measured points."""
         ...
 
-    def view(self, kernel: FloatArray, profile: KernelProfile | None) -> KernelView:
+    def on_support(self, kernel: FloatArray, profile: KernelProfile | None) -> Field:
         """A kernel on its support; from its profile, where that is known."""
         ...
 
@@ -133,21 +118,16 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     return GridChoice(spacing=float(spacing), support=support, extent=extent)
 
 
-def division_problem(estimate: ProfileEstimate, band: Band, fields: Fields) -> DivisionProblem:
-    """Return what a regulariser is given."""
+def constrained_kernel(
+    estimate: ProfileEstimate, fields: Fields
+) -> Callable[[bool, bool], tuple[KernelProfile, FloatArray]]:
+    """Return what gives A G of the estimate and its values on the grid, as constrained."""
 
     def posterior(nonnegative: bool, monotone: bool) -> tuple[KernelProfile, FloatArray]:
         profile = constrained_profile(estimate, nonnegative=nonnegative, monotone=monotone)
         return profile, fields.kernel(profile.radial)
 
-    return DivisionProblem(
-        fields.grid,
-        fields.voltage,
-        fields.reference,
-        band.weakest_voltage,
-        band.weakest_reference,
-        posterior=posterior,
-    )
+    return posterior
 
 
 def taper(radius: FloatArray, support: float) -> FloatArray:
@@ -165,8 +145,8 @@ class LineFields:
     """Both profiles, lifted to a quarter plane; of a vector field its potential."""
 
     grid: EvenGrid
-    voltage: FloatArray
-    reference: FloatArray
+    voltage: Field
+    stress: Field
     support: int
     radius: FloatArray
 
@@ -180,10 +160,10 @@ class LineFields:
         known = estimate.model.reference
         spectra = np.stack([estimate.spectrum.scalar.values, known.scalar.values], axis=1)
         wavenumbers = known.wavenumbers
-        both = lift(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
-        voltage, reference = np.ascontiguousarray(np.moveaxis(both, -1, 0))
+        both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
+        voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
         support = round(choice.support / choice.spacing)
-        return cls(grid, voltage, reference, support, estimate.distance)
+        return cls(grid, voltage, stress, support, estimate.distance)
 
     @property
     def confinement(self) -> FloatArray:
@@ -192,22 +172,17 @@ class LineFields:
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero."""
-        return lift(profile, self.grid, self.grid.spacing / 2)
+        return on_grid(profile, self.grid, self.grid.spacing / 2)
 
     def at_points(self, field: FloatArray) -> FloatArray:
         """Return the values of a field at the measured points."""
         return cut(field, self.grid, self.radius)
 
-    def view(self, kernel: FloatArray, profile: KernelProfile | None) -> KernelView:  # noqa: ARG002
+    def on_support(self, kernel: FloatArray, profile: KernelProfile | None) -> Field:  # noqa: ARG002
         """Return a kernel on its support."""
         # The lifted profile's grid is fine enough to be read as it is.
         inside = slice(0, self.support + 1)
-        quarter = kernel[inside, inside]
-        axis = self.grid.axis[inside]
-        mirrored = np.concatenate([-axis[:0:-1], axis])
-        plane = self.grid.to_image(quarter)
-        integral = self.grid.integrate(quarter)
-        return KernelView(mirrored, mirrored, plane, axis, quarter[0], integral)
+        return Field(EvenGrid(self.support + 1, self.grid.spacing), kernel[inside, inside])
 
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""

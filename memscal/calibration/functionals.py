@@ -12,7 +12,7 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.axisymmetry.quadrature import ring_areas
-from memscal.calibration.normalise import NormalisedKernel
+from memscal.deconvolution.fourier_ratio import Field
 from memscal.estimation.forward import unit_gaussian, unit_gaussian_slope
 from memscal.model.validation import FloatArray
 
@@ -30,23 +30,22 @@ class Functional:
     row: FloatArray
 
 
-def kernel_functionals(kernel: NormalisedKernel) -> tuple[Functional, ...]:
+def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
     """Return the Gaussian width nearest to G, its full width at half maximum and its area."""
-    r, g = kernel.view.r, kernel.view.radial
-    return (_gaussian_width(kernel, r), _half_width(r, g), _equivalent_area(r, g))
+    r, g = field.r, field.radial
+    return (_gaussian_width(r, g, sigma), _half_width(r, g), _equivalent_area(r, g))
 
 
-def _gaussian_width(kernel: NormalisedKernel, r: FloatArray) -> Functional:
+def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
     """Width of the Gaussian u nearest to G over the plane.
 
     Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
     """
-    sigma = kernel.gaussian_sigma
     slope, step = unit_gaussian_slope(r, sigma), 1e-4 * sigma
     bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
-    left = unit_gaussian(r, sigma) - kernel.view.radial
+    left = unit_gaussian(r, sigma) - g
     row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
-    return Functional("gaussian_sigma_deconvolved", kernel.gaussian_sigma, row)
+    return Functional("gaussian_sigma_deconvolved", sigma, row)
 
 
 def _half_width(r: FloatArray, g: FloatArray) -> Functional:

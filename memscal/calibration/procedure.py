@@ -44,7 +44,7 @@ class Calibration:
     apparatus : ApparatusFunction
         The result, ready to be saved and applied.
     solution : Solution
-        The steps: estimate, band, fields, quotient.
+        The steps: estimate, band, fields, deconvolution.
     effects : mapping of str to InputEffect
         What one standard uncertainty of each stated input does.
     correlations : mapping of (str, str) to float
@@ -237,10 +237,10 @@ def _uncertainties(
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
 ) -> Results:
-    wavenumbers = solution.fields.along_axis(solution.quotient.division.window)[0]
+    wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
     return propagate(
         solution.estimate,
-        solution.quotient.kernel,
+        solution.deconvolution,
         solution.window_at_nodes,
         wavenumbers,
         effects,

@@ -50,7 +50,7 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     return [
         _chi_square(
             "reconvolution",
-            solution.quotient.misfit,
+            solution.deconvolution.misfit,
             "Reduced chi-square of the scan against the found G convolved with the reference. A "
             f"failure means that {removed}, or that the scan is no convolution of the reference: "
             "look at chi_square, which does not depend on G.",
@@ -74,7 +74,7 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
     weights = estimate.weights / estimate.noise_scale**2
     misfits = [
         float(np.sum(estimate.points.standardised(estimate.points.u - u, weights) ** 2))
-        for u in (solution.quotient.predicted, estimate.predicted)
+        for u in (solution.deconvolution.predicted, estimate.predicted)
     ]
     # As many directions of G as the scan tells apart, and which the constraint may cost.
     told = free_model(estimate).design.shape[1] - estimate.basis.flat

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.axisymmetry.grids import Lattice, lift
-from memscal.calibration.fields import GridChoice, KernelView, taper
+from memscal.axisymmetry.grids import Lattice, on_grid
+from memscal.calibration.fields import GridChoice, taper
+from memscal.deconvolution.fourier_ratio import Field
 from memscal.deconvolution.problem import KernelProfile
 from memscal.errors import InputError
 from memscal.estimation.ellipse import elliptic_departure
@@ -39,8 +40,8 @@ class RasterFields:
     """A measured raster on its own lattice, continued by the fitted profile around it."""
 
     grid: Lattice
-    voltage: FloatArray
-    reference: FloatArray
+    voltage: Field
+    stress: Field
     support: float
     step: float
     oval: _Oval
@@ -54,13 +55,14 @@ class RasterFields:
         y, rows = _even_axis("y", points.y, choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
-        voltage = lift(estimate.spectrum.at, grid, step)
+        voltage = on_grid(estimate.spectrum.at, grid, step)
         # A point that is missing keeps the profile; an outlier keeps most of it.
         departure = estimate.weighed.residual * estimate.outlier_weight + estimate.oval
         voltage[rows, columns] += departure / points.load
-        reference = lift(estimate.model.reference.at, grid, step)
+        stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
         oval = _Oval(estimate.gaussian)
-        return cls(grid, voltage, reference, choice.support, step, oval, (rows, columns))
+        index = (rows, columns)
+        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, index)
 
     @property
     def confinement(self) -> FloatArray:
@@ -74,26 +76,23 @@ class RasterFields:
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero."""
         grid = self._kernel_grid
-        return lift(profile, grid, self.step) + self.oval.on(grid.x, grid.y)
+        return on_grid(profile, grid, self.step) + self.oval.on(grid.x, grid.y)
 
     def at_points(self, field: FloatArray) -> FloatArray:
         """Return the values of a field at the measured points."""
         return np.asarray(field[self.index])
 
-    def view(self, kernel: FloatArray, profile: KernelProfile | None) -> KernelView:
+    def on_support(self, kernel: FloatArray, profile: KernelProfile | None) -> Field:
         """Return a kernel on its support."""
         step = float(self.grid.x[1] - self.grid.x[0])
         # Odd, so that the kernel's zero stays a point of the lattice.
         refinement = max(_REFINEMENT, int(np.ceil(step / (2 * self.step))) | 1)
         fine, values = self.grid.refined(kernel, refinement)
         if profile is not None:
-            values = lift(profile.radial, fine, self.step) + self.oval.on(fine.x, fine.y)
+            values = on_grid(profile.radial, fine, self.step) + self.oval.on(fine.x, fine.y)
         inside_x, inside_y = np.abs(fine.x) <= self.support, np.abs(fine.y) <= self.support
         plane = values[np.ix_(inside_y, inside_x)]
-        x, y = fine.x[inside_x], fine.y[inside_y]
-        r = x[x.size // 2 :]
-        radial = _azimuthal_mean(x, y, plane, r)
-        return KernelView(x, y, plane, r, radial, float(plane.sum() * fine.cell_area))
+        return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), plane)
 
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""
@@ -123,14 +122,3 @@ def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatAr
     count = steps + 1 + 2 * padding + steps % 2
     axis = unique[0] + step * (np.arange(count) - padding)
     return axis, np.rint(index).astype(int) + padding
-
-
-def _azimuthal_mean(x: FloatArray, y: FloatArray, plane: FloatArray, r: FloatArray) -> FloatArray:
-    """Mean over 64 directions, by cubic splines; beyond the plane its edge is continued."""
-    from scipy.ndimage import map_coordinates
-
-    angle = 2 * np.pi * np.arange(64) / 64
-    rows = (np.multiply.outer(r, np.sin(angle)) - y[0]) / (y[1] - y[0])
-    columns = (np.multiply.outer(r, np.cos(angle)) - x[0]) / (x[1] - x[0])
-    samples = map_coordinates(plane, [rows, columns], order=3, mode="nearest")
-    return np.asarray(samples.mean(axis=1))

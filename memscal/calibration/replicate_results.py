@@ -58,10 +58,10 @@ class ReplicateResults:
     @classmethod
     def of(cls, solution: Solution) -> ReplicateResults:
         """Set up for the replicates of a solution's scan."""
-        kernel, model = solution.quotient.kernel, solution.estimate.model
-        r, window = kernel.view.r, solution.window_at_nodes
+        kernel, model = solution.deconvolution, solution.estimate.model
+        r, window = kernel.g.r, solution.window_at_nodes
         synthesis = None
-        if np.any(solution.quotient.division.window < 1):
+        if np.any(solution.deconvolution.quotient.window < 1):
             synthesis = j0(np.multiply.outer(r, model.k)) * (
                 model.reference.wavenumbers.weights * window
             )
@@ -69,7 +69,7 @@ class ReplicateResults:
         phase = np.clip(2 * r / support - 1, 0.0, 1.0)
         ring = ring_areas(r)
         # Rings miss a share of the plane that does not change from replicate to replicate.
-        ring = ring / float(ring @ kernel.view.radial)
+        ring = ring / float(ring @ kernel.g.radial)
         return cls(r, (1 + np.cos(np.pi * phase)) / 2, synthesis, model.k, ring)
 
     def read(

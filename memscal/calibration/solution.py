@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import j1
@@ -13,11 +13,18 @@ from memscal.calibration.fields import (
     GridChoice,
     LineFields,
     choose_grid,
-    division_problem,
+    constrained_kernel,
 )
-from memscal.calibration.normalise import NormalisedKernel, normalise
 from memscal.calibration.raster_fields import RasterFields
-from memscal.deconvolution.problem import Division, Regulariser
+from memscal.deconvolution.fourier_ratio import (
+    Field,
+    Quotient,
+    divide,
+    fit_gaussian,
+    normalise,
+    reconvolve,
+)
+from memscal.deconvolution.problem import Regulariser
 from memscal.errors import InputError
 from memscal.estimation.band import Band, find_band
 from memscal.estimation.channels import channel_order
@@ -30,10 +37,10 @@ from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
 __all__ = [
+    "Deconvolution",
     "Misfit",
-    "Quotient",
     "Solution",
-    "divide",
+    "deconvolve",
     "prepare_fields",
     "require_channel_method",
     "solve",
@@ -58,14 +65,18 @@ class Misfit:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Quotient:
-    """One division of the fields: the window, A and G, and what they predict for the scan.
+class Deconvolution:
+    """One division of the fields: A and G, and what they predict for the scan.
 
+    ``quotient``: A G confined to the support, with its window; ``conversion_constant`` in V/Pa;
+    ``g``: G on its support, in 1/m^2; ``gaussian_sigma`` in m: the Gaussian nearest to G;
     ``predicted`` (n,) in V, at the measured points.
     """
 
-    division: Division
-    kernel: NormalisedKernel
+    quotient: Quotient
+    conversion_constant: float
+    g: Field
+    gaussian_sigma: float
     predicted: FloatArray
     misfit: Misfit
 
@@ -90,8 +101,8 @@ class Solution:
         The two fields.
     regulariser : Regulariser
         How they were divided.
-    quotient : Quotient
-        The outcome.
+    deconvolution : Deconvolution
+        A and G by the division, and their misfit.
     gaussian_misfit : Misfit
         The Gaussian fitted in data space against the scan.
     """
@@ -103,7 +114,7 @@ class Solution:
     choice: GridChoice
     fields: Fields
     regulariser: Regulariser
-    quotient: Quotient
+    deconvolution: Deconvolution
     gaussian_misfit: Misfit
 
     @property
@@ -122,7 +133,7 @@ class Solution:
 
         What the grid does not carry, beyond its last wavenumber, is as hidden as if windowed.
         """
-        k, window = self.fields.along_axis(self.quotient.division.window)
+        k, window = self.fields.along_axis(self.deconvolution.quotient.window)
         return np.interp(self.estimate.model.k, k, window, right=0.0)
 
     @property
@@ -167,7 +178,7 @@ def solve(
         choice=choice,
         fields=fields,
         regulariser=regulariser,
-        quotient=divide(estimate, band, fields, regulariser),
+        deconvolution=deconvolve(estimate, band, fields, regulariser),
         gaussian_misfit=_misfit(estimate, estimate.gaussian.predicted),
     )
 
@@ -196,29 +207,41 @@ def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
     return LineFields.lift(estimate, choice)
 
 
-def divide(
+def deconvolve(
     estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
-) -> Quotient:
-    """Divide the fields, normalise the quotient, and convolve it back."""
+) -> Deconvolution:
+    """Divide the fields, normalise, fit a Gaussian, and convolve back (Eq. 1 to 3)."""
     require_channel_method(estimate.points.channel, regulariser)
-    raw = regulariser.divide(division_problem(estimate, band, fields))
-    division = Division(raw.field * fields.confinement, raw.window, raw.profile)
-    view = fields.view(division.field, division.profile)
-    kernel = normalise(view, estimate.gaussian.sigma)
-    predicted = _reconvolved(estimate, fields, division) + estimate.background
-    return Quotient(division, kernel, predicted, _misfit(estimate, predicted))
+    quotient = divide(
+        fields.voltage,
+        fields.stress,
+        weakest=(band.weakest_reference, band.weakest_voltage),
+        method=regulariser,
+        posterior=constrained_kernel(estimate, fields),
+    )
+    quotient = replace(quotient, values=quotient.values * fields.confinement)
+    a, g = normalise(fields.on_support(quotient.values, quotient.profile))
+    predicted = _reconvolved(estimate, fields, quotient) + estimate.background
+    return Deconvolution(
+        quotient=quotient,
+        conversion_constant=a,
+        g=g,
+        gaussian_sigma=fit_gaussian(g, estimate.gaussian.sigma),
+        predicted=predicted,
+        misfit=_misfit(estimate, predicted),
+    )
 
 
-def _reconvolved(estimate: ProfileEstimate, fields: Fields, division: Division) -> FloatArray:
+def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
     """Signal of the deconvolved A G at the points, in V: each scan through its own reference."""
-    model, profile = estimate.model, division.profile
+    model, profile = estimate.model, quotient.profile
     if profile is not None:
         geometry = model.geometry(estimate.centres)
         return np.asarray(model.signal(geometry, profile.transform(model.k)) + estimate.oval)
     if estimate.points.scans == 1:
-        back = fields.grid.convolve(division.field, fields.reference)
-        return fields.at_points(back) * estimate.points.load
-    k, kernel = fields.along_axis(fields.grid.transfer(division.field).real)
+        back = reconvolve(1.0, quotient, fields.stress)
+        return fields.at_points(back.values) * estimate.points.load
+    k, kernel = fields.along_axis(fields.grid.transfer(quotient.values).real)
     spectrum = np.interp(estimate.model.k, k, kernel, right=0.0)
     return estimate.model.signal(estimate.gaussian.geometry, spectrum)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.calibration.solution import Quotient, Solution, divide
+from memscal.calibration.solution import Solution, deconvolve
 from memscal.deconvolution.problem import Regulariser, require_count
 from memscal.deconvolution.white_noise import WhiteNoise, WhiteNoiseDraw
 from memscal.errors import FitError
@@ -62,8 +62,11 @@ def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -
 
 def _outcome(solution: Solution, regulariser: Regulariser) -> tuple[float, float, float]:
     try:
-        quotient: Quotient = divide(solution.estimate, solution.band, solution.fields, regulariser)
+        deconvolution = deconvolve(solution.estimate, solution.band, solution.fields, regulariser)
     except FitError:
         return np.nan, np.nan, np.nan
-    kernel = quotient.kernel
-    return kernel.conversion_constant, kernel.gaussian_sigma, quotient.misfit.relative_rms
+    return (
+        deconvolution.conversion_constant,
+        deconvolution.gaussian_sigma,
+        deconvolution.misfit.relative_rms,
+    )

@@ -20,7 +20,7 @@ from scipy.special import j0
 from memscal.calibration.field_noise import FieldNoise
 from memscal.calibration.functionals import Functional, kernel_functionals
 from memscal.calibration.inputs import InputEffect, correlation_matrix
-from memscal.calibration.normalise import NormalisedKernel
+from memscal.calibration.solution import Deconvolution
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.apparatus import ParameterSet
 from memscal.model.validation import FloatArray
@@ -88,7 +88,7 @@ class _Rows:
 
 def propagate(
     estimate: ProfileEstimate,
-    kernel: NormalisedKernel,
+    deconvolution: Deconvolution,
     window: FloatArray,
     wavenumbers: FloatArray,
     effects: Mapping[str, InputEffect],
@@ -101,7 +101,7 @@ def propagate(
     ----------
     estimate : ProfileEstimate
         The scan's profile and its posterior.
-    kernel : NormalisedKernel
+    deconvolution : Deconvolution
         A and G.
     window : ndarray, shape of ``estimate.model.k``
         The regularisation's window at the quadrature nodes.
@@ -114,7 +114,7 @@ def propagate(
     raster : FieldNoise, optional
         What the noise of a measured field adds.
     """
-    rows = _rows(estimate, kernel, window, wavenumbers)
+    rows = _rows(estimate, deconvolution, window, wavenumbers)
     random, fixed = _noise_roots(estimate)
     columns = {
         "noise": rows.matrix @ random,
@@ -122,7 +122,7 @@ def propagate(
         "window": rows.hidden[:, None],
     }
     if raster is not None:
-        columns["raster_noise"] = _raster_columns(rows, kernel, raster)
+        columns["raster_noise"] = _raster_columns(rows, deconvolution, raster)
     independent = list(columns.values())
     columns |= {name: _input_column(rows, estimate, effect) for name, effect in effects.items()}
     if effects:
@@ -165,12 +165,12 @@ def _input_column(rows: _Rows, estimate: ProfileEstimate, effect: InputEffect) -
 
 def _rows(
     estimate: ProfileEstimate,
-    kernel: NormalisedKernel,
+    deconvolution: Deconvolution,
     window: FloatArray,
     wavenumbers: FloatArray,
 ) -> _Rows:
     basis, k = estimate.basis, estimate.model.k
-    a, r = kernel.conversion_constant, kernel.view.r
+    a, r = deconvolution.conversion_constant, deconvolution.g.r
     fitted = estimate.gaussian.jacobian.shape[1]
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
     synthesis = j0(np.multiply.outer(r, k)) * estimate.model.reference.wavenumbers.weights
@@ -180,8 +180,8 @@ def _rows(
     hidden = (1 - window) * estimate.kernel / a
     hidden_radial = synthesis @ hidden
     opened = radial - synthesis @ ((1 - window)[:, None] * normalised)
-    functionals = kernel_functionals(kernel)
-    scalars, names, values = _scalar_rows(estimate, kernel, functionals, opened)
+    functionals = kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma)
+    scalars, names, values = _scalar_rows(estimate, deconvolution, functionals, opened)
     hidden_scalars = np.zeros(len(names))
     for functional in functionals:
         hidden_scalars[names.index(functional.name)] = functional.row @ hidden_radial
@@ -204,14 +204,14 @@ def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) ->
 
 def _scalar_rows(
     estimate: ProfileEstimate,
-    kernel: NormalisedKernel,
+    deconvolution: Deconvolution,
     functionals: tuple[Functional, ...],
     opened: FloatArray,
 ) -> tuple[FloatArray, tuple[str, ...], FloatArray]:
     count, fitted = estimate.basis.integrals.size, estimate.gaussian.jacobian.shape[1]
     gaussian = estimate.gaussian
     entries: list[tuple[str, float, FloatArray, int]] = [
-        ("conversion_constant", kernel.conversion_constant, estimate.basis.integrals, 0),
+        ("conversion_constant", deconvolution.conversion_constant, estimate.basis.integrals, 0),
         ("gaussian_sigma", gaussian.sigma, _unit(fitted, 1), count),
         *_ellipse(estimate),
         *((f.name, f.value, f.row @ opened, 0) for f in functionals),
@@ -258,13 +258,13 @@ def _number(scan: int) -> str:
     return "" if scan == 0 else f"_{scan + 1}"
 
 
-def _raster_columns(rows: _Rows, kernel: NormalisedKernel, raster: FieldNoise) -> FloatArray:
+def _raster_columns(rows: _Rows, deconvolution: Deconvolution, raster: FieldNoise) -> FloatArray:
     """Noise of a measured field: a column for A, then those of G, then each of the transfer's."""
     count, components = len(rows.names), raster.transfer.size
     columns = np.zeros((rows.hidden.size, 1 + raster.radial.shape[1] + components))
     columns[rows.names.index("conversion_constant"), 0] = raster.conversion_constant
     inner = slice(1, 1 + raster.radial.shape[1])
-    for functional in kernel_functionals(kernel):
+    for functional in kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma):
         columns[rows.names.index(functional.name), inner] = functional.row @ raster.radial
     columns[count : rows.stored, inner] = raster.radial
     columns[rows.stored :, inner.stop :] = np.diag(raster.transfer)

@@ -37,7 +37,7 @@ _MEASURED = (
 def calibration_json(found: Calibration, artifact: Path) -> dict[str, Any]:
     """Return the object that ``calibrate --json`` prints; its form is part of the contract."""
     apparatus, solution = found.apparatus, found.solution
-    deconvolved, gaussian = solution.quotient.misfit, solution.gaussian_misfit
+    deconvolved, gaussian = solution.deconvolution.misfit, solution.gaussian_misfit
     return {
         "schema_version": "1",
         "artifact": str(artifact),
@@ -83,7 +83,7 @@ def calibration_tables(found: Calibration) -> list[Table]:
     rows += [
         ("method of division", "", found.solution.regulariser.name),
         ("resolved up to the wavenumber", "k", f"{resolved:.3g} rad/mm"),
-        ("reconvolution with the deconvolved G", "", _misfit(found.solution.quotient.misfit)),
+        ("reconvolution with the deconvolved G", "", _misfit(found.solution.deconvolution.misfit)),
         ("reconvolution with the Gaussian", "", _misfit(found.solution.gaussian_misfit)),
     ]
     sensor = apparatus.sensor

@@ -15,7 +15,7 @@ import numpy as np
 
 from memscal.calibration.fields import choose_grid
 from memscal.calibration.inputs import InputEffect, input_effects
-from memscal.calibration.solution import Solution, divide, prepare_fields
+from memscal.calibration.solution import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import Results, propagate
 from memscal.deconvolution.problem import Regulariser
 from memscal.errors import FitError
@@ -67,7 +67,7 @@ def expected_calibration(plan: Plan, regulariser: Regulariser) -> Expected:
     band = find_band(estimate)
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, choice)
-    quotient = divide(estimate, band, fields, regulariser)
+    deconvolution = deconvolve(estimate, band, fields, regulariser)
     solution = Solution(
         scans=(scan,),
         stresses=(stress,),
@@ -76,8 +76,8 @@ def expected_calibration(plan: Plan, regulariser: Regulariser) -> Expected:
         choice=choice,
         fields=fields,
         regulariser=regulariser,
-        quotient=quotient,
-        gaussian_misfit=quotient.misfit,
+        deconvolution=deconvolution,
+        gaussian_misfit=deconvolution.misfit,
     )
     effects = input_effects(solution.scans, solution.stresses, estimate)
     return Expected(solution, _propagated(solution, effects))
@@ -106,12 +106,11 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
 
 
 def _propagated(solution: Solution, effects: Mapping[str, InputEffect]) -> Results:
-    division = solution.quotient.division
     return propagate(
         solution.estimate,
-        solution.quotient.kernel,
+        solution.deconvolution,
         solution.window_at_nodes,
-        solution.fields.along_axis(division.window)[0],
+        solution.fields.along_axis(solution.deconvolution.quotient.window)[0],
         effects,
         {},
     )

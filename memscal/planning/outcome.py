@@ -104,19 +104,19 @@ def evaluate(plan: Plan, method: str | Regulariser = "evidence", seed: int = 0) 
     regulariser = create_regulariser(method, seed=seed) if isinstance(method, str) else method
     expected = expected_calibration(plan, regulariser)
     solution, results = expected.solution, expected.results
-    view = solution.quotient.kernel.view
-    fields, division = solution.fields, solution.quotient.division
-    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(division.field)))
+    deconvolution, fields = solution.deconvolution, solution.fields
+    transfer = fields.grid.transfer(deconvolution.quotient.values)
+    k, modulus = fields.along_axis(np.abs(transfer))
     return Design(
         plan=plan,
         method=regulariser.name,
         parameters=results.parameters,
         budget=results.budget,
-        r=view.r,
-        g=view.radial,
+        r=deconvolution.g.r,
+        g=deconvolution.g.radial,
         g_errors=np.sqrt(np.diag(results.radial_covariance)),
         k=k,
-        transfer=modulus / solution.quotient.kernel.conversion_constant,
+        transfer=modulus / deconvolution.conversion_constant,
         transfer_errors=results.transfer_errors,
         resolved_wavenumber=solution.band.resolved,
     )

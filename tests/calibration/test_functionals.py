@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scans import RING, SIGMA
 
-from memscal.calibration.fields import KernelView
+from memscal import fit_gaussian, lift
 from memscal.calibration.functionals import kernel_functionals
-from memscal.calibration.normalise import normalise
 from memscal.estimation.forward import unit_gaussian
 from memscal.model.validation import FloatArray
 
@@ -18,8 +17,8 @@ R = np.linspace(0.0, 8e-3, 97)
 
 
 def functionals(g: FloatArray):
-    view = KernelView(R, R, np.zeros((97, 97)), R, g, 1.0)
-    return {f.name: f for f in kernel_functionals(normalise(view, SIGMA))}
+    field = lift(R, g, R[1], R[-1])
+    return {f.name: f for f in kernel_functionals(field, fit_gaussian(field, SIGMA))}
 
 
 def test_a_gaussian_has_the_width_and_area_of_its_closed_form() -> None:

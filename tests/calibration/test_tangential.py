@@ -104,7 +104,9 @@ def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
     side = np.sign(estimate.points.x - estimate.centre[0])
     expected = side * np.interp(estimate.distance, r, profile) + estimate.background
     largest = float(np.abs(profile).max())
-    np.testing.assert_allclose(found.solution.quotient.predicted, expected, atol=3e-3 * largest)
+    np.testing.assert_allclose(
+        found.solution.deconvolution.predicted, expected, atol=3e-3 * largest
+    )
     # At larger x than the sensor the film is squeezed towards smaller x: the voltage falls.
     assert profile.min() < 0 < np.abs(profile).max()
     assert profile.max() < 0.01 * largest

@@ -1,0 +1,349 @@
+r"""The paper's method on arrays, step by step: lift, divide, normalise, fit, convolve back.
+
+.. math::
+
+    A\,G = \mathcal F^{-1}\left\{\frac{\mathcal F\{U_{zz}\}}{\mathcal F\{\sigma_{zz}\}}\right\},
+    \qquad A = \int A\,G\,dx\,dy
+
+(the paper's Eq. 2).  :func:`memscal.calibrate` goes through these functions; they can be called on
+radial profiles that come from anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from memscal.axisymmetry.grids import EvenGrid, FieldGrid, on_grid
+from memscal.axisymmetry.hankel import radial_spline
+from memscal.deconvolution.problem import DivisionProblem, KernelProfile, Regulariser
+from memscal.deconvolution.registry import create_regulariser
+from memscal.errors import FitError, InputError
+from memscal.estimation.forward import unit_gaussian, unit_gaussian_slope
+from memscal.estimation.newton import gauss_newton
+from memscal.model.validation import FloatArray
+
+__all__ = ["Field", "Quotient", "divide", "fit_gaussian", "lift", "normalise", "reconvolve"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Field:
+    """A field over the plane, about its axis of symmetry; from :func:`lift`.
+
+    Parameters
+    ----------
+    grid : FieldGrid
+        Where its values lie.
+    values : ndarray
+        Values in the layout of the grid, in the unit of what was lifted.
+    """
+
+    grid: FieldGrid
+    values: FloatArray
+
+    def __repr__(self) -> str:
+        """Return size and spacing in place of the values."""
+        step = (self.x[1] - self.x[0]) * 1e3
+        return f"<{type(self).__name__}: {self.y.size} x {self.x.size} points, {step:.4g} mm apart>"
+
+    @property
+    def x(self) -> FloatArray:
+        """Positions along x, shape (n,), in m."""
+        return self.grid.axes[0]
+
+    @property
+    def y(self) -> FloatArray:
+        """Positions along y, shape (m,), in m."""
+        return self.grid.axes[1]
+
+    @property
+    def image(self) -> FloatArray:
+        """The whole plane, shape (m, n), the axis of symmetry at its central pixel."""
+        return self.grid.to_image(self.values)
+
+    @property
+    def integral(self) -> float:
+        """Integral over the plane, in the unit of the values times m^2."""
+        return self.grid.integrate(self.values)
+
+    @property
+    def r(self) -> FloatArray:
+        """Radii of the profile, shape (p,), in m."""
+        return self._profile[0]
+
+    @property
+    def radial(self) -> FloatArray:
+        """Radial profile at :attr:`r`, shape (p,): along an axis, or the mean over directions."""
+        return self._profile[1]
+
+    @cached_property
+    def _profile(self) -> tuple[FloatArray, FloatArray]:
+        return self.grid.radial(self.values)
+
+    def spectrum(self) -> tuple[FloatArray, FloatArray]:
+        """Return wavenumbers along x, in rad/m, and the modulus of the Fourier transform there."""
+        return self.grid.wavenumber[0], np.abs(self.grid.forward(self.values)[0])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Quotient(Field):
+    """The quotient of two fields, A G; from :func:`divide`.
+
+    Parameters
+    ----------
+    window : ndarray
+        What the regularisation leaves of each spectral component, from 0 to 1.
+    profile : KernelProfile or None
+        The radial function that the field was sampled from, where it was no division.
+    """
+
+    window: FloatArray
+    profile: KernelProfile | None = None
+
+
+def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> Field:
+    """Lift a radial profile to its axisymmetric field over the plane.
+
+    Parameters
+    ----------
+    r : ndarray, shape (n,)
+        Radii, increasing from zero, in m; four or more.
+    profile : ndarray, shape (n,)
+        Values there.  An even cubic spline interpolates them; beyond ``r[-1]`` the field is zero.
+    spacing : float
+        Distance of neighbouring points of the field, in m.
+    extent : float
+        Half of the field's side, in m: at least the reach of the profile and of the G to be
+        found together, so that nothing wraps around.
+
+    Returns
+    -------
+    Field
+        Values of the profile's unit.
+
+    Raises
+    ------
+    InputError
+        If the radii do not increase, a value is not finite, or the spacing does not fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> r = np.linspace(0, 4e-3, 81)
+    >>> stress = lift(r, np.exp(-((r / 1e-3) ** 2)), spacing=0.1e-3, extent=8e-3)
+    >>> float(stress.integral / (np.pi * 1e-6)).__round__(6)
+    1.0
+    """
+    r, profile = np.asarray(r, dtype=np.float64), np.asarray(profile, dtype=np.float64)
+    if r.ndim != 1 or r.shape != profile.shape or not np.all(np.isfinite([r, profile])):
+        raise InputError(
+            f"Radii of shape {r.shape} and values of shape {profile.shape} are no radial profile.",
+            cure="Give two arrays of one length, finite throughout.",
+        )
+    if r[0] < 0 or np.any(np.diff(r) <= 0):
+        raise InputError("The radii do not increase from the axis outward.", cure="Sort them.")
+    if not 0 < spacing < extent < np.inf:
+        raise InputError(
+            f"A field of half side {extent:g} m cannot have points {spacing:g} m apart.",
+            cure="Give both in m, the spacing smaller than the extent.",
+        )
+    spline = radial_spline(r, profile)
+
+    def continued(radius: FloatArray) -> FloatArray:
+        return np.where(radius <= r[-1], spline(np.minimum(radius, r[-1])), 0.0)
+
+    grid = EvenGrid(int(np.ceil(extent / spacing)) + 1, spacing)
+    return Field(grid, on_grid(continued, grid, spacing / 2))
+
+
+def divide(
+    voltage: Field,
+    stress: Field,
+    *,
+    weakest: float | tuple[float, float],
+    method: str | Regulariser = "white-noise",
+    posterior: Callable[[bool, bool], tuple[KernelProfile, FloatArray]] | None = None,
+    **options: Any,
+) -> Quotient:
+    r"""Divide a voltage field by a stress field in Fourier space, with regularisation.
+
+    .. math:: A\,G = \mathcal F^{-1}\{ w\,\mathcal F\{U\} / \mathcal F\{\sigma\} \}
+
+    with the window w of the method: of white noise of amplitude s, a tenth of the weakest
+    relevant component, in expectation :math:`w = 1 - \exp(-|\hat\sigma|^2/s^2)`.
+
+    Parameters
+    ----------
+    voltage : Field
+        Voltage less its baseline, about its centre, in V.
+    stress : Field
+        Base stress on the same grid, in Pa.
+    weakest : float or (float, float)
+        Modulus of the weakest relevant component of the stress's transform, in N: where the
+        voltage's spectrum still stands clear of its noise (the paper's rule).  With a second
+        number, that of the voltage's transform, in V m^2; otherwise it is read off where the
+        stress's transform first falls to the first.
+    method : str or Regulariser, default "white-noise"
+        One of the methods of :func:`memscal.calibrate` that divide fields.
+    posterior : callable, optional
+        What method ``"evidence"`` takes in place of a quotient.
+    **options
+        Parameters of the method, such as ``amplitude``.
+
+    Returns
+    -------
+    Quotient
+        A G, in V/Pa/m^2.
+
+    Raises
+    ------
+    InputError
+        If the fields lie on different grids, or there is no such method.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> r = np.linspace(0, 6e-3, 241)
+    >>> wide, narrow = (np.exp(-((r / s) ** 2)) for s in (1.0e-3, 0.6e-3))
+    >>> voltage, stress = (lift(r, f, 0.1e-3, 8e-3) for f in (wide, narrow))
+    >>> a, g = normalise(divide(voltage, stress, weakest=1e-4 * stress.integral))
+    >>> round(float(1e3 * fit_gaussian(g)), 3)  # sqrt((1 - 0.36) / 2) mm
+    0.566
+    """
+    if voltage.values.shape != stress.values.shape or not np.array_equal(voltage.x, stress.x):
+        raise InputError(
+            f"The voltage ({voltage!r}) and the stress ({stress!r}) lie on different grids.",
+            cure="Lift both with one spacing and one extent.",
+        )
+    regulariser = create_regulariser(method, **options) if isinstance(method, str) else method
+    if not isinstance(weakest, tuple):
+        modulus = stress.spectrum()[1]
+        weakest = (weakest, float(voltage.spectrum()[1][int(np.argmax(modulus <= weakest))]))
+    problem = DivisionProblem(
+        voltage.grid, voltage.values, stress.values, weakest[1], weakest[0], posterior=posterior
+    )
+    division = regulariser.divide(problem)
+    return Quotient(voltage.grid, division.field, division.window, division.profile)
+
+
+def normalise(quotient: Field) -> tuple[float, Field]:
+    r"""Split A G so that G integrates to one: :math:`A = \int A\,G\,dx\,dy` (the paper's Eq. 3).
+
+    Parameters
+    ----------
+    quotient : Field
+        A G, in V/Pa/m^2.
+
+    Returns
+    -------
+    float, Field
+        A, in V/Pa, and G, in 1/m^2.
+
+    Raises
+    ------
+    FitError
+        If A G does not add up to a positive number.
+
+    Examples
+    --------
+    See :func:`divide`.
+    """
+    a = quotient.integral
+    if not a > 0:
+        raise FitError(
+            f"The quotient of the fields adds up to {a:.3g} V/Pa.",
+            why="A conversion constant is positive.",
+            cure="Look at the deconvolved field; choose another method or less regularisation.",
+        )
+    return a, Field(quotient.grid, quotient.values / a)
+
+
+def fit_gaussian(g: Field, start: float | None = None) -> float:
+    r"""Width of the Gaussian of unit integral nearest to G over the plane: the paper's fit.
+
+    Minimises :math:`\int (G - e^{-r^2/2\sigma^2}/2\pi\sigma^2)^2\, r\,dr`.  No width below half a
+    step of the radial grid is told apart from a point.
+
+    Parameters
+    ----------
+    g : Field
+        G, in 1/m^2.
+    start : float, optional
+        Width from which the search starts, in m; from the value on the axis by default.
+
+    Returns
+    -------
+    float
+        Standard deviation of the Gaussian, in m.
+
+    Examples
+    --------
+    See :func:`divide`.
+    """
+    r, radial = g.r, g.radial
+    root, narrowest = np.sqrt(r), 0.5 * float(r[1] - r[0])
+    if start is None:
+        start = max(float(1 / np.sqrt(2 * np.pi * np.abs(radial[0]))), 2 * narrowest)
+
+    def misfit(scaled: FloatArray) -> FloatArray:
+        return root * (unit_gaussian(r, scaled[0] * start) - radial) * start**2
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
+
+    begin = np.array([max(start, 2 * narrowest) / start])
+
+    def linearise(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
+        # A step may lead beyond the narrowest width, where the search with a bound takes over.
+        inside = np.maximum(scaled, narrowest / start)
+        return misfit(inside), slope(inside)
+
+    near = gauss_newton(linearise, begin, tolerance=1e-10)
+    if near is not None and near[0] * start > 2 * narrowest:
+        return float(near[0] * start)
+    from scipy.optimize import least_squares
+
+    bounded = least_squares(
+        misfit,
+        begin,
+        jac=slope,
+        bounds=(narrowest / start, np.inf),
+        xtol=1e-12,
+        ftol=1e-14,
+        gtol=1e-14,
+    )
+    return float(bounded.x[0] * start)
+
+
+def reconvolve(a: float, g: Field, stress: Field) -> Field:
+    r"""Predict the voltage field, :math:`U = A\,(G \otimes \sigma)` (the paper's Eq. 1).
+
+    Parameters
+    ----------
+    a : float
+        A, in V/Pa.
+    g : Field
+        G, in 1/m^2.
+    stress : Field
+        Base stress on the same grid, in Pa.
+
+    Returns
+    -------
+    Field
+        Voltage, in V.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> r = np.linspace(0, 6e-3, 241)
+    >>> stress = lift(r, np.exp(-((r / 0.6e-3) ** 2)), 0.1e-3, 8e-3)
+    >>> voltage = lift(r, np.exp(-((r / 1.0e-3) ** 2)), 0.1e-3, 8e-3)
+    >>> a, g = normalise(divide(voltage, stress, weakest=1e-4 * stress.integral))
+    >>> bool(np.allclose(reconvolve(a, g, stress).radial, voltage.radial, atol=1e-4))
+    True
+    """
+    return replace(stress, values=a * stress.grid.convolve(g.values, stress.values))

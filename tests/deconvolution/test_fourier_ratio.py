@@ -1,0 +1,91 @@
+"""The paper's steps on arrays, against closed forms of Gaussians."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import memscal
+from memscal.errors import FitError, InputError
+
+R = np.linspace(0.0, 7e-3, 281)
+SPACING, EXTENT = 0.1e-3, 8e-3
+STRESS_WIDTH, WIDTH, CONVERSION = 0.5e-3, 0.561e-3, 1e-7
+
+
+def gaussian(width: float) -> memscal.Field:
+    """A Gaussian of unit integral, lifted."""
+    profile = np.exp(-((R / width) ** 2) / 2) / (2 * np.pi * width**2)
+    return memscal.lift(R, profile, SPACING, EXTENT)
+
+
+def voltage_and_stress() -> tuple[memscal.Field, memscal.Field]:
+    """Fields of a sensor with a Gaussian G: the widths add up in squares."""
+    blurred = gaussian(np.hypot(STRESS_WIDTH, WIDTH))
+    return memscal.Field(blurred.grid, CONVERSION * blurred.values), gaussian(STRESS_WIDTH)
+
+
+def test_lifting_keeps_the_integral_and_the_profile() -> None:
+    field = gaussian(WIDTH)
+    # The spline through the profile errs by (25 um / 561 um)^4 = 4e-6 at the most.
+    assert field.integral == pytest.approx(1.0, abs=4e-6)
+    assert field.image.shape == (field.y.size, field.x.size)
+    exact = np.exp(-((field.r / WIDTH) ** 2) / 2) / (2 * np.pi * WIDTH**2)
+    np.testing.assert_allclose(field.radial, exact, atol=1e-5 * exact[0])
+
+
+def test_the_transform_of_a_lifted_gaussian_is_a_gaussian() -> None:
+    k, modulus = gaussian(WIDTH).spectrum()
+    np.testing.assert_allclose(modulus, np.exp(-((k * WIDTH) ** 2) / 2), atol=1e-6)
+
+
+def test_the_steps_find_conversion_constant_and_width() -> None:
+    voltage, stress = voltage_and_stress()
+    quotient = memscal.divide(voltage, stress, weakest=1e-5)
+    a, g = memscal.normalise(quotient)
+    # The window leaves ripples of the size of the weakest component, 1e-5.
+    assert a == pytest.approx(CONVERSION, rel=3e-5)
+    assert g.integral == pytest.approx(1.0, abs=1e-12)
+    assert memscal.fit_gaussian(g) == pytest.approx(WIDTH, rel=1e-3)
+    assert quotient.window[0, 0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("method", ["white-noise", "tikhonov"])
+def test_what_was_divided_convolves_back_to_the_voltage(method: str) -> None:
+    voltage, stress = voltage_and_stress()
+    a, g = memscal.normalise(memscal.divide(voltage, stress, weakest=1e-5, method=method))
+    back = memscal.reconvolve(a, g, stress)
+    np.testing.assert_allclose(back.values, voltage.values, atol=2e-4 * voltage.values.max())
+
+
+def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_is() -> None:
+    voltage, stress = voltage_and_stress()
+    modulus = stress.spectrum()[1]
+    place = int(np.argmax(modulus <= 1e-2))
+    pair = (1e-2, float(voltage.spectrum()[1][place]))
+    drawn = [
+        memscal.divide(voltage, stress, weakest=weakest, method="white-noise-draw", seed=3)
+        for weakest in (1e-2, pair)
+    ]
+    np.testing.assert_allclose(drawn[0].values, drawn[1].values)
+
+
+def test_a_profile_that_is_none_is_refused() -> None:
+    with pytest.raises(InputError, match="do not increase"):
+        memscal.lift(R[::-1], R, SPACING, EXTENT)
+    with pytest.raises(InputError, match="no radial profile"):
+        memscal.lift(R, R[1:], SPACING, EXTENT)
+    with pytest.raises(InputError, match="half side"):
+        memscal.lift(R, R, SPACING, SPACING / 2)
+
+
+def test_fields_on_different_grids_are_not_divided() -> None:
+    stress = memscal.lift(R, np.exp(-R / 1e-3), SPACING, 2 * EXTENT)
+    with pytest.raises(InputError, match="one spacing and one extent"):
+        memscal.divide(gaussian(WIDTH), stress, weakest=1e-3)
+
+
+def test_a_quotient_without_a_positive_integral_has_no_conversion_constant() -> None:
+    field = gaussian(WIDTH)
+    with pytest.raises(FitError, match="conversion constant is positive"):
+        memscal.normalise(memscal.Field(field.grid, -field.values))
