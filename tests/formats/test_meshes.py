@@ -13,10 +13,9 @@ from builders import make_film
 from meshes import HEIGHTS, RADII, block, pressure, section, tensor
 
 from memscal.errors import FormatError, InputError, MemscalError, UnitError
-from memscal.formats.mesh_reader import read_mesh
-from memscal.formats.mesh_writer import write_mesh
+from memscal.formats.meshes.mesh_files import read_mesh, write_mesh
+from memscal.formats.meshes.reference_mesh import read_reference_mesh
 from memscal.formats.reference import read_reference, write_reference
-from memscal.formats.reference_mesh import read_reference_mesh
 from memscal.formats.reference_profile import ImportedProfile
 from memscal.mechanics.base_stress import base_normal_stress, base_shear_stress
 from memscal.model.field_mesh import FieldMesh
@@ -109,6 +108,41 @@ def test_every_kind_of_file_gives_the_same_stress(
     tmp_path: Path, name: str, options: dict[str, Any]
 ):
     path = saved(section(), tmp_path / name, **options)
+    assert_is_the_section(imported(path, "S9"))
+
+
+@pytest.mark.parametrize("header", ["UInt32", "UInt64"])
+@pytest.mark.parametrize("order", ["LittleEndian", "BigEndian"])
+def test_raw_numbers_are_read_without_compression_too(tmp_path: Path, header: str, order: str):
+    """ParaView writes them, and meshio does not."""
+    mesh, end = section(), {"LittleEndian": "<", "BigEndian": ">"}[order]
+    quads = mesh.cells[0].data
+    arrays = {
+        "S9": ("PointData", "Float64", 9, mesh.point_data["S9"].astype(end + "f8")),
+        "Points": ("Points", "Float64", 3, mesh.points.astype(end + "f8")),
+        "connectivity": ("Cells", "Int64", 1, quads.astype(end + "i8")),
+        "offsets": ("Cells", "Int64", 1, (4 * np.arange(1, 1 + len(quads))).astype(end + "i8")),
+        "types": ("Cells", "UInt8", 1, np.full(len(quads), 9, np.uint8)),
+    }
+    sections, raw = dict.fromkeys(("PointData", "Points", "Cells"), ""), b""
+    for name, (place, kind, count, values) in arrays.items():
+        components = f'NumberOfComponents="{count}" ' if count > 1 else ""
+        sections[place] += (
+            f'<DataArray type="{kind}" Name="{name}" {components}format="appended" '
+            f'offset="{len(raw)}"/>'
+        )
+        size = np.array(values.nbytes, end + {"UInt32": "u4", "UInt64": "u8"}[header])
+        raw += size.tobytes() + values.tobytes()
+    inner = "".join(f"<{place}>{text}</{place}>" for place, text in sections.items())
+    path = tmp_path / "film.vtu"
+    path.write_bytes(
+        f'<VTKFile type="UnstructuredGrid" version="2.2" byte_order="{order}" '
+        f'header_type="{header}"><UnstructuredGrid><Piece NumberOfPoints="{len(mesh.points)}" '
+        f'NumberOfCells="{len(quads)}">{inner}</Piece></UnstructuredGrid>'
+        '<AppendedData encoding="raw">_'.encode()
+        + raw
+        + b"</AppendedData></VTKFile>"
+    )
     assert_is_the_section(imported(path, "S9"))
 
 

@@ -8,10 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.mesh_base import Base, Frame, find_base, find_frame
-from memscal.formats.mesh_circles import average_over_circles
-from memscal.formats.mesh_reader import Mesh, read_mesh
-from memscal.formats.mesh_stress import Component, find_normal, find_shear
+from memscal.formats.meshes.base import (
+    Base,
+    Frame,
+    average_over_circles,
+    find_base,
+    find_frame,
+)
+from memscal.formats.meshes.components import Component, find_normal, find_shear
+from memscal.formats.meshes.mesh_files import Mesh, read_mesh
 from memscal.formats.reference_profile import (
     ImportedProfile,
     Samples,
