@@ -129,21 +129,21 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
         weight = touching[of_side][..., None]
         corners = frame.points[block.nodes[of_side]]
         sides.append((block, of_side, (weight * corners).sum(axis=1) / weight.sum(axis=1)))
-    found = np.unique(np.concatenate(nodes))
+    base_nodes = np.unique(np.concatenate(nodes))
     what = f"{AXES[frame.vertical]} = {position * 1e3:.6g} mm"
-    if found.size < _FEWEST:
+    if base_nodes.size < _FEWEST:
         nearest = float(heights[np.argmin(np.abs(heights - position))])
         raise InputError(
-            f"Only {found.size} nodes of the film in {mesh.source.file_name} lie on its base, at "
-            f"{what}.",
+            f"Only {base_nodes.size} nodes of the film in {mesh.source.file_name} lie on its base, "
+            f"at {what}.",
             why=f"The mesh reaches from {AXES[frame.vertical]} = {lowest * 1e3:.6g} mm to "
             f"{highest * 1e3:.6g} mm, and its nearest node is at {nearest * 1e3:.6g} mm.",
             cure="Name the axis across the film (vertical; --vertical) or the position of the "
             "flat base on it (base; --base).",
         )
     which = ", its lowest level" if level is None else ""
-    note = f"The base was taken at {what}{which}: {found.size} nodes."
-    return Base(found, tuple(sides), outward, (note,))
+    note = f"The base was taken at {what}{which}: {base_nodes.size} nodes."
+    return Base(base_nodes, tuple(sides), outward, (note,))
 
 
 def average_over_circles(

@@ -110,10 +110,10 @@ def run_meshio(
             why=f"The reader says: {printable(header['error'], _MAX_REASON)}.",
             cure=_AS_VTU,
         )
-    found = []
+    numbers = []
     while answer.tell() < len(answer.getbuffer()):
-        found.append(np.load(answer, allow_pickle=False))
-    return header, found
+        numbers.append(np.load(answer, allow_pickle=False))
+    return header, numbers
 
 
 def _run(request: str, folder: str, seconds: float, name: str) -> None:
@@ -132,7 +132,7 @@ def _run(request: str, folder: str, seconds: float, name: str) -> None:
             timeout=seconds,
             check=False,
         )
-        late = done.returncode == -getattr(signal, "SIGXCPU", 0) != 0
+        late = -done.returncode == getattr(signal, "SIGXCPU", None)
     except subprocess.TimeoutExpired:
         late = True
     except OSError as error:

@@ -101,8 +101,8 @@ def _of_tensor(
 def _is_plane(mesh: Mesh, wanted: str) -> bool:
     """Return whether four components are xx, xy, yx, yy: the middle ones are the same."""
     fields = [mesh.point_data, *(block.data for block in mesh.solid)]
-    found = [values[wanted] for values in fields if wanted in values]
-    return all(np.array_equal(each[:, 1], each[:, 2]) for each in found)
+    tensors = [values[wanted] for values in fields if wanted in values]
+    return all(np.array_equal(tensor[:, 1], tensor[:, 2]) for tensor in tensors)
 
 
 def _no_such_field(

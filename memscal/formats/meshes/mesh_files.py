@@ -87,18 +87,18 @@ class Mesh:
     @property
     def solid(self) -> tuple[Cells, ...]:
         """The cells of the highest dimension, which are the body and not its faces or edges."""
-        highest = max((each.dimension for each in self.cells), default=0)
-        return tuple(each for each in self.cells if each.dimension == highest)
+        highest = max((block.dimension for block in self.cells), default=0)
+        return tuple(block for block in self.cells if block.dimension == highest)
 
     @property
     def used(self) -> NDArray[np.int64]:
         """The nodes that belong to the body."""
-        return np.unique(np.concatenate([each.nodes.ravel() for each in self.solid]))
+        return np.unique(np.concatenate([block.nodes.ravel() for block in self.solid]))
 
     @property
     def size(self) -> str:
         """Numbers of nodes and cells, in words."""
-        return f"{len(self.points)} nodes, {sum(len(each.nodes) for each in self.solid)} cells"
+        return f"{len(self.points)} nodes, {sum(len(block.nodes) for block in self.solid)} cells"
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
@@ -125,7 +125,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     if _KINDS[ending] == "xdmf":
         heavy, drawn = heavy_arrays(data, shown)
         sources += drawn
-    with damage_named(f"{name} cannot be read as a mesh"):
+    with damage_named(f"{name} cannot be read as a mesh", why="Its reader gave no mesh back"):
         header, arrays = run_meshio(data, _KINDS[ending], name, heavy)
         return _checked(header, arrays, tuple(sources), tensor_order=_KINDS[ending] != "xdmf")
 
@@ -145,7 +145,7 @@ def _checked(
     *,
     tensor_order: bool,
 ) -> Mesh:
-    """Return what meshio found, if it is a mesh that can be worked with."""
+    """Return the mesh that meshio read, if it can be worked with."""
     points = np.asarray(arrays[header["points"]], dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
         raise _unusable(sources[0], f"points of shape {points.shape}")
