@@ -110,7 +110,7 @@ def read(path: Path, given: dict[str, Any]) -> ImportedProfile:
         return read_reference_table(
             path, **_given(given, (*_OF_TABLES, *_SHARED, *_READING, "load")), **setting
         )
-    from memscal.formats.reference_mesh import read_reference_mesh
+    from memscal.formats.meshes.reference_mesh import read_reference_mesh
 
     places = _given(given, ("base", "centre"))
     if "base" in places:
@@ -128,6 +128,6 @@ def _given(values: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 
 def is_mesh(path: Path) -> bool:
     """Return whether a file's name says that it is a mesh."""
-    from memscal.formats import mesh_names
+    from memscal.formats.meshes import mesh_files
 
-    return mesh_names.is_mesh(path)
+    return mesh_files.is_mesh(path)

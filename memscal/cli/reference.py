@@ -231,7 +231,7 @@ def _write(
 
         write_reference(contacts[0].profile(), output, overwrite=force)
     if mesh is not None:
-        from memscal.formats.mesh_writer import write_mesh
+        from memscal.formats.meshes.mesh_files import write_mesh
 
         write_mesh(contacts[0].mesh(), mesh, overwrite=force)
     if rendered:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import os
+import re
 import struct
-import subprocess
-import sys
-import tracemalloc
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,30 +19,20 @@ import pytest
 from meshes import section
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
-from memscal.formats.mesh_reader import read_mesh
+from memscal.formats.meshes import child
+from memscal.formats.meshes.mesh_files import Mesh, read_mesh
 
 SMALL = section(radii=np.linspace(0.0, 8.0, 5), heights=np.array([0.0, 1.0]))
 BOMB = "".join(
     f'<!ENTITY e{i} "{"".join([f"&e{i - 1};"] * 10) if i else "ha" * 10}">' for i in range(12)
 )
-SWEEP = """
-import pathlib, sys
-from memscal.errors import MemscalError
-from memscal.formats.mesh_reader import read_mesh
-
-path = pathlib.Path(sys.argv[1])
-good = path.read_bytes()
-read = refused = 0
-for i in range(0, len(good), int(sys.argv[2])):
-    for damaged in (good[:i], good[:i] + bytes([good[i] ^ 0x15]) + good[i + 1 :]):
-        path.write_bytes(damaged)
-        try:
-            read_mesh(path)
-            read += 1
-        except MemscalError:
-            refused += 1
-print(read, refused)
-"""
+POINTS = (
+    '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" '
+    'compressor="vtkZLibDataCompressor"><UnstructuredGrid>'
+    '<Piece NumberOfPoints="3" NumberOfCells="0"><Points>'
+    '<DataArray type="Float64" Name="Points" NumberOfComponents="3" format="binary">'
+    "{}</DataArray></Points></Piece></UnstructuredGrid></VTKFile>"
+)
 
 
 def small(path: Path, **options: Any) -> Path:
@@ -62,169 +52,107 @@ def edited(path: Path, old: str, new: str) -> Path:
     return path
 
 
-def refused_cheaply(path: Path, words: str, kind: type[MemscalError] = UnsafeFileError) -> None:
-    """The refusal names the file and a cure, and costs little memory."""
-    tracemalloc.start()
-    try:
-        with pytest.raises(kind, match=words) as caught:
-            read_mesh(path)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+def numbers_of(path: Path, name: str) -> str:
+    """Return the text of an array of a VTU file."""
+    return path.read_text().partition(f'Name="{name}"')[2].partition(">")[2].partition("<")[0]
+
+
+def refused(
+    path: Path, words: str = "cannot be read", kind: type[MemscalError] = FormatError
+) -> str:
+    """Return a refusal, which names the file and a cure."""
+    with pytest.raises(kind, match=words) as caught:
+        read_mesh(path)
     assert path.name in caught.value.problem
     assert caught.value.cure
-    assert peak < 10 * path.stat().st_size + 2**22
+    return str(caught.value)
 
 
-def compressed_vtu(path: Path, content: bytes, claimed: int) -> Path:
-    """Write a mesh whose points are one block that claims a size."""
-    block = zlib.compress(content, 9)
-    header = struct.pack("<4I", 1, claimed, 0, len(block))
-    points = (base64.b64encode(header) + base64.b64encode(block)).decode()
-    path.write_text(
-        '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" '
-        'compressor="vtkZLibDataCompressor"><UnstructuredGrid>'
-        '<Piece NumberOfPoints="3" NumberOfCells="1"><Points>'
-        '<DataArray type="Float64" Name="Points" NumberOfComponents="3" format="binary">'
-        f"{points}</DataArray></Points><Cells>"
-        '<DataArray type="Int64" Name="connectivity" format="ascii">0 1 2</DataArray>'
-        '<DataArray type="Int64" Name="offsets" format="ascii">3</DataArray>'
-        '<DataArray type="UInt8" Name="types" format="ascii">5</DataArray>'
-        "</Cells></Piece></UnstructuredGrid></VTKFile>"
-    )
-    return path
-
-
-@pytest.mark.parametrize("name", ["film.vtu", "film.xdmf"])
 @pytest.mark.parametrize(
-    "document_type",
+    ("name", "document_type"),
     [
-        f"<!DOCTYPE a [{BOMB}]>",
-        '<!DOCTYPE a [<!ENTITY e11 SYSTEM "file:///etc/passwd">]>',
-        '<!DOCTYPE a [<!ENTITY % e SYSTEM "file:///etc/passwd"> %e;]>',
-        '<!DOCTYPE a SYSTEM "file:///etc/passwd">',
+        ("film.vtu", f"<!DOCTYPE a [{BOMB}]>"),
+        ("film.xdmf", f"<!DOCTYPE a [{BOMB}]>"),
+        ("film.vtu", '<!DOCTYPE a [<!ENTITY e11 SYSTEM "{}">]>'),
+        ("film.xdmf", '<!DOCTYPE a [<!ENTITY % e SYSTEM "{}"> %e;]>'),
+        ("film.vtu", '<!DOCTYPE a SYSTEM "{}">'),
     ],
-    ids=["laughs", "file", "parameter", "document type"],
+    ids=["laughs", "laughs", "file", "parameter", "document type"],
 )
-def test_entities_are_refused_and_never_opened(tmp_path: Path, name: str, document_type: str):
+def test_entities_neither_grow_nor_open_a_file(tmp_path: Path, name: str, document_type: str):
+    (tmp_path / "other").write_text('<!ENTITY e11 "a secret">')
     path = tmp_path / name
+    head = document_type.replace("{}", (tmp_path / "other").as_uri())
     root = {"film.vtu": "VTKFile", "film.xdmf": "Xdmf"}[name]
-    path.write_text(f'<?xml version="1.0"?>{document_type}<{root}>&e11;</{root}>')
-    refused_cheaply(path, "entity")
+    path.write_text(f'<?xml version="1.0"?>{head}<{root} type="&e11;">&e11;</{root}>')
+    assert "secret" not in refused(path)
 
 
-def test_the_document_type_that_xdmf_files_name_is_allowed(tmp_path: Path):
-    path = small(tmp_path / "film.xdmf", data_format="XML")
-    edited(path, "<Xdmf ", '<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []><Xdmf ')
-    assert read_mesh(path).point_data["S9"].shape == (10, 9)
-
-
-def test_xml_inside_the_text_of_xml_is_left_alone(tmp_path: Path):
-    """meshio parses an Information a second time: a bomb would go off there."""
-    path = small(tmp_path / "film.xdmf", data_format="XML")
-    bomb = f"<!DOCTYPE a [{BOMB}]><a>&e11;</a>"
-    edited(path, "<Geometry", f"<Information><![CDATA[{bomb}]]></Information><Geometry")
-    assert read_mesh(path).point_data["S9"].shape == (10, 9)
-
-
-@pytest.mark.parametrize("text", ["<a>" * 60 + "</a>" * 60, f"<a>{'<b/>' * 30_000}</a>"])
+@pytest.mark.parametrize("text", ["<a>" * 10**6, f"<VTKFile>{'<b/>' * 10**6}</VTKFile>"])
 def test_absurd_xml_is_refused(tmp_path: Path, text: str):
     path = tmp_path / "film.vtu"
     path.write_text(text)
-    with pytest.raises(UnsafeFileError, match="XML elements"):
-        read_mesh(path)
+    refused(path)
 
 
-def test_a_compressed_block_that_claims_a_gibibyte_is_refused_unread(tmp_path: Path):
-    path = compressed_vtu(tmp_path / "film.vtu", bytes(2**24), claimed=2**30)
-    refused_cheaply(path, "more than 536,870,912 bytes")
-
-
-def test_a_compressed_block_is_inflated_no_further_than_it_claims(tmp_path: Path):
-    path = compressed_vtu(tmp_path / "film.vtu", bytes(2**28), claimed=72)
-    tracemalloc.start()
-    read_mesh(path)  # nine zeros, and nobody sees the rest
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 2**24
-    path = compressed_vtu(tmp_path / "film.vtu", bytes(72), claimed=80)
-    with pytest.raises(FormatError, match="a block of 80 bytes has only 72"):
-        read_mesh(path)
-
-
-@pytest.mark.parametrize("binary", [True, False])
-@pytest.mark.parametrize("version", ["4.2", "5.1"])
-@pytest.mark.parametrize("section_name", ["POINTS", "CELLS", "CELL_TYPES", "POINT_DATA"])
-def test_a_count_beyond_the_files_size_is_refused(
-    tmp_path: Path, binary: bool, version: str, section_name: str
-):
-    path = small(tmp_path / "film.vtk", binary=binary, fmt_version=version)
-    data = path.read_bytes()
-    head, name, rest = data.partition(section_name.encode() + b" ")
-    _, space, rest = rest.partition(b" " if section_name in ("POINTS", "CELLS") else b"\n")
-    path.write_bytes(head + name + b"900000000000" + space + rest)
-    refused_cheaply(path, f"claims {section_name} 900000000000")
+def test_compressed_blocks_of_gigabytes_meet_the_limit_of_memory(tmp_path: Path):
+    """Eighty blocks of 16 MiB."""
+    block = zlib.compress(bytes(2**24), 9)
+    header = struct.pack("<83I", 80, 2**24, 0, *[len(block)] * 80)
+    path = tmp_path / "film.vtu"
+    blocks = base64.b64encode(header) + base64.b64encode(block * 80)
+    path.write_text(POINTS.format(blocks.decode()))
+    refused(path, "more than 1,", UnsafeFileError)
 
 
 @pytest.mark.parametrize(
-    "line",
+    ("section_name", "options"),
     [
-        "DATASET STRUCTURED_POINTS",
-        "dataset structured_points",
-        "DATA\u017fET STRUCTURED_POINT\u017f",
-        "DATASET\tRECTILINEAR_GRID",
-        "0 0 0 DATASET STRUCTURED_GRID",
-        "DATASET\u2003structured_points",
+        ("POINTS", {"binary": True, "fmt_version": "5.1"}),
+        ("POINTS", {"binary": False, "fmt_version": "4.2"}),
+        ("CELLS", {"binary": True, "fmt_version": "5.1"}),
+        ("CELLS", {"binary": False, "fmt_version": "5.1"}),
+        ("CELL_TYPES", {"binary": True, "fmt_version": "4.2"}),
     ],
 )
-def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path: Path, line: str):
+def test_a_count_beyond_the_files_size_is_refused(
+    tmp_path: Path, section_name: str, options: dict[str, Any]
+):
+    path = small(tmp_path / "film.vtk", **options)
+    head, name, rest = path.read_bytes().partition(section_name.encode() + b" ")
+    rest = re.sub(rb"^\d+", b"900000000000", rest)
+    path.write_bytes(head + name + rest)
+    refused(path)
+
+
+def test_a_few_bytes_that_stand_for_a_billion_points_are_refused(tmp_path: Path):
     path = tmp_path / "film.vtk"
     path.write_text(
-        f"# vtk DataFile Version 3.0\nDATASET STRUCTURED_POINTS in a title\nASCII\n{line}\n"
-        "DIMENSIONS 2000 2000 2000\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+        "# vtk DataFile Version 3.0\na title\nASCII\nDATASET STRUCTURED_POINTS\n"
+        "DIMENSIONS 2000 2000 2000\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 8000000000\n"
     )
-    refused_cheaply(path, "structured grid")
+    refused(path, "more than 1,", UnsafeFileError)
 
 
-@pytest.mark.parametrize(
-    ("kind", "words"),
-    [("polygon", "the type 7"), ("VTK_LAGRANGE_TRIANGLE", "the type 69"), ("triangle", "")],
-)
-@pytest.mark.parametrize("binary", [True, False])
-def test_cells_that_state_their_own_size_are_read_from_vtu_files_only(
-    tmp_path: Path, binary: bool, kind: str, words: str
-):
+@pytest.mark.parametrize("kind", ["polygon", "VTK_LAGRANGE_TRIANGLE"])
+def test_cells_that_state_their_own_size_are_read(tmp_path: Path, kind: str):
     mesh = meshio.Mesh(SMALL.points, [(kind, SMALL.cells[0].data[:, :3])])
-    meshio.vtk.write(tmp_path / "film.vtk", mesh, binary=binary)
-    meshio.vtu.write(tmp_path / "film.vtu", mesh, binary=binary)
-    assert len(read_mesh(tmp_path / "film.vtu").solid[0].nodes) == 4
-    if words:
-        with pytest.raises(FormatError, match=words):
-            read_mesh(tmp_path / "film.vtk")
-    else:
-        assert len(read_mesh(tmp_path / "film.vtk").solid[0].nodes) == 4
+    meshio.vtk.write(tmp_path / "film.vtk", mesh)
+    meshio.vtu.write(tmp_path / "film.vtu", mesh)
+    for name in ("film.vtk", "film.vtu"):
+        (cells,) = read_mesh(tmp_path / name).solid
+        np.testing.assert_array_equal(cells.nodes, SMALL.cells[0].data[:, :3])
 
 
-@pytest.mark.parametrize("offsets", ["3000000000 4", "-4 4", "0 4", "4 9", "4.0 8.0"])
+@pytest.mark.parametrize("offsets", ["3000000000 4", "4 9", "4.0 8.0"])
 def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets: str):
-    mesh = meshio.Mesh(SMALL.points, [("polygon", SMALL.cells[0].data[:2])])
     path = tmp_path / "film.vtu"
+    mesh = meshio.Mesh(SMALL.points, [("polygon", SMALL.cells[0].data[:2])])
     meshio.vtu.write(path, mesh, binary=False)
-    text = path.read_text()
-    numbers = text.partition('Name="offsets"')[2].partition(">")[2].partition("<")[0]
-    text = text.replace(numbers, offsets)
+    edited(path, numbers_of(path, "offsets"), offsets)
     if "." in offsets:
-        text = text.replace('type="Int64" Name="offsets"', 'type="Float64" Name="offsets"')
-    path.write_text(text)
-    refused_cheaply(path, "cannot be", FormatError)
-
-
-def test_polyhedra_are_refused(tmp_path: Path):
-    path = small(tmp_path / "film.vtu", binary=False)
-    text = path.read_text()
-    types = text.partition('Name="types"')[2].partition(">")[2].partition("<")[0]
-    path.write_text(text.replace(types, types.replace("9", "42", 1)))
-    refused_cheaply(path, "polyhedra", FormatError)
+        edited(path, 'type="Int64" Name="offsets"', 'type="Float64" Name="offsets"')
+    refused(path)
 
 
 @pytest.mark.parametrize(
@@ -232,76 +160,70 @@ def test_polyhedra_are_refused(tmp_path: Path):
     [
         "/etc/passwd:/data1",
         "../film.h5:/data1",
-        "./film.h5:/data1",
         "other.h5:/data1",
         "film.xdmf:/data1",
-        "",
+        "<!-- -->other.h5:/data1",
+        "<![CDATA[/other/film.h5:/data9]]>",
     ],
 )
 def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(tmp_path: Path, address: str):
-    path = small(tmp_path / "film.xdmf")
-    edited(path, "film.h5:/data1", address)
-    refused_cheaply(path, "only the HDF5 file of the same name in the same folder|which is not")
+    path = edited(small(tmp_path / "film.xdmf"), "film.h5:/data1", address)
+    with h5py.File(tmp_path / "film.h5", "r") as file, h5py.File(tmp_path / "other.h5", "w") as to:
+        file.copy("data1", to)
+    refused(path, "takes its numbers from", UnsafeFileError)
 
 
 def test_an_xdmf_file_with_raw_binary_numbers_is_refused(tmp_path: Path):
-    path = small(tmp_path / "film.xdmf")
-    text = path.read_text().replace('Format="HDF"', 'Format="Binary"')
-    path.write_text(text.replace("film.h5:/data1", "/etc/passwd"))
-    refused_cheaply(path, "Any file could be read")
+    path = small(tmp_path / "film.xdmf", data_format="XML")
+    head, _, rest = path.read_text().partition('Format="XML"')
+    rest = rest.partition("</DataItem>")[2]
+    path.write_text(f'{head}Format="Binary">/etc/passwd</DataItem>{rest}')
+    refused(path, "asks for the file /etc/passwd", UnsafeFileError)
 
 
-def test_the_hdf5_file_beside_an_xdmf_file_may_be_no_pipe(tmp_path: Path):
+def test_the_hdf5_file_beside_an_xdmf_file_is_a_source_of_it_and_goes_through_the_safe_reader(
+    tmp_path: Path,
+):
     path = small(tmp_path / "film.xdmf")
+    mesh = read_mesh(path)
+    assert [source.file_name for source in mesh.sources] == ["film.xdmf", "film.h5"]
+    assert any(f"film.h5 (sha256 {mesh.sources[1].sha256})" in note for note in mesh.notes)
+    with h5py.File(tmp_path / "film.h5", "r+") as file:
+        del file["data1"]
+        file["data1"] = h5py.ExternalLink("/etc/passwd", "/x")
+    with pytest.raises(UnsafeFileError, match=r"film\.h5: /data1 is reached through"):
+        read_mesh(path)
     (tmp_path / "film.h5").unlink()
     os.mkfifo(tmp_path / "film.h5")
     with pytest.raises(UnsafeFileError, match=r"film\.h5 is not a regular file"):
         read_mesh(path)
 
 
-def test_the_hdf5_file_beside_an_xdmf_file_may_not_lead_on(tmp_path: Path):
-    path = small(tmp_path / "film.xdmf")
-    with h5py.File(tmp_path / "film.h5", "r+") as file:
-        del file["data1"]
-        file["data1"] = h5py.ExternalLink("/etc/passwd", "/x")
-    with pytest.raises(UnsafeFileError, match=r"film\.h5: /data1 is reached through"):
-        read_mesh(path)
-
-
-def test_the_hdf5_files_checksum_is_noted(tmp_path: Path):
-    (note,) = read_mesh(small(tmp_path / "film.xdmf")).notes
-    assert "film.h5 (sha256 " in note
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('Dimensions="10 9"', 'Dimensions="100000000 900000000"', "claims 90,000,000,000,000,000"),
-        ('Dimensions="10 9"', 'Dimensions="10 ten"', "without dimensions"),
+        ('Dimensions="10 9"', 'Dimensions="100000000 900000000"', "reshape"),
         ('Dimensions="10 9"', 'Dimensions="10 9" Reference="/Xdmf/Domain/Grid"', "points to them"),
         ('Dimensions="10 9"', 'Dimensions="10 9" ItemType="Function"', "calculated from others"),
         ("<Domain>", "<Domain><Grid><Topology/></Grid>", "holds 2 grids"),
-        ('Dimensions="10 9"', 'Dimensions="9 10"', "cannot be read as a mesh"),
     ],
 )
 def test_xdmf_that_is_more_than_a_mesh_with_numbers_is_refused(
     tmp_path: Path, old: str, new: str, words: str
 ):
-    path = edited(small(tmp_path / "film.xdmf", data_format="XML"), old, new)
-    with pytest.raises(FormatError, match=words) as caught:
-        read_mesh(path)
-    assert caught.value.cure
+    refused(edited(small(tmp_path / "film.xdmf", data_format="XML"), old, new), words)
 
 
-def test_a_time_series_of_one_step_is_read_as_fenics_writes_it(tmp_path: Path):
+def test_xdmf_is_read_as_fenics_writes_it_and_the_rest_of_it_is_left_alone(tmp_path: Path):
+    """One step in a series, a document type, and XML in the text of XML, which meshio parses."""
     path = small(tmp_path / "film.xdmf")
-    text = path.read_text()
-    head, grid, rest = text.partition("<Grid")
+    head, grid, rest = path.read_text().partition("<Grid")
     grid, end, rest = (grid + rest).partition("</Grid>")
     collection = '<Grid GridType="Collection" CollectionType="Temporal">'
-    time = '<Time Value="0" />'
-    inner = grid.replace("<Topology", time + "<Topology") + end
-    path.write_text(head + collection + inner + "</Grid>" + rest)
+    bomb = f"<Information><![CDATA[<!DOCTYPE a [{BOMB}]><a>&e11;</a>]]></Information>"
+    inner = grid.replace("<Topology", f'<Time Value="0" />{bomb}<Topology') + end
+    head = head.replace("<Xdmf ", '<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []><Xdmf ')
+    path.write_text(f"{head}{collection}{inner}</Grid>{rest}")
     assert read_mesh(path).point_data["S9"].shape == (10, 9)
 
 
@@ -313,13 +235,11 @@ def test_a_time_series_of_one_step_is_read_as_fenics_writes_it(tmp_path: Path):
         ('Name="Points" NumberOfComponents="3"', 'Name="Points" NumberOfComponents="5"', "mesh"),
         ('byte_order="LittleEndian"', 'byte_order="Middle"', "Middle"),
         ('NumberOfPoints="10"', 'NumberOfPoints="11"', "cannot be read as a mesh"),
-        ('Name="connectivity"', 'Name="joints"', "numbers of nodes cannot be"),
+        ('Name="connectivity"', 'Name="joints"', "connectivity"),
     ],
 )
 def test_a_vtu_file_of_another_shape_is_refused(tmp_path: Path, old: str, new: str, words: str):
-    path = edited(small(tmp_path / "film.vtu"), old, new)
-    with pytest.raises(FormatError, match=words):
-        read_mesh(path)
+    refused(edited(small(tmp_path / "film.vtu"), old, new), words)
 
 
 def test_what_vtk_writes_today_is_read_where_meshio_alone_would_not(tmp_path: Path):
@@ -330,42 +250,35 @@ def test_what_vtk_writes_today_is_read_where_meshio_alone_would_not(tmp_path: Pa
     assert list(read_mesh(path).point_data) == ["S9"]
 
 
-def test_a_field_of_the_wrong_length_is_refused(tmp_path: Path):
+def test_polyhedra_and_fields_of_the_wrong_length_are_refused(tmp_path: Path):
     path = small(tmp_path / "film.vtu", binary=False)
     text = path.read_text()
+    types = numbers_of(path, "types")
+    path.write_text(text.replace(types, types.replace("9", "42", 1)))
+    refused(path)
     array = '<DataArray type="Float64" Name="half" format="ascii">1 2 3</DataArray>'
     path.write_text(text.replace("<PointData>", f"<PointData>{array}"))
-    with pytest.raises(FormatError, match="half"):
-        read_mesh(path)
+    refused(path, "half")
 
 
 @pytest.mark.parametrize(("name", "before"), [("film.vtu", 'Name="S9"'), ("film.vtk", "POINTS")])
 def test_words_among_numbers_are_refused_and_not_cut_short(tmp_path: Path, name: str, before: str):
     path = small(tmp_path / name, binary=False)
     head, mark, rest = path.read_text().partition(before)
-    line, _, numbers = rest.partition("\n" if name == "film.vtk" else ">")
     ended = "\n" if name == "film.vtk" else ">"
+    line, _, numbers = rest.partition(ended)
     path.write_text(head + mark + line + ended + "overload " + numbers)
-    with pytest.raises(FormatError, match="string or file could not be read"):
-        read_mesh(path)
+    refused(path, "string or file could not be read")
 
 
-def test_cells_with_nodes_that_are_not_there_are_refused(tmp_path: Path):
-    mesh = meshio.Mesh(SMALL.points, [("quad", SMALL.cells[0].data + 100)])
+def test_nodes_that_are_not_there_or_nowhere_are_refused(tmp_path: Path):
     path = tmp_path / "film.vtu"
-    meshio.vtu.write(path, mesh)
-    with pytest.raises(FormatError, match="a node that is not there"):
-        read_mesh(path)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_points_that_are_nowhere_are_refused(tmp_path: Path, value: float):
-    path = tmp_path / "film.vtu"
+    meshio.vtu.write(path, meshio.Mesh(SMALL.points, [("quad", SMALL.cells[0].data + 100)]))
+    refused(path, "a node that is not there")
     points = SMALL.points.copy()
-    points[3, 1] = value
+    points[3, 1] = np.nan
     meshio.vtu.write(path, meshio.Mesh(points, SMALL.cells))
-    with pytest.raises(FormatError, match="not finite"):
-        read_mesh(path)
+    refused(path, "not finite")
 
 
 def test_text_from_a_mesh_cannot_steer_the_terminal(tmp_path: Path):
@@ -380,20 +293,12 @@ def test_what_is_no_file_with_something_in_it_is_refused(tmp_path: Path, ending:
     with pytest.raises(InputError, match="No such file"):
         read_mesh(path)
     path.write_bytes(b"")
-    with pytest.raises(FormatError, match="is empty"):
-        read_mesh(path)
+    refused(path, "is empty")
     path.write_bytes(b"\0\1\2 not a mesh at all")
-    with pytest.raises(FormatError, match="film") as caught:
-        read_mesh(path)
-    assert caught.value.cure
+    refused(path)
     path.unlink()
     os.mkfifo(path)
-    with pytest.raises(UnsafeFileError, match="not a regular file"):
-        read_mesh(path)
-    path.unlink()
-    path.mkdir()
-    with pytest.raises(UnsafeFileError, match="not a regular file"):
-        read_mesh(path)
+    refused(path, "not a regular file", UnsafeFileError)
 
 
 def test_meshio_neither_prints_nor_ends_the_program(
@@ -401,44 +306,122 @@ def test_meshio_neither_prints_nor_ends_the_program(
 ):
     """It warns on the terminal of a cell that it does not know; here this is a note."""
     path = small(tmp_path / "film.vtu", binary=False)
-    text = path.read_text()
-    cells = text.partition('Name="types"')[2].partition("</DataArray>")[0]
-    path.write_text(text.replace(cells, cells.replace("9", "4", 1)))
+    types = numbers_of(path, "types")
+    edited(path, types, types.replace("9", "4", 1))
     capfd.readouterr()  # meshio warned of writing text, too
     notes = read_mesh(path).notes
     assert any("meshio says" in note and "cannot handle" in note for note in notes)
     assert capfd.readouterr() == ("", "")
 
 
+HOSTILE = """
+import types
+
+def read(path):
+    import ctypes, os, pickle, socket, subprocess, sys
+    import numpy as np
+    {}
+
+NONE = dict(point_data=dict(), cell_data=dict())
+vtk = types.SimpleNamespace(read=read)
+"""
+
+
+@pytest.fixture
+def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+    """A mesh whose reader does, in the place of meshio, what a damaged one could be made to do."""
+
+    def with_reader(code: str) -> Path:
+        folder = tmp_path / "modules" / "meshio"
+        folder.mkdir(parents=True)
+        folder.joinpath("__init__.py").write_text(HOSTILE.format(code.replace("\n", "\n    ")))
+        monkeypatch.syspath_prepend(folder.parent)
+        return small(tmp_path / "film.vtk")
+
+    return with_reader
+
+
+def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
+    tmp_path: Path, hostile: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+):
+    secret = tmp_path / "secret"
+    secret.write_text("a secret")
+    monkeypatch.setenv("A_SECRET", "a secret")
+    actions = [
+        f"open({str(secret)!r})",
+        f"os.open({str(secret)!r}, os.O_RDONLY)",
+        f"np.fromfile({str(secret)!r}, np.uint8)",
+        f"os.remove({str(secret)!r})",
+        "open('more', 'w')",
+        "open(os.path.join(np.__path__[0], 'version.py'), 'a')",
+        "socket.socket().connect(('127.0.0.1', 9))",
+        "subprocess.run(['true'])",
+        "os.system('true')",
+        "os.fork()",
+        "os.execv('/bin/true', ['true'])",
+        "os.kill(os.getppid(), 0)",
+        "ctypes.CDLL(None)",
+        "pickle.loads(b'cos\\nsystem\\n.')",
+        "os.environ['A_SECRET']",
+    ]
+    path = hostile(
+        f"for action in {actions!r}:\n"
+        "    try:\n        exec(action)\n"
+        "    except (PermissionError, KeyError):\n        pass\n"
+        "    else:\n        print(action)\n"
+        "raise ValueError('allowed was: ' + sys.stdout.getvalue())"
+    )
+    assert "The reader says: allowed was:.\n" in refused(path)
+    assert secret.read_text() == "a secret"
+
+
 @pytest.mark.parametrize(
-    ("name", "options", "step"),
+    ("code", "words"),
     [
-        ("film.vtu", {"binary": False}, 41),
-        ("film.vtu", {}, 11),
-        ("film.vtk", {}, 11),
-        ("film.vtk", {"binary": False, "fmt_version": "4.2"}, 23),
-        ("film.xdmf", {}, 11),
-        ("film.xdmf", {"data_format": "XML"}, 29),
-        ("vtk_film.vtu", {}, 61),
+        ("bytearray(2**34)", "more than 1,0"),
+        ("raise SystemExit('the end')", "cannot be read as a mesh"),
+        ("os._exit(0)", "cannot be read"),
+        ("os.abort()", "ended by an error"),
+        (
+            "return types.SimpleNamespace(cells=[], points=np.zeros((2**27, 1)), **NONE)",
+            "cannot be read",
+        ),
+        ("import meshio.other", "No module named"),
+        ("return types.SimpleNamespace(cells=[], points=[[print]], **NONE)", "ended by an error"),
+    ],
+    ids=["memory", "exit", "silence", "crash", "no mesh", "no module", "objects"],
+)
+def test_whatever_ends_the_reader_of_a_mesh_is_an_error_of_ours(
+    hostile: Callable[[str], Path], code: str, words: str
+):
+    refused(hostile(code), words)
+
+
+def test_a_reader_that_does_not_end_is_ended(
+    hostile: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(child, "_SECONDS", 0.5)
+    refused(hostile("while True:\n    pass"), "takes longer than 0.5", UnsafeFileError)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("film.vtu", {}),
+        ("film.vtk", {}),
+        ("film.xdmf", {}),
+        ("vtk_film.vtu", None),
     ],
 )
-def test_damage_is_refused_or_harmless_wherever_it_is(
-    tmp_path: Path, name: str, options: dict[str, Any], step: int
-):
+def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path: Path, name: str, options: Any):
     path = tmp_path / name
-    if name.startswith("film"):
-        small(path, **options)
-    else:
+    if options is None:
         path.write_bytes((Path(__file__).with_name("data") / name).read_bytes())
-    done = subprocess.run(
-        [sys.executable, "-c", SWEEP, str(path), str(step)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    read, refused = map(int, done.stdout.split())
-    assert read + refused > 50
-    assert refused > read / 2
+    else:
+        small(path, **options)
+    good = path.read_bytes()
+    for i in np.linspace(20, len(good) - 20, 3).astype(int):
+        for damaged in (good[:i], good[:i] + bytes([good[i] ^ 0x15]) + good[i + 1 :]):
+            path.write_bytes(damaged)
+            with contextlib.suppress(FormatError):
+                assert isinstance(read_mesh(path), Mesh)

@@ -1,4 +1,4 @@
-"""The base of the film in a mesh: which way is up, where the base is, and what lies on it."""
+"""The base of the film in a mesh: which way is up, what lies on the base, means over circles."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError
-from memscal.formats.mesh_reader import Cells, Mesh
+from memscal.formats.meshes.mesh_files import Cells, Mesh
 from memscal.model.validation import FloatArray
 
-__all__ = ["AXES", "Base", "Frame", "find_base", "find_frame"]
+__all__ = ["AXES", "Base", "Frame", "average_over_circles", "find_base", "find_frame"]
 
 AXES = "xyz"
 # Of the largest coordinate: meshes are often stored in single precision.
 _TOLERANCE = 1e-6
 _FEWEST = 4
+_CIRCLES = 501
+_DIRECTIONS = 72
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,21 +74,9 @@ class Base:
 
 
 def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
-    """Find out which coordinates are radial and which is vertical.
+    """Find out which coordinates are radial and which is vertical; ``points`` (n, 3) are in m.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    points : ndarray, shape (n, 3)
-        Its points, in m.
-    vertical : {"x", "y", "z"}, optional
-        The axis across the film; by default the second of a section's two, and z in 3-D.
-
-    Raises
-    ------
-    InputError
-        If the mesh is a line, or has no extent along the axis that is asked for.
+    The vertical axis is by default the second of a section's two, and z in 3-D.
     """
     name = mesh.source.file_name
     inside = points[mesh.used]
@@ -121,20 +111,7 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
 
 
 def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
-    """Find what lies on the base of the film.
-
-    Parameters
-    ----------
-    mesh, frame : Mesh, Frame
-        The mesh and how it lies.
-    level : float, optional
-        Position of the base along the vertical axis, in m; the lowest by default.
-
-    Raises
-    ------
-    InputError
-        If there are too few nodes at that level.
-    """
+    """Find what lies on the base, at a level of the vertical axis in m: by default the lowest."""
     heights = frame.height[mesh.used]
     lowest, highest = float(heights.min()), float(heights.max())
     position = lowest if level is None else level
@@ -152,21 +129,69 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
         weight = touching[of_side][..., None]
         corners = frame.points[block.nodes[of_side]]
         sides.append((block, of_side, (weight * corners).sum(axis=1) / weight.sum(axis=1)))
-    found = np.unique(np.concatenate(nodes))
+    base_nodes = np.unique(np.concatenate(nodes))
     what = f"{AXES[frame.vertical]} = {position * 1e3:.6g} mm"
-    if found.size < _FEWEST:
+    if base_nodes.size < _FEWEST:
         nearest = float(heights[np.argmin(np.abs(heights - position))])
         raise InputError(
-            f"Only {found.size} nodes of the film in {mesh.source.file_name} lie on its base, at "
-            f"{what}.",
+            f"Only {base_nodes.size} nodes of the film in {mesh.source.file_name} lie on its base, "
+            f"at {what}.",
             why=f"The mesh reaches from {AXES[frame.vertical]} = {lowest * 1e3:.6g} mm to "
             f"{highest * 1e3:.6g} mm, and its nearest node is at {nearest * 1e3:.6g} mm.",
             cure="Name the axis across the film (vertical; --vertical) or the position of the "
             "flat base on it (base; --base).",
         )
     which = ", its lowest level" if level is None else ""
-    note = f"The base was taken at {what}{which}: {found.size} nodes."
-    return Base(found, tuple(sides), outward, (note,))
+    note = f"The base was taken at {what}{which}: {base_nodes.size} nodes."
+    return Base(base_nodes, tuple(sides), outward, (note,))
+
+
+def average_over_circles(
+    places: FloatArray, columns: dict[str, FloatArray]
+) -> tuple[dict[str, FloatArray], str]:
+    """Interpolate linearly between scattered places and average over circles about the origin.
+
+    Places (n, 2) are in m from the axis; the first column is the normal stress.  Returned are the
+    columns with ``r`` in m, and a note.  A half or a quarter of a film will do: where nothing is
+    known, nothing is averaged.  Circles of which less than half as much is inside as of others
+    are left out: they are at the corners.
+    """
+    from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import QhullError
+
+    reach = float(np.hypot(*places.T).max()) or 1.0
+    r = np.linspace(0.0, reach, _CIRCLES)
+    # On the axis and along an edge of the mesh, rounding decides what is inside.
+    directions = 2 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+    circles = np.maximum(r, 1e-6 * reach)[:, None]
+    points = np.stack([circles * np.cos(directions), circles * np.sin(directions)], axis=-1)
+    distinct, index = np.unique(np.round(places / reach, 7), axis=0, return_inverse=True)
+    number = np.bincount(index.ravel())
+    try:
+        fields = {
+            name: LinearNDInterpolator(
+                distinct * reach, np.bincount(index.ravel(), values) / number
+            )(points)
+            for name, values in columns.items()
+        }
+    except QhullError as error:
+        raise InputError(
+            "The nodes on the base of the film lie on one line.",
+            cure="Name the axis across the film (vertical; --vertical).",
+        ) from error
+    inside = np.isfinite(next(iter(fields.values())))
+    share = inside.sum(axis=1)
+    kept = share >= max(1, share.max() / 2)
+    means = {name: np.nansum(values[kept], axis=1) / share[kept] for name, values in fields.items()}
+    first = next(iter(columns))
+    spread = np.nanmax(np.abs(fields[first][kept] - means[first][:, None]))
+    peak = float(np.abs(means[first]).max())
+    note = (
+        f"Means over {kept.sum()} circles about the axis, interpolated linearly between "
+        f"{distinct.shape[0]} places in the base; on a circle the normal stress differs from its "
+        f"mean by up to {spread / peak if peak else 0:.2g} of the maximum."
+    )
+    return {"r": r[kept], **means}, note
 
 
 def _listed(axes: list[int] | tuple[int, ...]) -> str:

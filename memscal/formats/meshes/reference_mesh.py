@@ -8,10 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.mesh_base import Base, Frame, find_base, find_frame
-from memscal.formats.mesh_circles import average_over_circles
-from memscal.formats.mesh_reader import Mesh, read_mesh
-from memscal.formats.mesh_stress import Component, find_normal, find_shear
+from memscal.formats.meshes.base import (
+    Base,
+    Frame,
+    average_over_circles,
+    find_base,
+    find_frame,
+)
+from memscal.formats.meshes.components import Component, find_normal, find_shear
+from memscal.formats.meshes.mesh_files import Mesh, read_mesh
 from memscal.formats.reference_profile import (
     ImportedProfile,
     Samples,
@@ -170,14 +175,14 @@ def _shear_component(
 ) -> Component | None:
     """Return the shear that is asked for, or the one that comes with a stress tensor."""
     if shear is not None:
-        found = find_shear(mesh, frame, shear)
-        if found.at_points != normal.at_points:
+        component = find_shear(mesh, frame, shear)
+        if component.at_points != normal.at_points:
             raise InputError(
-                f"In {mesh.source.file_name}, one of {normal.field!r} and {found.field!r} is "
+                f"In {mesh.source.file_name}, one of {normal.field!r} and {component.field!r} is "
                 "given at the nodes and the other in the cells.",
                 cure="Give both in the same way.",
             )
-        return found
+        return component
     return find_shear(mesh, frame, normal.field) if normal.tensor else None
 
 
@@ -189,7 +194,7 @@ def _at_base(
     if wanted.at_points:
         places = frame.points[base.nodes][:, radial]
         return places, mesh.point_data[wanted.field][base.nodes, wanted.column]
-    here = [part for part in base.cells if wanted.field in part[0].data]
+    here = [block for block in base.cells if wanted.field in block[0].data]
     if not sum(len(cells) for _, cells, _ in here):
         raise InputError(
             f"No cell with a value of {wanted.field!r} has a side on the base in "

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.mesh_base import AXES, Frame
-from memscal.formats.mesh_reader import Mesh
+from memscal.formats.meshes.base import AXES, Frame
+from memscal.formats.meshes.mesh_files import Mesh
 from memscal.formats.text import printable
 
 __all__ = ["Component", "find_normal", "find_shear"]
@@ -38,18 +38,8 @@ class Component:
 def find_normal(mesh: Mesh, frame: Frame, wanted: str) -> Component:
     """Return the normal stress across the film in the field ``wanted``.
 
-    Parameters
-    ----------
-    mesh, frame : Mesh, Frame
-        The mesh and how it lies.
-    wanted : str
-        Name of a field with one component, or of a stress tensor; ``name:number`` takes a
-        component, counted from 1.
-
-    Raises
-    ------
-    InputError
-        If there is no such field, or it is not plain which component is meant.
+    The field has one component or is a stress tensor; ``name:number`` takes a component of it,
+    counted from 1.
     """
     up = frame.vertical
     return _find(mesh, frame, wanted, (up, up))
@@ -111,8 +101,8 @@ def _of_tensor(
 def _is_plane(mesh: Mesh, wanted: str) -> bool:
     """Return whether four components are xx, xy, yx, yy: the middle ones are the same."""
     fields = [mesh.point_data, *(block.data for block in mesh.solid)]
-    found = [values[wanted] for values in fields if wanted in values]
-    return all(np.array_equal(each[:, 1], each[:, 2]) for each in found)
+    tensors = [values[wanted] for values in fields if wanted in values]
+    return all(np.array_equal(tensor[:, 1], tensor[:, 2]) for tensor in tensors)
 
 
 def _no_such_field(

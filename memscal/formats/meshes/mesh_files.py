@@ -1,0 +1,274 @@
+"""Files of meshes with fields: VTU, legacy VTK and XDMF read, VTU written, all by meshio."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import tempfile
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from memscal.errors import FormatError, InputError
+from memscal.formats.atomic import atomic_write_bytes
+from memscal.formats.damage import damage_named
+from memscal.formats.file_bytes import read_bytes
+from memscal.formats.meshes.child import heavy_arrays, run_meshio
+from memscal.formats.text import printable
+from memscal.formats.units import from_si
+from memscal.model.field_mesh import FieldMesh
+from memscal.model.provenance import SourceFile
+from memscal.model.validation import FloatArray
+from memscal.version import __version__
+
+__all__ = ["Cells", "Mesh", "is_mesh", "read_mesh", "write_mesh"]
+
+_KINDS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".xmf": "xdmf"}
+# Known as meshes of other kinds, so that none is taken for a table.
+_OTHERS = {
+    *(".pvtu", ".pvd", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".msh", ".med", ".inp", ".frd"),
+    *(".exo", ".e", ".bdf", ".unv", ".odb", ".rst", ".mph", ".ply", ".stl", ".obj"),
+}
+_CELLS = {3: "triangle", 6: "triangle6"}
+_MAX_NAME = 80
+_MAX_NOTES = 4000
+
+
+def is_mesh(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file's name says that it is a mesh and not a table."""
+    ending = os.path.splitext(os.fspath(path))[1].lower()
+    return ending in _KINDS or ending in _OTHERS
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of one kind: their nodes, by rows, and the fields given for each of them."""
+
+    dimension: int
+    nodes: NDArray[np.int64]
+    data: dict[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A mesh and its fields, as they stand in a file.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Coordinates, in the file's unit.
+    cells : tuple of Cells
+        Blocks of cells of one kind.
+    point_data : dict of str to ndarray, shape (n, components)
+        Fields at the points.
+    sources : tuple of SourceFile
+        The file, and after it the files that it draws its numbers from.
+    notes : tuple of str
+        What was met on the way.
+    tensor_order : bool
+        Whether six components are known to be a tensor's in VTK's order.
+    """
+
+    points: FloatArray
+    cells: tuple[Cells, ...]
+    point_data: dict[str, FloatArray]
+    sources: tuple[SourceFile, ...]
+    notes: tuple[str, ...]
+    tensor_order: bool
+
+    @property
+    def source(self) -> SourceFile:
+        """The file that was named."""
+        return self.sources[0]
+
+    @property
+    def solid(self) -> tuple[Cells, ...]:
+        """The cells of the highest dimension, which are the body and not its faces or edges."""
+        highest = max((block.dimension for block in self.cells), default=0)
+        return tuple(block for block in self.cells if block.dimension == highest)
+
+    @property
+    def used(self) -> NDArray[np.int64]:
+        """The nodes that belong to the body."""
+        return np.unique(np.concatenate([block.nodes.ravel() for block in self.solid]))
+
+    @property
+    def size(self) -> str:
+        """Numbers of nodes and cells, in words."""
+        return f"{len(self.points)} nodes, {sum(len(block.nodes) for block in self.solid)} cells"
+
+
+def read_mesh(path: str | os.PathLike[str]) -> Mesh:
+    """Read a mesh and its fields from a VTU, legacy VTK or XDMF file.
+
+    An XDMF file's numbers may be in the HDF5 file of the same name beside it.  Whatever is no
+    such mesh, is damaged, or could read or exhaust something is a FormatError.
+    """
+    shown = os.fspath(path)
+    name, ending = os.path.basename(shown), os.path.splitext(shown)[1].lower()
+    if ending not in _KINDS:
+        raise FormatError(
+            f"{name} is not a mesh of a kind that is read.",
+            why="Meshes are read from VTU (.vtu), legacy VTK (.vtk) and XDMF (.xdmf) files.",
+            cure="Save it as .vtu from the program that wrote it or from ParaView, or export the "
+            "stress at the base as a table (CSV).",
+        )
+    _require_meshio()
+    data = read_bytes(shown)
+    if not data:
+        raise FormatError(f"{name} is empty.", cure="Save the mesh again.")
+    sources = [SourceFile(name, hashlib.sha256(data).hexdigest())]
+    heavy: dict[str, np.ndarray[Any, Any]] = {}
+    if _KINDS[ending] == "xdmf":
+        heavy, drawn = heavy_arrays(data, shown)
+        sources += drawn
+    with damage_named(f"{name} cannot be read as a mesh", why="Its reader gave no mesh back"):
+        header, arrays = run_meshio(data, _KINDS[ending], name, heavy)
+        return _checked(header, arrays, tuple(sources), tensor_order=_KINDS[ending] != "xdmf")
+
+
+def _require_meshio() -> None:
+    if importlib.util.find_spec("meshio") is None:
+        raise InputError(
+            "Meshes are read and written with meshio, which is not installed.",
+            cure='Install it with: pip install "memscal[fem-io]"',
+        )
+
+
+def _checked(
+    header: dict[str, Any],
+    arrays: list[np.ndarray[Any, Any]],
+    sources: tuple[SourceFile, ...],
+    *,
+    tensor_order: bool,
+) -> Mesh:
+    """Return the mesh that meshio read, if it can be worked with."""
+    points = np.asarray(arrays[header["points"]], dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
+        raise _unusable(sources[0], f"points of shape {points.shape}")
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    if not np.all(np.isfinite(points)):
+        raise _unusable(sources[0], "a point whose coordinates are not finite")
+    blocks = []
+    for block in header["cells"]:
+        numbers = arrays[block["nodes"]]
+        if not numbers.size:
+            continue
+        with np.errstate(invalid="ignore"):
+            nodes = numbers.astype(np.int64)
+        if nodes.ndim != 2 or not (
+            np.array_equal(nodes, numbers) and 0 <= nodes.min() <= nodes.max() < len(points)
+        ):
+            raise _unusable(sources[0], "a cell with a node that is not there")
+        fields = {key: arrays[i] for key, i in block["data"].items()}
+        blocks.append(Cells(int(block["dimension"]), nodes, _fields(fields, len(nodes))))
+    if not blocks:
+        raise _unusable(sources[0], "no cells")
+    notes = [
+        f"Its numbers are those of {drawn.file_name} (sha256 {drawn.sha256})."
+        for drawn in sources[1:]
+    ]
+    if words := printable(header["said"], _MAX_NOTES):
+        notes.append(f"meshio says: {words}")
+    if not header["limited"]:
+        notes.append("It was read without a limit of memory, which this system does not offer.")
+    return Mesh(
+        points=points,
+        cells=tuple(blocks),
+        point_data=_fields(
+            {key: arrays[i] for key, i in header["point_data"].items()}, len(points)
+        ),
+        sources=sources,
+        notes=tuple(notes),
+        tensor_order=tensor_order,
+    )
+
+
+def _fields(fields: dict[str, np.ndarray[Any, Any]], count: int) -> dict[str, FloatArray]:
+    """Return fields of numbers with one row each; a name is stripped of what does not print."""
+    return {
+        printable(name, _MAX_NAME): numbers.reshape(count, -1).astype(np.float64)
+        for name, numbers in fields.items()
+        if numbers.dtype.kind in "iuf" and numbers.shape[:1] == (count,) and numbers.size
+    }
+
+
+def _unusable(source: SourceFile, what: str) -> FormatError:
+    return FormatError(
+        f"{source.file_name} has {what}.",
+        why="A stress at the base cannot be found in it.",
+        cure="Save the mesh again, as an unstructured grid (.vtu).",
+    )
+
+
+def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    r"""Write displacement and stress on a mesh as a VTU file, whole or not at all.
+
+    The section lies in the plane of x (the radius) and y (the height), in mm.  At the points
+    there are the vector ``displacement_mm``, by which ParaView can warp the mesh as it is, and
+    ``stress_Pa``, tension positive, in VTK's order of a symmetric tensor: XX
+    (:math:`\sigma_{rr}`), YY (:math:`\sigma_{zz}`), ZZ (:math:`\sigma_{\theta\theta}`), XY
+    (:math:`\sigma_{rz}`), and zeros for YZ and XZ.
+
+    Parameters
+    ----------
+    mesh : FieldMesh
+        The fields; their notes become a comment at the head of the file.
+    path : path
+        The file; its name should end in ``.vtu``.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    InputError
+        If meshio is not installed.
+    OutputError
+        If the file exists or cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> corner = FieldMesh(
+    ...     points=[[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]],
+    ...     triangles=[[0, 1, 2]],
+    ...     displacement=np.zeros((3, 2)),
+    ...     stress=np.zeros((3, 4)),
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_mesh(corner, f"{folder}/corner.vtu")
+    ...     sorted(read_mesh(f"{folder}/corner.vtu").point_data)
+    ['displacement_mm', 'stress_Pa']
+    """
+    _require_meshio()
+    import meshio
+
+    points, unit = from_si(np.pad(mesh.points, ((0, 0), (0, 1))), "length")
+    moved, _ = from_si(np.pad(mesh.displacement, ((0, 0), (0, 1))), "length")
+    stress = np.pad(mesh.stress, ((0, 0), (0, 2)))
+    written = meshio.Mesh(
+        points,
+        [(_CELLS[mesh.triangles.shape[1]], mesh.triangles)],
+        point_data={f"displacement_{unit}": moved, "stress_Pa": stress},
+    )
+    with tempfile.TemporaryDirectory(prefix="memscal-") as folder:
+        plain = os.path.join(folder, "mesh.vtu")
+        # Not Mesh.write, which finds the format by the name, in any of forty.
+        meshio.vtu.write(plain, written)
+        with open(plain, "rb") as file:
+            data = file.read()
+    head, grid, rest = data.partition(b"<UnstructuredGrid>")
+    atomic_write_bytes(path, head + _comment(mesh) + grid + rest, overwrite=overwrite)
+
+
+def _comment(mesh: FieldMesh) -> bytes:
+    """Return what the file is, as XML allows it: a comment may not hold two hyphens."""
+    words = (
+        f"Written by memscal {__version__}: an axisymmetric section, x = radius and y = height "
+        f"in mm, z = hoop direction. {printable(mesh.notes, _MAX_NOTES)}"
+    )
+    return f"<!-- {words.replace('--', '- -').replace('--', '- -')} -->\n".encode()

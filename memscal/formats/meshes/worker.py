@@ -1,0 +1,292 @@
+"""The child process that reads a mesh with meshio, within limits, and sees no other file.
+
+:mod:`memscal.formats.meshes.child` starts this file by its path, in a folder that holds the mesh,
+and gives it a request on standard input.  It imports nothing of memscal, so that it starts fast.
+The answer is a file of arrays in numpy's format, the first of which is text in JSON.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import io
+import json
+import os
+import re
+import sys
+import types
+import warnings
+from collections.abc import Iterator, Mapping
+from typing import Any
+from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element, SubElement
+
+_SECTIONS = ("Points", "Cells", "PointData", "CellData")
+_NUMBERS = re.compile("U?Int(8|16|32|64)|Float(32|64)")
+# Bytes that are not XML follow the first underscore of a raw section.
+_RAW = re.compile(rb"""<AppendedData[^>]*encoding\s*=\s*["']raw["'][^>]*>\s*_""")
+_MOST_FILES = 32
+_MOST_SAID = 300
+_FORBIDDEN = {"ctypes", "ftplib", "pickle", "pty", "shutil", "socket", "subprocess", "urllib"}
+# What an import does: modules that are needed late, such as an encoding, may still be loaded.
+_ALLOWED_OF_OS = {"os.listdir", "os.scandir"}
+
+
+def main() -> None:
+    """Read the mesh of a request and write the answer."""
+    request = json.load(sys.stdin)
+    limited = _limit(request["memory"], request["seconds"], request["output"])
+    sys.path[:] = request["path"]
+    import numpy as np
+
+    heavy: dict[str, Any] = {}
+    if request["heavy"]:
+        with np.load("heavy.npz", allow_pickle=False) as stored:
+            heavy = {address: stored[f"arr_{i}"] for i, address in enumerate(request["heavy"])}
+    _stand_in_for_h5py(heavy)
+    import meshio
+
+    with open("answer", "wb") as answer:
+        arrays: list[Any] = []
+        path = f"mesh.{request['kind']}"
+        _forbid_other_files(path)
+        try:
+            said, mesh = _read(meshio, request["kind"], path)
+            header = {**_described(mesh, arrays), "said": said, "limited": limited}
+            if sum(values.nbytes for values in arrays) > request["output"]:
+                raise MemoryError
+        except BaseException as error:  # noqa: BLE001 - meshio ends the program on some files
+            arrays, header = [], _failure(error, request["memory"])
+        np.save(answer, np.frombuffer(json.dumps(header).encode(), np.uint8))
+        for values in arrays:
+            np.save(answer, values, allow_pickle=False)
+
+
+def _failure(error: BaseException, memory: int) -> dict[str, Any]:
+    """Return why a mesh was not read, and whether the file tried what no mesh needs."""
+    if isinstance(error, MemoryError):
+        return {"error": f"its numbers take more than {memory // 2**20:,} MB", "unsafe": True}
+    words = " ".join(str(error).split())[:_MOST_SAID]
+    if isinstance(error, ValueError | PermissionError) and words:
+        return {"error": words, "unsafe": isinstance(error, PermissionError)}
+    return {"error": f"{type(error).__name__}: {words}", "unsafe": False}
+
+
+def _limit(memory: int, seconds: int, output: int) -> bool:
+    """Limit what this process may take; return whether the system limits memory at all."""
+    try:
+        import resource
+    except ImportError:
+        return False
+    limited = sys.platform != "darwin"  # which accepts a limit and does not keep to it
+    for name, value in (
+        ("RLIMIT_CORE", 0),
+        ("RLIMIT_CPU", seconds),
+        ("RLIMIT_FSIZE", output + 2**20),
+        ("RLIMIT_NOFILE", _MOST_FILES),
+        ("RLIMIT_AS", memory),
+    ):
+        kind = getattr(resource, name)
+        hard = resource.getrlimit(kind)[1]
+        soft = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        try:
+            # A hard limit of time at the soft one would kill without a word of the reason.
+            resource.setrlimit(kind, (soft, soft + 1 if name == "RLIMIT_CPU" else soft))
+        except (ValueError, OSError):
+            limited = limited and name != "RLIMIT_AS"
+    return limited
+
+
+def _forbid_other_files(mesh: str) -> None:
+    """Refuse from now on whatever is not the mesh or a Python module: files, network, programs."""
+    folders = tuple(os.path.join(os.path.abspath(folder), "") for folder in sys.path)
+
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            path, mode, flags = arguments
+            if isinstance(path, int):
+                return
+            name = os.fsdecode(path)
+            reading = not flags & (os.O_WRONLY | os.O_RDWR) and not set(mode or "r") & set("wax+")
+            module = name.endswith((".py", ".pyc")) and name.startswith(folders)
+            if not (reading and (name == mesh or module)):
+                raise PermissionError(f"it asks for the file {name}, which no mesh needs")
+        elif event.partition(".")[0] in _FORBIDDEN or (
+            event.startswith("os.") and event not in _ALLOWED_OF_OS
+        ):
+            raise PermissionError(f"it asks for {event}, which no mesh needs")
+
+    sys.addaudithook(watch)
+
+
+def _stand_in_for_h5py(heavy: Mapping[str, Any]) -> None:
+    """Let meshio find, where it looks for h5py, the arrays that were read for it beforehand."""
+
+    class Node:
+        def __init__(self, path: str, _mode: str = "r") -> None:
+            self.path = path
+
+        def __getitem__(self, key: str | tuple[()]) -> Any:
+            if isinstance(key, str):
+                return Node(f"{self.path}/{key}")
+            if self.path not in heavy:
+                raise PermissionError(f"it takes its numbers from {self.path}, which is not read")
+            return heavy[self.path]
+
+    module = types.ModuleType("h5py")
+    module.__dict__["File"] = lambda path, mode="r": Node(f"{os.path.basename(path)}:", mode)
+    sys.modules["h5py"] = module
+
+
+def _read(meshio: Any, kind: str, path: str) -> tuple[str, Any]:
+    """Return what meshio says about a mesh, and the mesh."""
+    said = io.StringIO()
+    with (
+        warnings.catch_warnings(),
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(said),
+    ):
+        warnings.simplefilter("ignore")
+        # numpy only warns of text that is not a number, and cuts the array short.
+        warnings.filterwarnings("error", message="string or file could not be read")
+        if kind != "vtk":
+            with open(path, "rb") as file:
+                root = {"vtu": _tidy_vtu, "xdmf": _tidy_xdmf}[kind](file.read())
+            # meshio parses with this function: it is given the tidy tree.
+            ET.parse = lambda *_: ET.ElementTree(root)
+        try:
+            mesh = getattr(meshio, kind).read(path)
+        except SystemExit as error:
+            raise ValueError(said.getvalue()) from error
+    return " ".join(said.getvalue().split())[:_MOST_SAID], mesh
+
+
+def _tidy_vtu(data: bytes) -> Element:
+    """Return a VTU file as meshio can read it: without texts, version 2 and raw bytes."""
+    raw = None
+    if begin := _RAW.search(data):
+        end = data.rfind(b"</AppendedData>")
+        if end < begin.end():
+            raise ValueError("it ends inside its appended data")
+        data, raw = data[: begin.end()] + data[end:], data[begin.end() : end]
+    root = ET.fromstring(data)
+    if root.tag != "VTKFile" or root.get("type") != "UnstructuredGrid":
+        raise ValueError(f"it holds {root.get('type', root.tag)}, not an unstructured grid")
+    pieces = root.findall("UnstructuredGrid/Piece")
+    if len(pieces) != 1:
+        raise ValueError(f"it holds {len(pieces)} pieces, and only a mesh in one piece is read")
+    piece = pieces[0]
+    piece[:] = [section for section in piece if section.tag in _SECTIONS]
+    for section in piece:
+        section[:] = [array for array in section if _NUMBERS.fullmatch(array.get("type", ""))]
+    if raw is not None:
+        _put_inline(root, raw)
+    appended = [] if raw is not None else root.findall("AppendedData")
+    grid = Element("UnstructuredGrid")
+    grid.append(piece)
+    root[:] = [grid, *appended]
+    # Version 2 differs in polyhedra only.
+    root.set("version", "1.0")
+    return root
+
+
+def _put_inline(root: Element, raw: bytes) -> None:
+    """Move raw bytes as base64 into the arrays that they belong to.
+
+    Without compression the header is the number of bytes that follow; with it, the number of
+    blocks, two sizes before compression, and the compressed size of each block (VTK File
+    Formats, section "XML formats").
+    """
+    import numpy as np
+
+    order = ">" if root.get("byte_order") == "BigEndian" else "<"
+    size = np.dtype(f"{order}u{8 if root.get('header_type') == 'UInt64' else 4}")
+    for array in root.iterfind("UnstructuredGrid/Piece/*/DataArray[@format='appended']"):
+        begin = int(array.get("offset", ""))
+        count = body = int(np.frombuffer(raw, size, 1, begin)[0])
+        middle = begin + size.itemsize
+        array.set("format", "binary")
+        if count and root.get("compressor"):
+            body = int(np.frombuffer(raw, size, count, begin + 3 * size.itemsize).sum())
+            middle = begin + (3 + count) * size.itemsize
+            # meshio decodes the header by itself.
+            parts = [raw[begin:middle], raw[middle : middle + body]]
+        else:
+            parts = [raw[begin : middle + body]]
+        if not count:
+            array.set("format", "ascii")
+            parts = []
+        array.text = b"".join(map(base64.b64encode, parts)).decode()
+
+
+def _tidy_xdmf(data: bytes) -> Element:
+    """Return an XDMF file as meshio can read it: one grid with its mesh and its fields."""
+    root = ET.fromstring(data)
+    if root.tag != "Xdmf":
+        raise ValueError(f"it holds {root.tag}, not an XDMF grid")
+    all_grids = list(root.iter("Grid"))
+    grids = [grid for grid in all_grids if grid.find("Topology") is not None]
+    # The only grid with a mesh may be the only one of a collection.
+    if len(grids) != 1 or len(all_grids) > 2:
+        raise ValueError(
+            f"it holds {len(all_grids)} grids, {len(grids)} of them with a mesh: only one mesh "
+            "with its fields is read, no series in time and no parts"
+        )
+    tidy = Element("Xdmf", Version=root.get("Version", "3.0"))
+    grid = SubElement(SubElement(tidy, "Domain"), "Grid", GridType="Uniform")
+    grid.extend(_mesh_and_fields(grids[0]))
+    for item in grid.iter("DataItem"):
+        if "Reference" in item.attrib or item.get("ItemType", "Uniform") != "Uniform":
+            raise ValueError("it has a data item that is calculated from others or points to them")
+    return tidy
+
+
+def _mesh_and_fields(grid: Element) -> Iterator[Element]:
+    """Give the elements of a grid that are its mesh or a field on it, with XDMF's defaults."""
+    for element in grid:
+        element[:] = element.findall("DataItem")
+        if element.tag == "Attribute":
+            element.set("Center", element.get("Center", "Node"))
+            if (
+                element.get("Name")
+                and element.get("Center") in ("Node", "Cell")
+                and len(element) == 1
+            ):
+                yield element
+        elif element.tag == "Geometry":
+            if not {"Type", "GeometryType"} & set(element.attrib):
+                element.set("GeometryType", "XYZ")
+            yield element
+        elif element.tag == "Topology":
+            yield element
+
+
+def _described(mesh: Any, arrays: list[Any]) -> dict[str, Any]:
+    """Put the numbers of a mesh into arrays, and return which of them is what."""
+    import numpy as np
+
+    def add(values: Any) -> int:
+        arrays.append(np.asarray(values))
+        return len(arrays) - 1
+
+    def fields(named: Mapping[str, Any]) -> dict[str, int]:
+        return {name: add(v) for name, v in named.items() if np.asarray(v).dtype.kind in "iuf"}
+
+    if any(block.type.startswith("polyhedron") for block in mesh.cells):
+        raise ValueError("it has polyhedra for cells: cut them into tetrahedra")
+    return {
+        "points": add(mesh.points),
+        "point_data": fields(mesh.point_data),
+        "cells": [
+            {
+                "dimension": int(block.dim),
+                "nodes": add(block.data),
+                "data": fields({name: parts[i] for name, parts in mesh.cell_data.items()}),
+            }
+            for i, block in enumerate(mesh.cells)
+        ],
+    }
+
+
+if __name__ == "__main__":
+    main()
