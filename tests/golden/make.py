@@ -7,8 +7,8 @@ During a refactoring on one machine, from the top of the repository::
     python tests/golden/make.py --check 1e-9          # each number that differs by more
     python tests/golden/make.py --check 1e-9 apply    # the same for some commands only
 
-After a change of results on purpose, ``python tests/golden/make.py`` writes them anew (or those
-that are named): read the diff before it is committed.
+After a change on purpose, ``python tests/golden/make.py`` writes them anew (or those that are
+named), and the signatures of the public names: read the diff before it is committed.
 
 A long list of numbers is kept as its length, a few values, mean and root mean square.  What a run
 cannot repeat is masked: dates, digests, and versions of programs.
@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gzip
+import inspect
 import io
 import json
 import math
@@ -29,13 +31,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import memscal
+from memscal.cli import main as run_memscal
+
 HERE = Path(__file__).parent
 TOP = HERE.parents[1]
 OUTPUTS = HERE / "outputs"
+SIGNATURES = HERE / "signatures.txt"
 LINKS = {
     "data": TOP / "calibration_data",
     "meshes": TOP / "tests" / "formats" / "data",
-    "files": HERE / "files",
 }
 """Folders of the repository by the names that they have where the commands run."""
 
@@ -95,13 +100,13 @@ COMMANDS = {
     ' --shear-sign -1 --load 1 --solver "finite elements"',
     "import-mesh": "import meshes/vtk_film.vtu -o mesh.h5 --format reference --r-unit mm --sigma S"
     " --sigma-unit MPa --load 1",
-    "apply": f"apply sensor.h5 {SPHERE}/sphere_dry.h5 {SPHERE}/sphere_lubricated.h5 -o stress.h5",
+    "apply": f"apply sensor.h5 {SPHERE}/sphere_dry.h5 -o stress.h5",
     "apply-override": "apply messy_sensor.h5 experiment/sphere_dry.h5 -o other.h5 --override",
     "compare": f"compare sensor.h5 {SPHERE}/sphere_dry.h5 {SPHERE}/sphere_lubricated.h5"
-    " --loading incremental --friction 0.1 --friction 0.2 --friction 0.4 --macroscopic 0.2"
+    " --loading incremental --friction 0.1 --friction 0.3 --macroscopic 0.2"
     " --macroscopic-uncertainty 0.02 --cache contacts",
     "compare-coefficients": "compare line.h5 experiment/sphere_dry.h5"
-    " experiment/sphere_lubricated.h5 --friction 0.1 --friction 0.3 --cache contacts --override",
+    " experiment/sphere_lubricated.h5 --friction 0.2 --cache contacts --override",
     "compare-interface": "compare line.h5 experiment/sphere_dry.h5 --friction 0.2 --override"
     " --loading incremental --macroscopic 1.6 --interface --cache contacts",
     "compare-references": "compare line.h5 experiment/sphere_dry.h5 --reference mu0.h5"
@@ -114,7 +119,7 @@ COMMANDS = {
     "inspect-scan": f"inspect {SPHERE}/sphere_dry.h5",
     "inspect-reference": "inspect fem.h5",
     "inspect-artifact": "inspect sensor.h5",
-    "inspect-stress": "inspect stress.h5",
+    "inspect-stress": "inspect other.h5",
     "check-artifact": "check data/rod_scan_65.apparatus.h5",
     "check-stress": "check stress.h5",
 }
@@ -129,6 +134,7 @@ class Runs:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        unpack(folder / "files")
         self._results: dict[str, dict[str, Any]] = {}
         for name, target in LINKS.items():
             (folder / name).symlink_to(target)
@@ -141,19 +147,24 @@ class Runs:
         return self._results[name]
 
     def _run(self, name: str) -> dict[str, Any]:
-        from memscal.cli import main
-
         out, err = io.StringIO(), io.StringIO()
         with (
             contextlib.chdir(self.folder),
             contextlib.redirect_stdout(out),
             contextlib.redirect_stderr(err),
         ):
-            code = main([*shlex.split(COMMANDS[name]), "--json"])
+            code = run_memscal([*shlex.split(COMMANDS[name]), "--json"])
         if not out.getvalue():
             raise AssertionError(f"memscal {COMMANDS[name]}\n{err.getvalue()}")
         printed = reduced(json.loads(out.getvalue()))
         return {"command": COMMANDS[name], "exit_code": code, "output": printed}
+
+
+def unpack(folder: Path) -> None:
+    """Unpack the files that version 0.1 wrote: HDF5 compresses no metadata, gzip does."""
+    folder.mkdir()
+    for path in (HERE / "files").glob("*.h5.gz"):
+        (folder / path.stem).write_bytes(gzip.decompress(path.read_bytes()))
 
 
 def inputs(name: str) -> list[str]:
@@ -265,6 +276,44 @@ def _scale(values: Any) -> float:
     return max((abs(value) for value in values if isinstance(value, float)), default=0.0)
 
 
+# -------------------------------------------------------------------------------------- signatures
+
+
+def signatures() -> str:
+    """Return the signatures of all public names, and of the members of public classes."""
+    lines = []
+    for name in sorted(memscal.__all__):
+        value = getattr(memscal, name)
+        if callable(value):
+            lines += _signature(name, value)
+        if isinstance(value, type):
+            for member in sorted(_members(value)):
+                definition = inspect.getattr_static(value, member)
+                getter = getattr(definition, "fget", None) or getattr(definition, "func", None)
+                if getter is not None:
+                    lines += [f"{name}.{member}: {inspect.signature(getter).return_annotation}"]
+                elif callable(getattr(value, member)):
+                    lines += _signature(f"{name}.{member}", getattr(value, member))
+    return "\n".join(lines) + "\n"
+
+
+def _signature(name: str, value: Any) -> list[str]:
+    signature = inspect.signature(value)
+    lines = [f"{name}() -> {signature.return_annotation}"]
+    for parameter in signature.parameters.values():
+        if parameter.name != "self":
+            keyword = "keyword " if parameter.kind is parameter.KEYWORD_ONLY else ""
+            default = "" if parameter.default is parameter.empty else f" = {parameter.default!r}"
+            lines.append(f"    {keyword}{parameter.name}: {parameter.annotation}{default}")
+    return lines
+
+
+def _members(value: type) -> set[str]:
+    """Return the public names that memscal's own classes define, with the inherited ones."""
+    ours = [base for base in value.__mro__ if base.__module__.startswith("memscal")]
+    return {name for base in ours for name in vars(base) if not name.startswith("_")}
+
+
 # ------------------------------------------------------------------------------------ command line
 
 
@@ -291,6 +340,8 @@ def main() -> int:
     parser.add_argument("--check", type=float, metavar="TOLERANCE", help="compare, write nothing")
     arguments = parser.parse_args()
     names = arguments.names or list(COMMANDS)
+    if arguments.check is None and not arguments.names:
+        SIGNATURES.write_text(signatures(), encoding="utf-8")
     failed = 0
     with tempfile.TemporaryDirectory() as folder:
         runs = Runs(Path(folder))
