@@ -72,7 +72,7 @@ COMMANDS = {
     "reference-rod": "reference rod --load 0.5 --load 1",
     "reference-rod-fem": "reference rod --backend fem --rings 24 -o rod_fem.h5",
     "reference-rod-finite": "reference rod --strain finite --friction inf --load 0.02"
-    " --film-radius 3 -o finite.h5",
+    " --film-radius 2 -o finite.h5",
     "reference-sphere": "reference sphere --load 0.69 --load 2.75 --young-modulus 1.9",
     "reference-sphere-friction": "reference sphere --load 1 --load 2.75 --friction 0.3",
     "reference-sphere-total": "reference sphere --depth 20 --friction 0.3 --loading total",
@@ -103,10 +103,10 @@ COMMANDS = {
     "apply": f"apply sensor.h5 {SPHERE}/sphere_dry.h5 -o stress.h5",
     "apply-override": "apply messy_sensor.h5 experiment/sphere_dry.h5 -o other.h5 --override",
     "compare": f"compare sensor.h5 {SPHERE}/sphere_dry.h5 {SPHERE}/sphere_lubricated.h5"
-    " --loading incremental --friction 0.1 --friction 0.3 --macroscopic 0.2"
+    " --loading incremental --friction 0.2 --macroscopic 0.2"
     " --macroscopic-uncertainty 0.02 --cache contacts",
-    "compare-coefficients": "compare line.h5 experiment/sphere_dry.h5"
-    " experiment/sphere_lubricated.h5 --friction 0.2 --cache contacts --override",
+    "compare-total": "compare line.h5 experiment/sphere_dry.h5"
+    " experiment/sphere_lubricated.h5 --friction 0.2 --loading total --cache contacts --override",
     "compare-interface": "compare line.h5 experiment/sphere_dry.h5 --friction 0.2 --override"
     " --loading incremental --macroscopic 1.6 --interface --cache contacts",
     "compare-references": "compare line.h5 experiment/sphere_dry.h5 --reference mu0.h5"
