@@ -1,4 +1,4 @@
-"""The program as a process of its own: streams, exit codes, and the same bytes twice."""
+"""The program as a process of its own: streams and exit codes."""
 
 from __future__ import annotations
 
@@ -41,14 +41,6 @@ def files_up_to(size: int) -> Callable[[], None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
     return limit
-
-
-def test_the_same_input_gives_the_same_bytes_twice(scan: Path, folder: Path) -> None:
-    for name in ("1", "2"):
-        environment = {"SOURCE_DATE_EPOCH": "1700000000", "PYTHONHASHSEED": name}
-        done = run("calibrate", "scan.h5", "-o", name, cwd=folder, **environment)
-        assert done.returncode == 0, done.stderr
-    assert (folder / "1").read_bytes() == (folder / "2").read_bytes()
 
 
 def test_a_failed_check_is_the_exit_code_of_the_process(drifting_scan: Path, folder: Path) -> None:

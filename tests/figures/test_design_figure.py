@@ -8,7 +8,6 @@ import pytest
 import memscal
 from memscal.errors import InputError
 from memscal.figures.design import design_figure
-from memscal.figures.render import render_figure
 from memscal.planning.outcome import Design
 
 
@@ -49,8 +48,3 @@ def test_a_plan_with_many_positions_is_not_varied_beyond_reason() -> None:
 def test_what_cannot_be_varied_is_refused(planned: Design) -> None:
     with pytest.raises(InputError, match="'weather'"):
         design_figure(planned, vary="weather")
-
-
-def test_the_same_design_gives_the_same_bytes(planned: Design) -> None:
-    once, again = (render_figure(design_figure(planned), "png") for _ in range(2))
-    assert once == again

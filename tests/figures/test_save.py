@@ -1,4 +1,4 @@
-"""Figures in files: whole, of the right kind, and the same bytes for the same figure."""
+"""Figures in files: whole, and of the right kind."""
 
 from __future__ import annotations
 
@@ -11,20 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from memscal.errors import InputError, OutputError
-from memscal.figures.calibration import calibration_figure
 from memscal.figures.render import render_figure
 from memscal.figures.save import save_figure
-
-
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_two_figures_of_the_same_data_are_the_same_bytes(make_apparatus, drawn, tmp_path, suffix):
-    first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
-    figure = drawn("radii", 25)
-    save_figure(figure, first)
-    save_figure(calibration_figure(make_apparatus("radii", 25)), second)
-    assert first.read_bytes() == second.read_bytes()
-    save_figure(figure, second, overwrite=True)
-    assert first.read_bytes() == second.read_bytes()
 
 
 def test_a_png_has_its_signature_and_at_least_150_dots_per_inch(drawn, tmp_path):

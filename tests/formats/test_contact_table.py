@@ -63,12 +63,6 @@ def test_what_was_never_kept_is_not_found(tmp_path: Path) -> None:
     assert find_contact_table(tmp_path / "no" / "folder", KEY) is None
 
 
-def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
-    for folder in ("one", "two"):
-        keep_contact_table(tmp_path / folder, KEY, table())
-    assert entry(tmp_path / "one").read_bytes() == entry(tmp_path / "two").read_bytes()
-
-
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
 def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share: float) -> None:
     keep_contact_table(tmp_path, KEY, table())

@@ -1,11 +1,10 @@
-"""What is written is what is read: values, units, text and bytes."""
+"""What is written is what is read: values, units and text."""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -194,22 +193,6 @@ def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp
     write_artifact(make_artifact(process=process), tmp_path / "a.h5")
     found = read_artifact(tmp_path / "a.h5").process.configuration
     assert found == {"seed": 3, "mu": "inf", "loads": [1.0, 2.0]}
-
-
-WRITE: dict[str, Callable[[Path], None]] = {
-    "scan": lambda path: write_scan(make_scan(), path, overwrite=True),
-    "reference": lambda path: write_reference(make_profile(), path, overwrite=True),
-    "artifact": lambda path: write_artifact(make_artifact(), path, overwrite=True),
-}
-
-
-@pytest.mark.parametrize("kind", WRITE)
-def test_the_same_content_gives_the_same_bytes_a_second_later(tmp_path: Path, kind: str):
-    first, second = tmp_path / "a.h5", tmp_path / "b.h5"
-    WRITE[kind](first)
-    time.sleep(1.1)  # HDF5 counts times of change in seconds
-    WRITE[kind](second)
-    assert first.read_bytes() == second.read_bytes()
 
 
 def test_a_large_field_is_compressed_and_comes_back(tmp_path: Path):

@@ -139,11 +139,6 @@ def test_an_existing_file_is_left_alone(path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_the_same_record_gives_the_same_bytes(path: Path, tmp_path: Path) -> None:
-    write_stress(make_record(), tmp_path / "b.h5")
-    assert (tmp_path / "b.h5").read_bytes() == path.read_bytes()
-
-
 def test_a_covariance_of_another_shape_is_refused_by_its_path(tmp_path: Path) -> None:
     profile = replace(make_record_profile(1.0), covariances={"noise": np.eye(7)})
     wrong = replace(profile, x=np.zeros(5))
