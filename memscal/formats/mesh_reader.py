@@ -1,4 +1,4 @@
-"""Meshes with fields from other programs, through meshio, which is kept on a short lead.
+"""Meshes with fields from other programs, through meshio, which sees a checked copy only.
 
 A mesh can come from anywhere.  Its bytes are read once and hashed, and meshio is given a copy
 that was checked and made plain (:mod:`memscal.formats.mesh_vtu`,

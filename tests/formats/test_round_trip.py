@@ -21,7 +21,8 @@ from memscal.errors import FormatError, InputError, UnitError
 from memscal.formats.artifact import read_artifact, write_artifact
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
-from memscal.model.apparatus import ParameterSet, QualityCheck
+from memscal.model.apparatus import ParameterSet
+from memscal.model.checks import QualityCheck
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import SourceFile
 

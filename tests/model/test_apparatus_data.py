@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from memscal.errors import InputError
-from memscal.model.apparatus import ParameterSet, QualityCheck
+from memscal.model.apparatus import ParameterSet
+from memscal.model.checks import QualityCheck
 
 
 def checked(*passed: bool) -> tuple[QualityCheck, ...]:
