@@ -115,7 +115,7 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     wide, high = (float(np.ptp(inside[:, i])) * 1e3 for i in (radial[0], up))
     if high > wide:
         text = (
-            f"The mesh extends {high:.4g} mm along {AXES[up]} but {wide:.4g} mm along "
+            f"the mesh extends {high:.4g} mm along {AXES[up]} but {wide:.4g} mm along "
             f"{AXES[radial[0]]}. A film is wider than thick: if the axis across it is "
             f"{AXES[radial[0]]}, say so (vertical; --vertical)."
         )

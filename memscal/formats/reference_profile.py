@@ -203,7 +203,7 @@ def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message
         else "Check the load, the units, and that the radii are fine enough under the indenter."
     )
     warning = (
-        f"The {kind}'s force differs from the load by {abs(ratio - 1):.1%} of it. A "
+        f"the {kind}'s force differs from the load by {abs(ratio - 1):.1%} of it. A "
         f"calibration takes stress per load from the {kind}, so its conversion constant would be "
         f"wrong by as much. {cure}"
     )

@@ -226,7 +226,6 @@ def test_a_line_whose_positions_cluster_is_told_of_its_repeats(tmp_path: Path) -
     assert found.scan.kind == "line"
     (note,) = [note for note in found.notes if "--repeat COLUMN" in note.text]
     assert "66 of 99 positions" in note.text
-    assert "--repeats average" in note.text
 
 
 @given(seed=st.integers(0, 2**16), spread=st.floats(0.0, 0.4))

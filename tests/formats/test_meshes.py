@@ -90,7 +90,6 @@ def test_a_mesh_as_paraview_writes_it_is_read_at_its_nodes_and_in_its_cells():
     np.testing.assert_allclose(found.profile.r, 1e-3 * middles, rtol=1e-12)
     np.testing.assert_allclose(found.profile.sigma_zz, 1e6 * pressure(middles), rtol=1e-12)
     assert found.profile.sigma_rz is None
-    assert any("middle of its cell's side" in note.text for note in found.notes)
 
 
 @pytest.mark.parametrize(
@@ -118,11 +117,7 @@ def test_every_kind_of_file_gives_the_same_stress(
 def test_the_components_of_a_tensor_are_found_in_every_plane(
     tmp_path: Path, sigma: str, plane: str
 ):
-    found = imported(saved(section(plane), tmp_path / "film.vtu"), sigma)
-    assert_is_the_section(found)
-    assert any(
-        f"{plane[0]} as the radius and {plane[1]} across" in note.text for note in found.notes
-    )
+    assert_is_the_section(imported(saved(section(plane), tmp_path / "film.vtu"), sigma))
 
 
 def test_the_axis_across_the_film_can_be_named(tmp_path: Path):
