@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.indent import indent
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
+    from memscal.model.checks import Message
     from memscal.model.film import ElasticFilm
     from memscal.model.indenter import Cone, Profile, Rod, Sphere
     from memscal.model.scan import Scan, StressSensor
@@ -72,6 +73,7 @@ _HOMES = {
     "MeasuredProfile": "memscal.measurement.measured_stress",
     "MeasuredStress": "memscal.measurement.measured_stress",
     "MemscalError": "memscal.errors",
+    "Message": "memscal.model.checks",
     "MonteCarlo": "memscal.calibration.monte_carlo",
     "Profile": "memscal.model.indenter",
     "Restoration": "memscal.measurement.restoration",
@@ -119,6 +121,7 @@ __all__ = [
     "MeasuredProfile",
     "MeasuredStress",
     "MemscalError",
+    "Message",
     "MonteCarlo",
     "Profile",
     "Quotient",

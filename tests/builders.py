@@ -12,10 +12,10 @@ from memscal.model.apparatus import (
     ApparatusField,
     ApparatusRadial,
     ParameterSet,
-    QualityCheck,
     Reconvolution,
     TransferFunction,
 )
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.provenance import Process, SourceFile
@@ -160,7 +160,7 @@ def make_artifact(**changes: Any) -> ApparatusData:
             date="2024-01-02T03:04:05+00:00",
             configuration={"method": "white-noise", "seed": None, "noise": 0.1},
             environment={"python": "3.11"},
-            messages=("Two points were down-weighted.",),
+            messages=(Message("outlier", "Two points were down-weighted.", "warning"),),
             input_scan=SourceFile("scan.h5", "0" * 64),
         ),
         budget={

@@ -25,7 +25,7 @@ from memscal.friction.results import (
     Interval,
     LoadComparison,
 )
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.provenance import SourceFile
 
 FRICTION = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, math.inf])
@@ -220,7 +220,7 @@ def interface_comparison(slip_length: float = 1.8e-6) -> InterfaceComparison:
         normal=_laws(
             "lubricated", ("rigid, frictionless", "normal compliance"), (0.0, -1.2), 0.3e-6, None
         ),
-        messages=("The slip length is that of the prior.",),
+        messages=(Message("prior", "The slip length is that of the prior."),),
     )
 
 

@@ -19,10 +19,10 @@ from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import (
     ApparatusField,
     ApparatusRadial,
-    QualityCheck,
     Reconvolution,
     TransferFunction,
 )
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.validation import FloatArray
@@ -35,7 +35,7 @@ def assemble(
     solution: Solution,
     results: Results,
     checks: tuple[QualityCheck, ...],
-    messages: tuple[str, ...],
+    messages: tuple[Message, ...],
     configuration: Mapping[str, Any],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""

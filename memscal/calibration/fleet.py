@@ -11,7 +11,8 @@ from typing import Any
 from memscal.calibration.procedure import calibrate, chosen_method
 from memscal.calibration.workers import require_workers, worker_pool
 from memscal.errors import InputError, MemscalError
-from memscal.model.apparatus import ApparatusRadial, ParameterSet, QualityCheck
+from memscal.model.apparatus import ApparatusRadial, ParameterSet
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.scan import Scan
 
 __all__ = ["FleetCalibration", "calibrate_many"]
@@ -40,7 +41,7 @@ class FleetCalibration:
         Standard uncertainties by source.
     checks : tuple of QualityCheck
         Quality checks.
-    messages : tuple of str
+    messages : tuple of Message
         What the calibration tells.
     error : MemscalError or None
         Why there is no result.
@@ -52,7 +53,7 @@ class FleetCalibration:
     resolved_wavenumber: float | None = None
     budget: Mapping[str, Mapping[str, float]]
     checks: tuple[QualityCheck, ...] = ()
-    messages: tuple[str, ...] = ()
+    messages: tuple[Message, ...] = ()
     error: MemscalError | None = None
 
     def __repr__(self) -> str:

@@ -1,11 +1,17 @@
-"""What a calibration tells its user."""
+"""Messages of a calibration."""
 
 from __future__ import annotations
 
 from memscal.calibration.solution import Solution
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.mechanics.contact import Contact
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import (
+    NOISE_UNSTATED,
+    OUTLIER_WEIGHT,
+    Message,
+    QualityCheck,
+    failed_check_messages,
+)
 from memscal.model.indenter import RoundIndenter
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -18,26 +24,23 @@ _WINDOWS = ("white-noise", "tikhonov", "evidence")
 _SAME = 1e-6
 
 
-def calibration_messages(solution: Solution, checks: tuple[QualityCheck, ...]) -> tuple[str, ...]:
+def calibration_messages(
+    solution: Solution, checks: tuple[QualityCheck, ...]
+) -> tuple[Message, ...]:
     """Return the messages that accompany a result, the gravest first."""
     estimate, scan = solution.estimate, solution.scan
-    messages = [
-        f"Quality check {check.name} failed: {check.value:.3g} exceeds {check.limit:.3g}. "
-        f"{check.meaning}"
-        for check in checks
-        if not check.passed
-    ]
+    messages = failed_check_messages(checks)
     messages += _channel(estimate)
     messages += _points(estimate)
     messages += _method(solution)
     messages += _reference(solution)
     messages += _unstated(scan)
     if scan.synthetic is not None:
-        messages.append("The scan is synthetic: its truth is stored in it.")
+        messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
 
 
-def _channel(estimate: ProfileEstimate) -> list[str]:
+def _channel(estimate: ProfileEstimate) -> list[Message]:
     channel = estimate.points.channel
     if estimate.model.order == 0:
         return []
@@ -46,52 +49,57 @@ def _channel(estimate: ProfileEstimate) -> list[str]:
         "those of the shear at the base; the voltage is positive where the film pulls the sensor "
         f"towards larger {channel[0]}."
     )
-    return [text]
+    return [Message("experimental", text)]
 
 
-def _points(estimate: ProfileEstimate) -> list[str]:
-    points, messages = estimate.points, []
+def _points(estimate: ProfileEstimate) -> list[Message]:
+    points = estimate.points
+    messages: list[Message] = []
     if points.missing:
-        messages.append(f"{points.missing} points of the scan are missing and were left out.")
-    for i in (estimate.outlier_weight < 0.5).nonzero()[0]:
+        text = f"{points.missing} points of the scan are missing and were left out."
+        messages.append(Message("missing_points", text))
+    for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]:
         place = f"x = {points.x[i] * 1e3:.4g} mm"
         if points.planar:
             place += f", y = {points.y[i] * 1e3:.4g} mm"
         if points.repeat.any():
             place += f" of repeat {points.repeat[i]}"
-        messages.append(
+        text = (
             f"Outlier at {place}: {points.u[i] * 1e3:.4g} mV instead of "
             f"{estimate.predicted[i] * 1e3:.4g} mV; its weight is "
             f"{estimate.outlier_weight[i]:.2g}."
         )
+        messages.append(Message("outlier", text))
     if points.u_errors is None:
-        messages.append(
+        text = (
             f"u_{points.channel}_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV "
             "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
             "misfit of the same size, and has no p-value."
         )
+        messages.append(Message(NOISE_UNSTATED, text))
     return messages
 
 
-def _method(solution: Solution) -> list[str]:
+def _method(solution: Solution) -> list[Message]:
     """Say of a method that is no fixed window on the spectrum what its uncertainty leaves out."""
     regulariser = solution.regulariser
     if regulariser.name in _WINDOWS:
         return []
-    left_out = (
+    text = (
         f"Method {regulariser.name}: uncertainties are first-order through its effective window, "
         f"without its own scatter. {regulariser.fails}"
     )
-    return [left_out]
+    return [Message("method", text)]
 
 
-def _reference(solution: Solution) -> list[str]:
+def _reference(solution: Solution) -> list[Message]:
     stress, scan = solution.stress, solution.scan
     if isinstance(stress, Contact):
-        return [_model_form(stress)]
+        return [Message("model_form", _model_form(stress))]
     messages = _other_set_up(scan, stress)
     if stress.convergence is None:
-        messages.append("The reference states no convergence: its own error is not counted.")
+        text = "The reference states no convergence: its own error is not counted."
+        messages.append(Message("convergence_unstated", text))
     return messages
 
 
@@ -112,7 +120,7 @@ def _model_form(contact: Contact) -> str:
     )
 
 
-def _other_set_up(scan: Scan, stress: StressProfile) -> list[str]:
+def _other_set_up(scan: Scan, stress: StressProfile) -> list[Message]:
     """Say where a reference was made for another film or indenter than the scan's."""
     pairs = []
     if stress.film is not None:
@@ -122,14 +130,17 @@ def _other_set_up(scan: Scan, stress: StressProfile) -> list[str]:
     if isinstance(stress.indenter, RoundIndenter):
         pairs.append(("rod radius", scan.indenter.radius * 1e3, stress.indenter.radius * 1e3))
     return [
-        f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "
-        f"{ours:.4g}{'' if 'ratio' in name else ' mm'}."
+        Message(
+            "other_set_up",
+            f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "
+            f"{ours:.4g}{'' if 'ratio' in name else ' mm'}.",
+        )
         for name, ours, theirs in pairs
         if abs(theirs - ours) > _SAME * abs(ours)
     ]
 
 
-def _unstated(scan: Scan) -> list[str]:
+def _unstated(scan: Scan) -> list[Message]:
     film = scan.film
     missing = {
         "film thickness": film.thickness_uncertainty,
@@ -142,4 +153,5 @@ def _unstated(scan: Scan) -> list[str]:
         return []
     pronoun = "them" if len(names) > 1 else "it"
     listed = ", ".join(names)
-    return [f"No uncertainty is stated for {listed}: nothing is counted for {pronoun}."]
+    text = f"No uncertainty is stated for {listed}: nothing is counted for {pronoun}."
+    return [Message("uncertainty_unstated", text)]

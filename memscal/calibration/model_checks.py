@@ -10,7 +10,6 @@ from memscal.estimation.hold_out import hold_out, load_groups
 from memscal.estimation.hypotheses import (
     ExtraColumns,
     axisymmetry_test,
-    chi_square_limit,
     departure_evidence,
     linearity_test,
     symmetry_test,
@@ -25,28 +24,25 @@ from memscal.estimation.residuals import (
     residuals_of,
     runs_test,
 )
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import (
+    FALSE_ALARM,
+    NOISE_LIMIT,
+    QualityCheck,
+    check,
+    chi_square_limit,
+)
 
-__all__ = ["check", "model_checks"]
+__all__ = ["model_checks"]
 
-_NOISE_LIMIT = 1.5
 #: Evidence exceeds this in less than one Gaussian sensor of a thousand: odds of mean one
 #: exceed a thousand at most once in a thousand (Markov's inequality).
-_EVIDENCE_LIMIT = float(np.log(1000.0))
+_EVIDENCE_LIMIT = -float(np.log(FALSE_ALARM))
 _KINDS = {
     "edge": "an edge: a flat top with steep flanks, as of a disc",
     "rough edge": "an edge: a flat top with steep flanks, as of a disc",
     "core": "a core of its own: a ring or a spike in the middle",
     "tail": "tails that fall more slowly than a Gaussian's",
 }
-
-
-def check(
-    name: str, value: float, limit: float, meaning: str, p_value: float | None = None
-) -> QualityCheck:
-    """Return a check, which passes while its value is at most the limit."""
-    passed = bool(value <= limit)
-    return QualityCheck(name, float(value), float(limit), passed, meaning, p_value)
 
 
 def model_checks(estimate: ProfileEstimate) -> list[QualityCheck]:
@@ -69,7 +65,7 @@ def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
         check(
             "noise_as_stated",
             estimate.weighed.noise,
-            _NOISE_LIMIT,
+            NOISE_LIMIT,
             f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. "
             "A failure means that "
             "something besides electronic noise scatters the scan, such as position or load; the "

@@ -20,6 +20,7 @@ from memscal.calibration.draw_blocks import DrawModel, drawn_results
 from memscal.calibration.replicate_results import REPLICATED
 from memscal.calibration.workers import require_workers
 from memscal.errors import InputError
+from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["Comparison", "MonteCarlo", "monte_carlo"]
 
 _METHODS = ("evidence", "white-noise", "tikhonov")
-#: A point of less weight is an outlier.
-_ORDINARY = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,7 +53,7 @@ class MonteCarlo:
         Coverage intervals of 95 % at each radius, in 1/m^2.
     g_first_order : ndarray, shape (n,)
         Standard uncertainty of G to first order in noise and inputs, in 1/m^2.
-    messages : tuple of str
+    messages : tuple of Message
         What the numbers rest on.
     """
 
@@ -69,7 +68,7 @@ class MonteCarlo:
     g_symmetric: FloatArray
     g_shortest: FloatArray
     g_first_order: FloatArray
-    messages: tuple[str, ...]
+    messages: tuple[Message, ...]
 
     def __repr__(self) -> str:
         """Return what was drawn in place of the draws."""
@@ -186,26 +185,28 @@ def _check(calibration: Calibration, draws: Any, seed: Any, workers: int) -> Non
 
 def _messages(
     calibration: Calibration, model: DrawModel, comparisons: list[Comparison]
-) -> tuple[str, ...]:
+) -> tuple[Message, ...]:
     """What was drawn, and what no draw shows."""
     messages = []
     if not model.inputs.sources:
-        messages.append("No input states an uncertainty: the draws are of noise alone.")
+        text = "No input states an uncertainty: the draws are of noise alone."
+        messages.append(Message("uncertainty_unstated", text))
     elif len(calibration.solution.scans) > 1:
-        messages.append(
-            "Inputs of several scans are drawn by their first-order effects on the voltages."
-        )
+        text = "Inputs of several scans are drawn by their first-order effects on the voltages."
+        messages.append(Message("first_order", text))
     hidden = [
         f"{1 - (each.first_order / each.stated) ** 2:.0%} of {each.name}"
         for each in comparisons
         if each.first_order < (1 - TOLERANCE) * each.stated
     ]
     if hidden:
-        messages.append(
+        text = (
             "Not all of the stated uncertainty scatters: of its square, what regularisation hides "
             f"makes up {', '.join(hidden)}. It is the same error in every draw, so it is counted, "
             "but not drawn; the comparison is with the rest."
         )
-    if (calibration.solution.estimate.outlier_weight < _ORDINARY).any():
-        messages.append("Outliers keep their reduced weight in every draw.")
+        messages.append(Message("regularisation", text))
+    if (calibration.solution.estimate.outlier_weight < OUTLIER_WEIGHT).any():
+        text = "Outliers keep their reduced weight in every draw."
+        messages.append(Message("outlier", text))
     return tuple(messages)

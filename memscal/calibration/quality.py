@@ -5,15 +5,21 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtrc
 
-from memscal.calibration.model_checks import check, model_checks
+from memscal.calibration.model_checks import model_checks
 from memscal.calibration.solution import Misfit, Solution
 from memscal.deconvolution.evidence import Evidence
 from memscal.estimation.band import RESOLVED
 from memscal.estimation.forward import gaussian_transfer
 from memscal.estimation.free_model import free_model
-from memscal.estimation.hypotheses import chi_square_limit
 from memscal.estimation.reference import carried_force
-from memscal.model.apparatus import ParameterSet, QualityCheck
+from memscal.model.apparatus import ParameterSet
+from memscal.model.checks import (
+    OUTLIER_LIMIT,
+    OUTLIER_WEIGHT,
+    QualityCheck,
+    check,
+    chi_square_limit,
+)
 
 __all__ = ["quality_checks"]
 
@@ -23,7 +29,6 @@ _TAIL_LIMIT = 0.05
 _SHEAR_TAIL_LIMIT = 0.10
 _BAND_LIMIT = 0.5
 _FORCE_LIMIT = 0.01
-_OUTLIER_LIMIT = 0.10
 _WIDTH_LIMIT = 3.0
 _NEGLIGIBLE_DIFFERENCE = 0.002
 
@@ -163,8 +168,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         ),
         check(
             "outliers",
-            float(np.mean(estimate.outlier_weight < 0.5)),
-            _OUTLIER_LIMIT,
+            float(np.mean(estimate.outlier_weight < OUTLIER_WEIGHT)),
+            OUTLIER_LIMIT,
             "Share of points whose weight was more than halved. A failure means that the noise is "
             "not what the uncertainties take it for: look at the points that the messages name.",
         ),

@@ -9,7 +9,7 @@ import click
 
 from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, force_option, json_option
-from memscal.cli.output import emit_json, message, note, warn
+from memscal.cli.output import emit_json, message, show_messages
 from memscal.cli.progress import working
 from memscal.cli.targets import FigurePath, beside, prove_writable
 
@@ -112,8 +112,7 @@ def _tell(found: MeasuredStress, output: Path, files: list[Path], as_json: bool)
         emit_json(stress_json(found, output))
     else:
         emit_tables(*stress_tables(found))
-    for text in found.messages:
-        (warn if text.startswith(("Quality check", "Overridden")) else note)(text)
+    show_messages(found.messages)
     for path in files:
         message(f"Written: {path}")
     return exit_code_of(found.checks)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from memscal.cli.output import finite
+from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
 from memscal.figures.quantities import KPA, MM, MV
 from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.measurement.stress_checks import pooled_force
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck
 from memscal.model.notation import format_measured
 
 __all__ = ["stress_json", "stress_tables"]
@@ -40,7 +40,7 @@ def stress_json(found: MeasuredStress, output: Path) -> dict[str, Any]:
         "profiles": [_profile_json(found, profile) for profile in found.profiles],
         "overridden": list(found.overridden),
         "checks": checks_json(found.checks),
-        "warnings": list(found.messages),
+        "warnings": texts_of(found.messages),
     }
 
 
@@ -78,10 +78,10 @@ def stress_tables(found: MeasuredStress) -> list[Table]:
     head = ("", "load", "state", "total force", "maximum of S_zz", "centre", "checks")
     rows, marked = [], set()
     for i, profile in enumerate(found.profiles):
-        failed = [check.name for check in _checks_of(found, i) if not check.passed]
+        failed = [check.kind for check in _checks_of(found, i) if not check.passed]
         if failed:
             marked.add(i)
-        names = ", ".join(name.rpartition("_")[0].replace("_", " ") for name in failed)
+        names = ", ".join(name.replace("_", " ") for name in failed)
         rows.append(
             (
                 str(i + 1),
@@ -123,7 +123,7 @@ def _farthest(found: MeasuredStress) -> float:
 
 
 def _checks_of(found: MeasuredStress, number: int) -> list[QualityCheck]:
-    return [check for check in found.checks if check.name.endswith(f"_{number + 1}")]
+    return [check for check in found.checks if check.profile == str(number + 1)]
 
 
 def _shown(found: MeasuredStress) -> list[QualityCheck]:
@@ -131,7 +131,7 @@ def _shown(found: MeasuredStress) -> list[QualityCheck]:
     return [
         check
         for check in found.checks
-        if check.name.startswith("applied_force") or not check.passed
+        if check.kind in ("applied_force", "applied_force_all") or not check.passed
     ]
 
 

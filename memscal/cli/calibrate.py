@@ -11,7 +11,7 @@ from memscal.cli.calibration_outputs import Outputs
 from memscal.cli.calibration_setup import artifact_beside, chosen_method, correlation
 from memscal.cli.failures import DONE, debug_option
 from memscal.cli.options import FILE, force_option, json_option
-from memscal.cli.output import emit_json, message, note, warn
+from memscal.cli.output import emit_json, message, note, show_messages
 from memscal.cli.progress import working
 from memscal.cli.targets import FigurePath, prove_writable
 
@@ -271,8 +271,7 @@ def _drawn(found: Calibration, draws: int, seed: int) -> MonteCarlo:
 
     with working(f"Drawing {draws} scans"):
         drawn = monte_carlo(found, draws=draws, seed=seed)
-    for text in monte_carlo_notes(drawn):
-        note(text)
+    show_messages(monte_carlo_notes(drawn))
     return drawn
 
 
@@ -292,8 +291,7 @@ def _tell(
         emit_json(calibration_json(found, outputs.artifact) | _further_json(swept, drawn))
     else:
         emit_tables(*calibration_tables(found), *_further_tables(swept, drawn))
-    for text in found.apparatus.process.messages:
-        (warn if text.startswith("Quality check") else note)(text)
+    show_messages(found.apparatus.process.messages)
     for path in outputs.paths:
         message(f"Written: {path}")
     checks = found.apparatus.checks

@@ -8,7 +8,7 @@ from typing import Any
 
 from memscal.calibration.procedure import Calibration
 from memscal.calibration.solution import Misfit
-from memscal.cli.output import finite
+from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
 from memscal.estimation.points import ScanPoints
@@ -54,7 +54,7 @@ def calibration_json(found: Calibration, artifact: Path) -> dict[str, Any]:
             "gaussian_chi2_reduced": finite(gaussian.chi2_reduced),
         },
         "checks": checks_json(apparatus.checks),
-        "warnings": list(apparatus.process.messages),
+        "warnings": texts_of(apparatus.process.messages),
     }
 
 

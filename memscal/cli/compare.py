@@ -11,7 +11,7 @@ import click
 from memscal.cli.compare_outputs import FigureFiles
 from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, Quantity, force_option, json_option
-from memscal.cli.output import emit_json, message, note, warn
+from memscal.cli.output import emit_json, message, show_messages
 from memscal.cli.progress import working
 from memscal.cli.targets import FIGURE_SUFFIXES, FigurePath
 from memscal.cli.user_cache import cache_from, cache_options
@@ -253,8 +253,7 @@ def _tell(
         emit_json(comparison_json(found, _source(artifact), sources, files))
     else:
         emit_tables(*comparison_tables(found))
-    for text in comparison_notes(found):
-        (warn if text.startswith("Quality check") else note)(text)
+    show_messages(comparison_notes(found))
 
 
 def _judged(found: FrictionComparison) -> int:
@@ -262,6 +261,7 @@ def _judged(found: FrictionComparison) -> int:
     from memscal.cli.quality_view import exit_code_of
 
     named = [
-        f"{kind} {' '.join(numbers)}".strip() for kind, numbers in failures(found.checks).items()
+        f"{kind} {' '.join(check.profile for check in failed)}".strip()
+        for kind, failed in failures(found.checks).items()
     ]
     return exit_code_of(found.checks, named)

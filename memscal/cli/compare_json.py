@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from memscal.cli.interface_view import interface_json
-from memscal.cli.output import finite
+from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json
 from memscal.figures.quantities import KPA
 from memscal.friction.results import (
@@ -54,7 +54,7 @@ def comparison_json(
         "macroscopic": None if found.macroscopic is None else _quantity(*found.macroscopic, "1"),
         "checks": checks_json(found.checks),
         "overridden": list(found.measured.overridden),
-        "warnings": list(found.messages),
+        "warnings": texts_of(found.messages),
     }
 
 

@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 
-from memscal.cli.compare_notes import kind, which
+from memscal.cli.compare_notes import which
 from memscal.cli.friction_text import bounded_text, friction_name, percent
 from memscal.cli.interface_view import interface_tables
 from memscal.cli.quality_view import checks_table
 from memscal.cli.tables import Table
 from memscal.figures.quantities import KPA, MM
 from memscal.friction.results import EffectiveFriction, FrictionComparison, LoadComparison
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck
 from memscal.model.notation import format_measured
 
 __all__ = ["comparison_tables"]
@@ -195,7 +195,7 @@ def _against(joint: EffectiveFriction, value: float) -> str:
 def _checks_table(checks: Sequence[QualityCheck]) -> Table:
     """Return what failed, and of checks that were made of each profile the closest to failing."""
     shown: list[QualityCheck] = []
-    for name, of_it in groupby(sorted(checks, key=_kind_in(checks)), key=kind):
+    for name, of_it in groupby(sorted(checks, key=_kind_in(checks)), key=lambda check: check.kind):
         group = list(of_it)
         passed = [check for check in group if check.passed]
         shown += [check for check in group if not check.passed]
@@ -208,8 +208,8 @@ def _checks_table(checks: Sequence[QualityCheck]) -> Table:
 
 def _kind_in(checks: Sequence[QualityCheck]) -> Callable[[QualityCheck], int]:
     """Return an order in which checks of one kind follow each other, kinds as they came."""
-    order = list(dict.fromkeys(kind(check) for check in checks))
-    return lambda check: order.index(kind(check))
+    order = list(dict.fromkeys(check.kind for check in checks))
+    return lambda check: order.index(check.kind)
 
 
 def _lubrication_table(found: FrictionComparison) -> Table:

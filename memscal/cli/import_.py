@@ -22,8 +22,9 @@ from memscal.cli.options import (
     radius_options,
     si,
 )
-from memscal.cli.output import emit, emit_json, message, readable, warn
+from memscal.cli.output import emit, emit_json, message, readable, show_messages
 from memscal.cli.targets import prove_writable
+from memscal.model.checks import marked_texts
 
 if TYPE_CHECKING:
     from memscal.formats.reference_profile import ImportedProfile
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-#: How the importer begins a note that the user should act on.
-_WARNING = "Warning: "
 
 EXAMPLES = """\b
 Examples:
@@ -186,20 +185,19 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
     prove_writable([output], force=force, inputs=[table])
     found = _scan(table, given) if kind == "scan" else import_reference.read(table, given)
     _write(found, output, force)
+    warnings = [note for note in found.notes if note.severity == "warning"]
     if as_json:
         emit_json(
             {
                 "schema_version": "1",
                 "output": str(output),
                 "format": kind,
-                "notes": list(found.notes),
+                "notes": marked_texts(found.notes),
             }
         )
     else:
-        emit(readable("\n".join(n for n in found.notes if not n.startswith(_WARNING))))
-    for note in found.notes:
-        if note.startswith(_WARNING):
-            warn(note.removeprefix(_WARNING))
+        emit(readable("\n".join(note.text for note in found.notes if note not in warnings)))
+    show_messages(warnings)
     message(f"Written: {output}")
     return DONE
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from memscal.cli.friction_text import bounded_text, friction_name, percent
-from memscal.cli.output import finite
+from memscal.cli.output import finite, texts_of
 from memscal.cli.tables import Table
 from memscal.friction.compliance_results import (
     InterfaceComparison,
@@ -123,7 +123,7 @@ def _short(value: float) -> str:
 def interface_json(found: InterfaceComparison) -> dict[str, Any]:
     """Return laws, evidence and lengths as JSON says them."""
     return {name: _part_json(part) for name, part in _parts(found).items()} | {
-        "warnings": list(found.messages)
+        "warnings": texts_of(found.messages)
     }
 
 

@@ -6,9 +6,10 @@ from typing import Any
 
 from memscal.calibration.comparison import Comparison
 from memscal.calibration.monte_carlo import MonteCarlo
-from memscal.cli.output import finite
+from memscal.cli.output import finite, texts_of
 from memscal.cli.tables import Table
 from memscal.figures.quantities import quantity
+from memscal.model.checks import Message
 
 __all__ = ["monte_carlo_json", "monte_carlo_notes", "monte_carlo_table"]
 
@@ -35,10 +36,14 @@ def monte_carlo_table(found: MonteCarlo) -> Table:
     return Table(title, head, rows, apart)
 
 
-def monte_carlo_notes(found: MonteCarlo) -> list[str]:
+def monte_carlo_notes(found: MonteCarlo) -> list[Message]:
     """Return what the numbers rest on, and why draws and budget disagree."""
-    apart = (each for each in found.comparisons if not each.agrees)
-    return [*found.messages, *(f"{quantity(each.name).words}: {each.reason}" for each in apart)]
+    disagreements = [
+        Message("disagreement", f"{quantity(each.name).words}: {each.reason}")
+        for each in found.comparisons
+        if not each.agrees
+    ]
+    return [*found.messages, *disagreements]
 
 
 def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:
@@ -49,7 +54,7 @@ def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:
         "sources": list(found.sources),
         "agrees": found.agrees,
         "parameters": {each.name: _one(each) for each in found.comparisons},
-        "messages": list(found.messages),
+        "messages": texts_of(found.messages),
     }
 
 

@@ -7,15 +7,27 @@ import math
 import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
 import click
 
 from memscal.errors import OutputError
 from memscal.formats.text import printable
+from memscal.model.checks import Message
 
-__all__ = ["emit", "emit_json", "error", "finite", "message", "note", "readable", "warn"]
+__all__ = [
+    "emit",
+    "emit_json",
+    "error",
+    "finite",
+    "message",
+    "note",
+    "readable",
+    "show_messages",
+    "texts_of",
+    "warn",
+]
 
 _LONGEST = 100_000
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
@@ -130,6 +142,17 @@ def note(text: str) -> None:
 def warn(text: str) -> None:
     """Tell the user something that puts the result in doubt."""
     _to_stderr([f"Warning: {text}"])
+
+
+def show_messages(messages: Iterable[Message]) -> None:
+    """Write the messages of a result to standard error, each as a note or a warning."""
+    for each in messages:
+        (warn if each.severity == "warning" else note)(each.text)
+
+
+def texts_of(messages: Iterable[Message]) -> list[str]:
+    """Return messages as the JSON output holds them."""
+    return [each.text for each in messages]
 
 
 def error(problem: str, why: str = "", cure: str = "") -> None:

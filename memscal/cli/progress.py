@@ -1,4 +1,4 @@
-"""A sign of life on standard error while a step takes long; nothing where nobody watches."""
+"""Progress of a long step on standard error: its name and its time, on a terminal only."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import Any
 from memscal.cli.failures import CHECK_FAILED, DONE
 from memscal.cli.output import finite, warn
 from memscal.cli.tables import Table
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck
 
 __all__ = ["checks_json", "checks_table", "exit_code_of"]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.cli.output import finite
+from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
 from memscal.figures.quantities import KPA, MM, MV, PER_MM
@@ -68,7 +68,7 @@ def restoration_json(
         },
         "calculated": None if compared is None else _comparison_json(compared),
         "checks": checks_json(found.checks),
-        "warnings": list(found.messages),
+        "warnings": texts_of(found.messages),
     }
 
 

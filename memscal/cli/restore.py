@@ -9,7 +9,7 @@ import click
 
 from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, force_option, json_option
-from memscal.cli.output import emit_json, message, note, warn
+from memscal.cli.output import emit_json, message, note, show_messages
 from memscal.cli.progress import working
 from memscal.cli.targets import FigurePath, prove_writable
 
@@ -143,8 +143,7 @@ def _tell(
         emit_json(restoration_json(found, compared, output))
     else:
         emit_tables(*restoration_tables(found, compared))
-    for text in found.messages:
-        (warn if text.startswith("Quality check") else note)(text)
+    show_messages(found.messages)
     for path in files:
         message(f"Written: {path}")
     return exit_code_of(found.checks)

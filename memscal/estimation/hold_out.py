@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri
 
 from memscal.estimation.free_model import FreeModel, free_model
-from memscal.estimation.hypotheses import FALSE_ALARM
 from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS
+from memscal.model.checks import FALSE_ALARM
 from memscal.model.validation import FloatArray
 
 __all__ = ["HeldOut", "hold_out", "load_groups"]

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 from memscal.estimation.evidence import HYPOTHESES
 from memscal.estimation.forward import gaussian_transfer
@@ -21,14 +20,11 @@ __all__ = [
     "Departure",
     "ExtraColumns",
     "axisymmetry_test",
-    "chi_square_limit",
     "departure_evidence",
     "linearity_test",
     "symmetry_test",
 ]
 
-#: Chance that a check fails although its assumption holds.
-FALSE_ALARM = 1e-3
 #: Loads must differ by this share of their mean before linearity can be tested.
 _LOAD_CONTRAST = 0.05
 #: Probabilities below this are not followed by the evidence.
@@ -76,11 +72,6 @@ def departure_evidence(estimate: ProfileEstimate) -> Departure:
             kinds[name] = kinds.get(name, 0.0) + float(probability)
     kind = max(kinds, key=lambda name: kinds[name])
     return Departure(float(np.log(factor)), kind, kinds[kind] / max(sum(kinds.values()), 1e-300))
-
-
-def chi_square_limit(degrees: float) -> float:
-    """Value that chi-square exceeds by chance once in a thousand."""
-    return float(chdtri(degrees, FALSE_ALARM))
 
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:

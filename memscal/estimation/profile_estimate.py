@@ -16,7 +16,7 @@ from memscal.estimation.gaussian_fit import GaussianFit, fit_gaussian
 from memscal.estimation.points import ScanPoints
 from memscal.model.validation import FloatArray
 
-__all__ = ["ProfileEstimate", "estimate_profile"]
+__all__ = ["CentreError", "ProfileEstimate", "estimate_profile"]
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
@@ -25,6 +25,10 @@ NUMERICAL_FLOOR = 1e-6
 #: A conversion constant must exceed this many of its standard uncertainties.
 LEAST_SIGNIFICANCE = 5.0
 _WEIGHING_ROUNDS = 4
+
+
+class CentreError(FitError):
+    """A scan that does not cross the centre of its sensor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,7 +252,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
         name, centre = "xy"[axis], estimate.centres[scan, axis]
         positions = (points.x, points.y)[axis][points.scan == scan]
         if not positions.min() - points.step <= centre <= positions.max() + points.step:
-            raise FitError(
+            raise CentreError(
                 f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "
                 f"scan from {positions.min() * 1e3:.4g} mm to {positions.max() * 1e3:.4g} mm.",
                 why="A centre that was not crossed is not determined, nor is anything else.",

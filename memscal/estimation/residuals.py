@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy.special import bdtr, chdtrc, fdtrc, fdtri, gammaincc, gammainccinv
 
 from memscal.estimation.free_model import free_model
-from memscal.estimation.hypotheses import FALSE_ALARM, chi_square_limit
 from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.model.checks import FALSE_ALARM, chi_square_limit
 from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:

@@ -202,7 +202,7 @@ def _provenance(data: ApparatusData) -> str:
             parts.append(_table(caption, ("name", "value"), rows))
     parts.append("<h3>Messages</h3>")
     if process.messages:
-        items = "\n".join(f"<li>{escape(message)}</li>" for message in process.messages)
+        items = "\n".join(f"<li>{escape(message.text)}</li>" for message in process.messages)
         parts.append(f"<ul>\n{items}\n</ul>")
     else:
         parts.append("<p>None.</p>")

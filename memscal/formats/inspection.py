@@ -27,6 +27,7 @@ from memscal.formats.schema import (
 from memscal.formats.stress import PROFILE_ARRAYS, PROFILE_NUMBERS, profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.verify import altered
+from memscal.model.checks import messages_from_json
 
 __all__ = ["Finding", "check", "describe"]
 
@@ -91,7 +92,7 @@ _PROVENANCE = {
     "input_reference_sha256": "/entry/process/input_reference/checksum",
     "synthetic": "/entry/synthetic/description",
 }
-_NOTES = ("configuration", "environment", "messages")
+_OPTIONS = ("configuration", "environment")
 
 
 @dataclass(frozen=True)
@@ -269,10 +270,13 @@ def _provenance(file: SafeFile) -> dict[str, Any]:
     found: dict[str, Any] = {
         name: file.text(path) for name, path in _PROVENANCE.items() if file.has(path)
     }
-    for name in _NOTES:
+    for name in _OPTIONS:
         value = json_value(file, f"/entry/process/{name}/data", object, None)
         if value is not None:
             found[name] = value
+    if file.has(path := "/entry/process/messages/data"):
+        messages = messages_from_json(json_value(file, path, list, []))
+        found["messages"] = [message.text for message in messages]
     return found
 
 

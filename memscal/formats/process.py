@@ -17,7 +17,7 @@ from memscal.formats.fields import (
 from memscal.formats.hdf5_reader import SafeFile
 from memscal.formats.json_text import to_json
 from memscal.formats.tree import Group, Node, count, note, si
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck, messages_from_json, messages_to_json
 from memscal.model.provenance import Process, SourceFile
 
 __all__ = ["process_group", "quality_group", "read_process", "read_quality"]
@@ -38,7 +38,7 @@ def process_group(process: Process) -> Group:
         value: Mapping[str, Any] = getattr(process, name)
         text = to_json(name, value)
         children[name] = note(text, media_type=_JSON, description=description)
-    messages = to_json("messages", list(process.messages))
+    messages = to_json("messages", messages_to_json(process.messages))
     children["messages"] = note(
         messages, media_type=_JSON, description="What the user was told while it ran."
     )
@@ -64,7 +64,7 @@ def read_process(file: SafeFile, path: str) -> Process:
         date=optional_text(file, f"{path}/date"),
         configuration=json_value(file, f"{path}/configuration/data", dict, {}),
         environment=json_value(file, f"{path}/environment/data", dict, {}),
-        messages=tuple(str(m) for m in json_value(file, f"{path}/messages/data", list, [])),
+        messages=messages_from_json(json_value(file, f"{path}/messages/data", list, [])),
         input_scan=_read_input(file, f"{path}/input_scan"),
         input_reference=_read_input(file, f"{path}/input_reference"),
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -30,7 +31,7 @@ class ImportedProfile:
     """A stress profile that was imported, and what was done on the way."""
 
     profile: StressProfile
-    notes: tuple[str, ...]
+    notes: tuple[Message, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,7 +44,7 @@ class Samples:
         ``r``, ``sigma_zz`` (positive in compression) and, where it is known, ``sigma_rz``.
     source : SourceFile
         The file.
-    notes : sequence of str
+    notes : sequence of Message
         What was done so far.
     kind, item : str
         What the file is and what a sample is in it: ``table`` and ``data row``.
@@ -59,7 +60,7 @@ class Samples:
 
     columns: dict[str, FloatArray]
     source: SourceFile
-    notes: Sequence[str]
+    notes: Sequence[Message]
     kind: str
     item: str
     units: tuple[str, str]
@@ -137,16 +138,16 @@ def profile_of(
         source=samples.source,
     )
     notes += _compare_with_load(profile, samples)
-    return ImportedProfile(replace(profile, notes="\n".join(notes)), tuple(notes))
+    return ImportedProfile(replace(profile, notes="\n".join(marked_texts(notes))), tuple(notes))
 
 
-def _sorted_by_radius(samples: Samples, notes: list[str]) -> dict[str, FloatArray]:
+def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, FloatArray]:
     """Sort, and average the values that element-wise output gives twice at a shared node."""
     columns = samples.columns
     order = np.argsort(columns["r"], kind="stable")
     columns = {name: values[order] for name, values in columns.items()}
     if samples.kind == "table" and np.any(np.diff(order) < 0):  # nodes of a mesh have no order
-        notes.append(f"The {samples.plural} were sorted by radius.")
+        notes += import_notes([f"The {samples.plural} were sorted by radius."])
     r = columns["r"]
     index = np.concatenate([[0], np.cumsum(np.diff(r) > samples.spacing)])
     if index[-1] == r.size - 1:
@@ -156,15 +157,16 @@ def _sorted_by_radius(samples: Samples, notes: list[str]) -> dict[str, FloatArra
     means["r"] = r[np.searchsorted(index, np.arange(number.size))]
     peak = float(np.abs(means["sigma_zz"]).max())
     apart = float(np.abs(columns["sigma_zz"] - means["sigma_zz"][index]).max())
-    notes.append(
+    text = (
         f"{r.size - number.size} {samples.plural} repeat a radius; they were averaged "
         f"(normal stresses differ from the mean by up to {apart / peak if peak else 0:.2g} "
         "of the maximum)."
     )
+    notes += import_notes([text])
     return means
 
 
-def _compare_with_load(profile: StressProfile, samples: Samples) -> tuple[str, ...]:
+def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message]:
     """Hold the force that the samples carry against their load, which finds a wrong unit."""
     force, load = profile.force, profile.load
     file_name, kind, turned = samples.source.file_name, samples.kind, -samples.sign
@@ -189,9 +191,11 @@ def _compare_with_load(profile: StressProfile, samples: Samples) -> tuple[str, .
             f'lengths ("{samples.units[0]}"), the sign, that it is the normal stress at the base, '
             "and the load in N.",
         )
-    carried = f"The {kind} carries {force:.4g} N of the load of {load:g} N ({ratio:.2%}) {within}."
+    carried = import_notes(
+        [f"The {kind} carries {force:.4g} N of the load of {load:g} N ({ratio:.2%}) {within}."]
+    )
     if abs(ratio - 1) <= _WARNED:
-        return (carried,)
+        return carried
     cure = (
         f"The {kind} ends with {tail:.1%} of its maximum left: extend it to where the stress has "
         "decayed."
@@ -199,8 +203,8 @@ def _compare_with_load(profile: StressProfile, samples: Samples) -> tuple[str, .
         else "Check the load, the units, and that the radii are fine enough under the indenter."
     )
     warning = (
-        f"Warning: the {kind}'s force differs from the load by {abs(ratio - 1):.1%} of it. A "
+        f"the {kind}'s force differs from the load by {abs(ratio - 1):.1%} of it. A "
         f"calibration takes stress per load from the {kind}, so its conversion constant would be "
         f"wrong by as much. {cure}"
     )
-    return carried, warning
+    return [*carried, Message("force_differs", warning, "warning")]

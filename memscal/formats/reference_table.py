@@ -14,6 +14,7 @@ from memscal.formats.reference_profile import (
     require_sign,
 )
 from memscal.formats.units import to_si
+from memscal.model.checks import import_notes
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 
@@ -94,9 +95,11 @@ def read_reference_table(
     samples = Samples(
         columns=columns,
         source=table.source,
-        notes=(
-            f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
-            *table.notes,
+        notes=import_notes(
+            [
+                f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
+                *table.notes,
+            ]
         ),
         kind="table",
         item="data row",

@@ -14,6 +14,7 @@ from memscal.formats.placement import place_readings
 from memscal.formats.reference_profile import ImportedProfile
 from memscal.formats.reference_table import read_reference_table
 from memscal.formats.units import to_si
+from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan, StressSensor
@@ -32,7 +33,7 @@ class ImportedScan:
     """A scan that was read from a table, and what was done on the way."""
 
     scan: Scan
-    notes: tuple[str, ...]
+    notes: tuple[Message, ...]
 
 
 def read_scan_table(
@@ -186,8 +187,9 @@ def read_scan_table(
     loads = fields.pop("normal_load", None)
     if load_scatter is not None and loads is None:
         loads = np.full(fields["u_zz"].shape, load)
+    messages = import_notes(notes)
     if loads is not None and placed.y is None:
-        notes += _mixed_loads(loads, indenter)
+        messages += _mixed_loads(loads, indenter)
     scan = Scan(
         x=placed.x,
         y=placed.y,
@@ -205,10 +207,10 @@ def read_scan_table(
         indenter=indenter,
         sensor=sensor or StressSensor(),
         title=title,
-        notes="\n".join(notes),
+        notes="\n".join(marked_texts(messages)),
         source=table.source,
     )
-    return ImportedScan(scan, tuple(notes))
+    return ImportedScan(scan, tuple(messages))
 
 
 def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) -> FloatArray:
@@ -226,7 +228,7 @@ def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) ->
     return lines
 
 
-def _mixed_loads(loads: FloatArray, indenter: RoundIndenter) -> list[str]:
+def _mixed_loads(loads: FloatArray, indenter: RoundIndenter) -> list[Message]:
     """Warn of lines at several loads: only a rod's voltage is proportional to its load."""
     lines = np.atleast_2d(loads)
     known = lines[np.isfinite(lines).any(axis=1)]
@@ -236,11 +238,11 @@ def _mixed_loads(loads: FloatArray, indenter: RoundIndenter) -> list[str]:
         return []
     i = int(np.argmax(mixed))
     text = (
-        f"Warning: The loads of a line go from {low[i]:.4g} to {high[i]:.4g} N, but each load has "
+        f"The loads of a line go from {low[i]:.4g} to {high[i]:.4g} N, but each load has "
         "a profile of its own. Name the column of the loads that were set among those that number "
         'the repeats (repeat=("set load", "pass"); --repeat "set load" --repeat pass).'
     )
-    return [text]
+    return [Message("mixed_loads", text, "warning")]
 
 
 def _voltage(table: Table, column: Column, unit: str, scale: float | None) -> FloatArray:

@@ -7,10 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.special import chdtrc
 
-from memscal.calibration.model_checks import check
-from memscal.estimation.hypotheses import chi_square_limit
 from memscal.friction.results import EffectiveFriction, LoadComparison
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck, check, chi_square_limit
 
 __all__ = ["comparison_checks"]
 

@@ -16,7 +16,7 @@ the interface yields normally.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,7 @@ from memscal.friction.law_families import LawFamilies
 from memscal.friction.load_points import LoadPoints, load_points
 from memscal.friction.predicted import sensor_of
 from memscal.friction.weighed_laws import weigh_normal_compliance, weigh_slip_length
+from memscal.model.checks import Message
 from memscal.model.validation import require_positive
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ def compare_interface(
         normal = weigh_normal_compliance(
             _measured(wet, apparatus, calculated.yielding(wet, yielding))
         )
-    messages = _messages(tangential, normal, macroscopic_uncertainty, dry)
+    messages = tuple(_messages(tangential, normal, macroscopic_uncertainty, dry))
     return InterfaceComparison((macroscopic, macroscopic_uncertainty), tangential, normal, messages)
 
 
@@ -133,25 +134,29 @@ def _messages(
     normal: LawComparison | None,
     uncertainty: float | None,
     dry: Sequence[MeasuredProfile],
-) -> tuple[str, ...]:
-    found = []
+) -> Iterator[Message]:
     if any(not profile.part.lubrication for profile in dry):
-        found.append("Scans that do not state their lubrication were taken as dry.")
+        yield Message(
+            "lubrication_unstated", "Scans that do not state their lubrication were taken as dry."
+        )
     if tangential is not None and uncertainty is None:
-        found.append(
+        yield Message(
+            "uncertainty_unstated",
             "The macroscopic friction coefficient was taken as exact: the slip length's "
-            "uncertainty lacks its share (relatively the same as the coefficient's)."
+            "uncertainty lacks its share (relatively the same as the coefficient's).",
         )
     if tangential is not None and tangential.loads.size < 2:
-        found.append("One load cannot tell a slip length from a smaller friction coefficient.")
+        yield Message(
+            "one_load", "One load cannot tell a slip length from a smaller friction coefficient."
+        )
     for part in (tangential, normal):
         if part is None:
             continue
         best = max(part.laws, key=lambda law: law.p_value)
         if best.p_value < _MISFIT:
-            found.append(
+            yield Message(
+                "misfit",
                 f"No law of the {part.lubrication or 'dry'} interface explains the data: the best "
                 f"one's chi-square, {best.least:.0f} of {best.degrees} degrees of freedom, has "
-                f"p = {best.p_value:.1g}. Their Bayes factors compare laws that are all wrong."
+                f"p = {best.p_value:.1g}. Their Bayes factors compare laws that are all wrong.",
             )
-    return tuple(found)

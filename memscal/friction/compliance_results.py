@@ -1,4 +1,4 @@
-"""What laws of the interface are worth by their evidence, and the lengths of those that yield."""
+"""Laws of the interface: their marginal likelihoods, Bayes factors, and slip lengths."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from memscal.friction.results import Interval
+from memscal.model.checks import Message
 from memscal.model.validation import FloatArray
 
 __all__ = [
@@ -229,11 +230,11 @@ class InterfaceComparison:
     normal : LawComparison or None
         From lubricated scans: a rigid frictionless interface, and one that yields normally, in
         that order; ``None`` without lubricated scans.
-    messages : tuple of str
+    messages : tuple of Message
         What a user should know.
     """
 
     macroscopic: tuple[float, float | None]
     tangential: LawComparison | None
     normal: LawComparison | None
-    messages: tuple[str, ...] = field(default=())
+    messages: tuple[Message, ...] = field(default=())

@@ -1,4 +1,4 @@
-"""What a comparison with calculated contacts tells its user."""
+"""Messages of a comparison with calculated contacts."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import numpy as np
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import EffectiveFriction
 from memscal.measurement.measured_stress import MeasuredStress
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import Message, QualityCheck, failed_check_messages
 from memscal.model.notation import format_bound
 
-__all__ = ["comparison_messages"]
+__all__ = ["SYNTHETIC_SCANS", "comparison_messages"]
+
+SYNTHETIC_SCANS = Message("synthetic", "The scans are synthetic: nothing here was measured.")
 
 #: Calculated contacts that are less certain than this share of their stress are named.
 _COARSE = 2e-3
@@ -27,13 +29,13 @@ def comparison_messages(
     joint: Mapping[str, Mapping[str, EffectiveFriction]],
     checks: tuple[QualityCheck, ...],
     macroscopic: tuple[float, float | None] | None,
-) -> tuple[str, ...]:
+) -> tuple[Message, ...]:
     """Return the messages that accompany a comparison, the gravest first.
 
     Those of the measured stress are among them.
     """
     own = [
-        *_failed(checks),
+        *failed_check_messages(checks),
         *_synthetic(measured),
         *_loadings(joint),
         *_against_macroscopic(joint, macroscopic),
@@ -43,21 +45,12 @@ def comparison_messages(
     return tuple(dict.fromkeys([*own, *measured.messages]))
 
 
-def _failed(checks: tuple[QualityCheck, ...]) -> Iterator[str]:
-    for one in checks:
-        if not one.passed:
-            yield (
-                f"Quality check {one.name} failed: {one.value:.3g} exceeds {one.limit:.3g}. "
-                f"{one.meaning}"
-            )
-
-
-def _synthetic(measured: MeasuredStress) -> Iterator[str]:
+def _synthetic(measured: MeasuredStress) -> Iterator[Message]:
     if any(scan.synthetic for scan in measured.scans):
-        yield "The scans are synthetic: nothing here was measured."
+        yield SYNTHETIC_SCANS
 
 
-def _loadings(joint: Mapping[str, Mapping[str, EffectiveFriction]]) -> Iterator[str]:
+def _loadings(joint: Mapping[str, Mapping[str, EffectiveFriction]]) -> Iterator[Message]:
     for lubrication, by_loading in joint.items():
         if not {"incremental", "total"} <= by_loading.keys():
             continue
@@ -65,25 +58,27 @@ def _loadings(joint: Mapping[str, Mapping[str, EffectiveFriction]]) -> Iterator[
         of = f"the {lubrication} loads" if lubrication else "the loads"
         if first.value is None or second.value is None:
             if (first.value is None) != (second.value is None):
-                yield (
+                yield Message(
+                    "loading",
                     f"The definitions of the loading disagree for {of}: incremental loading gives "
-                    f"{in_words(first)}, total loading {in_words(second)}."
+                    f"{in_words(first)}, total loading {in_words(second)}.",
                 )
             continue
         apart = abs(first.value - second.value)
         errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
         if errors and apart > max(errors):
-            yield (
+            yield Message(
+                "loading",
                 f"The definitions of the loading disagree for {of} by {apart:.2g}, more than one "
                 f"standard uncertainty: incremental loading gives {in_words(first)}, total "
-                f"loading {in_words(second)}."
+                f"loading {in_words(second)}.",
             )
 
 
 def _against_macroscopic(
     joint: Mapping[str, Mapping[str, EffectiveFriction]],
     macroscopic: tuple[float, float | None] | None,
-) -> Iterator[str]:
+) -> Iterator[Message]:
     if macroscopic is None:
         return
     value, u = macroscopic
@@ -102,22 +97,26 @@ def _against_macroscopic(
             else:
                 verdict = "agrees with the macroscopic one"
             words = f" ({loading} loading)" if loading else ""
-            yield f"The effective friction coefficient{words} {verdict}, {value:.3g}."
+            yield Message(
+                "macroscopic",
+                f"The effective friction coefficient{words} {verdict}, {value:.3g}.",
+            )
 
 
-def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[str]:
+def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
     for loading, family in families.items():
         known = family.convergence[np.isfinite(family.convergence)]
         if known.size and float(known.max()) > _COARSE:
             words = f" ({loading} loading)" if loading else ""
-            yield (
+            yield Message(
+                "convergence",
                 f"The calculated contacts{words} have converged to {float(known.max()):.1%} of "
-                "their stress only."
+                "their stress only.",
             )
-        yield from family.notes
+        yield from (Message("calculated", text) for text in family.notes)
 
 
-def _unstated(measured: MeasuredStress) -> Iterator[str]:
+def _unstated(measured: MeasuredStress) -> Iterator[Message]:
     """Name what no uncertainty is stated for: the intervals count nothing for it."""
     names = []
     for scan in measured.scans:
@@ -131,9 +130,10 @@ def _unstated(measured: MeasuredStress) -> Iterator[str]:
         }
         names += [name for name, value in stated.items() if value is None]
     if names:
-        yield (
+        yield Message(
+            "uncertainty_unstated",
             f"No uncertainty is stated for {', '.join(dict.fromkeys(names))}: the intervals of "
-            "the friction coefficient count nothing for it."
+            "the friction coefficient count nothing for it.",
         )
 
 

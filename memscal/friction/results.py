@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ class FrictionComparison:
         Friction coefficient measured otherwise, and its standard uncertainty.
     checks : tuple of QualityCheck
         Quality checks.
-    messages : tuple of str
+    messages : tuple of Message
         What a user should know.
     """
 
@@ -229,7 +229,7 @@ class FrictionComparison:
     interface: InterfaceComparison | None = None
     macroscopic: tuple[float, float | None] | None = None
     checks: tuple[QualityCheck, ...] = ()
-    messages: tuple[str, ...] = field(default=())
+    messages: tuple[Message, ...] = field(default=())
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

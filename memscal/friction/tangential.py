@@ -7,7 +7,7 @@ tangential channel.  Loads and centres come from the normal channel of the same 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 
@@ -22,10 +22,12 @@ from memscal.friction.assembly import require_sphere
 from memscal.friction.cache import CacheFolder
 from memscal.friction.effective import confront
 from memscal.friction.load_points import LoadPoints
+from memscal.friction.messages import SYNTHETIC_SCANS
 from memscal.friction.predicted import sensor_of
 from memscal.friction.requirements import contact_scans
 from memscal.friction.results import EffectiveFriction
 from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
+from memscal.model.checks import Message
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
@@ -51,7 +53,7 @@ class ShearComparison:
         One for each measured profile, in their order, by definition of the loading.
     joint : mapping of str to mapping of str to EffectiveFriction
         One for all loads together, by lubrication and definition of the loading.
-    messages : tuple of str
+    messages : tuple of Message
         What a user should know.
     """
 
@@ -60,7 +62,7 @@ class ShearComparison:
     friction: FloatArray
     loads: Mapping[str, tuple[EffectiveFriction, ...]]
     joint: Mapping[str, Mapping[str, EffectiveFriction]]
-    messages: tuple[str, ...]
+    messages: tuple[Message, ...]
 
 
 def compare_shear(
@@ -213,11 +215,11 @@ def _shear_points(profile: MeasuredProfile, channel: str) -> LoadPoints:
     )
 
 
-def _messages(scan: Scan, apparatus: ApparatusFunction) -> list[str]:
+def _messages(scan: Scan, apparatus: ApparatusFunction) -> Iterator[Message]:
     channel = apparatus.sensor.channel
-    messages = [
-        f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
-    ]
+    yield Message(
+        "experimental",
+        f"Channel {channel} is experimental: comparisons were tested on synthetic scans only.",
+    )
     if scan.synthetic:
-        messages.append("The scans are synthetic: nothing here was measured.")
-    return messages
+        yield SYNTHETIC_SCANS

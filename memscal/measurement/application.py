@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from os import PathLike
 
 import numpy as np
@@ -15,15 +16,29 @@ from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.measurement.prepared_scan import PreparedScan, prepared_scan
 from memscal.measurement.procedure import restore_known
 from memscal.measurement.requirements import require_covariance
+from memscal.measurement.restoration_checks import (
+    failed_calibration_messages,
+    noise_unstated_message,
+)
 from memscal.measurement.single_loads import SingleLoad, place_of, single_loads
 from memscal.measurement.single_profile import measured_profile
 from memscal.measurement.stress_checks import stress_checks
 from memscal.measurement.usable_scan import require_ends, require_points
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import (
+    FAILED_CALIBRATION,
+    FAILED_CHECK,
+    NOISE_UNSTATED,
+    Message,
+    QualityCheck,
+    failed_check_messages,
+)
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan
 
 __all__ = ["measure_stress"]
+
+#: Messages of a restoration that the measured stress gives itself.
+_SAID_OF_ALL = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 
 
 def measure_stress(
@@ -159,36 +174,34 @@ def _messages(
     known: ApparatusFunction,
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
-) -> Iterator[str]:
+) -> Iterator[Message]:
     """Yield what a user should know, the gravest first."""
-    for one in checks:
-        if not one.passed:
-            yield (
-                f"Quality check {one.name} failed: {one.value:.3g} exceeds {one.limit:.3g}. "
-                f"{one.meaning}"
-            )
+    yield from failed_check_messages(checks)
     for text in overridden:
-        yield f"Overridden: {text}."
-    if not known.passed:
-        yield "A quality check of the calibration itself had failed: see its artifact."
+        yield Message("overridden", f"Overridden: {text}.", "warning")
+    yield from failed_calibration_messages(known)
     # What is true of every profile is said once.
-    said: dict[str, list[str]] = {}
+    numbers: dict[Message, list[str]] = {}
     for i, profile in enumerate(profiles):
-        for text in _of_profile(profile):
-            said.setdefault(text, []).append(str(i + 1))
-    for text, where in said.items():
-        yield text if len(where) == len(profiles) else f"Profile {', '.join(where)}: {text}"
+        for message in _of_profile(profile):
+            numbers.setdefault(message, []).append(str(i + 1))
+    for message, of_profiles in numbers.items():
+        everywhere = len(of_profiles) == len(profiles)
+        place = "" if everywhere else f"Profile {', '.join(of_profiles)}: "
+        yield replace(message, text=f"{place}{message.text}")
 
 
-def _of_profile(profile: MeasuredProfile) -> Iterator[str]:
+def _of_profile(profile: MeasuredProfile) -> Iterator[Message]:
     found, scan = profile.restoration, profile.part.scan
     if profile.noise_found:
-        noise = float(np.nanmin(profile.electronic_noise)) * 1e3
-        yield f"u_zz_errors is absent: a noise of {noise:.3g} mV was estimated from the scatter."
+        yield noise_unstated_message(float(np.nanmin(profile.electronic_noise)))
     if scan.normal_load is not None and scan.normal_load_errors is None:
-        yield "normal_load_errors is absent: the recorded loads are taken as exact."
+        yield Message(
+            "load_errors_unstated",
+            "normal_load_errors is absent: the recorded loads are taken as exact.",
+        )
     if not scan.lubrication:
-        yield "The scan does not state its lubrication."
-    for text in found.messages:
-        if not text.startswith(("Quality check", "u_zz_errors", "A quality check of the cal")):
-            yield text
+        yield Message("lubrication_unstated", "The scan does not state its lubrication.")
+    for message in found.messages:
+        if message.kind not in _SAID_OF_ALL:
+            yield message

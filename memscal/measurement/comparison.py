@@ -17,11 +17,11 @@ from scipy.special import chdtrc
 
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
-from memscal.estimation.hypotheses import chi_square_limit
 from memscal.measurement.posterior import Posterior
 from memscal.measurement.pressure import film_transfer
 from memscal.measurement.requirements import SAME_LOAD
 from memscal.mechanics.contact import Contact
+from memscal.model.checks import chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile

@@ -21,7 +21,7 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.single_loads import SingleLoad
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan
@@ -160,7 +160,7 @@ class MeasuredStress:
         What was measured; each names its file.
     checks : tuple of QualityCheck
         Those of each profile, numbered from one, then those of all together.
-    messages : tuple of str
+    messages : tuple of Message
         What a user should know.
     overridden : tuple of str
         Mismatches of artifact and scan that were accepted.
@@ -176,7 +176,7 @@ class MeasuredStress:
     apparatus: ApparatusFunction
     scans: tuple[Scan, ...]
     checks: tuple[QualityCheck, ...]
-    messages: tuple[str, ...]
+    messages: tuple[Message, ...]
     overridden: tuple[str, ...]
     configuration: Mapping[str, Any]
     artifact: SourceFile | None = None

@@ -8,7 +8,7 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import FitError, InputError
-from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.estimation.profile_estimate import CentreError, ProfileEstimate
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 
@@ -57,9 +57,9 @@ def restored_or_explained(estimate: Callable[[], ProfileEstimate]) -> ProfileEst
     """
     try:
         return estimate()
+    except CentreError:
+        raise
     except FitError as failure:
-        if "centre" in failure.problem or "positions" in failure.problem:
-            raise
         raise FitError(
             "The scan determines no stress at the base of the film.",
             why="Its voltage does not rise clear of noise and baseline as the indenter passes one "

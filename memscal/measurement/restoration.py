@@ -19,7 +19,7 @@ from memscal.measurement.comparison import (
     read_expected,
 )
 from memscal.measurement.posterior import Posterior, reach_of, sensor_transfer
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.notation import format_measured
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -48,7 +48,7 @@ class Restoration:
         With an expected stress, where one was given.
     checks : tuple of QualityCheck
         Quality checks.
-    messages : tuple of str
+    messages : tuple of Message
         What a user should know.
     """
 
@@ -60,7 +60,7 @@ class Restoration:
     covariance: FloatArray
     comparison: Comparison | None = None
     checks: tuple[QualityCheck, ...] = ()
-    messages: tuple[str, ...] = ()
+    messages: tuple[Message, ...] = ()
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

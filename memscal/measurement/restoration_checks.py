@@ -1,4 +1,4 @@
-"""The quality checks of a restoration, and what it tells its user."""
+"""Quality checks and messages of a restoration."""
 
 from __future__ import annotations
 
@@ -7,28 +7,40 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtrc
 
-from memscal.calibration.model_checks import check
 from memscal.estimation.hypotheses import (
     ExtraColumns,
     axisymmetry_test,
-    chi_square_limit,
     symmetry_test,
 )
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import (
+    FAILED_CALIBRATION,
+    NOISE_LIMIT,
+    NOISE_UNSTATED,
+    OUTLIER_LIMIT,
+    OUTLIER_WEIGHT,
+    Message,
+    QualityCheck,
+    check,
+    chi_square_limit,
+    failed_check_messages,
+)
 
 if TYPE_CHECKING:
+    from memscal.apparatus import ApparatusFunction
     from memscal.measurement.restoration import Restoration
 
-__all__ = ["restoration_checks", "restoration_messages"]
+__all__ = [
+    "failed_calibration_messages",
+    "noise_unstated_message",
+    "restoration_checks",
+    "restoration_messages",
+]
 
 _FORCE_LIMIT = 3.0
 #: What the shapes of pressure themselves leave open of the force, however small the noise.
 _NEGLIGIBLE_FORCE = 0.01
 _SAME_FILM = 0.02
-_NOISE_LIMIT = 1.5
-_OUTLIER_LIMIT = 0.10
-_OUTLIER = 0.5
 
 
 def restoration_checks(found: Restoration) -> tuple[QualityCheck, ...]:
@@ -90,7 +102,7 @@ def _noise(found: Restoration) -> list[QualityCheck]:
         check(
             "noise_as_stated",
             found.posterior.found_noise,
-            _NOISE_LIMIT,
+            NOISE_LIMIT,
             "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
             "something besides electronic noise scatters the scan, such as position or load; the "
             "uncertainties have been raised accordingly.",
@@ -132,8 +144,8 @@ def _added(name: str, found: ExtraColumns, meaning: str) -> QualityCheck:
 def _outliers(found: Restoration) -> QualityCheck:
     return check(
         "outliers",
-        float(np.mean(found.posterior.estimate.outlier_weight < _OUTLIER)),
-        _OUTLIER_LIMIT,
+        float(np.mean(found.posterior.estimate.outlier_weight < OUTLIER_WEIGHT)),
+        OUTLIER_LIMIT,
         "Share of points whose weight was more than halved. A failure means that the noise is not "
         "what the uncertainties take it for: look at the residuals.",
     )
@@ -155,31 +167,29 @@ def _expected(found: Restoration) -> QualityCheck:
     )
 
 
-def restoration_messages(found: Restoration, checks: tuple[QualityCheck, ...]) -> tuple[str, ...]:
+def restoration_messages(
+    found: Restoration, checks: tuple[QualityCheck, ...]
+) -> tuple[Message, ...]:
     """Return the messages that accompany a result, the gravest first."""
     estimate, points = found.posterior.estimate, found.points
-    messages = [
-        f"Quality check {check.name} failed: {check.value:.3g} exceeds {check.limit:.3g}. "
-        f"{check.meaning}"
-        for check in checks
-        if not check.passed
-    ]
-    if not found.apparatus.passed:
-        messages.append("A quality check of the calibration itself had failed: see its artifact.")
+    messages = failed_check_messages(checks)
+    messages += failed_calibration_messages(found.apparatus)
     if points.missing:
-        messages.append(f"{points.missing} points of the scan are missing and were left out.")
+        text = f"{points.missing} points of the scan are missing and were left out."
+        messages.append(Message("missing_points", text))
     messages += [
-        f"Outlier {found.distance[i] * 1e3:.4g} mm from the centre: {points.u[i] * 1e3:.4g} mV "
-        f"instead of {found.predicted[i] * 1e3:.4g} mV."
-        for i in (estimate.outlier_weight < _OUTLIER).nonzero()[0]
+        Message(
+            "outlier",
+            f"Outlier {found.distance[i] * 1e3:.4g} mm from the centre: {points.u[i] * 1e3:.4g} mV "
+            f"instead of {found.predicted[i] * 1e3:.4g} mV.",
+        )
+        for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]
     ]
     if points.u_errors is None:
-        noise = float(found.noise.min()) * 1e3
-        messages.append(
-            f"u_zz_errors is absent: a noise of {noise:.3g} mV was estimated from the scatter."
-        )
+        messages.append(noise_unstated_message(float(found.noise.min())))
     if not found.apparatus.radial_profile.g_errors.any():
-        messages.append("The artifact states no uncertainty of G: nothing is counted for it.")
+        text = "The artifact states no uncertainty of G: nothing is counted for it."
+        messages.append(Message("uncertainty_unstated", text))
     film = found.scan.film
     unstated = {
         "film thickness": film.thickness_uncertainty,
@@ -188,8 +198,21 @@ def restoration_messages(found: Restoration, checks: tuple[QualityCheck, ...]) -
     }
     names = [name for name, value in unstated.items() if value is None]
     if names:
-        messages.append(
+        text = (
             f"No uncertainty is stated for {', '.join(names)}: nothing is counted for "
             f"{'it' if len(names) == 1 else 'them'}."
         )
+        messages.append(Message("uncertainty_unstated", text))
     return tuple(messages)
+
+
+def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
+    """Return one message if a check of the calibration had failed, else none."""
+    text = "A quality check of the calibration itself had failed: see its artifact."
+    return [] if apparatus.passed else [Message(FAILED_CALIBRATION, text)]
+
+
+def noise_unstated_message(noise: float) -> Message:
+    """Return the message for a scan without u_zz_errors, with the estimated noise in V."""
+    text = f"u_zz_errors is absent: a noise of {noise * 1e3:.3g} mV was estimated from the scatter."
+    return Message(NOISE_UNSTATED, text)

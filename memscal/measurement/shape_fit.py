@@ -17,7 +17,7 @@ from memscal.model.validation import FloatArray
 
 __all__ = ["ShapeFit", "believed_noise", "fit_shape"]
 
-#: A width this many times off the Gaussian's is no fit but a flight.
+#: A fit diverges if its width is this many times the Gaussian's, or that fraction of it.
 _FARTHEST = 4.0
 #: A pressure narrower than this share of the scan's step is not told from one without width.
 _NARROWEST = 0.2

@@ -20,9 +20,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import erfc
 
-from memscal.calibration.model_checks import check
 from memscal.measurement.measured_stress import MeasuredProfile
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck, check
 
 __all__ = ["pooled_force", "stress_checks"]
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.model.checks import QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
@@ -21,7 +22,6 @@ __all__ = [
     "ApparatusField",
     "ApparatusRadial",
     "ParameterSet",
-    "QualityCheck",
     "Reconvolution",
     "TransferFunction",
 ]
@@ -162,22 +162,6 @@ class ParameterSet:
                 f"There is no parameter {name}.", cure=f"There are {', '.join(self.names)}."
             )
         return self.names.index(name)
-
-
-@dataclass(frozen=True)
-class QualityCheck:
-    """One check of a result: what was found, what is allowed, and what a failure means.
-
-    A check passes while ``value`` is at most ``limit``.  ``p_value``: the chance of such a value,
-    or a larger one, if nothing is wrong; ``None`` where it is not known.
-    """
-
-    name: str
-    value: float
-    limit: float
-    passed: bool
-    meaning: str
-    p_value: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

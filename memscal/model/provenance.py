@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from memscal.model.checks import Message
+
 __all__ = ["Process", "SourceFile"]
 
 
@@ -32,7 +34,7 @@ class Process:
         Every option with its value, the seed included; JSON-serialisable.
     environment : mapping
         Versions of Python and of the numerical libraries; JSON-serialisable.
-    messages : tuple of str
+    messages : tuple of Message
         What the user was told while it ran.
     input_scan, input_reference : SourceFile, optional
         The files that were read.
@@ -43,6 +45,6 @@ class Process:
     date: str
     configuration: Mapping[str, Any] = field(default_factory=dict)
     environment: Mapping[str, Any] = field(default_factory=dict)
-    messages: tuple[str, ...] = ()
+    messages: tuple[Message, ...] = ()
     input_scan: SourceFile | None = None
     input_reference: SourceFile | None = None

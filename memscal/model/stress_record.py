@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import Process, SourceFile

@@ -11,7 +11,7 @@ import pytest
 from scans import RING, TAILS, simulated
 
 import memscal
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck
 
 TABLE = Path(__file__).parent.parent.parent / "docs" / "quality.md"
 

@@ -15,7 +15,7 @@ from memscal.calibration.fields import GridChoice
 from memscal.deconvolution.registry import regulariser_names
 from memscal.deconvolution.tikhonov import Tikhonov
 from memscal.errors import InputError
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck
 
 R = np.linspace(0, 3e-3, 121)
 MAIN_PARAMETERS = {
@@ -89,7 +89,7 @@ def test_the_messy_scan_is_the_normal_case() -> None:
     ]:
         error = apparatus.parameters[name] - truth
         assert abs(error) < 5 * apparatus.parameters.uncertainty(name)
-    text = "\n".join(apparatus.process.messages)
+    text = "\n".join(map(str, apparatus.process.messages))
     assert "5 points of the scan are missing" in text
     assert f"Outlier at x = {clean.x[40] * 1e3:.4g} mm" in text
 
@@ -180,7 +180,7 @@ def test_a_failed_check_marks_the_result_and_is_said_first() -> None:
     assert not calibration.passed
     assert not check(calibration, "gaussian_misfit").passed
     assert check(calibration, "reconvolution").passed
-    assert "gaussian_misfit failed" in calibration.apparatus.process.messages[0]
+    assert "gaussian_misfit failed" in calibration.apparatus.process.messages[0].text
 
 
 def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:
@@ -264,7 +264,7 @@ def test_a_reference_for_another_film_or_rod_is_noticed() -> None:
     scan = simulated()
     thicker = replace(scan.film, thickness=2.1e-3)
     other = memscal.indent(thicker, memscal.Rod(radius=0.3e-3), load=1.0).profile()
-    text = "\n".join(memscal.calibrate(scan, reference=other).apparatus.process.messages)
+    text = "\n".join(map(str, memscal.calibrate(scan, reference=other).apparatus.process.messages))
     assert "another film thickness than the scan's: 2.1 instead of 2 mm" in text
     assert "another rod radius" in text
     assert "poisson ratio" not in text
@@ -277,7 +277,7 @@ def test_a_raster_may_miss_whole_rows_and_columns() -> None:
     apparatus = memscal.calibrate(replace(scan, u_zz=u)).apparatus
     error = apparatus.conversion_constant - CONVERSION
     assert abs(error) < 5 * apparatus.parameters.uncertainty("conversion_constant")
-    assert "50 points of the scan are missing" in "\n".join(apparatus.process.messages)
+    assert "50 points of the scan are missing" in "\n".join(map(str, apparatus.process.messages))
 
 
 def test_lengths_and_voltages_of_any_size_give_the_same() -> None:

@@ -84,7 +84,7 @@ def test_json_and_artifact_say_the_same_in_their_own_units(run: Run, scan: Path)
     assert found["resolved_wavenumber"]["value"] == pytest.approx(
         apparatus.resolved_wavenumber / 1e3
     )
-    assert found["warnings"] == list(apparatus.process.messages)
+    assert found["warnings"] == [message.text for message in apparatus.process.messages]
     relative = np.sqrt(np.mean(apparatus.reconvolution.residual**2))
     largest = np.ptp(apparatus.reconvolution.u_zz_predicted)
     assert found["reconvolution"]["relative_rms"] == pytest.approx(relative / largest, rel=0.1)

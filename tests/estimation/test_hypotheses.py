@@ -11,10 +11,10 @@ from scipy.stats import binom, chi2
 
 from memscal.estimation.hypotheses import (
     axisymmetry_test,
-    chi_square_limit,
     linearity_test,
     symmetry_test,
 )
+from memscal.model.checks import chi_square_limit
 
 
 def rejected(p_values: list[float], level: float) -> int:

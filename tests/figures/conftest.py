@@ -16,10 +16,10 @@ from memscal.model.apparatus import (
     ApparatusField,
     ApparatusRadial,
     ParameterSet,
-    QualityCheck,
     Reconvolution,
     TransferFunction,
 )
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.provenance import Process, SourceFile
@@ -113,7 +113,7 @@ def build(
     failed: int = 0,
     sensor: StressSensor | None = None,
     meaning: str = "The scan is not explained to within its noise.",
-    messages: tuple[str, ...] = ("1 outlier was down-weighted at x = 2.25 mm.",),
+    message: str = "1 outlier was down-weighted at x = 2.25 mm.",
 ) -> ApparatusData:
     """Return the data of a calibration that never ran."""
     grid = np.linspace(-3e-3, 3e-3, 61)
@@ -169,7 +169,7 @@ def build(
             date="2024-03-01T12:00:00+00:00",
             configuration={"method": "white-noise", "seed": None, "support": 0.008},
             environment={"python": "3.11", "numpy": "2.0"},
-            messages=messages,
+            messages=(Message("outlier", message),),
             input_scan=SourceFile("scan.h5", "ab" * 32),
         ),
         budget={

@@ -128,7 +128,7 @@ def test_hostile_strings_are_text_and_nothing_else(make_apparatus):
         sensor=StressSensor(name=_HOSTILE, model=_HOSTILE, channel=_HOSTILE),
         meaning=_HOSTILE,
         failed=1,
-        messages=(_HOSTILE,),
+        message=_HOSTILE,
     )
     object.__setattr__(data.process, "configuration", {_HOSTILE: _HOSTILE})
     page = Page(html_report(data))

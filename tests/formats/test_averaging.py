@@ -155,9 +155,9 @@ def test_an_outlier_is_reported_by_place_value_and_repeat(tmp_path: Path) -> Non
     columns = repeated_line(1)
     columns["u"][70] += 5.0  # x = -6 mm of the third repeat
     found = imported(tmp_path, columns, repeat="n")
-    (note,) = [note for note in found.notes if "left out" in note]
-    assert f"{columns['u'][70]:.4g} mV at x = -6 mm, repeat 3" in note
-    assert note in found.scan.notes
+    (note,) = [note for note in found.notes if "left out" in note.text]
+    assert f"{columns['u'][70]:.4g} mV at x = -6 mm, repeat 3" in note.text
+    assert note.text in found.scan.notes
     others = np.mean([columns["u"][4], columns["u"][37]]) * 1e-3
     assert found.scan.u_zz[4] == pytest.approx(others, rel=1e-12)
     assert found.scan.u_zz_errors is not None
@@ -181,7 +181,7 @@ def test_readings_that_do_not_repeat_at_all_are_warned_of(tmp_path: Path) -> Non
     for i in range(0, 33, 2):  # every second place of the first repeat
         columns["u"][i] += 3.0
     found = imported(tmp_path, columns, repeat="n")
-    assert any("noise is not one and the same" in note for note in found.notes)
+    assert any("noise is not one and the same" in note.text for note in found.notes)
 
 
 @pytest.mark.parametrize("numbered", [True, False])
@@ -191,13 +191,13 @@ def test_the_step_of_jittered_places_is_that_of_their_lattice(
     columns = repeated_line(1, jitter=0.003)
     found = imported(tmp_path, columns, repeat="n" if numbered else None)
     assert found.scan.u_zz.shape == (33,)
-    assert any("33 places, 0.5 mm apart" in note for note in found.notes)
+    assert any("33 places, 0.5 mm apart" in note.text for note in found.notes)
 
 
 def test_uneven_places_are_reported_by_their_range(tmp_path: Path) -> None:
     x = [-4.0, -1.0, -0.5, 0.0, 0.5, 1.0, 4.0] * 2
     found = imported(tmp_path, {"x": x, "u": [1.0] * 14})
-    assert any("7 places, 0.5 to 3 mm apart" in note for note in found.notes)
+    assert any("7 places, 0.5 to 3 mm apart" in note.text for note in found.notes)
 
 
 def test_a_line_that_is_dense_in_the_middle_keeps_its_places(tmp_path: Path) -> None:
@@ -215,7 +215,7 @@ def test_two_readings_of_a_position_in_one_repeat_are_averaged_and_noted(tmp_pat
     columns["u"] = [1.0, 2.0, 2.2, 3.0, 1.2, 2.4, 3.2]
     found = imported(tmp_path, columns, repeat="n")
     np.testing.assert_allclose(found.scan.u_zz, [1.1e-3, 2.2e-3, 3.1e-3], rtol=1e-12)
-    assert any("1 readings share their place" in note for note in found.notes)
+    assert any("1 readings share their place" in note.text for note in found.notes)
     with pytest.raises(InputError, match="--repeats average"):
         imported(tmp_path, columns, repeat="n", repeats="keep")
 
@@ -224,9 +224,8 @@ def test_a_line_whose_positions_cluster_is_told_of_its_repeats(tmp_path: Path) -
     columns = repeated_line(1, jitter=0.003)
     found = imported(tmp_path, columns, repeats="keep")
     assert found.scan.kind == "line"
-    (note,) = [note for note in found.notes if "--repeat COLUMN" in note]
-    assert "66 of 99 positions" in note
-    assert "--repeats average" in note
+    (note,) = [note for note in found.notes if "--repeat COLUMN" in note.text]
+    assert "66 of 99 positions" in note.text
 
 
 @given(seed=st.integers(0, 2**16), spread=st.floats(0.0, 0.4))
@@ -237,7 +236,7 @@ def test_a_single_line_is_not_told_of_repeats(
     x = np.arange(33.0) + spread * rng.uniform(-1, 1, 33)
     columns = {"x": rng.permutation(x).tolist(), "u": [1.0] * 33}
     found = imported(tmp_path_factory.mktemp("t"), columns, repeats="keep")
-    assert not any("--repeat COLUMN" in note for note in found.notes)
+    assert not any("--repeat COLUMN" in note.text for note in found.notes)
 
 
 def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ from memscal.errors import FormatError, InputError, UnitError
 from memscal.formats.artifact import read_artifact, write_artifact
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
-from memscal.model.apparatus import ParameterSet, QualityCheck
+from memscal.model.apparatus import ParameterSet
+from memscal.model.checks import Message, QualityCheck, messages_from_json
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import SourceFile
 
@@ -184,6 +185,13 @@ def test_check_names_are_kept_as_they_are_and_two_alike_are_refused(tmp_path: Pa
     assert read_artifact(tmp_path / "a.h5").checks == (check,)
     with pytest.raises(InputError, match="gaussian_misfit_far"):
         write_artifact(make_artifact(checks=(check, check)), tmp_path / "b.h5")
+
+
+def test_the_texts_of_older_files_are_read_as_notes() -> None:
+    assert messages_from_json(["old"]) == (Message("note", "old"),)
+    odd = [7, {"severity": "fatal", "text": ["z"]}, {}]
+    texts = [(each.kind, each.text, each.severity) for each in messages_from_json(odd)]
+    assert texts == [("note", "7", "note"), ("note", "['z']", "note"), ("note", "", "note")]
 
 
 def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp_path: Path):

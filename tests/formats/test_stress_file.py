@@ -17,7 +17,7 @@ from memscal.errors import FormatError, MemscalError, OutputError, UnitError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
 from memscal.formats.stress import read_stress, write_stress
-from memscal.model.apparatus import QualityCheck
+from memscal.model.checks import QualityCheck
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import StressSensor

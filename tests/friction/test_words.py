@@ -14,6 +14,7 @@ from memscal.friction.bracketing import bracketed_share
 from memscal.friction.checks import comparison_checks
 from memscal.friction.messages import comparison_messages, in_words
 from memscal.friction.results import EffectiveFriction, FrictionComparison, Interval
+from memscal.model.checks import Message
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
 
@@ -45,7 +46,9 @@ def measured(**film: float) -> Any:
         indenter=Sphere(radius=0.1),
         load_uncertainty=None,
     )
-    return SimpleNamespace(scans=(scan,), messages=("from the measured stress",))
+    return SimpleNamespace(
+        scans=(scan,), messages=(Message("measured", "from the measured stress"),)
+    )
 
 
 def messages(
@@ -53,7 +56,7 @@ def messages(
 ) -> str:
     joint = {"dry": {"incremental": incremental, "total": total}}
     given = None if macroscopic is None else (macroscopic, None)
-    return "\n".join(comparison_messages(measured(), {}, joint, (), given))
+    return "\n".join(map(str, comparison_messages(measured(), {}, joint, (), given)))
 
 
 def test_points_within_both_extremes_and_their_uncertainty_are_bracketed() -> None:

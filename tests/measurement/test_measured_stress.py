@@ -192,7 +192,7 @@ def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
     found = memscal.measure_stress(scan, named, override=True)
     assert len(found.overridden) == 1
     assert "film 2" in found.overridden[0]
-    assert any(text.startswith("Overridden: ") for text in found.messages)
+    assert [m.severity for m in found.messages if m.kind == "overridden"] == ["warning"]
     assert found.configuration["override"] is True
 
 
@@ -222,7 +222,7 @@ def test_a_gap_of_a_contact_s_radius_is_refused_with_its_size_and_place() -> Non
 def test_a_few_missing_points_are_no_gap() -> None:
     found = memscal.measure_stress(spoilt(3, slice(14, 16)), SENSOR)
     assert found.profiles[3].r.size == 31
-    assert any("2 points of the scan are missing" in text for text in found.messages)
+    assert any("2 points of the scan are missing" in message.text for message in found.messages)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.formats.meshes.mesh_files import Cells, Mesh
+from memscal.model.checks import Message, import_notes
 from memscal.model.validation import FloatArray
 
 __all__ = ["AXES", "Base", "Frame", "average_over_circles", "find_base", "find_frame"]
@@ -35,7 +36,7 @@ class Frame:
         The axis across the film.
     tolerance : float
         Distance within which coordinates are the same, in m.
-    notes : tuple of str
+    notes : tuple of Message
         What was taken.
     """
 
@@ -43,7 +44,7 @@ class Frame:
     radial: tuple[int, ...]
     vertical: int
     tolerance: float
-    notes: tuple[str, ...]
+    notes: tuple[Message, ...]
 
     @property
     def height(self) -> FloatArray:
@@ -97,16 +98,18 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     radial = tuple(i for i in varying if i != up)
     across = f"{AXES[up]} across the film"
     if len(radial) > 1:
-        notes = [f"The mesh is a body in 3-D: {across} was taken, and its base in the other two."]
+        text = f"The mesh is a body in 3-D: {across} was taken, and its base in the other two."
     else:
-        notes = [f"The mesh is a section: {AXES[radial[0]]} as the radius and {across} were taken."]
+        text = f"The mesh is a section: {AXES[radial[0]]} as the radius and {across} were taken."
+    notes = import_notes([text])
     wide, high = (float(np.ptp(inside[:, i])) * 1e3 for i in (radial[0], up))
     if high > wide:
-        notes.append(
-            f"Warning: the mesh extends {high:.4g} mm along {AXES[up]} but {wide:.4g} mm along "
+        text = (
+            f"the mesh extends {high:.4g} mm along {AXES[up]} but {wide:.4g} mm along "
             f"{AXES[radial[0]]}. A film is wider than thick: if the axis across it is "
             f"{AXES[radial[0]]}, say so (vertical; --vertical)."
         )
+        notes.append(Message("vertical_axis", text, "warning"))
     return Frame(points, radial, up, tolerance, tuple(notes))
 
 

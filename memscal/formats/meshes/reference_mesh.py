@@ -25,6 +25,7 @@ from memscal.formats.reference_profile import (
     require_sign,
 )
 from memscal.formats.units import to_si
+from memscal.model.checks import Message, import_notes
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.validation import FloatArray
@@ -108,10 +109,9 @@ def read_reference_mesh(
     places, values = _at_base(mesh, frame, footing, normal)
     columns = {"sigma_zz": sign * to_si(values, sigma_unit, "stress", f"{name}: {sigma}")}
     notes = [
-        f"Imported from {name} (sha256 {mesh.source.sha256}).",
-        *mesh.notes,
+        *import_notes([f"Imported from {name} (sha256 {mesh.source.sha256}).", *mesh.notes]),
         *frame.notes,
-        *footing.notes,
+        *import_notes(footing.notes),
         _told(normal, "Normal stress", "compression negative" if sign < 0 else "as it is"),
     ]
     if tangential is not None:
@@ -149,7 +149,7 @@ def _along_radius(
         return replace(samples, columns={"r": r, **samples.columns})
     require_numbers(samples)  # a mean would leave out what is missing
     columns, note = average_over_circles(places - np.array(centre), samples.columns)
-    return replace(samples, columns=columns, notes=[*samples.notes, note])
+    return replace(samples, columns=columns, notes=[*samples.notes, *import_notes([note])])
 
 
 def _require_meaning(
@@ -206,8 +206,8 @@ def _at_base(
     return places, np.concatenate(values)
 
 
-def _told(component: Component, what: str, how: str) -> str:
-    note = f"{what}: {component}, {how}"
+def _told(component: Component, what: str, how: str) -> Message:
+    text = f"{what}: {component}, {how}"
     if not component.at_points:
-        return f"{note}; each value is taken at the middle of its cell's side on the base."
-    return f"{note}."
+        text += "; each value is taken at the middle of its cell's side on the base"
+    return Message("import", f"{text}.")

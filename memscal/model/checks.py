@@ -1,0 +1,158 @@
+"""Quality checks and messages of a result: their records, the limits they share, their wording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+__all__ = [
+    "FAILED_CALIBRATION",
+    "FAILED_CHECK",
+    "FALSE_ALARM",
+    "NOISE_LIMIT",
+    "NOISE_UNSTATED",
+    "OUTLIER_LIMIT",
+    "OUTLIER_WEIGHT",
+    "Message",
+    "QualityCheck",
+    "check",
+    "chi_square_limit",
+    "failed_check_messages",
+    "import_notes",
+    "marked_texts",
+    "messages_from_json",
+    "messages_to_json",
+]
+
+#: Chance that a check fails although its assumption holds.
+FALSE_ALARM = 1e-3
+#: Scatter over stated noise up to which a scan counts as being as noisy as stated.
+NOISE_LIMIT = 1.5
+#: Share of points that may be outliers.
+OUTLIER_LIMIT = 0.10
+#: A point of less weight is an outlier.
+OUTLIER_WEIGHT = 0.5
+
+#: Kinds of messages that code asks for.
+FAILED_CHECK = "failed_check"
+FAILED_CALIBRATION = "failed_calibration"
+NOISE_UNSTATED = "noise_unstated"
+
+
+@dataclass(frozen=True)
+class Message:
+    """One message that accompanies a result.
+
+    Parameters
+    ----------
+    kind : str
+        What it is about, for code to select by: ``"failed_check"``, ``"outlier"``,
+        ``"uncertainty_unstated"``, ...; ``"note"`` where a file does not state it.
+    text : str
+        One or more sentences; ``str(message)`` returns them.
+    severity : {"note", "warning"}
+        A warning puts the result in doubt, a note helps to judge it.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> message = memscal.Message("synthetic", "The scan is synthetic: its truth is stored in it.")
+    >>> print(message)
+    The scan is synthetic: its truth is stored in it.
+    >>> message.severity
+    'note'
+    """
+
+    kind: str
+    text: str
+    severity: Literal["note", "warning"] = "note"
+
+    def __str__(self) -> str:
+        """Return the text."""
+        return self.text
+
+
+@dataclass(frozen=True)
+class QualityCheck:
+    """One check of a result: its value, its limit, and what a failure means.
+
+    A check passes while ``value`` is at most ``limit``.  ``p_value``: the chance of such a value,
+    or a larger one, if nothing is wrong; ``None`` where it is not known.
+    """
+
+    name: str
+    value: float
+    limit: float
+    passed: bool
+    meaning: str
+    p_value: float | None = None
+
+    @property
+    def kind(self) -> str:
+        """The name without the number of a profile."""
+        return self.name.rstrip("0123456789").rstrip("_")
+
+    @property
+    def profile(self) -> str:
+        """The number of the profile that was checked, from one; empty where there is none."""
+        return self.name.removeprefix(self.kind).lstrip("_")
+
+
+def check(
+    name: str, value: float, limit: float, meaning: str, p_value: float | None = None
+) -> QualityCheck:
+    """Return a check, which passes while its value is at most the limit."""
+    passed = bool(value <= limit)
+    return QualityCheck(name, float(value), float(limit), passed, meaning, p_value)
+
+
+def chi_square_limit(degrees: float) -> float:
+    """Value that chi-square exceeds by chance once in a thousand."""
+    from scipy.special import chdtri
+
+    return float(chdtri(degrees, FALSE_ALARM))
+
+
+def failed_check_messages(checks: Iterable[QualityCheck]) -> list[Message]:
+    """Return a warning for each check that failed, in their order."""
+    return [
+        Message(
+            FAILED_CHECK,
+            f"Quality check {check.name} failed: {check.value:.3g} exceeds {check.limit:.3g}. "
+            f"{check.meaning}",
+            "warning",
+        )
+        for check in checks
+        if not check.passed
+    ]
+
+
+def import_notes(texts: Iterable[str]) -> list[Message]:
+    """Return what an import did, as notes."""
+    return [Message("import", text) for text in texts]
+
+
+def marked_texts(messages: Iterable[Message]) -> list[str]:
+    """Return texts for a list without severities: a warning begins with "Warning: "."""
+    return [
+        f"Warning: {message.text}" if message.severity == "warning" else message.text
+        for message in messages
+    ]
+
+
+def messages_to_json(messages: Iterable[Message]) -> list[dict[str, str]]:
+    """Return messages as files store them: objects of kind, severity and text."""
+    return [asdict(message) for message in messages]
+
+
+def messages_from_json(stored: Sequence[Any]) -> tuple[Message, ...]:
+    """Return messages from a file; a plain text, as older files hold them, is a note."""
+    return tuple(_message_from_json(entry) for entry in stored)
+
+
+def _message_from_json(entry: object) -> Message:
+    if not isinstance(entry, Mapping):
+        return Message("note", str(entry))
+    kind, text = str(entry.get("kind", "note")), str(entry.get("text", ""))
+    return Message(kind, text, "warning" if entry.get("severity") == "warning" else "note")
