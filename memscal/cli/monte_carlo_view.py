@@ -8,7 +8,7 @@ from memscal.calibration.comparison import Comparison
 from memscal.calibration.monte_carlo import MonteCarlo
 from memscal.cli.output import finite
 from memscal.cli.tables import Table
-from memscal.figures.quantities import quantity
+from memscal.model.quantities import estimated_quantity
 
 __all__ = ["monte_carlo_json", "monte_carlo_notes", "monte_carlo_table"]
 
@@ -17,7 +17,7 @@ def monte_carlo_table(found: MonteCarlo) -> Table:
     """Return each parameter's standard uncertainty by the budget and by draws."""
     rows = []
     for each in found.comparisons:
-        shown = quantity(each.name)
+        shown = estimated_quantity(each.name)
         scale = shown.scale
         low, high = (end / scale for end in each.symmetric)
         rows.append(
@@ -37,8 +37,12 @@ def monte_carlo_table(found: MonteCarlo) -> Table:
 
 def monte_carlo_notes(found: MonteCarlo) -> list[str]:
     """Return what the numbers rest on, and why draws and budget disagree."""
-    apart = (each for each in found.comparisons if not each.agrees)
-    return [*found.messages, *(f"{quantity(each.name).words}: {each.reason}" for each in apart)]
+    apart = (
+        f"{estimated_quantity(each.name).words}: {each.reason}"
+        for each in found.comparisons
+        if not each.agrees
+    )
+    return [*found.messages, *apart]
 
 
 def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:
@@ -54,7 +58,8 @@ def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:
 
 
 def _one(each: Comparison) -> dict[str, Any]:
-    unit, scale = quantity(each.name).unit, quantity(each.name).scale
+    shown = estimated_quantity(each.name)
+    unit, scale = shown.unit, shown.scale
     return {
         "value": finite(each.value / scale),
         "mean": finite(each.mean / scale),

@@ -11,9 +11,12 @@ import numpy as np
 
 from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
-from memscal.formats.fields import json_value, require_schema, units_of
+from memscal.formats.codec import Record, origins
+from memscal.formats.fields import require_schema, units_of
 from memscal.formats.hdf5_reader import SafeFile, open_hdf5
+from memscal.formats.parameters import estimated_record
 from memscal.formats.process import read_quality
+from memscal.formats.records import LAYOUTS, STRESS_PROFILE
 from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.schema import (
@@ -24,9 +27,10 @@ from memscal.formats.schema import (
     SCHEMA_ATTRIBUTE,
     STRESS_SCHEMA,
 )
-from memscal.formats.stress import PROFILE_ARRAYS, PROFILE_NUMBERS, profile_paths, stress_from
+from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.verify import altered
+from memscal.model.quantities import Quantity
 
 __all__ = ["Finding", "check", "describe"]
 
@@ -36,62 +40,6 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
     ARTIFACT_SCHEMA: artifact_from,
     STRESS_SCHEMA: stress_from,
 }
-_ARRAYS = {
-    SCAN_SCHEMA: {
-        "/entry/data": "x y repeat x_errors y_errors u_zz u_zz_errors u_zz_correlation "
-        "normal_load normal_load_errors u_xz u_xz_errors u_yz u_yz_errors",
-        "/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz",
-    },
-    REFERENCE_SCHEMA: {"/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz"},
-    ARTIFACT_SCHEMA: {
-        "/entry/apparatus_function": "x y g g_errors",
-        "/entry/radial_profile": "r g g_errors g_gaussian g_covariance conversion_correlation",
-        "/entry/transfer_function": "k modulus modulus_errors window",
-        "/entry/reconvolution": "x u_zz u_zz_errors u_zz_predicted u_zz_gaussian residual",
-    },
-    STRESS_SCHEMA: {},
-}
-_FILM = "young_modulus poisson_ratio thickness roughness_rms"
-_PROFILE = "load depth contact_radius stick_radius friction_coefficient loading"
-_QUANTITIES = {
-    SCAN_SCHEMA: {"/entry/indenter": "shape radius load", "/entry/sample/film": _FILM},
-    REFERENCE_SCHEMA: {
-        "/entry/parameters": _PROFILE,
-        "/entry/parameters/indenter": "shape radius inclination",
-        "/entry/parameters/film": _FILM,
-        "/entry/process/numerics": "convergence discretisation",
-    },
-    ARTIFACT_SCHEMA: {
-        "/entry/transfer_function": "resolved_wavenumber",
-        "/entry/indenter": "shape radius load",
-        "/entry/sample/film": _FILM,
-    },
-    STRESS_SCHEMA: {
-        "/entry/indenter": "shape radius",
-        "/entry/sample/film": _FILM,
-        "/entry/sensor": "conversion_constant",
-    },
-}
-_PROVENANCE = {
-    "start_time": "/entry/start_time",
-    "end_time": "/entry/end_time",
-    "notes": "/entry/notes/data",
-    "reference_notes": "/entry/process/notes/data",
-    "lubrication": "/entry/sample/lubrication",
-    "lubricant": "/entry/sample/lubricant",
-    "sensor": "/entry/instrument/stress_sensor/name",
-    "sensor_model": "/entry/instrument/stress_sensor/model",
-    "channel": "/entry/instrument/stress_sensor/channel",
-    "program": "/entry/process/program",
-    "version": "/entry/process/version",
-    "date": "/entry/process/date",
-    "input_scan": "/entry/process/input_scan/file_name",
-    "input_scan_sha256": "/entry/process/input_scan/checksum",
-    "input_reference": "/entry/process/input_reference/file_name",
-    "input_reference_sha256": "/entry/process/input_reference/checksum",
-    "synthetic": "/entry/synthetic/description",
-}
-_NOTES = ("configuration", "environment", "messages")
 
 
 @dataclass(frozen=True)
@@ -128,16 +76,20 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
+        listed = list(_listed(file, schema))
+        numbers = [(at, q) for at, q in listed if not q.axes and not q.origin]
         return {
             "file": file.name,
             "sha256": file.source.sha256,
             "schema": schema,
             "schema_version": version,
             "title": file.text("/entry/title") if file.has("/entry/title") else "",
-            "quantities": list(_quantities(file, schema)),
-            "arrays": list(_arrays(file, schema)),
+            "quantities": [
+                _quantity_row(file, at, q.key) for at, q in numbers if not q.key.endswith("_errors")
+            ],
+            "arrays": [_array_row(file, at) for at, q in listed if q.axes],
             "checks": list(_checks(file)),
-            "provenance": _provenance(file),
+            "provenance": origins(file, [(at, q) for at, q in listed if q.origin]),
         }
 
 
@@ -202,23 +154,28 @@ def _schema(file: SafeFile) -> str:
     )
 
 
-def _quantities(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:
-    names = json_value(file, "/entry/parameters/names", list, [])
-    groups = {"/entry/parameters": " ".join(map(str, names)), **_QUANTITIES[schema]}
-    groups |= dict.fromkeys(profile_paths(file), PROFILE_NUMBERS)
-    for group, listed in groups.items():
-        for name in listed.split():
-            path = f"{group}/{name}"
-            if not file.has(path):
-                continue
-            text = file.is_text(path)
-            yield {
-                "path": path,
-                "name": name,
-                "value": file.text(path) if text else _plain(file.array(path)),
-                "standard_uncertainty": _uncertainty(file, path),
-                "unit": None if text else units_of(file, path) or "1",
-            }
+def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
+    """Yield the groups that such a file may hold, with what is declared for each."""
+    yield "/entry/parameters", estimated_record(file, "/entry/parameters")
+    yield from LAYOUTS[schema].items()
+    yield from ((path, STRESS_PROFILE) for path in profile_paths(file))
+
+
+def _listed(file: SafeFile, schema: str) -> Iterator[tuple[str, Quantity]]:
+    """Yield the path of every quantity that is declared and there."""
+    for path, record in _layout(file, schema):
+        yield from record.listed(file, path)
+
+
+def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
+    text = file.is_text(path)
+    return {
+        "path": path,
+        "name": name,
+        "value": file.text(path) if text else _plain(file.array(path)),
+        "standard_uncertainty": _uncertainty(file, path),
+        "unit": None if text else units_of(file, path) or "1",
+    }
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:
@@ -235,45 +192,28 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     return _plain(spread)
 
 
-def _arrays(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:
-    groups = _ARRAYS[schema] | dict.fromkeys(profile_paths(file), PROFILE_ARRAYS)
-    for group, listed in groups.items():
-        for name in listed.split():
-            path = f"{group}/{name}"
-            if not file.has(path):
-                continue
-            values = file.array(path)
-            known = values[np.isfinite(values)]
-            yield {
-                "path": path,
-                "shape": list(values.shape),
-                "unit": units_of(file, path) or "1",
-                "minimum": _plain(known.min()) if known.size else None,
-                "maximum": _plain(known.max()) if known.size else None,
-                "missing": int(np.isnan(values).sum()),
-            }
+def _array_row(file: SafeFile, path: str) -> dict[str, Any]:
+    values = file.array(path)
+    finite = values[np.isfinite(values)]
+    return {
+        "path": path,
+        "shape": list(values.shape),
+        "unit": units_of(file, path) or "1",
+        "minimum": _plain(finite.min()) if finite.size else None,
+        "maximum": _plain(finite.max()) if finite.size else None,
+        "missing": int(np.isnan(values).sum()),
+    }
 
 
 def _checks(file: SafeFile) -> Iterator[dict[str, Any]]:
-    for found in read_quality(file, "/entry/quality"):
+    for check in read_quality(file, "/entry/quality"):
         yield {
-            "name": found.name,
-            "value": _plain(found.value),
-            "limit": _plain(found.limit),
-            "passed": found.passed,
-            "meaning": found.meaning,
+            "name": check.name,
+            "value": _plain(check.value),
+            "limit": _plain(check.limit),
+            "passed": check.passed,
+            "meaning": check.meaning,
         }
-
-
-def _provenance(file: SafeFile) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        name: file.text(path) for name, path in _PROVENANCE.items() if file.has(path)
-    }
-    for name in _NOTES:
-        value = json_value(file, f"/entry/process/{name}/data", object, None)
-        if value is not None:
-            found[name] = value
-    return found
 
 
 def _plain(value: Any) -> float | int | None:

@@ -7,54 +7,24 @@ from collections.abc import Mapping
 import numpy as np
 
 from memscal.errors import FormatError, InputError
+from memscal.formats.codec import Record
 from memscal.formats.fields import any_scalar, json_value, require_array, units_of
 from memscal.formats.hdf5_reader import SafeFile
 from memscal.formats.json_text import to_json
 from memscal.formats.tree import Group, Node, Number, index_axis, si
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.model.apparatus import ParameterSet
+from memscal.model.quantities import TRUTH, declared_quantity, estimated_quantity
 
 __all__ = [
     "budget_group",
+    "estimated_record",
     "parameter_dimension",
     "parameter_group",
     "read_budget",
     "read_parameters",
 ]
 
-# Names whose dimension is known, by their beginning; the longest that fits counts.
-_DIMENSIONS = {
-    "conversion_constant": "voltage per stress",
-    "gaussian_sigma": "length",
-    "fwhm": "length",
-    "noise_equivalent_area": "area",
-    "ellipticity": "dimensionless",
-    "centre": "length",
-    "baseline": "voltage",
-    "baseline_slope": "voltage per length",
-    "drift": "voltage",
-    "noise": "voltage",
-    "load": "force",
-    "force": "force",
-    "maximum": "stress",
-    "seed": "dimensionless",
-    # The truth of a simulated experiment: film and indenter, their contact, and what went wrong.
-    "young_modulus": "stress",
-    "poisson_ratio": "dimensionless",
-    "thickness": "length",
-    "indenter_radius": "length",
-    "friction": "dimensionless",
-    "slip_length": "length",
-    "roughness": "length",
-    "asperity_density": "per area",
-    "asperity_radius": "length",
-    "decay_length": "length",
-    "reference_pressure": "stress",
-    "load_scale": "dimensionless",
-    "load_scatter": "dimensionless",
-    "position_error": "length",
-    "gain": "dimensionless",
-}
 # One name for each axis of the covariance: netCDF tools want each dimension once.
 _AXES = ("parameter", "parameter_prime")
 _COVARIANCE = (
@@ -77,14 +47,14 @@ def parameter_dimension(name: str, unit: str = "") -> str:
     """
     if unit:
         return dimension_of(unit, f"parameter {name}")
-    known = [start for start in _DIMENSIONS if name == start or name.startswith(start + "_")]
-    if known:
-        return _DIMENSIONS[max(known, key=len)]
+    declared = declared_quantity(name)
+    if declared is not None:
+        return declared.dimension
     raise InputError(
         f"The unit of {name} is not known.",
         why="Every number in a file carries its unit.",
         cure="Begin its name with one of "
-        + ", ".join(_DIMENSIONS)
+        + ", ".join(TRUTH)
         + ", or give the SI unit of a parameter in ParameterSet(units=...).",
     )
 
@@ -142,6 +112,12 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
         covariance=covariance * scale[:, None] * scale[None, :],
         units=tuple(unit for _, unit in pairs),
     )
+
+
+def estimated_record(file: SafeFile, path: str) -> Record:
+    """Return what the group of the parameters holds, by the names that the file gives them."""
+    names = json_value(file, f"{path}/names", list, [])
+    return Record("NXcollection", tuple(estimated_quantity(str(name)) for name in names))
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:

@@ -1,0 +1,185 @@
+"""Codec between records and groups of a file: it writes, reads and lists what a table declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from memscal.errors import FormatError, InputError
+from memscal.formats.fields import json_value, require_array, require_scalar, require_text
+from memscal.formats.hdf5_reader import SafeFile
+from memscal.formats.json_text import to_json
+from memscal.formats.tree import Group, Node, count, note, si
+from memscal.model.provenance import SourceFile
+from memscal.model.quantities import Quantity
+
+__all__ = ["KINDS", "Kind", "Record", "origins"]
+
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a quantity that is no number is written and read.
+
+    An empty value is not written, unless ``always``; it is there if ``inside`` its group is.
+    """
+
+    write: Callable[[Quantity, Any], Node]
+    read: Callable[[SafeFile, str], Any]
+    always: bool = False
+    inside: str = ""
+
+
+def _write_json_note(quantity: Quantity, value: Any) -> Group:
+    text = to_json(quantity.name, value)
+    return note(text, media_type="application/json", description=quantity.words)
+
+
+def _write_file(_: Quantity, source: SourceFile) -> Group:
+    named = {"file_name": source.file_name, "checksum": source.sha256, "algorithm": "sha256"}
+    return Group("NXnote", named)
+
+
+def _read_file(file: SafeFile, path: str) -> SourceFile:
+    name, checksum = (require_text(file, f"{path}/{part}") for part in ("file_name", "checksum"))
+    return SourceFile(name, checksum)
+
+
+def _read_mapping(file: SafeFile, path: str) -> dict[str, Any]:
+    mapping: dict[str, Any] = json_value(file, path, dict, {})
+    return mapping
+
+
+def _read_texts(file: SafeFile, path: str) -> tuple[str, ...]:
+    return tuple(str(text) for text in json_value(file, path, list, []))
+
+
+def _read_truth(file: SafeFile, path: str) -> bool:
+    return bool(require_scalar(file, path, "dimensionless"))
+
+
+KINDS = {
+    "text": Kind(lambda _, text: str(text), require_text),
+    "note": Kind(lambda _, text: note(text), require_text, inside="/data"),
+    "truth": Kind(lambda _, truth: count(int(truth)), _read_truth, always=True),
+    "mapping": Kind(_write_json_note, _read_mapping, always=True, inside="/data"),
+    "texts": Kind(_write_json_note, _read_texts, always=True, inside="/data"),
+    "file": Kind(_write_file, _read_file),
+}
+"""Kinds of quantity beside the numbers, by :attr:`Quantity.dimension`."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A group of a file: its NeXus class, the quantities that it holds, and its signal."""
+
+    nx_class: str
+    quantities: tuple[Quantity, ...]
+    signal: str = ""
+
+    def write(self, record: object, **others: Node) -> Group:
+        """Return the group of an object or a mapping, with other nodes behind its quantities.
+
+        Raises
+        ------
+        InputError
+            If it lacks a quantity that a file must hold.
+        """
+        children: dict[str, Node] = {}
+        for quantity in self.quantities:
+            value = (
+                record.get(quantity.name)
+                if isinstance(record, Mapping)
+                else getattr(record, quantity.name, None)
+            )
+            if value is None and quantity.required:
+                raise InputError(
+                    f"The {quantity.words} ({quantity.name}) is not stated.",
+                    why="A file must hold it.",
+                )
+            kind = KINDS.get(quantity.dimension)
+            if kind is None and value is not None:
+                children[quantity.key] = si(value, quantity.dimension, quantity.axes)
+            elif kind is not None and value is not None and (value or kind.always):
+                children[quantity.key] = kind.write(quantity, value)
+        return Group(self.nx_class, children | others, self._plot())
+
+    def read(
+        self,
+        file: SafeFile,
+        path: str,
+        *,
+        defaults: Mapping[str, Any] = _NOTHING,
+        sizes: Mapping[str, int] = _NOTHING,
+    ) -> dict[str, Any]:
+        """Return what stands at a path, in SI units, by the names of the quantities.
+
+        What a file need not state is left out, or taken from ``defaults`` where they name it.
+        Arrays have the shape of their axes, those in ``sizes`` or in the group.
+
+        Raises
+        ------
+        FormatError, UnitError
+            If a quantity is missing, has another kind, unit or shape; the message names its path.
+        """
+        values = dict(defaults)
+        lengths = dict(sizes)
+        for at, quantity in self._paths(path):
+            if not file.has(at) and (quantity.name in defaults or not quantity.required):
+                continue
+            values[quantity.name] = _read(file, at, quantity, lengths)
+        return values
+
+    def listed(self, file: SafeFile, path: str) -> Iterator[tuple[str, Quantity]]:
+        """Yield the path of each quantity that a file holds, with its declaration."""
+        return ((at, quantity) for at, quantity in self._paths(path) if file.has(at))
+
+    def _paths(self, path: str) -> Iterator[tuple[str, Quantity]]:
+        """Yield where each quantity stands; an attribute that is stored twice is read once."""
+        names: set[str] = set()
+        for quantity in self.quantities:
+            if quantity.name not in names:
+                names.add(quantity.name)
+                kind = KINDS.get(quantity.dimension)
+                yield f"{path}/{quantity.key}{kind.inside if kind else ''}", quantity
+
+    def _plot(self) -> dict[str, Any]:
+        if not self.signal:
+            return {}
+        axes = next(q.axes for q in self.quantities if q.key == self.signal)
+        return {"signal": self.signal, "axes": axes}
+
+
+def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) -> Any:
+    kind = KINDS.get(quantity.dimension)
+    if kind is not None:
+        return kind.read(file, at)
+    if not quantity.axes:
+        return require_scalar(file, at, quantity.dimension)
+    values = require_array(file, at, quantity.dimension, ndim=len(quantity.axes))
+    axes = [axis.removesuffix("_prime") for axis in quantity.axes]
+    shape = tuple(lengths.setdefault(a, n) for a, n in zip(axes, values.shape, strict=True))
+    if values.shape != shape:
+        raise FormatError(
+            f"{file.where(at)} has shape {values.shape}, but its axes give {shape}.",
+            cure="Write the file again.",
+        )
+    return values
+
+
+def origins(file: SafeFile, listed: Iterable[tuple[str, Quantity]]) -> dict[str, Any]:
+    """Return what quantities say of a file's origin, by their names; JSON notes come last."""
+    texts: dict[str, Any] = {}
+    notes: dict[str, Any] = {}
+    for at, quantity in listed:
+        value = KINDS[quantity.dimension].read(file, at)
+        if isinstance(value, SourceFile):
+            texts |= {quantity.origin: value.file_name, f"{quantity.origin}_sha256": value.sha256}
+        elif isinstance(value, str):
+            texts[quantity.origin] = value
+        else:
+            notes[quantity.origin] = list(value) if isinstance(value, tuple) else value
+    return texts | notes
