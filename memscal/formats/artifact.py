@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
+
 from memscal.errors import FormatError
 from memscal.formats.fields import require_scalar, require_schema
 from memscal.formats.hdf5_reader import SafeFile, open_hdf5
@@ -20,7 +22,14 @@ from memscal.formats.parts import (
     sample_group,
 )
 from memscal.formats.process import process_group, quality_group, read_process, read_quality
-from memscal.formats.records import FIELD, RADIAL, RECONVOLUTION, TRANSFER
+from memscal.formats.records import (
+    FIELD,
+    RADIAL,
+    RADIAL_COVARIANCE,
+    RADIAL_VERSION_1_0,
+    RECONVOLUTION,
+    TRANSFER,
+)
 from memscal.formats.schema import ARTIFACT_SCHEMA
 from memscal.formats.tree import Group, Node
 from memscal.formats.verify import altered
@@ -73,7 +82,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     paths = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
     return ApparatusData(
         field=ApparatusField(**FIELD.read(file, "/entry/apparatus_function")),
-        radial_profile=ApparatusRadial(**RADIAL.read(file, "/entry/radial_profile")),
+        radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
         transfer=TransferFunction(**TRANSFER.read(file, "/entry/transfer_function")),
         reconvolution=Reconvolution(**RECONVOLUTION.read(file, "/entry/reconvolution")),
         parameters=read_parameters(file, "/entry/parameters"),
@@ -121,6 +130,7 @@ def _entry(data: ApparatusData) -> Group:
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
         "apparatus_function": FIELD.write(data.field),
         "radial_profile": RADIAL.write(data.radial_profile),
+        "radial_covariance": RADIAL_COVARIANCE.write(data.radial_profile),
         "transfer_function": TRANSFER.write(data.transfer),
         "reconvolution": RECONVOLUTION.write(data.reconvolution),
         "parameters": parameter_group(data.parameters, data.budget),
@@ -134,3 +144,18 @@ def _entry(data: ApparatusData) -> Group:
         "process": process_group(data.process),
     }
     return Group("NXentry", children, {"default": "apparatus_function"})
+
+
+def _read_radial(file: SafeFile, path: str, covariance_path: str) -> ApparatusRadial:
+    """Read G(r) with its covariance, which a file of version 1.0 holds in the same group."""
+    if not file.has(covariance_path):
+        return ApparatusRadial(**RADIAL_VERSION_1_0.read(file, path))
+    profile = RADIAL.read(file, path)
+    covariance = RADIAL_COVARIANCE.read(file, covariance_path, sizes={"r": profile["r"].size})
+    if not np.allclose(covariance["r"], profile["r"], rtol=1e-9, atol=0):
+        raise FormatError(
+            f"{file.where(covariance_path)}/r differs from {path}/r.",
+            why="The covariance is that of the profile, radius by radius.",
+            cure="Write the file again.",
+        )
+    return ApparatusRadial(**profile, g_covariance=covariance["g_covariance"])

@@ -21,6 +21,8 @@ __all__ = [
     "PROFILE",
     "PROFILE_NOTES",
     "RADIAL",
+    "RADIAL_COVARIANCE",
+    "RADIAL_VERSION_1_0",
     "RECONVOLUTION",
     "ROUND_INDENTER",
     "SENSOR",
@@ -42,7 +44,9 @@ SOLVER = Record("NXprocess", records.SOLVER)
 NUMERICS = Record("NXparameters", records.NUMERICS)
 PROFILE_NOTES = Record("NXprocess", records.PROFILE_NOTES)
 FIELD = Record("NXdata", records.FIELD, "g")
-RADIAL = Record("NXdata", records.RADIAL_VERSION_1_0, "g")
+RADIAL = Record("NXdata", records.RADIAL, "g")
+RADIAL_COVARIANCE = Record("NXdata", records.RADIAL_COVARIANCE, "g_covariance")
+RADIAL_VERSION_1_0 = Record("NXdata", records.RADIAL_VERSION_1_0, "g")
 TRANSFER = Record("NXdata", records.TRANSFER, "modulus")
 RECONVOLUTION = Record("NXdata", records.RECONVOLUTION, "u_zz")
 CHECK = Record("NXcollection", records.CHECK)
@@ -73,7 +77,8 @@ LAYOUTS: dict[str, dict[str, Record]] = {
     },
     ARTIFACT_SCHEMA: {
         "/entry/apparatus_function": FIELD,
-        "/entry/radial_profile": RADIAL,
+        "/entry/radial_profile": RADIAL_VERSION_1_0,
+        "/entry/radial_covariance": RADIAL_COVARIANCE,
         "/entry/transfer_function": TRANSFER,
         "/entry/reconvolution": RECONVOLUTION,
         **_MEASURED_ON,

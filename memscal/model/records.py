@@ -118,14 +118,14 @@ CONTACT = (
 )
 SOLVER = (Quantity("solver", "text", "program", stored="program", origin="program"),)
 NUMERICS = (
-    Quantity("discretisation", "text", "mesh or quadrature"),
     Quantity("convergence", _ONE, "estimated relative error of the largest stress"),
+    Quantity("discretisation", "text", "mesh or quadrature"),
 )
 PROFILE_NOTES = (Quantity("notes", "note", "notes", origin="reference_notes"),)
 
 FIELD = (
-    Quantity("y", _L, "position along y", "y", ("y",), required=True),
     Quantity("x", _L, "position along x", "x", _X, required=True),
+    Quantity("y", _L, "position along y", "y", ("y",), required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _YX, required=True),
     Quantity("g_errors", _PER_AREA, "standard uncertainty of G", axes=_YX, required=True),
 )
@@ -142,7 +142,7 @@ RADIAL_COVARIANCE = (
     Quantity("g_covariance", "per area squared", "covariance of G", axes=_RR, required=True),
 )
 RADIAL_VERSION_1_0 = (*RADIAL_COVARIANCE[:2], *RADIAL[1:4], RADIAL_COVARIANCE[2], RADIAL[4])
-"""The radial profile of files of version 1.0, which held its covariance."""
+"""The radial profile in files of version 1.0, which held its covariance."""
 TRANSFER = (
     Quantity("k", "wavenumber", "wavenumber", "k", _K, required=True),
     Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|", _K, required=True),
