@@ -7,6 +7,7 @@ import os
 import numpy as np
 
 from memscal.errors import FormatError
+from memscal.formats.codec import read_record, write_record
 from memscal.formats.fields import require_scalar, require_schema
 from memscal.formats.hdf5_reader import SafeFile, open_hdf5
 from memscal.formats.hdf5_writer import file_tree, write_tree
@@ -22,17 +23,10 @@ from memscal.formats.parts import (
     sample_group,
 )
 from memscal.formats.process import process_group, quality_group, read_process, read_quality
-from memscal.formats.records import (
-    FIELD,
-    RADIAL,
-    RADIAL_COVARIANCE,
-    RADIAL_VERSION_1_0,
-    RECONVOLUTION,
-    TRANSFER,
-)
 from memscal.formats.schema import ARTIFACT_SCHEMA
 from memscal.formats.tree import Group, Node
 from memscal.formats.verify import altered
+from memscal.model import records
 from memscal.model.apparatus import (
     ApparatusData,
     ApparatusField,
@@ -45,22 +39,9 @@ __all__ = ["read_artifact", "write_artifact"]
 
 
 def read_artifact(path: str | os.PathLike[str]) -> ApparatusData:
-    """Read an apparatus function from a memscal-artifact file.
+    """Read an apparatus function from a memscal-artifact file, in SI units.
 
-    Parameters
-    ----------
-    path : path
-        The file; units in it are converted to SI.
-
-    Returns
-    -------
-    ApparatusData
-
-    Raises
-    ------
-    FormatError, UnitError, UnsafeFileError, SchemaVersionError
-        If the file does not hold an apparatus function that this version can read, or was
-        changed since it was written (its content digest no longer fits).
+    It refuses a file that this version cannot read, or that was changed since it was written.
     """
     with open_hdf5(path) as file:
         return artifact_from(file)
@@ -81,10 +62,14 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     indenter = read_round_indenter(file, "/entry/indenter")
     paths = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
     return ApparatusData(
-        field=ApparatusField(**FIELD.read(file, "/entry/apparatus_function")),
+        field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
-        transfer=TransferFunction(**TRANSFER.read(file, "/entry/transfer_function")),
-        reconvolution=Reconvolution(**RECONVOLUTION.read(file, "/entry/reconvolution")),
+        transfer=TransferFunction(
+            **read_record(records.TRANSFER, file, "/entry/transfer_function")
+        ),
+        reconvolution=Reconvolution(
+            **read_record(records.RECONVOLUTION, file, "/entry/reconvolution")
+        ),
         parameters=read_parameters(file, "/entry/parameters"),
         budget=read_budget(file, "/entry/parameters/budget"),
         checks=read_quality(file, "/entry/quality"),
@@ -103,22 +88,6 @@ def write_artifact(
     """Write an apparatus function as a memscal-artifact file, whole or not at all.
 
     The same data give the same bytes; the only time in the file is ``data.process.date``.
-
-    Parameters
-    ----------
-    data : ApparatusData
-        What the calibration found.
-    path : path
-        The file.
-    overwrite : bool
-        Whether an existing file may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If the file exists or cannot be written.
-    InputError
-        If the data hold a name that is no name, or a value without a known unit.
     """
     write_tree(file_tree(ARTIFACT_SCHEMA, _entry(data)), path, overwrite=overwrite)
 
@@ -128,11 +97,11 @@ def _entry(data: ApparatusData) -> Group:
     sensor = data.sensor.name
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
-        "apparatus_function": FIELD.write(data.field),
-        "radial_profile": RADIAL.write(data.radial_profile),
-        "radial_covariance": RADIAL_COVARIANCE.write(data.radial_profile),
-        "transfer_function": TRANSFER.write(data.transfer),
-        "reconvolution": RECONVOLUTION.write(data.reconvolution),
+        "apparatus_function": write_record(records.FIELD, data.field),
+        "radial_profile": write_record(records.RADIAL, data.radial_profile),
+        "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),
+        "transfer_function": write_record(records.TRANSFER, data.transfer),
+        "reconvolution": write_record(records.RECONVOLUTION, data.reconvolution),
         "parameters": parameter_group(data.parameters, data.budget),
         "quality": quality_group(data.checks),
         "sample": sample_group(data.film),
@@ -149,9 +118,11 @@ def _entry(data: ApparatusData) -> Group:
 def _read_radial(file: SafeFile, path: str, covariance_path: str) -> ApparatusRadial:
     """Read G(r) with its covariance, which a file of version 1.0 holds in the same group."""
     if not file.has(covariance_path):
-        return ApparatusRadial(**RADIAL_VERSION_1_0.read(file, path))
-    profile = RADIAL.read(file, path)
-    covariance = RADIAL_COVARIANCE.read(file, covariance_path, sizes={"r": profile["r"].size})
+        return ApparatusRadial(**read_record(records.RADIAL_VERSION_1_0, file, path))
+    profile = read_record(records.RADIAL, file, path)
+    covariance = read_record(
+        records.RADIAL_COVARIANCE, file, covariance_path, sizes={"r": profile["r"].size}
+    )
     if not np.allclose(covariance["r"], profile["r"], rtol=1e-9, atol=0):
         raise FormatError(
             f"{file.where(covariance_path)}/r differs from {path}/r.",

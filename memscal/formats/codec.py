@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from memscal.errors import FormatError, InputError
+from memscal.errors import FormatError
 from memscal.formats.fields import json_value, require_array, require_scalar, require_text
 from memscal.formats.hdf5_reader import SafeFile
 from memscal.formats.json_text import to_json
-from memscal.formats.tree import Group, Node, count, note, si
+from memscal.formats.tree import Attribute, Group, Node, count, note, si
 from memscal.model.provenance import SourceFile
-from memscal.model.quantities import Quantity
+from memscal.model.quantities import Quantity, Record
 
-__all__ = ["KINDS", "Kind", "Record", "origins"]
+__all__ = ["KINDS", "Kind", "listed", "origins", "read_record", "write_record"]
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -72,85 +72,62 @@ KINDS = {
 """Kinds of quantity beside the numbers, by :attr:`Quantity.dimension`."""
 
 
-@dataclass(frozen=True)
-class Record:
-    """A group of a file: its NeXus class, the quantities that it holds, and its signal."""
+def write_record(record: Record, stated: object, **others: Node) -> Group:
+    """Return the group of an object or a mapping, with other nodes behind its quantities."""
+    children: dict[str, Node] = {}
+    for quantity in record.quantities:
+        name = quantity.name
+        value = stated[name] if isinstance(stated, Mapping) else getattr(stated, name)
+        kind = KINDS.get(quantity.dimension)
+        if value is not None and kind is None:
+            children[quantity.key] = si(value, quantity.dimension, quantity.axes)
+        elif value is not None and kind is not None and (value or kind.always):
+            children[quantity.key] = kind.write(quantity, value)
+    plot: dict[str, Attribute] = {}
+    if record.signal:
+        plot = {"signal": record.signal, "axes": record.axes}
+    return Group(record.nx_class, children | others, plot)
 
-    nx_class: str
-    quantities: tuple[Quantity, ...]
-    signal: str = ""
 
-    def write(self, record: object, **others: Node) -> Group:
-        """Return the group of an object or a mapping, with other nodes behind its quantities.
+def read_record(
+    record: Record,
+    file: SafeFile,
+    path: str,
+    *,
+    defaults: Mapping[str, Any] = _NOTHING,
+    sizes: Mapping[str, int] = _NOTHING,
+) -> dict[str, Any]:
+    """Return what stands at a path, in SI units, by the names of the quantities.
 
-        Raises
-        ------
-        InputError
-            If it lacks a quantity that a file must hold.
-        """
-        children: dict[str, Node] = {}
-        for quantity in self.quantities:
-            value = (
-                record.get(quantity.name)
-                if isinstance(record, Mapping)
-                else getattr(record, quantity.name, None)
-            )
-            if value is None and quantity.required:
-                raise InputError(
-                    f"The {quantity.words} ({quantity.name}) is not stated.",
-                    why="A file must hold it.",
-                )
-            kind = KINDS.get(quantity.dimension)
-            if kind is None and value is not None:
-                children[quantity.key] = si(value, quantity.dimension, quantity.axes)
-            elif kind is not None and value is not None and (value or kind.always):
-                children[quantity.key] = kind.write(quantity, value)
-        return Group(self.nx_class, children | others, self._plot())
+    What a file need not state is left out, or taken from ``defaults`` where they name it.
+    Arrays have the shape of their axes, those in ``sizes`` or in the group.
 
-    def read(
-        self,
-        file: SafeFile,
-        path: str,
-        *,
-        defaults: Mapping[str, Any] = _NOTHING,
-        sizes: Mapping[str, int] = _NOTHING,
-    ) -> dict[str, Any]:
-        """Return what stands at a path, in SI units, by the names of the quantities.
-
-        What a file need not state is left out, or taken from ``defaults`` where they name it.
-        Arrays have the shape of their axes, those in ``sizes`` or in the group.
-
-        Raises
-        ------
-        FormatError, UnitError
-            If a quantity is missing, has another kind, unit or shape; the message names its path.
-        """
-        values = dict(defaults)
-        lengths = dict(sizes)
-        for at, quantity in self._paths(path):
-            if not file.has(at) and (quantity.name in defaults or not quantity.required):
-                continue
+    Raises
+    ------
+    FormatError, UnitError
+        If a quantity is missing, or has another kind, unit or shape; the message names its path.
+    """
+    values = dict(defaults)
+    lengths = dict(sizes)
+    for at, quantity in _paths(record, path):
+        if file.has(at) or (quantity.required and quantity.name not in defaults):
             values[quantity.name] = _read(file, at, quantity, lengths)
-        return values
+    return values
 
-    def listed(self, file: SafeFile, path: str) -> Iterator[tuple[str, Quantity]]:
-        """Yield the path of each quantity that a file holds, with its declaration."""
-        return ((at, quantity) for at, quantity in self._paths(path) if file.has(at))
 
-    def _paths(self, path: str) -> Iterator[tuple[str, Quantity]]:
-        """Yield where each quantity stands; an attribute that is stored twice is read once."""
-        names: set[str] = set()
-        for quantity in self.quantities:
-            if quantity.name not in names:
-                names.add(quantity.name)
-                kind = KINDS.get(quantity.dimension)
-                yield f"{path}/{quantity.key}{kind.inside if kind else ''}", quantity
+def listed(record: Record, file: SafeFile, path: str) -> Iterator[tuple[str, Quantity]]:
+    """Yield the path of each quantity that a file holds, with its declaration."""
+    return ((at, quantity) for at, quantity in _paths(record, path) if file.has(at))
 
-    def _plot(self) -> dict[str, Any]:
-        if not self.signal:
-            return {}
-        axes = next(q.axes for q in self.quantities if q.key == self.signal)
-        return {"signal": self.signal, "axes": axes}
+
+def _paths(record: Record, path: str) -> Iterator[tuple[str, Quantity]]:
+    """Yield where each quantity stands; an attribute that is stored twice is read once."""
+    names: set[str] = set()
+    for quantity in record.quantities:
+        if quantity.name not in names:
+            names.add(quantity.name)
+            kind = KINDS.get(quantity.dimension)
+            yield f"{path}/{quantity.key}{kind.inside if kind else ''}", quantity
 
 
 def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) -> Any:
@@ -170,11 +147,11 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
     return values
 
 
-def origins(file: SafeFile, listed: Iterable[tuple[str, Quantity]]) -> dict[str, Any]:
+def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, Any]:
     """Return what quantities say of a file's origin, by their names; JSON notes come last."""
     texts: dict[str, Any] = {}
     notes: dict[str, Any] = {}
-    for at, quantity in listed:
+    for at, quantity in paths:
         value = KINDS[quantity.dimension].read(file, at)
         if isinstance(value, SourceFile):
             texts |= {quantity.origin: value.file_name, f"{quantity.origin}_sha256": value.sha256}

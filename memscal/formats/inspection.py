@@ -11,12 +11,11 @@ import numpy as np
 
 from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
-from memscal.formats.codec import Record, origins
+from memscal.formats.codec import listed, origins
 from memscal.formats.fields import require_schema, units_of
 from memscal.formats.hdf5_reader import SafeFile, open_hdf5
 from memscal.formats.parameters import estimated_record
 from memscal.formats.process import read_quality
-from memscal.formats.records import LAYOUTS, STRESS_PROFILE
 from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.schema import (
@@ -30,7 +29,8 @@ from memscal.formats.schema import (
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.verify import altered
-from memscal.model.quantities import Quantity
+from memscal.model import records
+from memscal.model.quantities import Quantity, Record, record
 
 __all__ = ["Finding", "check", "describe"]
 
@@ -39,6 +39,48 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
     REFERENCE_SCHEMA: profile_from,
     ARTIFACT_SCHEMA: artifact_from,
     STRESS_SCHEMA: stress_from,
+}
+
+
+_MEASURED_ON = {
+    "/entry/indenter": records.INDENTER,
+    "/entry/sample/film": records.FILM,
+    "/entry/sample": records.SAMPLE,
+    "/entry/instrument/stress_sensor": records.SENSOR,
+}
+# The records of each kind of file by their paths, in the order in which they are listed.
+_LAYOUTS: dict[str, dict[str, Record]] = {
+    SCAN_SCHEMA: {
+        "/entry": records.EXPERIMENT,
+        "/entry/data": records.SCAN_DATA,
+        "/entry/reference": records.PROFILE,
+        **_MEASURED_ON,
+        "/entry/synthetic": records.SYNTHETIC,
+    },
+    REFERENCE_SCHEMA: {
+        "/entry/reference": records.PROFILE,
+        "/entry/parameters": records.CONTACT,
+        "/entry/parameters/indenter": records.INDENTER,
+        "/entry/parameters/film": records.FILM,
+        "/entry/process/numerics": records.NUMERICS,
+        "/entry/process": record(
+            "NXprocess", *records.PROFILE_NOTES.quantities, *records.SOLVER.quantities
+        ),
+    },
+    ARTIFACT_SCHEMA: {
+        "/entry/apparatus_function": records.FIELD,
+        "/entry/radial_profile": records.RADIAL_VERSION_1_0,
+        "/entry/radial_covariance": records.RADIAL_COVARIANCE,
+        "/entry/transfer_function": records.TRANSFER,
+        "/entry/reconvolution": records.RECONVOLUTION,
+        **_MEASURED_ON,
+        "/entry/process": records.PROCESS,
+    },
+    STRESS_SCHEMA: {
+        **_MEASURED_ON,
+        "/entry/sensor": records.CONVERSION,
+        "/entry/process": records.PROCESS,
+    },
 }
 
 
@@ -54,30 +96,16 @@ class Finding:
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return what a file of memscal holds, in plain values that JSON can say.
 
-    Parameters
-    ----------
-    path : path
-        A scan, reference or artifact.
-
-    Returns
-    -------
-    dict
-        ``file``, ``sha256``, ``schema``, ``schema_version``, ``title``, ``quantities`` (each
-        with path, value, standard_uncertainty or ``None``, unit), ``arrays`` (each with path,
-        shape, unit, minimum, maximum, missing), ``checks``, ``provenance``.  Numbers are in
-        the units of the file.
-
-    Raises
-    ------
-    FormatError
-        If it is not a file of memscal, or not a sound one.
+    Quantities (with path, value, standard uncertainty or ``None``, unit) and arrays (with path,
+    shape, unit, minimum, maximum, missing) are in the units of the file.  It raises a
+    :class:`FormatError` if it is not a file of memscal, or not a sound one.
     """
     with open_hdf5(path) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
-        listed = list(_listed(file, schema))
-        numbers = [(at, q) for at, q in listed if not q.axes and not q.origin]
+        paths = list(_listed(file, schema))
+        numbers = [(at, q) for at, q in paths if not q.axes and not q.origin]
         return {
             "file": file.name,
             "sha256": file.source.sha256,
@@ -87,26 +115,17 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
             "quantities": [
                 _quantity_row(file, at, q.key) for at, q in numbers if not q.key.endswith("_errors")
             ],
-            "arrays": [_array_row(file, at) for at, q in listed if q.axes],
+            "arrays": [_array_row(file, at) for at, q in paths if q.axes],
             "checks": list(_checks(file)),
-            "provenance": origins(file, [(at, q) for at, q in listed if q.origin]),
+            "provenance": origins(file, [(at, q) for at, q in paths if q.origin]),
         }
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """Check a file step by step: safety, schema, completeness, digest.
+    """Check a file step by step: safety, schema, digest, completeness.
 
-    It stops at the first step that fails, because what follows would rest on it.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-
-    Returns
-    -------
-    list of Finding
-        Never empty; the file is in order if every one passed.
+    It stops at the first step that fails, because what follows would rest on it; the file is in
+    order if every finding passed.
     """
     findings: list[Finding] = []
     step = "safety"
@@ -157,14 +176,14 @@ def _schema(file: SafeFile) -> str:
 def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     """Yield the groups that such a file may hold, with what is declared for each."""
     yield "/entry/parameters", estimated_record(file, "/entry/parameters")
-    yield from LAYOUTS[schema].items()
-    yield from ((path, STRESS_PROFILE) for path in profile_paths(file))
+    yield from _LAYOUTS[schema].items()
+    yield from ((path, records.STRESS_PROFILE) for path in profile_paths(file))
 
 
 def _listed(file: SafeFile, schema: str) -> Iterator[tuple[str, Quantity]]:
     """Yield the path of every quantity that is declared and there."""
-    for path, record in _layout(file, schema):
-        yield from record.listed(file, path)
+    for path, known in _layout(file, schema):
+        yield from listed(known, file, path)
 
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:

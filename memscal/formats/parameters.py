@@ -7,14 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from memscal.errors import FormatError, InputError
-from memscal.formats.codec import Record
 from memscal.formats.fields import any_scalar, json_value, require_array, units_of
 from memscal.formats.hdf5_reader import SafeFile
 from memscal.formats.json_text import to_json
 from memscal.formats.tree import Group, Node, Number, index_axis, si
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.model.apparatus import ParameterSet
-from memscal.model.quantities import TRUTH, declared_quantity, estimated_quantity
+from memscal.model.quantities import TRUTH, Record, declared_quantity, estimated_quantity, record
 
 __all__ = [
     "budget_group",
@@ -34,11 +33,6 @@ _COVARIANCE = (
 
 def parameter_dimension(name: str, unit: str = "") -> str:
     """Return the dimension of a parameter: by its SI unit where that is given, else by its name.
-
-    Raises
-    ------
-    InputError
-        If neither says it.
 
     Examples
     --------
@@ -94,13 +88,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
             why="It says which parameters there are, and the order of their covariance.",
         )
     pairs = [any_scalar(file, f"{path}/{name}") for name in names]
-    units = [units_of(file, f"{path}/{name}") or "1" for name in names]
-    scale = np.array(
-        [
-            float(to_si(1.0, unit, dimension_of(unit, f"{path}/{name}"), file.where(path)))
-            for name, unit in zip(names, units, strict=True)
-        ]
-    )
+    scale = np.array([_unit_scale(file, f"{path}/{name}") for name in names])
     covariance = require_array(file, f"{path}/covariance", "dimensionless", ndim=2)
     if covariance.shape != (len(names), len(names)):
         raise FormatError(
@@ -117,7 +105,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
 def estimated_record(file: SafeFile, path: str) -> Record:
     """Return what the group of the parameters holds, by the names that the file gives them."""
     names = json_value(file, f"{path}/names", list, [])
-    return Record("NXcollection", tuple(estimated_quantity(str(name)) for name in names))
+    return record("NXcollection", *(estimated_quantity(str(name)) for name in names))
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
@@ -148,3 +136,9 @@ def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
 def _dimensions(parameters: ParameterSet) -> list[str]:
     units = parameters.units or ("",) * len(parameters.names)
     return [parameter_dimension(n, u) for n, u in zip(parameters.names, units, strict=True)]
+
+
+def _unit_scale(file: SafeFile, path: str) -> float:
+    """How many SI units the unit at a path is."""
+    unit = units_of(file, path) or "1"
+    return float(to_si(1.0, unit, dimension_of(unit, file.where(path)), file.where(path)))

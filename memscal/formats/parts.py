@@ -6,22 +6,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from memscal.errors import FormatError
+from memscal.formats.codec import read_record, write_record
 from memscal.formats.fields import require_text
 from memscal.formats.hdf5_reader import SafeFile
-from memscal.formats.records import (
-    CONE,
-    CONTACT,
-    FILM,
-    INDENTER_FACE,
-    LOAD,
-    NUMERICS,
-    PROFILE,
-    PROFILE_NOTES,
-    ROUND_INDENTER,
-    SENSOR,
-    SOLVER,
-)
 from memscal.formats.tree import Group, Node
+from memscal.model import records
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
 from memscal.model.scan import StressSensor
@@ -45,13 +34,13 @@ _NO_TEXTS: Mapping[str, str] = MappingProxyType({})
 
 def read_film(file: SafeFile, path: str) -> ElasticFilm:
     """Read a film."""
-    return ElasticFilm(**FILM.read(file, path))
+    return ElasticFilm(**read_record(records.FILM, file, path))
 
 
 def sample_group(film: ElasticFilm, texts: Mapping[str, str] = _NO_TEXTS) -> Group:
     """Return the NXsample that holds the film, and the texts beside it that are not empty."""
     stated = {name: text for name, text in texts.items() if text}
-    return Group("NXsample", {"film": FILM.write(film), **stated})
+    return Group("NXsample", {"film": write_record(records.FILM, film), **stated})
 
 
 def indenter_group(
@@ -60,13 +49,13 @@ def indenter_group(
     """Return an indenter as an NXcollection, with its nominal load."""
     children: dict[str, Node] = {"shape": indenter.shape}
     if isinstance(indenter, Profile):
-        children["face"] = INDENTER_FACE.write(indenter)
+        children["face"] = write_record(records.INDENTER_FACE, indenter)
     else:
-        round_or_cone = CONE if isinstance(indenter, Cone) else ROUND_INDENTER
-        children |= round_or_cone.write(indenter).children
+        round_or_cone = records.CONE if isinstance(indenter, Cone) else records.ROUND_INDENTER
+        children |= write_record(round_or_cone, indenter).children
     if load is not None:
         stated = {"load": load, "load_uncertainty": load_uncertainty}
-        children |= LOAD.write(stated).children
+        children |= write_record(records.LOAD, stated).children
     return Group("NXcollection", children)
 
 
@@ -74,9 +63,9 @@ def read_indenter(file: SafeFile, path: str) -> Indenter:
     """Read an indenter."""
     shape = _shape(file, path)
     if shape == Cone.shape:
-        return Cone(**CONE.read(file, path))
+        return Cone(**read_record(records.CONE, file, path))
     if shape == Profile.shape:
-        return Profile(**INDENTER_FACE.read(file, f"{path}/face"))
+        return Profile(**read_record(records.INDENTER_FACE, file, f"{path}/face"))
     return read_round_indenter(file, path)
 
 
@@ -89,7 +78,7 @@ def read_round_indenter(file: SafeFile, path: str) -> RoundIndenter:
             why="A scan is made with a flat rod or with a sphere.",
             cure='Write "rod" or "sphere".',
         )
-    return _ROUND[shape](**ROUND_INDENTER.read(file, path))
+    return _ROUND[shape](**read_record(records.ROUND_INDENTER, file, path))
 
 
 def _shape(file: SafeFile, path: str) -> str:
@@ -98,25 +87,29 @@ def _shape(file: SafeFile, path: str) -> str:
 
 def instrument_group(sensor: StressSensor) -> Group:
     """Return the NXinstrument that holds the sensor."""
-    return Group("NXinstrument", {"stress_sensor": SENSOR.write(sensor)})
+    return Group("NXinstrument", {"stress_sensor": write_record(records.SENSOR, sensor)})
 
 
 def read_sensor(file: SafeFile, path: str) -> StressSensor:
     """Read the sensor; what is not stated stays empty."""
-    return StressSensor(**SENSOR.read(file, path))
+    return StressSensor(**read_record(records.SENSOR, file, path))
 
 
 def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     """Return a stress profile as NXdata, its parameters, and how it was calculated."""
     of: dict[str, Node] = {}
     if profile.film is not None:
-        of["film"] = FILM.write(profile.film)
+        of["film"] = write_record(records.FILM, profile.film)
     if profile.indenter is not None:
         of["indenter"] = indenter_group(profile.indenter)
-    numerics = NUMERICS.write(profile)
+    numerics = write_record(records.NUMERICS, profile)
     made: dict[str, Node] = {"numerics": numerics} if numerics.children else {}
-    made |= PROFILE_NOTES.write(profile).children
-    return PROFILE.write(profile), CONTACT.write(profile, **of), SOLVER.write(profile, **made)
+    made |= write_record(records.PROFILE_NOTES, profile).children
+    return (
+        write_record(records.PROFILE, profile),
+        write_record(records.CONTACT, profile, **of),
+        write_record(records.SOLVER, profile, **made),
+    )
 
 
 def read_profile(
@@ -138,9 +131,11 @@ def read_profile(
         film=film,
         indenter=indenter,
         source=file.source,
-        **PROFILE.read(file, data),
-        **CONTACT.read(file, parameters, defaults={} if load is None else {"load": load}),
-        **SOLVER.read(file, process),
-        **NUMERICS.read(file, f"{process}/numerics"),
-        **PROFILE_NOTES.read(file, process),
+        **read_record(records.PROFILE, file, data),
+        **read_record(
+            records.CONTACT, file, parameters, defaults={} if load is None else {"load": load}
+        ),
+        **read_record(records.SOLVER, file, process),
+        **read_record(records.NUMERICS, file, f"{process}/numerics"),
+        **read_record(records.PROFILE_NOTES, file, process),
     )

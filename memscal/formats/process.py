@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 
 from memscal.errors import InputError
+from memscal.formats.codec import read_record, write_record
 from memscal.formats.fields import json_value
 from memscal.formats.hdf5_reader import SafeFile
 from memscal.formats.json_text import to_json
-from memscal.formats.records import CHECK, PROCESS
 from memscal.formats.tree import Group, Node
+from memscal.model import records
 from memscal.model.apparatus import QualityCheck
 from memscal.model.provenance import Process
 
@@ -20,12 +21,12 @@ _NOT_STATED = {"program": "", "version": "", "date": ""}
 
 def process_group(process: Process) -> Group:
     """Return what was done as an NXprocess with its notes."""
-    return PROCESS.write(process)
+    return write_record(records.PROCESS, process)
 
 
 def read_process(file: SafeFile, path: str) -> Process:
     """Read what was done."""
-    return Process(**PROCESS.read(file, path, defaults=_NOT_STATED))
+    return Process(**read_record(records.PROCESS, file, path, defaults=_NOT_STATED))
 
 
 def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
@@ -35,7 +36,7 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
         name = re.sub(r"[^a-z0-9_]+", "_", check.name.lower()).strip("_")
         if not name or name in children:
             raise InputError(f'Two quality checks would be stored as "{name}".')
-        children[name] = CHECK.write(check)
+        children[name] = write_record(records.CHECK, check)
     listed = to_json("quality checks", list(children))
     return Group("NXcollection", {"names": listed, **children})
 
@@ -44,6 +45,10 @@ def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
     names = [str(name) for name in json_value(file, f"{path}/names", list, [])]
     return tuple(
-        QualityCheck(**CHECK.read(file, f"{path}/{name}", defaults={"name": name, "meaning": ""}))
+        QualityCheck(
+            **read_record(
+                records.CHECK, file, f"{path}/{name}", defaults={"name": name, "meaning": ""}
+            )
+        )
         for name in names
     )

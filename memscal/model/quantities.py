@@ -24,12 +24,14 @@ __all__ = [
     "TRUTH",
     "Dimension",
     "Quantity",
+    "Record",
     "by_name",
     "declared_quantity",
     "estimated_quantity",
     "measured",
     "measured_text",
     "parameter_quantity",
+    "record",
 ]
 
 MM = 1e-3
@@ -112,6 +114,25 @@ class Quantity:
         if self.shown or self.dimension not in DIMENSIONS:
             return _OTHER_UNITS.get(self.shown, 1.0)
         return DIMENSIONS[self.dimension].scale
+
+
+@dataclass(frozen=True)
+class Record:
+    """Quantities that stand together: a group of a file, of a NeXus class, with its signal."""
+
+    nx_class: str
+    quantities: tuple[Quantity, ...]
+    signal: str = ""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes of the signal."""
+        return next((q.axes for q in self.quantities if q.key == self.signal), ())
+
+
+def record(nx_class: str, *quantities: Quantity, signal: str = "") -> Record:
+    """Return a record of quantities."""
+    return Record(nx_class, quantities, signal)
 
 
 def measured(quantity: Quantity, *, required: bool = False) -> tuple[Quantity, Quantity]:

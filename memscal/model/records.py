@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from memscal.model.quantities import Quantity, measured
+from memscal.model.quantities import Quantity, measured, record
 
 __all__ = [
     "CHECK",
@@ -39,7 +39,8 @@ _R, _X, _YX, _K = ("r",), ("x",), ("y", "x"), ("k",)
 # The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
 _RR = ("r", "r_prime")
 
-FILM = (
+FILM = record(
+    "NXcollection",
     *measured(Quantity("young_modulus", _P, "Young's modulus", "E", shown="MPa", required=True)),
     *measured(Quantity("poisson_ratio", _ONE, "Poisson's ratio", "ν", required=True)),
     *measured(Quantity("thickness", _L, "thickness", "h", required=True)),
@@ -47,44 +48,57 @@ FILM = (
     Quantity("name", "text", "name of the film", origin="film"),
 )
 
-ROUND_INDENTER = measured(Quantity("radius", _L, "radius", "R", required=True))
-CONE = (Quantity("inclination", "angle", "inclination of the face", required=True),)
-INDENTER_FACE = (
+_RADIUS = measured(Quantity("radius", _L, "radius", "R", required=True))
+ROUND_INDENTER = record("NXcollection", *_RADIUS)
+_SLOPE = Quantity("inclination", "angle", "inclination of the face", required=True)
+CONE = record("NXcollection", _SLOPE)
+INDENTER_FACE = record(
+    "NXdata",
     Quantity("r", _L, "radius", "r", _R, required=True),
     Quantity("z", _L, "height of the face", "z", _R, required=True),
+    signal="z",
 )
-LOAD = measured(Quantity("load", "force", "load", "P", required=True))
-INDENTER = (
+_LOAD = measured(Quantity("load", "force", "load", "P", required=True))
+LOAD = record("NXcollection", *_LOAD)
+INDENTER = record(
+    "NXcollection",
     Quantity("shape", "text", "shape of the indenter", required=True),
-    *ROUND_INDENTER,
-    *CONE,
-    *LOAD,
+    *_RADIUS,
+    _SLOPE,
+    *_LOAD,
 )
 """What the group of an indenter may hold, by its shape."""
 
-SAMPLE = (
+SAMPLE = record(
+    "NXsample",
     Quantity("lubrication", "text", "dry or lubricated", origin="lubrication"),
     Quantity("lubricant", "text", "lubricant", origin="lubricant"),
 )
-SENSOR = (
+SENSOR = record(
+    "NXsensor",
     Quantity("name", "text", "name of the sensor", origin="sensor"),
     Quantity("model", "text", "model of the sensor", origin="sensor_model"),
     Quantity("channel", "text", "channel of the sensor", origin="channel"),
 )
-CONVERSION = measured(
-    Quantity(
-        "conversion_constant", "voltage per stress", "conversion constant", "A", required=True
+CONVERSION = record(
+    "NXcollection",
+    *measured(
+        Quantity(
+            "conversion_constant", "voltage per stress", "conversion constant", "A", required=True
+        ),
+        required=True,
     ),
-    required=True,
 )
 
-EXPERIMENT = (
+EXPERIMENT = record(
+    "NXentry",
     Quantity("start_time", "text", "begin of the scan", origin="start_time"),
     Quantity("end_time", "text", "end of the scan", origin="end_time"),
     Quantity("notes", "note", "notes of the experiment", origin="notes"),
 )
 # The axes of the signal are those of the scan: [x], [y], [repeat, x], [repeat, y] or [y, x].
-SCAN_DATA = (
+SCAN_DATA = record(
+    "NXdata",
     Quantity("x", _L, "position along x", "x", _X),
     Quantity("y", _L, "position along y", "y", ("y",)),
     Quantity("repeat", _ONE, "repeat", axes=("repeat",)),
@@ -99,51 +113,78 @@ SCAN_DATA = (
     Quantity("u_xz_errors", _U, "noise of the channel xz", axes=_X),
     Quantity("u_yz", _U, "voltage of the channel yz", "U_yz", _X),
     Quantity("u_yz_errors", _U, "noise of the channel yz", axes=_X),
+    signal="u_zz",
 )
-SYNTHETIC = (Quantity("description", "text", "what is synthetic", origin="synthetic"),)
+SYNTHETIC = record(
+    "NXcollection",
+    Quantity("description", "text", "what is synthetic", origin="synthetic"),
+)
 
-PROFILE = (
+PROFILE = record(
+    "NXdata",
     Quantity("r", _L, "distance from the indenter's axis", "r", _R, required=True),
     Quantity("sigma_zz", _P, "normal stress at the base", "σ_zz", _R, required=True),
     Quantity("sigma_rz", _P, "radial traction on the film", "σ_rz", _R),
     Quantity("sigma_zz_errors", _P, "standard uncertainty of the normal stress", axes=_R),
+    signal="sigma_zz",
 )
-CONTACT = (
-    LOAD[0],
+CONTACT = record(
+    "NXcollection",
+    _LOAD[0],
     Quantity("depth", _L, "indentation depth", "d", shown="um"),
     Quantity("contact_radius", _L, "contact radius", "a"),
     Quantity("stick_radius", _L, "stick radius", "c"),
     Quantity("friction_coefficient", _ONE, "friction coefficient", "μ"),
     Quantity("loading", "text", "incremental or total loading"),
 )
-SOLVER = (Quantity("solver", "text", "program", stored="program", origin="program"),)
-NUMERICS = (
+SOLVER = record(
+    "NXprocess",
+    Quantity("solver", "text", "program", stored="program", origin="program"),
+)
+NUMERICS = record(
+    "NXparameters",
     Quantity("convergence", _ONE, "estimated relative error of the largest stress"),
     Quantity("discretisation", "text", "mesh or quadrature"),
 )
-PROFILE_NOTES = (Quantity("notes", "note", "notes", origin="reference_notes"),)
+PROFILE_NOTES = record(
+    "NXprocess",
+    Quantity("notes", "note", "notes", origin="reference_notes"),
+)
 
-FIELD = (
+FIELD = record(
+    "NXdata",
     Quantity("x", _L, "position along x", "x", _X, required=True),
     Quantity("y", _L, "position along y", "y", ("y",), required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _YX, required=True),
     Quantity("g_errors", _PER_AREA, "standard uncertainty of G", axes=_YX, required=True),
+    signal="g",
 )
-RADIAL = (
+RADIAL = record(
+    "NXdata",
     Quantity("r", _L, "distance from the sensor", "r", _R, required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _R, required=True),
     Quantity("g_errors", _PER_AREA, "standard uncertainty of G", axes=_R, required=True),
     Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan", axes=_R, required=True),
     Quantity("conversion_correlation", _ONE, "correlation of the errors of G and A", axes=_R),
+    signal="g",
 )
-RADIAL_COVARIANCE = (
-    RADIAL[0],
+RADIAL_COVARIANCE = record(
+    "NXdata",
+    RADIAL.quantities[0],
     Quantity("r", _L, "distance from the sensor", axes=("r_prime",), stored="r_prime"),
     Quantity("g_covariance", "per area squared", "covariance of G", axes=_RR, required=True),
+    signal="g_covariance",
 )
-RADIAL_VERSION_1_0 = (*RADIAL_COVARIANCE[:2], *RADIAL[1:4], RADIAL_COVARIANCE[2], RADIAL[4])
+RADIAL_VERSION_1_0 = record(
+    "NXdata",
+    *RADIAL.quantities[:4],
+    *RADIAL_COVARIANCE.quantities[1:],
+    RADIAL.quantities[4],
+    signal="g",
+)
 """The radial profile in files of version 1.0, which held its covariance."""
-TRANSFER = (
+TRANSFER = record(
+    "NXdata",
     Quantity("k", "wavenumber", "wavenumber", "k", _K, required=True),
     Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|", _K, required=True),
     Quantity("modulus_errors", _ONE, "standard uncertainty of |Ĝ|", axes=_K, required=True),
@@ -151,17 +192,21 @@ TRANSFER = (
     Quantity(
         "resolved_wavenumber", "wavenumber", "resolved up to the wavenumber", "k", required=True
     ),
+    signal="modulus",
 )
-RECONVOLUTION = (
+RECONVOLUTION = record(
+    "NXdata",
     Quantity("x", _L, "position", "x", _X, required=True),
     Quantity("u_zz", _U, "voltage", "U", _X, required=True),
     Quantity("u_zz_errors", _U, "noise of the voltage", axes=_X, required=True),
     Quantity("u_zz_predicted", _U, "predicted with the deconvolved G", axes=_X, required=True),
     Quantity("u_zz_gaussian", _U, "predicted with the Gaussian", axes=_X, required=True),
     Quantity("residual", _U, "measured minus predicted", axes=_X, required=True),
+    signal="u_zz",
 )
 
-CHECK = (
+CHECK = record(
+    "NXcollection",
     Quantity("name", "text", "check"),
     Quantity("value", _ONE, "value", required=True),
     Quantity("limit", _ONE, "limit", required=True),
@@ -169,7 +214,8 @@ CHECK = (
     Quantity("meaning", "text", "meaning"),
     Quantity("p_value", _ONE, "chance of such a value, or a larger one", "p"),
 )
-PROCESS = (
+PROCESS = record(
+    "NXprocess",
     Quantity("program", "text", "program", origin="program"),
     Quantity("version", "text", "version of the program", origin="version"),
     Quantity("date", "text", "date", origin="date"),
@@ -186,7 +232,8 @@ PROCESS = (
 )
 
 # Along r; x and y are the indenter's positions.
-STRESS_PROFILE = (
+STRESS_PROFILE = record(
+    "NXdata",
     *measured(Quantity("load", "force", "stated load", "P", required=True)),
     Quantity("lubrication", "text", "dry or lubricated"),
     *measured(Quantity("force", "force", "force of the measured stress", "F", required=True)),
@@ -201,4 +248,5 @@ STRESS_PROFILE = (
     Quantity("s_zz", _P, "measured normal stress", "S_zz", _R, required=True),
     Quantity("s_zz_errors", _P, "standard uncertainty of S_zz", axes=_R, required=True),
     Quantity("covariance", "stress squared", "covariance of S_zz", axes=_RR, required=True),
+    signal="s_zz",
 )
