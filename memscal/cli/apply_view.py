@@ -10,11 +10,11 @@ import numpy as np
 from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
-from memscal.figures.quantities import KPA, MM, MV
 from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.measurement.stress_checks import pooled_force
 from memscal.model.checks import QualityCheck
 from memscal.model.notation import format_measured
+from memscal.model.quantities import KPA, MM, MV
 
 __all__ = ["stress_json", "stress_tables"]
 

@@ -12,9 +12,9 @@ from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
 from memscal.estimation.points import ScanPoints
-from memscal.figures.quantities import MM, PER_MM, measured_text, shown_quantity
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
+from memscal.model.quantities import MM, PER_MM, measured_text, parameter_quantity
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
@@ -59,7 +59,7 @@ def calibration_json(found: Calibration, artifact: Path) -> dict[str, Any]:
 
 
 def _measured(parameters: ParameterSet, name: str) -> dict[str, Any]:
-    shown = shown_quantity(parameters, name)
+    shown = parameter_quantity(parameters, name)
     return {
         "value": finite(parameters[name] / shown.scale),
         "standard_uncertainty": finite(parameters.uncertainty(name) / shown.scale),
@@ -73,8 +73,8 @@ def calibration_tables(found: Calibration) -> list[Table]:
     parameters = apparatus.parameters
     rows = [
         (
-            shown_quantity(parameters, name).words,
-            shown_quantity(parameters, name).symbol,
+            parameter_quantity(parameters, name).words,
+            parameter_quantity(parameters, name).symbol,
             measured_text(parameters, name),
         )
         for name in parameters.names

@@ -10,7 +10,6 @@ from typing import Any
 from memscal.cli.interface_view import interface_json
 from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json
-from memscal.figures.quantities import KPA
 from memscal.friction.results import (
     DryAgainstLubricated,
     EffectiveFriction,
@@ -18,6 +17,7 @@ from memscal.friction.results import (
     LoadComparison,
 )
 from memscal.model.provenance import SourceFile
+from memscal.model.quantities import KPA
 from memscal.model.validation import FloatArray
 
 __all__ = ["comparison_json"]

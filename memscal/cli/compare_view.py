@@ -12,10 +12,10 @@ from memscal.cli.friction_text import bounded_text, friction_name, percent
 from memscal.cli.interface_view import interface_tables
 from memscal.cli.quality_view import checks_table
 from memscal.cli.tables import Table
-from memscal.figures.quantities import KPA, MM
 from memscal.friction.results import EffectiveFriction, FrictionComparison, LoadComparison
 from memscal.model.checks import QualityCheck
 from memscal.model.notation import format_measured
+from memscal.model.quantities import KPA, MM
 
 __all__ = ["comparison_tables"]
 

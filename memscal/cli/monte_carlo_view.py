@@ -8,8 +8,8 @@ from memscal.calibration.comparison import Comparison
 from memscal.calibration.monte_carlo import MonteCarlo
 from memscal.cli.output import finite, texts_of
 from memscal.cli.tables import Table
-from memscal.figures.quantities import quantity
 from memscal.model.checks import Message
+from memscal.model.quantities import estimated_quantity
 
 __all__ = ["monte_carlo_json", "monte_carlo_notes", "monte_carlo_table"]
 
@@ -18,7 +18,7 @@ def monte_carlo_table(found: MonteCarlo) -> Table:
     """Return each parameter's standard uncertainty by the budget and by draws."""
     rows = []
     for each in found.comparisons:
-        shown = quantity(each.name)
+        shown = estimated_quantity(each.name)
         scale = shown.scale
         low, high = (end / scale for end in each.symmetric)
         rows.append(
@@ -39,7 +39,7 @@ def monte_carlo_table(found: MonteCarlo) -> Table:
 def monte_carlo_notes(found: MonteCarlo) -> list[Message]:
     """Return what the numbers rest on, and why draws and budget disagree."""
     disagreements = [
-        Message("disagreement", f"{quantity(each.name).words}: {each.reason}")
+        Message("disagreement", f"{estimated_quantity(each.name).words}: {each.reason}")
         for each in found.comparisons
         if not each.agrees
     ]
@@ -59,7 +59,8 @@ def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:
 
 
 def _one(each: Comparison) -> dict[str, Any]:
-    unit, scale = quantity(each.name).unit, quantity(each.name).scale
+    shown = estimated_quantity(each.name)
+    unit, scale = shown.unit, shown.scale
     return {
         "value": finite(each.value / scale),
         "mean": finite(each.mean / scale),

@@ -10,11 +10,11 @@ import numpy as np
 from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
-from memscal.figures.quantities import KPA, MM, MV, PER_MM
 from memscal.measurement.comparison import Comparison
 from memscal.measurement.restoration import Restoration
 from memscal.mechanics.contact import Contact
 from memscal.model.notation import format_measured
+from memscal.model.quantities import KPA, MM, MV, PER_MM
 
 __all__ = ["restoration_json", "restoration_tables"]
 

@@ -7,33 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from memscal.cli.output import emit_json
+from memscal.model.quantities import TRUTH, estimated_quantity
 
 if TYPE_CHECKING:
     from memscal.model.scan import Scan
 
 __all__ = ["tell_experiment", "tell_scan"]
-
-# Words for what is no estimated parameter, and the unit in which it is shown.
-_SHOWN = {
-    "gaussian_sigma": ("Gaussian width", "mm", 1e3),
-    "noise": ("noise", "mV", 1e3),
-    "young_modulus": ("Young's modulus of the film", "MPa", 1e-6),
-    "poisson_ratio": ("Poisson's ratio of the film", "", 1.0),
-    "thickness": ("thickness of the film", "mm", 1e3),
-    "indenter_radius": ("radius of the indenter", "mm", 1e3),
-    "friction": ("friction coefficient", "", 1.0),
-    "slip_length": ("slip length", "um", 1e6),
-    "roughness": ("rms height of the asperities", "um", 1e6),
-    "asperity_density": ("asperities", "1/mm^2", 1e-6),
-    "asperity_radius": ("radius of their tips", "um", 1e6),
-    "decay_length": ("decay length of the pressure", "um", 1e6),
-    "reference_pressure": ("pressure where mean planes meet", "MPa", 1e-6),
-    "load_scale": ("true loads over the stated", "", 1.0),
-    "load_scatter": ("scatter of the loads", "percent", 1e2),
-    "position_error": ("scatter of the positions", "um", 1e6),
-    "gain": ("gain against the rod scan", "", 1.0),
-    "seed": ("seed", "", 1.0),
-}
 
 
 def tell_scan(scan: Scan, output: Path, as_json: bool) -> None:
@@ -100,10 +79,5 @@ def _entry(name: str, value: float | str) -> tuple[str, str]:
         return name.replace("_", " "), value
     if name.startswith("load_") and name.removeprefix("load_").isdigit():
         return f"true load {name.removeprefix('load_')}", f"{value:.6g} N"
-    if name in _SHOWN:
-        words, unit, factor = _SHOWN[name]
-        return words, f"{value * factor:.6g} {unit}".rstrip()
-    from memscal.figures.quantities import quantity
-
-    shown = quantity(name)
-    return shown.words, f"{value / shown.scale:.6g} {shown.unit}"
+    shown = TRUTH.get(name) or estimated_quantity(name)
+    return shown.words, f"{value / shown.scale:.6g} {shown.unit}".rstrip()

@@ -9,7 +9,7 @@ import numpy as np
 from memscal.calibration.sweep import Sweep
 from memscal.cli.output import finite
 from memscal.cli.tables import Table
-from memscal.figures.quantities import MM, MV
+from memscal.model.quantities import MM, MV
 from memscal.model.validation import FloatArray
 
 __all__ = ["sweep_json", "sweep_table"]

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from memscal.figures.quantities import MM, PER_MM, PER_MM2, channel_indices
+from memscal.estimation.channels import TANGENTIAL
 from memscal.figures.style import COLOURS, legend_above
 from memscal.model.apparatus import ApparatusData, ApparatusRadial
+from memscal.model.quantities import MM, PER_MM, PER_MM2
 from memscal.model.validation import FloatArray
 
-__all__ = ["draw_radial", "draw_radial_log", "draw_transfer"]
+__all__ = ["channel_indices", "draw_radial", "draw_radial_log", "draw_transfer"]
 
 _EXPANDED = 2.0
 _LOG_DECADES = 4.0
@@ -150,3 +151,8 @@ def _shown_wavenumber(k: FloatArray, limit: float) -> float:
 def _largest(values: FloatArray, floor: float = 1e-300) -> float:
     finite = values[np.isfinite(values)]
     return max(float(np.max(finite)), floor) if finite.size else floor
+
+
+def channel_indices(data: ApparatusData) -> str:
+    """Return the indices of the stress that a sensor's channel measures: zz, xz or yz."""
+    return data.sensor.channel if data.sensor.channel in TANGENTIAL else "zz"

@@ -7,12 +7,12 @@ import textwrap
 from matplotlib.figure import Figure
 
 from memscal.figures.apparatus_panels import draw_radial, draw_radial_log, draw_transfer
-from memscal.figures.quantities import KPA, MM, measured_text
 from memscal.figures.residual_panel import draw_residuals
 from memscal.figures.scan_panels import draw_scan, draw_scan_log
 from memscal.figures.style import COLOURS, drawable, house_style, new_figure, panel_letter
 from memscal.model.apparatus import ApparatusData
 from memscal.model.checks import QualityCheck
+from memscal.model.quantities import KPA, MM, measured_text
 
 __all__ = ["calibration_figure", "failed_checks_text", "values_text"]
 

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.errors import InputError
-from memscal.figures.quantities import MM
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.mechanics.contact import Contact
+from memscal.model.quantities import MM
 from memscal.model.validation import FloatArray
 
 __all__ = ["contact_figure"]

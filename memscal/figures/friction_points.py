@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from memscal.figures.friction_scale import LUBRICATIONS
-from memscal.figures.quantities import KPA, MM
 from memscal.friction.results import LoadComparison
+from memscal.model.quantities import KPA, MM
 from memscal.model.validation import FloatArray
 
 __all__ = ["EXPANDED", "draw_errorbar", "draw_points", "share_limits"]

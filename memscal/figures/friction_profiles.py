@@ -19,9 +19,9 @@ from memscal.figures.friction_scale import (
     main_loading,
     on_axis,
 )
-from memscal.figures.quantities import KPA, MM
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.friction.results import FrictionComparison, LoadComparison
+from memscal.model.quantities import KPA, MM
 
 __all__ = ["draw_profiles", "draw_residuals", "friction_set_figure", "profile_figure"]
 

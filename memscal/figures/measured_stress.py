@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from memscal.figures.quantities import KPA, MM
 from memscal.figures.style import house_style, new_figure, panel_letter
 from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
+from memscal.model.quantities import KPA, MM
 
 __all__ = ["measured_stress_figure"]
 

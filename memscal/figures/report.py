@@ -9,12 +9,18 @@ from html import escape
 import numpy as np
 
 from memscal.figures.calibration import calibration_figure, values_text
-from memscal.figures.quantities import MM, PER_MM, measured_text, quantity, shown_quantity
 from memscal.figures.render import render_figure
 from memscal.figures.report_style import PAGE, STYLE
 from memscal.model.apparatus import ApparatusData
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
+from memscal.model.quantities import (
+    MM,
+    PER_MM,
+    estimated_quantity,
+    measured_text,
+    parameter_quantity,
+)
 
 __all__ = ["html_report"]
 
@@ -85,7 +91,10 @@ def _verdict_text(data: ApparatusData) -> str:
 def _values_table(data: ApparatusData) -> str:
     rows = []
     for name in data.parameters.names:
-        shown, text = shown_quantity(data.parameters, name), measured_text(data.parameters, name)
+        shown, text = (
+            parameter_quantity(data.parameters, name),
+            measured_text(data.parameters, name),
+        )
         value, spread = data.parameters[name], data.parameters.uncertainty(name)
         # A share of a position or an offset would mean nothing: its zero is arbitrary.
         share = f"{100 * spread / abs(value):.2g} %" if name in _RATIO_SCALE and value else "–"
@@ -121,7 +130,13 @@ def _budget_table(data: ApparatusData) -> str:
     sources = list(dict.fromkeys(source for name in columns for source in data.budget[name]))
     if not sources:
         return "<p>No budget by source was stored.</p>"
-    head = ["source", *(f"{quantity(name).words} ({quantity(name).unit})" for name in columns)]
+    head = [
+        "source",
+        *(
+            f"{estimated_quantity(name).words} ({estimated_quantity(name).unit})"
+            for name in columns
+        ),
+    ]
     rows = [
         (source.replace("_", " "), *(_share(data, name, source) for name in columns))
         for source in sources
@@ -142,7 +157,7 @@ def _share(data: ApparatusData, name: str, source: str) -> str:
 
 
 def _in_unit(name: str, value: float) -> str:
-    return f"{value / quantity(name).scale:.2g}"
+    return f"{value / estimated_quantity(name).scale:.2g}"
 
 
 def _root_sum_square(parts: Iterable[float]) -> float:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from memscal.figures.quantities import MM
 from memscal.figures.scan_panels import limit_to_scan
 from memscal.figures.style import COLOURS, SCATTER_THRESHOLD, legend_above, marker_size
 from memscal.model.apparatus import ApparatusData
+from memscal.model.quantities import MM
 from memscal.model.validation import FloatArray
 
 __all__ = ["draw_residuals"]

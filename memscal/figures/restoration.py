@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from memscal.figures.quantities import KPA, MM
 from memscal.figures.style import (
     COLOURS,
     SCATTER_THRESHOLD,
@@ -19,6 +18,7 @@ from memscal.figures.style import (
 from memscal.measurement.comparison import Comparison
 from memscal.measurement.restoration import Restoration
 from memscal.mechanics.contact import Contact
+from memscal.model.quantities import KPA, MM
 
 __all__ = ["restoration_figure"]
 

@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
-from memscal.figures.quantities import KPA, MM, MV, channel_indices
+from memscal.figures.apparatus_panels import channel_indices
 from memscal.figures.style import COLOURS, SCATTER_THRESHOLD, legend_above, marker_size
 from memscal.model.apparatus import ApparatusData
+from memscal.model.quantities import KPA, MM, MV
 from memscal.model.validation import FloatArray
 
 __all__ = ["draw_scan", "draw_scan_log", "limit_to_scan"]

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from memscal.figures.quantities import MM, MV
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
+from memscal.model.quantities import MM, MV
 from memscal.model.validation import FloatArray
 
 __all__ = ["SweepLike", "sweep_figure"]

@@ -11,8 +11,10 @@ import numpy as np
 
 from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
-from memscal.formats.fields import json_value, require_schema, units_of
+from memscal.formats.codec import listed, origins
+from memscal.formats.fields import require_schema, units_of
 from memscal.formats.hdf5_reader import SafeFile, open_hdf5
+from memscal.formats.parameters import estimated_record
 from memscal.formats.process import read_quality
 from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
@@ -24,10 +26,11 @@ from memscal.formats.schema import (
     SCHEMA_ATTRIBUTE,
     STRESS_SCHEMA,
 )
-from memscal.formats.stress import PROFILE_ARRAYS, PROFILE_NUMBERS, profile_paths, stress_from
+from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.verify import altered
-from memscal.model.checks import messages_from_json
+from memscal.model import records
+from memscal.model.quantities import Quantity, Record, record
 
 __all__ = ["Finding", "check", "describe"]
 
@@ -37,62 +40,48 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
     ARTIFACT_SCHEMA: artifact_from,
     STRESS_SCHEMA: stress_from,
 }
-_ARRAYS = {
-    SCAN_SCHEMA: {
-        "/entry/data": "x y repeat x_errors y_errors u_zz u_zz_errors u_zz_correlation "
-        "normal_load normal_load_errors u_xz u_xz_errors u_yz u_yz_errors",
-        "/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz",
-    },
-    REFERENCE_SCHEMA: {"/entry/reference": "r sigma_zz sigma_zz_errors sigma_rz"},
-    ARTIFACT_SCHEMA: {
-        "/entry/apparatus_function": "x y g g_errors",
-        "/entry/radial_profile": "r g g_errors g_gaussian g_covariance conversion_correlation",
-        "/entry/transfer_function": "k modulus modulus_errors window",
-        "/entry/reconvolution": "x u_zz u_zz_errors u_zz_predicted u_zz_gaussian residual",
-    },
-    STRESS_SCHEMA: {},
+
+
+_MEASURED_ON = {
+    "/entry/indenter": records.INDENTER,
+    "/entry/sample/film": records.FILM,
+    "/entry/sample": records.SAMPLE,
+    "/entry/instrument/stress_sensor": records.SENSOR,
 }
-_FILM = "young_modulus poisson_ratio thickness roughness_rms"
-_PROFILE = "load depth contact_radius stick_radius friction_coefficient loading"
-_QUANTITIES = {
-    SCAN_SCHEMA: {"/entry/indenter": "shape radius load", "/entry/sample/film": _FILM},
+# The records of each kind of file by their paths, in the order in which they are listed.
+_LAYOUTS: dict[str, dict[str, Record]] = {
+    SCAN_SCHEMA: {
+        "/entry": records.EXPERIMENT,
+        "/entry/data": records.SCAN_DATA,
+        "/entry/reference": records.PROFILE,
+        **_MEASURED_ON,
+        "/entry/synthetic": records.SYNTHETIC,
+    },
     REFERENCE_SCHEMA: {
-        "/entry/parameters": _PROFILE,
-        "/entry/parameters/indenter": "shape radius inclination",
-        "/entry/parameters/film": _FILM,
-        "/entry/process/numerics": "convergence discretisation",
+        "/entry/reference": records.PROFILE,
+        "/entry/parameters": records.CONTACT,
+        "/entry/parameters/indenter": records.INDENTER,
+        "/entry/parameters/film": records.FILM,
+        "/entry/process/numerics": records.NUMERICS,
+        "/entry/process": record(
+            "NXprocess", *records.PROFILE_NOTES.quantities, *records.SOLVER.quantities
+        ),
     },
     ARTIFACT_SCHEMA: {
-        "/entry/transfer_function": "resolved_wavenumber",
-        "/entry/indenter": "shape radius load",
-        "/entry/sample/film": _FILM,
+        "/entry/apparatus_function": records.FIELD,
+        "/entry/radial_profile": records.RADIAL_VERSION_1_0,
+        "/entry/radial_covariance": records.RADIAL_COVARIANCE,
+        "/entry/transfer_function": records.TRANSFER,
+        "/entry/reconvolution": records.RECONVOLUTION,
+        **_MEASURED_ON,
+        "/entry/process": records.PROCESS,
     },
     STRESS_SCHEMA: {
-        "/entry/indenter": "shape radius",
-        "/entry/sample/film": _FILM,
-        "/entry/sensor": "conversion_constant",
+        **_MEASURED_ON,
+        "/entry/sensor": records.CONVERSION,
+        "/entry/process": records.PROCESS,
     },
 }
-_PROVENANCE = {
-    "start_time": "/entry/start_time",
-    "end_time": "/entry/end_time",
-    "notes": "/entry/notes/data",
-    "reference_notes": "/entry/process/notes/data",
-    "lubrication": "/entry/sample/lubrication",
-    "lubricant": "/entry/sample/lubricant",
-    "sensor": "/entry/instrument/stress_sensor/name",
-    "sensor_model": "/entry/instrument/stress_sensor/model",
-    "channel": "/entry/instrument/stress_sensor/channel",
-    "program": "/entry/process/program",
-    "version": "/entry/process/version",
-    "date": "/entry/process/date",
-    "input_scan": "/entry/process/input_scan/file_name",
-    "input_scan_sha256": "/entry/process/input_scan/checksum",
-    "input_reference": "/entry/process/input_reference/file_name",
-    "input_reference_sha256": "/entry/process/input_reference/checksum",
-    "synthetic": "/entry/synthetic/description",
-}
-_OPTIONS = ("configuration", "environment")
 
 
 @dataclass(frozen=True)
@@ -107,55 +96,36 @@ class Finding:
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return what a file of memscal holds, in plain values that JSON can say.
 
-    Parameters
-    ----------
-    path : path
-        A scan, reference or artifact.
-
-    Returns
-    -------
-    dict
-        ``file``, ``sha256``, ``schema``, ``schema_version``, ``title``, ``quantities`` (each
-        with path, value, standard_uncertainty or ``None``, unit), ``arrays`` (each with path,
-        shape, unit, minimum, maximum, missing), ``checks``, ``provenance``.  Numbers are in
-        the units of the file.
-
-    Raises
-    ------
-    FormatError
-        If it is not a file of memscal, or not a sound one.
+    Quantities (with path, value, standard uncertainty or ``None``, unit) and arrays (with path,
+    shape, unit, minimum, maximum, missing) are in the units of the file.  It raises a
+    :class:`FormatError` if it is not a file of memscal, or not a sound one.
     """
     with open_hdf5(path) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
+        paths = list(_listed(file, schema))
+        numbers = [(at, q) for at, q in paths if not q.axes and not q.origin]
         return {
             "file": file.name,
             "sha256": file.source.sha256,
             "schema": schema,
             "schema_version": version,
             "title": file.text("/entry/title") if file.has("/entry/title") else "",
-            "quantities": list(_quantities(file, schema)),
-            "arrays": list(_arrays(file, schema)),
+            "quantities": [
+                _quantity_row(file, at, q.key) for at, q in numbers if not q.key.endswith("_errors")
+            ],
+            "arrays": [_array_row(file, at) for at, q in paths if q.axes],
             "checks": list(_checks(file)),
-            "provenance": _provenance(file),
+            "provenance": origins(file, [(at, q) for at, q in paths if q.origin]),
         }
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """Check a file step by step: safety, schema, completeness, digest.
+    """Check a file step by step: safety, schema, digest, completeness.
 
-    It stops at the first step that fails, because what follows would rest on it.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-
-    Returns
-    -------
-    list of Finding
-        Never empty; the file is in order if every one passed.
+    It stops at the first step that fails, because what follows would rest on it; the file is in
+    order if every finding passed.
     """
     findings: list[Finding] = []
     step = "safety"
@@ -203,23 +173,28 @@ def _schema(file: SafeFile) -> str:
     )
 
 
-def _quantities(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:
-    names = json_value(file, "/entry/parameters/names", list, [])
-    groups = {"/entry/parameters": " ".join(map(str, names)), **_QUANTITIES[schema]}
-    groups |= dict.fromkeys(profile_paths(file), PROFILE_NUMBERS)
-    for group, listed in groups.items():
-        for name in listed.split():
-            path = f"{group}/{name}"
-            if not file.has(path):
-                continue
-            text = file.is_text(path)
-            yield {
-                "path": path,
-                "name": name,
-                "value": file.text(path) if text else _plain(file.array(path)),
-                "standard_uncertainty": _uncertainty(file, path),
-                "unit": None if text else units_of(file, path) or "1",
-            }
+def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
+    """Yield the groups that such a file may hold, with what is declared for each."""
+    yield "/entry/parameters", estimated_record(file, "/entry/parameters")
+    yield from _LAYOUTS[schema].items()
+    yield from ((path, records.STRESS_PROFILE) for path in profile_paths(file))
+
+
+def _listed(file: SafeFile, schema: str) -> Iterator[tuple[str, Quantity]]:
+    """Yield the path of every quantity that is declared and there."""
+    for path, known in _layout(file, schema):
+        yield from listed(known, file, path)
+
+
+def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
+    text = file.is_text(path)
+    return {
+        "path": path,
+        "name": name,
+        "value": file.text(path) if text else _plain(file.array(path)),
+        "standard_uncertainty": _uncertainty(file, path),
+        "unit": None if text else units_of(file, path) or "1",
+    }
 
 
 def _uncertainty(file: SafeFile, path: str) -> float | int | None:
@@ -236,48 +211,28 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     return _plain(spread)
 
 
-def _arrays(file: SafeFile, schema: str) -> Iterator[dict[str, Any]]:
-    groups = _ARRAYS[schema] | dict.fromkeys(profile_paths(file), PROFILE_ARRAYS)
-    for group, listed in groups.items():
-        for name in listed.split():
-            path = f"{group}/{name}"
-            if not file.has(path):
-                continue
-            values = file.array(path)
-            known = values[np.isfinite(values)]
-            yield {
-                "path": path,
-                "shape": list(values.shape),
-                "unit": units_of(file, path) or "1",
-                "minimum": _plain(known.min()) if known.size else None,
-                "maximum": _plain(known.max()) if known.size else None,
-                "missing": int(np.isnan(values).sum()),
-            }
+def _array_row(file: SafeFile, path: str) -> dict[str, Any]:
+    values = file.array(path)
+    finite = values[np.isfinite(values)]
+    return {
+        "path": path,
+        "shape": list(values.shape),
+        "unit": units_of(file, path) or "1",
+        "minimum": _plain(finite.min()) if finite.size else None,
+        "maximum": _plain(finite.max()) if finite.size else None,
+        "missing": int(np.isnan(values).sum()),
+    }
 
 
 def _checks(file: SafeFile) -> Iterator[dict[str, Any]]:
-    for found in read_quality(file, "/entry/quality"):
+    for check in read_quality(file, "/entry/quality"):
         yield {
-            "name": found.name,
-            "value": _plain(found.value),
-            "limit": _plain(found.limit),
-            "passed": found.passed,
-            "meaning": found.meaning,
+            "name": check.name,
+            "value": _plain(check.value),
+            "limit": _plain(check.limit),
+            "passed": check.passed,
+            "meaning": check.meaning,
         }
-
-
-def _provenance(file: SafeFile) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        name: file.text(path) for name, path in _PROVENANCE.items() if file.has(path)
-    }
-    for name in _OPTIONS:
-        value = json_value(file, f"/entry/process/{name}/data", object, None)
-        if value is not None:
-            found[name] = value
-    if file.has(path := "/entry/process/messages/data"):
-        messages = messages_from_json(json_value(file, path, list, []))
-        found["messages"] = [message.text for message in messages]
-    return found
 
 
 def _plain(value: Any) -> float | int | None:

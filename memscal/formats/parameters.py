@@ -13,48 +13,17 @@ from memscal.formats.json_text import to_json
 from memscal.formats.tree import Group, Node, Number, index_axis, si
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.model.apparatus import ParameterSet
+from memscal.model.quantities import TRUTH, Record, declared_quantity, estimated_quantity, record
 
 __all__ = [
     "budget_group",
+    "estimated_record",
     "parameter_dimension",
     "parameter_group",
     "read_budget",
     "read_parameters",
 ]
 
-# Names whose dimension is known, by their beginning; the longest that fits counts.
-_DIMENSIONS = {
-    "conversion_constant": "voltage per stress",
-    "gaussian_sigma": "length",
-    "fwhm": "length",
-    "noise_equivalent_area": "area",
-    "ellipticity": "dimensionless",
-    "centre": "length",
-    "baseline": "voltage",
-    "baseline_slope": "voltage per length",
-    "drift": "voltage",
-    "noise": "voltage",
-    "load": "force",
-    "force": "force",
-    "maximum": "stress",
-    "seed": "dimensionless",
-    # The truth of a simulated experiment: film and indenter, their contact, and what went wrong.
-    "young_modulus": "stress",
-    "poisson_ratio": "dimensionless",
-    "thickness": "length",
-    "indenter_radius": "length",
-    "friction": "dimensionless",
-    "slip_length": "length",
-    "roughness": "length",
-    "asperity_density": "per area",
-    "asperity_radius": "length",
-    "decay_length": "length",
-    "reference_pressure": "stress",
-    "load_scale": "dimensionless",
-    "load_scatter": "dimensionless",
-    "position_error": "length",
-    "gain": "dimensionless",
-}
 # One name for each axis of the covariance: netCDF tools want each dimension once.
 _AXES = ("parameter", "parameter_prime")
 _COVARIANCE = (
@@ -65,11 +34,6 @@ _COVARIANCE = (
 def parameter_dimension(name: str, unit: str = "") -> str:
     """Return the dimension of a parameter: by its SI unit where that is given, else by its name.
 
-    Raises
-    ------
-    InputError
-        If neither says it.
-
     Examples
     --------
     >>> parameter_dimension("gaussian_sigma_deconvolved")
@@ -77,14 +41,14 @@ def parameter_dimension(name: str, unit: str = "") -> str:
     """
     if unit:
         return dimension_of(unit, f"parameter {name}")
-    known = [start for start in _DIMENSIONS if name == start or name.startswith(start + "_")]
-    if known:
-        return _DIMENSIONS[max(known, key=len)]
+    declared = declared_quantity(name)
+    if declared is not None:
+        return declared.dimension
     raise InputError(
         f"The unit of {name} is not known.",
         why="Every number in a file carries its unit.",
         cure="Begin its name with one of "
-        + ", ".join(_DIMENSIONS)
+        + ", ".join(TRUTH)
         + ", or give the SI unit of a parameter in ParameterSet(units=...).",
     )
 
@@ -124,13 +88,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
             why="It says which parameters there are, and the order of their covariance.",
         )
     pairs = [any_scalar(file, f"{path}/{name}") for name in names]
-    units = [units_of(file, f"{path}/{name}") or "1" for name in names]
-    scale = np.array(
-        [
-            float(to_si(1.0, unit, dimension_of(unit, f"{path}/{name}"), file.where(path)))
-            for name, unit in zip(names, units, strict=True)
-        ]
-    )
+    scale = np.array([_unit_scale(file, f"{path}/{name}") for name in names])
     covariance = require_array(file, f"{path}/covariance", "dimensionless", ndim=2)
     if covariance.shape != (len(names), len(names)):
         raise FormatError(
@@ -142,6 +100,12 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
         covariance=covariance * scale[:, None] * scale[None, :],
         units=tuple(unit for _, unit in pairs),
     )
+
+
+def estimated_record(file: SafeFile, path: str) -> Record:
+    """Return what the group of the parameters holds, by the names that the file gives them."""
+    names = json_value(file, f"{path}/names", list, [])
+    return record("NXcollection", *(estimated_quantity(str(name)) for name in names))
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
@@ -172,3 +136,9 @@ def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
 def _dimensions(parameters: ParameterSet) -> list[str]:
     units = parameters.units or ("",) * len(parameters.names)
     return [parameter_dimension(n, u) for n, u in zip(parameters.names, units, strict=True)]
+
+
+def _unit_scale(file: SafeFile, path: str) -> float:
+    """How many SI units the unit at a path is."""
+    unit = units_of(file, path) or "1"
+    return float(to_si(1.0, unit, dimension_of(unit, file.where(path)), file.where(path)))

@@ -15,43 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import UnitError
+from memscal.model.quantities import DIMENSIONS
 from memscal.model.validation import FloatArray
 
 __all__ = ["FILE_UNITS", "SI_UNITS", "dimension_of", "from_si", "to_si"]
 
-# Dimension -> SI unit inside Python.
-SI_UNITS = {
-    "length": "m",
-    "voltage": "V",
-    "force": "N",
-    "stress": "Pa",
-    "stress squared": "Pa^2",
-    "voltage per stress": "V/Pa",
-    "area": "m^2",
-    "per area": "1/m^2",
-    "per area squared": "1/m^4",
-    "wavenumber": "rad/m",
-    "voltage per length": "V/m",
-    "dimensionless": "1",
-    "angle": "rad",
-}
-
-# Dimension -> unit that our writers use.
-FILE_UNITS = {
-    "length": "mm",
-    "voltage": "mV",
-    "force": "N",
-    "stress": "Pa",
-    "stress squared": "Pa^2",
-    "voltage per stress": "mV/Pa",
-    "area": "mm^2",
-    "per area": "1/mm^2",
-    "per area squared": "1/mm^4",
-    "wavenumber": "rad/mm",
-    "voltage per length": "mV/mm",
-    "dimensionless": "1",
-    "angle": "rad",
-}
+SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
+"""The unit of each dimension inside Python."""
+FILE_UNITS = {name: dimension.stored for name, dimension in DIMENSIONS.items()}
+"""The unit of each dimension that our writers use."""
 
 # Canonical unit -> (dimension, power of ten that takes it to SI).
 _CANONICAL = {

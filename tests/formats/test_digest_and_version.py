@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from memscal.formats.artifact import read_artifact, write_artifact
 from memscal.formats.digest import content_digest
 from memscal.formats.fields import json_value
 from memscal.formats.hdf5_reader import open_hdf5
+from memscal.formats.inspection import describe
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 from memscal.formats.schema import CONTENTS_PATH
@@ -147,6 +149,51 @@ def test_a_newer_major_version_is_refused_in_plain_words(versioned: Any, version
 @pytest.mark.parametrize("version", ["1.0.0", "1.7.3"])
 def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, version: str):
     assert versioned(version).load == 1.0
+
+
+def store_as_version_1_0(file: h5py.File) -> None:
+    """Put the covariance where version 1.0 had it, in the group of the radial profile."""
+    contents = json.loads(file[CONTENTS_PATH][()])
+    for name in ("r_prime", "g_covariance"):
+        old, new = f"/entry/radial_profile/{name}", f"/entry/radial_covariance/{name}"
+        file.move(new, old)
+        contents[old] = contents.pop(new)
+    del file["/entry/radial_covariance"], file[CONTENTS_PATH]
+    del contents["/entry/radial_covariance"], contents["/entry/radial_covariance/r"]
+    file[CONTENTS_PATH] = json.dumps(contents)
+    file.attrs["memscal_schema_version"] = "1.0.0"
+    rewrite_digest(file)
+
+
+def test_an_artifact_of_version_1_0_is_read_with_its_covariance(artifact: Path):
+    new = read_artifact(artifact).radial_profile
+    with h5py.File(artifact, "r+") as file:
+        store_as_version_1_0(file)
+    old = read_artifact(artifact).radial_profile
+    for name in ("r", "g", "g_errors", "g_gaussian", "g_covariance"):
+        np.testing.assert_allclose(getattr(old, name), getattr(new, name), rtol=1e-15)
+    paths = [array["path"] for array in describe(artifact)["arrays"]]
+    assert "/entry/radial_profile/g_covariance" in paths
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "message"),
+    [
+        ("/entry/radial_covariance/r", lambda r: 1.5 * r, "differs from /entry/radial_profile/r"),
+        ("/entry/radial_profile/g", lambda g: g[:-1], r"shape \(40,\), but its axes give \(41,\)"),
+    ],
+)
+def test_arrays_that_do_not_fit_each_other_are_refused(
+    artifact: Path, path: str, change: Callable[[Any], Any], message: str
+):
+    with h5py.File(artifact, "r+") as file:
+        values = change(file[path][()])
+        del file[path]
+        file[path] = values
+        file[path].attrs["units"] = "mm" if path.endswith("r") else "1/mm^2"
+        rewrite_digest(file)
+    with pytest.raises(FormatError, match=message):
+        read_artifact(artifact)
 
 
 @pytest.mark.parametrize("version", ["", "one", "-1", "²"])

@@ -80,7 +80,7 @@ def test_silx_finds_every_nxdata_valid_and_the_right_default(path: Path, kind: s
         default = silx.io.nxdata.get_default(file)
         assert default is not None
         assert default.group.name == DEFAULTS.get(kind, "/entry/data")
-    assert found == {"artifact": 5, "reference": 1, "plain line": 1}.get(kind, 2)
+    assert found == {"artifact": 6, "reference": 1, "plain line": 1}.get(kind, 2)
 
 
 def test_nexusformat_reports_no_error(path: Path):
@@ -102,7 +102,7 @@ def test_xarray_opens_every_group_without_a_warning(path: Path):
     [
         ("artifact", "apparatus_function", "g", ("y", "x"), "1/mm^2"),
         ("artifact", "apparatus_function", "g_errors", ("y", "x"), "1/mm^2"),
-        ("artifact", "radial_profile", "g_covariance", ("r", "r_prime"), "1/mm^4"),
+        ("artifact", "radial_covariance", "g_covariance", ("r", "r_prime"), "1/mm^4"),
         ("artifact", "transfer_function", "modulus", ("k",), "1"),
         ("artifact", "transfer_function", "resolved_wavenumber", (), "rad/mm"),
         ("artifact", "reconvolution", "u_zz_predicted", ("x",), "mV"),

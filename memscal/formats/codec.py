@@ -1,0 +1,168 @@
+"""Codec between records and groups of a file: it writes, reads and lists what a table declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from memscal.errors import FormatError
+from memscal.formats.fields import json_value, require_array, require_scalar, require_text
+from memscal.formats.hdf5_reader import SafeFile
+from memscal.formats.json_text import to_json
+from memscal.formats.tree import Attribute, Group, Node, count, note, si
+from memscal.model.checks import Message, messages_from_json, messages_to_json
+from memscal.model.provenance import SourceFile
+from memscal.model.quantities import Quantity, Record
+
+__all__ = ["KINDS", "Kind", "listed", "origins", "read_record", "write_record"]
+
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a quantity that is no number is written and read.
+
+    An empty value is not written, unless ``always``; it is there if ``inside`` its group is.
+    """
+
+    write: Callable[[Quantity, Any], Node]
+    read: Callable[[SafeFile, str], Any]
+    always: bool = False
+    inside: str = ""
+
+
+def _write_json_note(quantity: Quantity, value: Any) -> Group:
+    text = to_json(quantity.name, value)
+    return note(text, media_type="application/json", description=quantity.words)
+
+
+def _write_file(_: Quantity, source: SourceFile) -> Group:
+    named = {"file_name": source.file_name, "checksum": source.sha256, "algorithm": "sha256"}
+    return Group("NXnote", named)
+
+
+def _read_file(file: SafeFile, path: str) -> SourceFile:
+    name, checksum = (require_text(file, f"{path}/{part}") for part in ("file_name", "checksum"))
+    return SourceFile(name, checksum)
+
+
+def _read_mapping(file: SafeFile, path: str) -> dict[str, Any]:
+    mapping: dict[str, Any] = json_value(file, path, dict, {})
+    return mapping
+
+
+def _write_messages(quantity: Quantity, messages: tuple[Message, ...]) -> Group:
+    return _write_json_note(quantity, messages_to_json(messages))
+
+
+def _read_messages(file: SafeFile, path: str) -> tuple[Message, ...]:
+    return messages_from_json(json_value(file, path, list, []))
+
+
+def _read_truth(file: SafeFile, path: str) -> bool:
+    return bool(require_scalar(file, path, "dimensionless"))
+
+
+KINDS = {
+    "text": Kind(lambda _, text: str(text), require_text),
+    "note": Kind(lambda _, text: note(text), require_text, inside="/data"),
+    "truth": Kind(lambda _, truth: count(int(truth)), _read_truth, always=True),
+    "mapping": Kind(_write_json_note, _read_mapping, always=True, inside="/data"),
+    "messages": Kind(_write_messages, _read_messages, always=True, inside="/data"),
+    "file": Kind(_write_file, _read_file),
+}
+"""Kinds of quantity beside the numbers, by :attr:`Quantity.dimension`."""
+
+
+def write_record(record: Record, stated: object, **others: Node) -> Group:
+    """Return the group of an object or a mapping, with other nodes behind its quantities."""
+    children: dict[str, Node] = {}
+    for quantity in record.quantities:
+        name = quantity.name
+        value = stated[name] if isinstance(stated, Mapping) else getattr(stated, name)
+        kind = KINDS.get(quantity.dimension)
+        if value is not None and kind is None:
+            children[quantity.key] = si(value, quantity.dimension, quantity.axes)
+        elif value is not None and kind is not None and (value or kind.always):
+            children[quantity.key] = kind.write(quantity, value)
+    plot: dict[str, Attribute] = {}
+    if record.signal:
+        plot = {"signal": record.signal, "axes": record.axes}
+    return Group(record.nx_class, children | others, plot)
+
+
+def read_record(
+    record: Record,
+    file: SafeFile,
+    path: str,
+    *,
+    defaults: Mapping[str, Any] = _NOTHING,
+    sizes: Mapping[str, int] = _NOTHING,
+) -> dict[str, Any]:
+    """Return what stands at a path, in SI units, by the names of the quantities.
+
+    What a file need not state is left out, or taken from ``defaults`` where they name it.
+    Arrays have the shape of their axes, those in ``sizes`` or in the group.
+
+    Raises
+    ------
+    FormatError, UnitError
+        If a quantity is missing, or has another kind, unit or shape; the message names its path.
+    """
+    values = dict(defaults)
+    lengths = dict(sizes)
+    for at, quantity in _paths(record, path):
+        if file.has(at) or (quantity.required and quantity.name not in defaults):
+            values[quantity.name] = _read(file, at, quantity, lengths)
+    return values
+
+
+def listed(record: Record, file: SafeFile, path: str) -> Iterator[tuple[str, Quantity]]:
+    """Yield the path of each quantity that a file holds, with its declaration."""
+    return ((at, quantity) for at, quantity in _paths(record, path) if file.has(at))
+
+
+def _paths(record: Record, path: str) -> Iterator[tuple[str, Quantity]]:
+    """Yield where each quantity stands; an attribute that is stored twice is read once."""
+    names: set[str] = set()
+    for quantity in record.quantities:
+        if quantity.name not in names:
+            names.add(quantity.name)
+            kind = KINDS.get(quantity.dimension)
+            yield f"{path}/{quantity.key}{kind.inside if kind else ''}", quantity
+
+
+def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) -> Any:
+    kind = KINDS.get(quantity.dimension)
+    if kind is not None:
+        return kind.read(file, at)
+    if not quantity.axes:
+        return require_scalar(file, at, quantity.dimension)
+    values = require_array(file, at, quantity.dimension, ndim=len(quantity.axes))
+    axes = [axis.removesuffix("_prime") for axis in quantity.axes]
+    shape = tuple(lengths.setdefault(a, n) for a, n in zip(axes, values.shape, strict=True))
+    if values.shape != shape:
+        raise FormatError(
+            f"{file.where(at)} has shape {values.shape}, but its axes give {shape}.",
+            cure="Write the file again.",
+        )
+    return values
+
+
+def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, Any]:
+    """Return what quantities say of a file's origin, by their names; JSON notes come last."""
+    texts: dict[str, Any] = {}
+    notes: dict[str, Any] = {}
+    for at, quantity in paths:
+        value = KINDS[quantity.dimension].read(file, at)
+        if isinstance(value, SourceFile):
+            texts |= {quantity.origin: value.file_name, f"{quantity.origin}_sha256": value.sha256}
+        elif isinstance(value, str):
+            texts[quantity.origin] = value
+        else:
+            is_told = quantity.dimension == "messages"
+            notes[quantity.origin] = [message.text for message in value] if is_told else value
+    return texts | notes

@@ -1,0 +1,260 @@
+"""Quantities of memscal's records: each declared once by name, dimension, axes, words and symbol.
+
+Files, ``memscal inspect``, tables, figures and reports take what they write from here and from
+:mod:`memscal.model.records`; a further quantity is one more line there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from memscal.model.apparatus import ParameterSet
+from memscal.model.notation import format_measured
+
+__all__ = [
+    "DIMENSIONS",
+    "ESTIMATED",
+    "KPA",
+    "MM",
+    "MV",
+    "PER_MM",
+    "PER_MM2",
+    "TRUTH",
+    "Dimension",
+    "Quantity",
+    "Record",
+    "by_name",
+    "declared_quantity",
+    "estimated_quantity",
+    "measured",
+    "measured_text",
+    "parameter_quantity",
+    "record",
+]
+
+MM = 1e-3
+"""Metres in a millimetre; dividing by it shows a length in mm."""
+MV = 1e-3
+"""Volts in a millivolt."""
+KPA = 1e3
+"""Pascals in a kilopascal."""
+PER_MM = 1e3
+"""rad/m in a rad/mm."""
+PER_MM2 = 1e6
+"""1/m^2 in a 1/mm^2."""
+
+
+class Dimension(NamedTuple):
+    """Units of a dimension: in Python, in files, and as shown, with the SI units in the last."""
+
+    si: str
+    stored: str
+    shown: str
+    scale: float
+
+
+DIMENSIONS = {
+    "length": Dimension("m", "mm", "mm", MM),
+    "voltage": Dimension("V", "mV", "mV", MV),
+    "force": Dimension("N", "N", "N", 1.0),
+    "stress": Dimension("Pa", "Pa", "kPa", KPA),
+    "stress squared": Dimension("Pa^2", "Pa^2", "kPa²", KPA**2),
+    "voltage per stress": Dimension("V/Pa", "mV/Pa", "mV/Pa", MV),
+    "area": Dimension("m^2", "mm^2", "mm²", MM**2),
+    "per area": Dimension("1/m^2", "1/mm^2", "1/mm²", PER_MM2),
+    "per area squared": Dimension("1/m^4", "1/mm^4", "1/mm⁴", PER_MM2**2),
+    "wavenumber": Dimension("rad/m", "rad/mm", "rad/mm", PER_MM),
+    "voltage per length": Dimension("V/m", "mV/mm", "mV/mm", MV / MM),
+    "dimensionless": Dimension("1", "1", "", 1.0),
+    "angle": Dimension("rad", "rad", "rad", 1.0),
+}
+
+# Units other than a dimension's own in which some quantities are shown, in SI units.
+_OTHER_UNITS = {"um": 1e-6, "MPa": 1e6, "1/mm^2": PER_MM2, "percent": 1e-2}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a record.
+
+    ``name`` is its attribute; ``dimension`` a key of :data:`DIMENSIONS`, or what else it is, such
+    as ``"text"`` (:data:`memscal.formats.codec.KINDS`); ``axes`` name the quantities along which
+    an array runs.  ``stored`` is its name in files where that differs from ``name``, ``shown`` the
+    unit where that differs from its dimension's, and ``origin`` its name among the origins of a
+    file where it says where the data come from.
+    """
+
+    name: str
+    dimension: str
+    words: str = ""
+    symbol: str = ""
+    axes: tuple[str, ...] = ()
+    required: bool = False
+    stored: str = ""
+    shown: str = ""
+    origin: str = ""
+
+    @property
+    def key(self) -> str:
+        """Its name in files."""
+        return self.stored or self.name
+
+    @property
+    def unit(self) -> str:
+        """The unit in which it is shown; that of a number of unknown dimension is its dimension."""
+        if self.shown or self.dimension not in DIMENSIONS:
+            return self.shown or self.dimension
+        return DIMENSIONS[self.dimension].shown
+
+    @property
+    def scale(self) -> float:
+        """How many SI units :attr:`unit` is."""
+        if self.shown or self.dimension not in DIMENSIONS:
+            return _OTHER_UNITS.get(self.shown, 1.0)
+        return DIMENSIONS[self.dimension].scale
+
+
+@dataclass(frozen=True)
+class Record:
+    """Quantities that stand together: a group of a file, of a NeXus class, with its signal."""
+
+    nx_class: str
+    quantities: tuple[Quantity, ...]
+    signal: str = ""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes of the signal."""
+        return next((q.axes for q in self.quantities if q.key == self.signal), ())
+
+
+def record(nx_class: str, *quantities: Quantity, signal: str = "") -> Record:
+    """Return a record of quantities."""
+    return Record(nx_class, quantities, signal)
+
+
+def measured(quantity: Quantity, *, required: bool = False) -> tuple[Quantity, Quantity]:
+    """Return a number and its standard uncertainty, ``NAME_errors`` in files."""
+    spread = replace(
+        quantity,
+        name=f"{quantity.name}_uncertainty",
+        stored=f"{quantity.key}_errors",
+        words=f"standard uncertainty of the {quantity.words}",
+        symbol="",
+        required=required,
+    )
+    return quantity, spread
+
+
+def by_name(quantities: Iterable[Quantity]) -> dict[str, Quantity]:
+    """Return quantities by their names."""
+    return {quantity.name: quantity for quantity in quantities}
+
+
+_A, _L, _U, _ONE = "voltage per stress", "length", "voltage", "dimensionless"
+
+ESTIMATED = by_name(
+    (
+        Quantity("conversion_constant", _A, "conversion constant", "A"),
+        Quantity("gaussian_sigma", _L, "Gaussian width, fitted to the scan", "σ"),
+        Quantity(
+            "gaussian_sigma_deconvolved", _L, "Gaussian width, fitted to the deconvolved G", "σ(G)"
+        ),
+        Quantity("fwhm", _L, "full width of G at half maximum", "FWHM"),
+        Quantity("noise_equivalent_area", "area", "noise-equivalent area of G"),
+        Quantity("ellipticity", _ONE, "ellipticity of the Gaussian along x", "e₁"),
+        Quantity(
+            "ellipticity_diagonal", _ONE, "ellipticity of the Gaussian along the diagonal", "e₂"
+        ),
+        Quantity("centre", _L, "centre of the scan", "x₀"),
+        Quantity("centre_y", _L, "centre of the scan along y", "y₀"),
+        Quantity("baseline", _U, "baseline", "U₀"),
+        Quantity("baseline_slope", "voltage per length", "baseline slope"),
+        Quantity("drift", _U, "drift of the baseline across the scan", "ΔU"),
+        Quantity("drift_y", _U, "drift of the baseline along y", "ΔU"),
+        Quantity("conversion_constant_gaussian", _A, "conversion constant with the Gaussian", "A"),
+        Quantity("force", "force", "force", "P"),
+        Quantity("maximum", "stress", "largest stress", "S"),
+    )
+)
+"""What a calibration or a measurement estimates: parameters of an artifact, rows of a budget."""
+
+TRUTH = ESTIMATED | by_name(
+    (
+        Quantity("gaussian_sigma", _L, "Gaussian width", "σ"),
+        Quantity("noise", _U, "noise"),
+        Quantity("young_modulus", "stress", "Young's modulus of the film", "E", shown="MPa"),
+        Quantity("poisson_ratio", _ONE, "Poisson's ratio of the film", "ν"),
+        Quantity("thickness", _L, "thickness of the film", "h"),
+        Quantity("indenter_radius", _L, "radius of the indenter", "R"),
+        Quantity("load", "force", "true load", "P"),
+        Quantity("friction", _ONE, "friction coefficient", "μ"),
+        Quantity("slip_length", _L, "slip length", shown="um"),
+        Quantity("roughness", _L, "rms height of the asperities", shown="um"),
+        Quantity("asperity_density", "per area", "asperities", shown="1/mm^2"),
+        Quantity("asperity_radius", _L, "radius of their tips", shown="um"),
+        Quantity("decay_length", _L, "decay length of the pressure", shown="um"),
+        Quantity("reference_pressure", "stress", "pressure where mean planes meet", shown="MPa"),
+        Quantity("load_scale", _ONE, "true loads over the stated"),
+        Quantity("load_scatter", _ONE, "scatter of the loads", shown="percent"),
+        Quantity("position_error", _L, "scatter of the positions", shown="um"),
+        Quantity("gain", _ONE, "gain against the rod scan"),
+        Quantity("seed", _ONE, "seed"),
+    )
+)
+"""The truth of a simulated experiment: what is estimated, film and indenter, what went wrong."""
+
+
+def declared_quantity(name: str) -> Quantity | None:
+    """Return the quantity that a parameter's name begins with, the longest that fits."""
+    names = [known for known in TRUTH if name == known or name.startswith(f"{known}_")]
+    return TRUTH[max(names, key=len)] if names else None
+
+
+def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
+    """Return how an estimated parameter is shown; one that is not known keeps its name.
+
+    A number at the end of a known name says which scan it belongs to.
+
+    Examples
+    --------
+    >>> estimated_quantity("centre").unit
+    'mm'
+    >>> estimated_quantity("tilt_of_stage", "V/m").unit, estimated_quantity("tilt_of_stage").words
+    ('mV/mm', 'tilt of stage')
+    """
+    start, _, number = name.rpartition("_")
+    if start in ESTIMATED and number.isdigit():
+        declared = replace(
+            ESTIMATED[start], name=name, words=f"{ESTIMATED[start].words}, scan {number}"
+        )
+    else:
+        declared = ESTIMATED.get(name) or Quantity(name, "SI units", name.replace("_", " "))
+    if not si_unit:
+        return declared
+    dimension = next((name for name, units in DIMENSIONS.items() if units.si == si_unit), si_unit)
+    return declared if dimension == declared.dimension else replace(declared, dimension=dimension)
+
+
+def parameter_quantity(parameters: ParameterSet, name: str) -> Quantity:
+    """Return how one of a set's parameters is shown, by its stated unit where there is one."""
+    if not parameters.units:
+        return estimated_quantity(name)
+    return estimated_quantity(name, parameters.units[parameters.names.index(name)])
+
+
+def measured_text(parameters: ParameterSet, name: str) -> str:
+    """Return one parameter as text with its standard uncertainty and unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> p = ParameterSet(("gaussian_sigma",), np.array([5.612e-4]), np.array([[1.2e-11]]))
+    >>> measured_text(p, "gaussian_sigma")
+    '(0.5612 ± 0.0035) mm'
+    """
+    shown = parameter_quantity(parameters, name)
+    uncertainty = parameters.uncertainty(name)
+    return format_measured(parameters[name] / shown.scale, uncertainty / shown.scale, shown.unit)

@@ -1,0 +1,252 @@
+"""Records of memscal as tables of quantities, in the order in which files hold them."""
+
+from __future__ import annotations
+
+from memscal.model.quantities import Quantity, measured, record
+
+__all__ = [
+    "CHECK",
+    "CONE",
+    "CONTACT",
+    "CONVERSION",
+    "EXPERIMENT",
+    "FIELD",
+    "FILM",
+    "INDENTER",
+    "INDENTER_FACE",
+    "LOAD",
+    "NUMERICS",
+    "PROCESS",
+    "PROFILE",
+    "PROFILE_NOTES",
+    "RADIAL",
+    "RADIAL_COVARIANCE",
+    "RADIAL_VERSION_1_0",
+    "RECONVOLUTION",
+    "ROUND_INDENTER",
+    "SAMPLE",
+    "SCAN_DATA",
+    "SENSOR",
+    "SOLVER",
+    "STRESS_PROFILE",
+    "SYNTHETIC",
+    "TRANSFER",
+]
+
+_L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
+_PER_AREA = "per area"
+_R, _X, _YX, _K = ("r",), ("x",), ("y", "x"), ("k",)
+# The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
+_RR = ("r", "r_prime")
+
+FILM = record(
+    "NXcollection",
+    *measured(Quantity("young_modulus", _P, "Young's modulus", "E", shown="MPa", required=True)),
+    *measured(Quantity("poisson_ratio", _ONE, "Poisson's ratio", "ν", required=True)),
+    *measured(Quantity("thickness", _L, "thickness", "h", required=True)),
+    *measured(Quantity("roughness_rms", _L, "rms roughness", shown="um")),
+    Quantity("name", "text", "name of the film", origin="film"),
+)
+
+_RADIUS = measured(Quantity("radius", _L, "radius", "R", required=True))
+ROUND_INDENTER = record("NXcollection", *_RADIUS)
+_SLOPE = Quantity("inclination", "angle", "inclination of the face", required=True)
+CONE = record("NXcollection", _SLOPE)
+INDENTER_FACE = record(
+    "NXdata",
+    Quantity("r", _L, "radius", "r", _R, required=True),
+    Quantity("z", _L, "height of the face", "z", _R, required=True),
+    signal="z",
+)
+_LOAD = measured(Quantity("load", "force", "load", "P", required=True))
+LOAD = record("NXcollection", *_LOAD)
+INDENTER = record(
+    "NXcollection",
+    Quantity("shape", "text", "shape of the indenter", required=True),
+    *_RADIUS,
+    _SLOPE,
+    *_LOAD,
+)
+"""What the group of an indenter may hold, by its shape."""
+
+SAMPLE = record(
+    "NXsample",
+    Quantity("lubrication", "text", "dry or lubricated", origin="lubrication"),
+    Quantity("lubricant", "text", "lubricant", origin="lubricant"),
+)
+SENSOR = record(
+    "NXsensor",
+    Quantity("name", "text", "name of the sensor", origin="sensor"),
+    Quantity("model", "text", "model of the sensor", origin="sensor_model"),
+    Quantity("channel", "text", "channel of the sensor", origin="channel"),
+)
+CONVERSION = record(
+    "NXcollection",
+    *measured(
+        Quantity(
+            "conversion_constant", "voltage per stress", "conversion constant", "A", required=True
+        ),
+        required=True,
+    ),
+)
+
+EXPERIMENT = record(
+    "NXentry",
+    Quantity("start_time", "text", "begin of the scan", origin="start_time"),
+    Quantity("end_time", "text", "end of the scan", origin="end_time"),
+    Quantity("notes", "note", "notes of the experiment", origin="notes"),
+)
+# The axes of the signal are those of the scan: [x], [y], [repeat, x], [repeat, y] or [y, x].
+SCAN_DATA = record(
+    "NXdata",
+    Quantity("x", _L, "position along x", "x", _X),
+    Quantity("y", _L, "position along y", "y", ("y",)),
+    Quantity("repeat", _ONE, "repeat", axes=("repeat",)),
+    Quantity("x_errors", _L, "standard uncertainty of x", axes=_X),
+    Quantity("y_errors", _L, "standard uncertainty of y", axes=("y",)),
+    Quantity("u_zz", _U, "voltage of the normal channel", "U_zz", _X, required=True),
+    Quantity("u_zz_errors", _U, "noise of the normal channel", axes=_X),
+    Quantity("u_zz_correlation", _ONE, "correlation of the noise", axes=("point", "point_prime")),
+    Quantity("normal_load", "force", "load at each point", "P", _X),
+    Quantity("normal_load_errors", "force", "standard uncertainty of the load", axes=_X),
+    Quantity("u_xz", _U, "voltage of the channel xz", "U_xz", _X),
+    Quantity("u_xz_errors", _U, "noise of the channel xz", axes=_X),
+    Quantity("u_yz", _U, "voltage of the channel yz", "U_yz", _X),
+    Quantity("u_yz_errors", _U, "noise of the channel yz", axes=_X),
+    signal="u_zz",
+)
+SYNTHETIC = record(
+    "NXcollection",
+    Quantity("description", "text", "what is synthetic", origin="synthetic"),
+)
+
+PROFILE = record(
+    "NXdata",
+    Quantity("r", _L, "distance from the indenter's axis", "r", _R, required=True),
+    Quantity("sigma_zz", _P, "normal stress at the base", "σ_zz", _R, required=True),
+    Quantity("sigma_rz", _P, "radial traction on the film", "σ_rz", _R),
+    Quantity("sigma_zz_errors", _P, "standard uncertainty of the normal stress", axes=_R),
+    signal="sigma_zz",
+)
+CONTACT = record(
+    "NXcollection",
+    _LOAD[0],
+    Quantity("depth", _L, "indentation depth", "d", shown="um"),
+    Quantity("contact_radius", _L, "contact radius", "a"),
+    Quantity("stick_radius", _L, "stick radius", "c"),
+    Quantity("friction_coefficient", _ONE, "friction coefficient", "μ"),
+    Quantity("loading", "text", "incremental or total loading"),
+)
+SOLVER = record(
+    "NXprocess",
+    Quantity("solver", "text", "program", stored="program", origin="program"),
+)
+NUMERICS = record(
+    "NXparameters",
+    Quantity("convergence", _ONE, "estimated relative error of the largest stress"),
+    Quantity("discretisation", "text", "mesh or quadrature"),
+)
+PROFILE_NOTES = record(
+    "NXprocess",
+    Quantity("notes", "note", "notes", origin="reference_notes"),
+)
+
+FIELD = record(
+    "NXdata",
+    Quantity("x", _L, "position along x", "x", _X, required=True),
+    Quantity("y", _L, "position along y", "y", ("y",), required=True),
+    Quantity("g", _PER_AREA, "apparatus function", "G", _YX, required=True),
+    Quantity("g_errors", _PER_AREA, "standard uncertainty of G", axes=_YX, required=True),
+    signal="g",
+)
+RADIAL = record(
+    "NXdata",
+    Quantity("r", _L, "distance from the sensor", "r", _R, required=True),
+    Quantity("g", _PER_AREA, "apparatus function", "G", _R, required=True),
+    Quantity("g_errors", _PER_AREA, "standard uncertainty of G", axes=_R, required=True),
+    Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan", axes=_R, required=True),
+    Quantity("conversion_correlation", _ONE, "correlation of the errors of G and A", axes=_R),
+    signal="g",
+)
+RADIAL_COVARIANCE = record(
+    "NXdata",
+    RADIAL.quantities[0],
+    Quantity("r", _L, "distance from the sensor", axes=("r_prime",), stored="r_prime"),
+    Quantity("g_covariance", "per area squared", "covariance of G", axes=_RR, required=True),
+    signal="g_covariance",
+)
+RADIAL_VERSION_1_0 = record(
+    "NXdata",
+    *RADIAL.quantities[:4],
+    *RADIAL_COVARIANCE.quantities[1:],
+    RADIAL.quantities[4],
+    signal="g",
+)
+"""The radial profile in files of version 1.0, which held its covariance."""
+TRANSFER = record(
+    "NXdata",
+    Quantity("k", "wavenumber", "wavenumber", "k", _K, required=True),
+    Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|", _K, required=True),
+    Quantity("modulus_errors", _ONE, "standard uncertainty of |Ĝ|", axes=_K, required=True),
+    Quantity("window", _ONE, "window of the regularisation", axes=_K, required=True),
+    Quantity(
+        "resolved_wavenumber", "wavenumber", "resolved up to the wavenumber", "k", required=True
+    ),
+    signal="modulus",
+)
+RECONVOLUTION = record(
+    "NXdata",
+    Quantity("x", _L, "position", "x", _X, required=True),
+    Quantity("u_zz", _U, "voltage", "U", _X, required=True),
+    Quantity("u_zz_errors", _U, "noise of the voltage", axes=_X, required=True),
+    Quantity("u_zz_predicted", _U, "predicted with the deconvolved G", axes=_X, required=True),
+    Quantity("u_zz_gaussian", _U, "predicted with the Gaussian", axes=_X, required=True),
+    Quantity("residual", _U, "measured minus predicted", axes=_X, required=True),
+    signal="u_zz",
+)
+
+CHECK = record(
+    "NXcollection",
+    Quantity("name", "text", "check"),
+    Quantity("value", _ONE, "value", required=True),
+    Quantity("limit", _ONE, "limit", required=True),
+    Quantity("passed", "truth", "whether the value is within the limit", required=True),
+    Quantity("meaning", "text", "meaning"),
+    Quantity("p_value", _ONE, "chance of such a value, or a larger one", "p"),
+)
+PROCESS = record(
+    "NXprocess",
+    Quantity("program", "text", "program", origin="program"),
+    Quantity("version", "text", "version of the program", origin="version"),
+    Quantity("date", "text", "date", origin="date"),
+    Quantity("configuration", "mapping", "Every option with its value.", origin="configuration"),
+    Quantity(
+        "environment",
+        "mapping",
+        "Versions of Python and of the numerical libraries.",
+        origin="environment",
+    ),
+    Quantity("messages", "messages", "What the user was told while it ran.", origin="messages"),
+    Quantity("input_scan", "file", "scan", origin="input_scan"),
+    Quantity("input_reference", "file", "reference", origin="input_reference"),
+)
+
+# Along r; x and y are the indenter's positions.
+STRESS_PROFILE = record(
+    "NXdata",
+    *measured(Quantity("load", "force", "stated load", "P", required=True)),
+    Quantity("lubrication", "text", "dry or lubricated"),
+    *measured(Quantity("force", "force", "force of the measured stress", "F", required=True)),
+    *measured(Quantity("maximum", _P, "largest measured stress", "S", required=True)),
+    *measured(Quantity("centre", _L, "centre along x", "x₀", required=True)),
+    *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
+    *measured(Quantity("baseline", _U, "baseline", "U₀", required=True)),
+    Quantity("contact_radius", _L, "contact radius", "a", required=True),
+    Quantity("r", _L, "distance from the centre", "r", _R, required=True),
+    Quantity("x", _L, "position along x", "x", _R, required=True),
+    Quantity("y", _L, "position along y", "y", _R),
+    Quantity("s_zz", _P, "measured normal stress", "S_zz", _R, required=True),
+    Quantity("s_zz_errors", _P, "standard uncertainty of S_zz", axes=_R, required=True),
+    Quantity("covariance", "stress squared", "covariance of S_zz", axes=_RR, required=True),
+    signal="s_zz",
+)
