@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from memscal.model.stress import StressProfile
 
 __all__ = ["command"]
+
+#: Processes that draws are shared by, where there are as many cores.
+_MOST_WORKERS = 8
 
 EXAMPLES = """\b
 Examples:
@@ -129,7 +133,7 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     type=click.IntRange(min=2),
     metavar="DRAWS",
     help="Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
-    "scatters with the budget of uncertainties. For methods evidence, white-noise and tikhonov.",
+    "scatters with the budget of uncertainties. Each draw is calibrated like the scan.",
 )
 @force_option
 @click.option(
@@ -269,8 +273,16 @@ def _drawn(found: Calibration, draws: int, seed: int) -> MonteCarlo:
     from memscal.calibration.monte_carlo import monte_carlo
     from memscal.cli.monte_carlo_view import monte_carlo_notes
 
-    with working(f"Drawing {draws} scans"):
-        drawn = monte_carlo(found, draws=draws, seed=seed)
+    # Starting a process takes about as long as twenty draws.
+    workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
+    with working(f"Drawing {draws} scans") as show:
+        drawn = monte_carlo(
+            found,
+            draws=draws,
+            seed=seed,
+            workers=workers,
+            progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
+        )
     for text in monte_carlo_notes(drawn):
         note(text)
     return drawn

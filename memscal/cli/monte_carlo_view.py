@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from memscal.calibration.comparison import Comparison
-from memscal.calibration.monte_carlo import MonteCarlo
+from memscal.calibration.monte_carlo import Comparison, MonteCarlo
 from memscal.cli.output import finite
 from memscal.cli.tables import Table
 from memscal.figures.quantities import quantity
