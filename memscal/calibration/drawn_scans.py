@@ -25,7 +25,7 @@ from memscal.model.validation import FloatArray
 __all__ = ["ORDINARY", "DrawnScans", "SolvedInput"]
 
 #: Draws that a process takes at a time.
-_LARGEST_BLOCK = 16
+_LARGEST_BLOCK = 8
 #: A point of less weight is an outlier.
 ORDINARY = 0.5
 
@@ -100,10 +100,11 @@ class DrawnScans:
         standard = self.standardised(rng.standard_normal(len(self.effects)))
         estimate = self.solution.estimate
         points = estimate.points
-        noise = rng.standard_normal(points.u.size)
+        noise: FloatArray = rng.standard_normal(points.u.size)
         if points.decorrelation is not None:
-            noise = np.linalg.solve(points.decorrelation, noise)
-        stray = np.where(estimate.outlier_weight < ORDINARY, estimate.weighed.residual, 0.0)
+            noise = np.asarray(np.linalg.solve(points.decorrelation, noise), dtype=float)
+        residual = points.u - self.solution.quotient.predicted
+        stray = np.where(estimate.outlier_weight < ORDINARY, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise
         return [
             _with_voltages(scan, points.channel, voltages[points.scan == i])
@@ -123,17 +124,15 @@ class DrawnScans:
     def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
         """Voltages without noise, shape (n,), in V, for the true values of the inputs.
 
-        They are the estimate's, which no division has smoothed: a window would act twice.
+        They are those of the calibration's A and G, convolved with the stress of the true inputs.
         """
-        estimate = self.solution.estimate
-        voltages = estimate.predicted
+        estimate, voltages = self.solution.estimate, self.solution.quotient.predicted
+        signal = voltages - estimate.background
         exact = {item.source for item in self.solved}
         for source, effect in self.effects.items():
             # An effect is that of a larger value in the analysis: the other way round.
             if source not in exact:
-                change = effect.voltage + effect.scaling * (
-                    estimate.predicted - estimate.background
-                )
+                change = effect.voltage + effect.scaling * signal
                 voltages = voltages - standard[source] * change
         if exact:
             model = replace(estimate.model, references=self._reference_changes(standard))

@@ -142,8 +142,8 @@ def monte_carlo(
 ) -> MonteCarlo:
     r"""Propagate the distributions of noise and inputs through a calibration.
 
-    Every draw is calibrated by the same method, with the same options.  Its voltages are those
-    that the calibration's estimate predicts for the drawn film, rod, load and positions, and new
+    Every draw is calibrated by the same method, with the same options.  Its voltages are
+    those of the calibration's A and G under the drawn film, rod, load and positions, with new
     noise.  Inputs are normal, cut off where no film is (a Poisson's ratio above 1/2), or
     rectangular (the model's form).
 

@@ -13,6 +13,9 @@ from memscal.calibration.drawn_scans import DrawnScans
 from memscal.calibration.monte_carlo import shortest_interval
 from memscal.calibration.procedure import Calibration
 from memscal.calibration.uncertainty import BUDGETED
+from memscal.deconvolution.problem import Division, DivisionProblem
+from memscal.deconvolution.registry import create_regulariser
+from memscal.errors import FitError
 from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.scan import Scan
 
@@ -62,8 +65,8 @@ CASES: dict[str, tuple[Sequence[Scan], dict[str, object]]] = {
     "tikhonov": ([simulated(**LINE)], {"method": "tikhonov"}),
     "wiener": ([simulated(**LINE, kernel=TAILS)], {"method": "wiener"}),
     "unsupervised-wiener": ([simulated(**LINE)], {"method": "unsupervised-wiener"}),
-    "richardson-lucy": ([simulated(**LINE)], {"method": "richardson-lucy", "iterations": 5}),
-    "raster": ([simulated(**LINE, raster=True, points=21)], {}),
+    "richardson-lucy": ([simulated(**LINE)], {"method": "richardson-lucy", "iterations": 2}),
+    "raster": ([simulated(**LINE, raster=True, points=15)], {}),
     "loads": ([simulated(**LINE, load=[0.5, 1.0], repeats=2)], {"method": "evidence"}),
     "films": ([simulated(**LINE), simulated(**(LINE | {"film": THICKER}), seed=1)], {}),
     "correlated noise": ([correlated(simulated(**LINE))], {"method": "evidence"}),
@@ -92,10 +95,11 @@ TRUTHS = {
     "poisson_ratio": {"film": replace(EXACT_FILM, poisson_ratio=0.465)},
     "rod_radius": {"rod": replace(EXACT_ROD, radius=0.265e-3)},
     "load": {"load": 1.03},
+    "position_scale": {"half_range": 8e-3 * 1.003, "centre": (0.14e-3 * 1.003, 0.0)},
 }
 
 
-@pytest.mark.parametrize("source", [*TRUTHS, "position_scale"])
+@pytest.mark.parametrize("source", TRUTHS)
 def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str) -> None:
     film = replace(
         EXACT_FILM, poisson_ratio=0.45, thickness_uncertainty=1e-5, poisson_ratio_uncertainty=0.005
@@ -107,14 +111,8 @@ def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str) -> None:
     standard = dict.fromkeys(model.effects, np.asarray(0.0))
     nominal = model.voltages(standard)
     change = model.voltages(standard | {source: np.asarray(3.0)}) - nominal
-    if source == "position_scale":
-        centre = 0.14e-3
-        truth = np.interp(centre + (scan.x - centre) * 1.003, scan.x, scan.u_zz) - scan.u_zz
-        allowed = 0.1
-    else:
-        truth = simulated(**(stated | TRUTHS[source])).u_zz - scan.u_zz
-        allowed = 0.01
-    assert np.abs(change - truth).max() < allowed * np.abs(truth).max()
+    truth = simulated(**(stated | TRUTHS[source])).u_zz - scan.u_zz
+    assert np.abs(change - truth).max() < 0.02 * np.abs(truth).max()
 
 
 def test_youngs_modulus_does_not_matter_at_a_given_load() -> None:
@@ -130,38 +128,31 @@ def test_youngs_modulus_does_not_matter_at_a_given_load() -> None:
 def test_an_uncertain_load_scatters_a_by_its_own_share_and_no_width() -> None:
     film, rod = EXACT_FILM, EXACT_ROD
     calibration = uncertain(film=film, rod=rod, load_uncertainty=0.05, noise=1e-4)
-    found = memscal.monte_carlo(calibration, draws=100)
+    found = memscal.monte_carlo(calibration, draws=50)
     a, width = found["conversion_constant"], found["gaussian_sigma"]
-    assert a.uncertainty / a.value == pytest.approx(0.05, rel=spread_limit(100))
+    assert a.uncertainty / a.value == pytest.approx(0.05, rel=spread_limit(50))
     assert width.uncertainty / width.value < 0.001
 
 
 @pytest.mark.parametrize("method", ["evidence", "white-noise"])
 def test_a_budget_of_noise_is_that_of_draws_where_the_estimate_is_linear(method: str) -> None:
     calibration = memscal.calibrate(simulated(noise=0.001, seed=3), method=method)
-    found = memscal.monte_carlo(calibration, draws=150)
+    found = memscal.monte_carlo(calibration, draws=100)
     for name in ("conversion_constant", "gaussian_sigma", "noise_equivalent_area"):
         assert found[name].agrees, found[name].reason
-        assert found[name].ratio == pytest.approx(1.0, abs=spread_limit(150))
+        assert found[name].ratio == pytest.approx(1.0, abs=spread_limit(100))
     core = found.r < 1e-3
     ratio = found.g_uncertainty[core] / found.g_first_order[core]
-    assert np.median(ratio) == pytest.approx(1.0, abs=spread_limit(150))
-
-
-def test_noise_of_a_raster_scatters_as_its_budget_says() -> None:
-    calibration = memscal.calibrate(simulated(raster=True, points=25, noise=0.01, seed=2))
-    found = memscal.monte_carlo(calibration, draws=60)
-    for name in ("conversion_constant", "gaussian_sigma"):
-        assert found[name].ratio == pytest.approx(1.0, abs=spread_limit(60)), name
+    assert np.median(ratio) == pytest.approx(1.0, abs=spread_limit(100))
 
 
 def test_poissons_ratio_never_exceeds_one_half_and_the_reason_says_so() -> None:
     film = replace(EXACT_FILM, poisson_ratio_uncertainty=0.02)
     calibration = uncertain(film=film, rod=EXACT_ROD, load_uncertainty=None, noise=1e-4)
-    found = memscal.monte_carlo(calibration, draws=150)
+    found = memscal.monte_carlo(calibration, draws=100)
     width = found["gaussian_sigma"]
     # Half of a normal distribution has 0.603 of its standard deviation, and its mean at 0.798.
-    assert width.ratio == pytest.approx(0.603, rel=spread_limit(150))
+    assert width.ratio == pytest.approx(0.603, rel=spread_limit(100))
     assert abs(width.mean - width.value) == pytest.approx(0.798 * width.first_order, rel=0.25)
     assert "cut off at 0.5" in width.reason
     assert not width.agrees
@@ -229,12 +220,32 @@ def test_outliers_are_drawn_again_and_noise_alone_is_said_to_be() -> None:
     assert any("Outliers" in text for text in found.messages)
 
 
+class Failing:
+    """White noise that refuses every division from the given one on."""
+
+    name, fails = "failing", "It fails."
+
+    def __init__(self, first: int) -> None:
+        self.method = create_regulariser("white-noise")
+        self.first, self.divisions = first, 0
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        self.divisions += 1
+        if self.divisions >= self.first:
+            raise FitError("This one is refused.")
+        return self.method.divide(problem)
+
+
 def test_draws_that_fail_are_left_out_and_told() -> None:
-    calibration = memscal.calibrate(simulated(noise=0.5, seed=0), method="evidence")
-    found = memscal.monte_carlo(calibration, draws=40)
-    assert 2 <= len(found.samples) < 40
-    failed = 40 - len(found.samples)
-    assert any(text.startswith(f"{failed} of 40 draws") for text in found.messages)
+    method = Failing(first=1000)
+    calibration = memscal.calibrate(simulated(), method=method)
+    method.first = method.divisions + 4
+    found = memscal.monte_carlo(calibration, draws=5)
+    assert len(found.samples) == 3
+    assert "2 of 5 draws could not be calibrated" in found.messages[-1]
+    assert "This one is refused" in found.messages[-1]
+    with pytest.raises(FitError, match="4 of 4 draws"):
+        memscal.monte_carlo(calibration, draws=4)
 
 
 @pytest.mark.parametrize(
