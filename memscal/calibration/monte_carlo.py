@@ -249,12 +249,8 @@ def _compared(
 
 def _random_part(budget: Mapping[str, float]) -> float:
     """Standard uncertainty of what scatters; correlations carry the sign of what they add."""
-    variance = sum(
-        float(np.copysign(part**2, part))
-        for source, part in budget.items()
-        if source not in NOT_RANDOM
-    )
-    return float(np.sqrt(max(variance, 0.0)))
+    parts = np.array([part for source, part in budget.items() if source not in NOT_RANDOM])
+    return float(np.sqrt(max(float(np.sum(parts * np.abs(parts))), 0.0)))
 
 
 def _reason(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,9 +25,6 @@ if TYPE_CHECKING:
     from memscal.model.stress import StressProfile
 
 __all__ = ["command"]
-
-#: Processes that draws are shared by, where there are as many cores.
-_MOST_WORKERS = 8
 
 EXAMPLES = """\b
 Examples:
@@ -200,7 +196,11 @@ def command(
     if sweeping or sweep_figure:
         with working("Sweeping the noise amplitude"):
             swept = found.sweep(seed=seed or 0)
-    drawn = None if draws is None else _drawn(found, draws, seed or 0)
+    drawn = None
+    if draws is not None:
+        from memscal.cli.monte_carlo_view import drawn_with_progress
+
+        drawn = drawn_with_progress(found, draws, seed or 0)
     with working("Drawing"):
         ready = outputs.rendered(found, swept)
     outputs.write(found, ready, force=force)
@@ -267,25 +267,6 @@ def _rehearse(
     else:
         emit_tables(rehearsal_table(scans[0], points, stresses[0], regulariser.name, outputs.paths))
     message("Nothing was written (--dry-run).")
-
-
-def _drawn(found: Calibration, draws: int, seed: int) -> MonteCarlo:
-    from memscal.calibration.monte_carlo import monte_carlo
-    from memscal.cli.monte_carlo_view import monte_carlo_notes
-
-    # Starting a process takes about as long as twenty draws.
-    workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
-    with working(f"Drawing {draws} scans") as show:
-        drawn = monte_carlo(
-            found,
-            draws=draws,
-            seed=seed,
-            workers=workers,
-            progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
-        )
-    for text in monte_carlo_notes(drawn):
-        note(text)
-    return drawn
 
 
 def _tell(
