@@ -1,34 +1,77 @@
-r"""Propagation of distributions (JCGM 101:2008, GUM Supplement 1), beside the first-order budget.
+"""Propagation of distributions (JCGM 101:2008, GUM Supplement 1), beside the first-order budget.
 
-Each draw is a scan of the sensor that the calibration found: the voltages that it predicts, new
-noise, and new values of every input whose uncertainty is stated, which the estimator does not
-know of.  What scatters is compared with the same part of the budget: noise and inputs.  The rest
-of a stated uncertainty, what regularisation hides, is an error that is the same in every draw:
-it is counted, but no draw can show it.
+Each draw is a scan of the sensor that the calibration found, with new noise.  The true values of
+all inputs whose uncertainty is stated are drawn; the scan states the nominal ones, and is
+calibrated like any other.  What scatters is compared with the same part of the budget: noise and
+inputs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from memscal.calibration.comparison import COVERAGE, TOLERANCE, Comparison, compared, judged
-from memscal.calibration.coverage import shortest_interval, symmetric_interval
-from memscal.calibration.disagreement import Blame
-from memscal.calibration.draw_blocks import DrawModel, drawn_results
-from memscal.calibration.replicate_results import REPLICATED
+import numpy as np
+from scipy.special import ndtri
+
+from memscal.calibration.drawn_scans import DrawnScans, SolvedInput
+from memscal.calibration.procedure import Calibration, uncertainties
+from memscal.calibration.uncertainty import BUDGETED, NOT_RANDOM
 from memscal.calibration.workers import require_workers
-from memscal.errors import InputError
+from memscal.errors import FitError, InputError
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.validation import FloatArray
 
-if TYPE_CHECKING:
-    from memscal.calibration.procedure import Calibration
+__all__ = ["Comparison", "MonteCarlo", "monte_carlo", "shortest_interval"]
 
-__all__ = ["Comparison", "MonteCarlo", "monte_carlo"]
+_COVERAGE = 0.95
+_TAILS = ((1 - _COVERAGE) / 2, (1 + _COVERAGE) / 2)
+#: Share by which standard uncertainties may differ, and by which the mean may be off.
+_TOLERANCE = 0.1
+_LARGEST_SHIFT = 0.25
+#: A cut-off is named where the drawn values lose this share of their scatter, and the budget has
+#: this share of its uncertainty from them.
+_CUT, _COUNTS = 0.05, 0.2
 
-_METHODS = ("evidence", "white-noise", "tikhonov")
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """One parameter by draws and by the first-order budget, in its SI unit.
+
+    ``value`` is the calibration's; ``mean``, ``uncertainty`` (standard deviation) and the coverage
+    intervals of 95 % are the draws'; ``sampling_error`` is the standard uncertainty of
+    ``uncertainty`` for their number.  ``first_order`` is the budget's standard uncertainty by noise
+    and inputs, ``stated`` that with what regularisation hides.  ``reason`` says why draws and
+    budget do not agree; it is empty where they do.
+    """
+
+    name: str
+    value: float
+    mean: float
+    uncertainty: float
+    sampling_error: float
+    symmetric: tuple[float, float]
+    shortest: tuple[float, float]
+    first_order: float
+    stated: float
+    reason: str = ""
+
+    @property
+    def ratio(self) -> float:
+        """Standard uncertainty of the draws over that of the budget."""
+        return self.uncertainty / self.first_order if self.first_order > 0 else np.nan
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the budget may be used in place of draws.
+
+        Their standard uncertainties differ by no more than a tenth, and the mean of the draws
+        from the calibration's value by no more than a quarter of one, beyond what the number of
+        draws allows (two standard errors).
+        """
+        return not self.reason
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,8 +84,9 @@ class MonteCarlo:
         How many there are, and their seed.
     sources : tuple of str
         What was drawn: noise, then the inputs whose uncertainty is stated.
-    samples : ndarray, shape (draws, 5)
-        A (V/Pa), both widths (m), full width at half maximum (m) and noise-equivalent area (m^2).
+    samples : ndarray, shape (m, 5)
+        A (V/Pa), both widths (m), full width at half maximum (m) and noise-equivalent area (m^2)
+        of the m draws that could be calibrated: all of them, unless a message says otherwise.
     comparisons : tuple of Comparison
         The same, summed up, beside the budget.
     r : ndarray, shape (n,)
@@ -72,45 +116,52 @@ class MonteCarlo:
 
     def __repr__(self) -> str:
         """Return what was drawn in place of the draws."""
-        apart = [each.name for each in self.comparisons if not each.agrees]
+        apart = [comparison.name for comparison in self.comparisons if not comparison.agrees]
         verdict = f"the budget does not do for {', '.join(apart)}" if apart else "the budget agrees"
         return f"<MonteCarlo: {self.draws} draws of {', '.join(self.sources)}; {verdict}>"
 
     @property
     def agrees(self) -> bool:
         """Whether every parameter agrees with its budget."""
-        return all(each.agrees for each in self.comparisons)
+        return all(comparison.agrees for comparison in self.comparisons)
 
     def __getitem__(self, name: str) -> Comparison:
         """Return the comparison of one parameter."""
-        for each in self.comparisons:
-            if each.name == name:
-                return each
-        raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(REPLICATED)}.")
+        for comparison in self.comparisons:
+            if comparison.name == name:
+                return comparison
+        raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(BUDGETED)}.")
 
 
 def monte_carlo(
-    calibration: Calibration, *, draws: int = 1000, seed: int = 0, workers: int = 1
+    calibration: Calibration,
+    *,
+    draws: int = 1000,
+    seed: int = 0,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
 ) -> MonteCarlo:
     r"""Propagate the distributions of noise and inputs through a calibration.
 
-    The estimator is expanded about the calibration's own scan
-    (:class:`memscal.estimation.replicates.ReplicateEstimator`); the reference of each draw is
-    that of its film and rod, solved exactly on a grid of their values.  Inputs are normal, cut
-    off where no film is (a Poisson's ratio above 1/2), or rectangular (the model's form).
+    Every draw is calibrated by the same method, with the same options.  Its voltages are
+    those of the calibration's A and G under the drawn film, rod, load and positions, with new
+    noise.  Inputs are normal, cut off where no film is (a Poisson's ratio above 1/2), or
+    rectangular (the model's form).
 
     Parameters
     ----------
     calibration : Calibration
-        From :func:`memscal.calibrate`, by method evidence, white-noise or tikhonov; of lines, or
-        of several scans.
+        From :func:`memscal.calibrate`: of lines, a raster or several scans, by any method.
     draws : int, default 1000
         How many; two or more.  The 95 % interval's ends are known to about
         :math:`3/\sqrt{M}` standard uncertainties.
     seed : int, default 0
         Every draw has a seed of its own, spawned from this one.
     workers : int, default 1
-        Processes that share the draws; the draws do not depend on it.
+        Processes that share the draws; the draws do not depend on it.  Where these are more than
+        one, a script needs the usual ``if __name__ == "__main__":``.
+    progress : callable, optional
+        Called with the number of draws that are done and the number of all draws.
 
     Returns
     -------
@@ -120,93 +171,155 @@ def monte_carlo(
     Raises
     ------
     InputError
-        If a number is out of range, the method is not linear in the fields, or the scan is a
-        raster.
+        If a number is out of range.
+    FitError
+        If fewer than two draws can be calibrated.
 
     Examples
     --------
     >>> import memscal
     >>> calibration = memscal.calibrate(memscal.simulate(noise=0.003, seed=2), method="evidence")
-    >>> found = memscal.monte_carlo(calibration, draws=400)
-    >>> 0.8 < found["gaussian_sigma"].ratio < 1.25
+    >>> drawn = memscal.monte_carlo(calibration, draws=20)
+    >>> 0.4 < drawn["gaussian_sigma"].ratio < 1.6
     True
     """
-    _check(calibration, draws, seed, workers)
-    model = DrawModel.of(calibration)
-    samples, g = drawn_results(model, draws, seed, workers)
-    apparatus = calibration.apparatus
-    comparisons = compared(apparatus.parameters, apparatus.budget, samples)
-    blame = Blame(
-        lambda only: drawn_results(model, draws, seed, workers, only=only)[0], model.table
-    )
-    sources = ("noise", *model.inputs.sources)
-    return MonteCarlo(
-        draws=draws,
-        seed=seed,
-        sources=sources,
-        samples=samples,
-        comparisons=tuple(
-            judged(each, i, apparatus.budget[each.name], sources, draws, blame)
-            for i, each in enumerate(comparisons)
-        ),
-        r=model.results.r,
-        g_mean=g.mean(axis=0),
-        g_uncertainty=g.std(axis=0, ddof=1),
-        g_symmetric=symmetric_interval(g, COVERAGE),
-        g_shortest=shortest_interval(g, COVERAGE),
-        g_first_order=model.first_order(),
-        messages=_messages(calibration, model, comparisons),
-    )
-
-
-def _check(calibration: Calibration, draws: Any, seed: Any, workers: int) -> None:
-    for name, value, least in (("draws", draws, 2), ("seed", seed, 0)):
+    numbers: list[tuple[str, Any, int]] = [("draws", draws, 2), ("seed", seed, 0)]
+    for name, value, least in numbers:
         if not isinstance(value, Integral) or int(value) < least:
             raise InputError(
                 f"{name} is {value!r}, but it is a whole number from {least} on.",
                 cure=f"Give {name}={least} or more.",
             )
     require_workers(workers)
-    solution = calibration.solution
-    name, points = solution.regulariser.name, solution.estimate.points
-    if name not in _METHODS:
-        raise InputError(
-            f"The calibration is by method {name}; its draws would be divided one by one.",
-            why="A draw is estimated at once with all others, without fields.",
-            cure="Calibrate with method='evidence'.",
+    solution, effects = calibration.solution, calibration.effects
+    model = DrawnScans(solution, effects, calibration.correlations, seed)
+    rows, failures = model.all_results(draws, workers, progress)
+    if len(rows) < 2:
+        raise FitError(
+            f"{len(failures)} of {draws} draws could not be calibrated.",
+            why=f"The first one: {failures[0]}",
+            cure="The scan is close to failing, too; measure with less noise.",
         )
-    if points.planar and points.scans == 1:
-        raise InputError(
-            "The calibration is of a raster, whose G is read off the raster's own lattice.",
-            why="Draws are of the profile, whose widths are not those of a coarse lattice.",
-            cure="Draw a line of it, or use the first-order budget.",
-        )
+    samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
+    comparisons = tuple(
+        _compared(calibration, name, column, model.solved)
+        for name, column in zip(BUDGETED, samples.T, strict=True)
+    )
+    return MonteCarlo(
+        draws=draws,
+        seed=seed,
+        sources=("noise", *effects),
+        samples=samples,
+        comparisons=comparisons,
+        r=solution.deconvolution.g.r,
+        g_mean=g.mean(axis=0),
+        g_uncertainty=g.std(axis=0, ddof=1),
+        g_symmetric=np.quantile(g, _TAILS, axis=0),
+        g_shortest=shortest_interval(g),
+        g_first_order=uncertainties(solution, effects, calibration.correlations).radial_scatter,
+        messages=tuple(_messages(calibration, comparisons, failures, draws)),
+    )
+
+
+def _compared(
+    calibration: Calibration, name: str, column: FloatArray, solved: Sequence[SolvedInput]
+) -> Comparison:
+    """Sum up the draws of one parameter, shape (m,), and judge its budget."""
+    parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
+    value, mean, spread = parameters[name], float(column.mean()), float(column.std(ddof=1))
+    error, u = spread * _sampling_error(column), _random_part(budget)
+    same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
+    same_mean = abs(mean - value) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
+    low, high = np.quantile(column, _TAILS)
+    first, last = shortest_interval(column)
+    return Comparison(
+        name=name,
+        value=value,
+        mean=mean,
+        uncertainty=spread,
+        sampling_error=error,
+        symmetric=(float(low), float(high)),
+        shortest=(float(first), float(last)),
+        first_order=u,
+        stated=parameters.uncertainty(name),
+        reason=""
+        if same_spread and same_mean
+        else _reason(spread, mean - value, u, budget, solved),
+    )
+
+
+def _random_part(budget: Mapping[str, float]) -> float:
+    """Standard uncertainty of what scatters; correlations carry the sign of what they add."""
+    parts = np.array([part for source, part in budget.items() if source not in NOT_RANDOM])
+    return float(np.sqrt(max(float(np.sum(parts * np.abs(parts))), 0.0)))
+
+
+def _reason(
+    spread: float,
+    shift: float,
+    u: float,
+    budget: Mapping[str, float],
+    solved: Sequence[SolvedInput],
+) -> str:
+    """Say by how much draws and budget disagree, and of a distribution that is cut off."""
+    told = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
+    for item in solved:
+        quantiles = ndtri((np.arange(1000) + 0.5) / 1000)
+        kept = float(item.truncated(quantiles).std())
+        if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:
+            return (
+                f"{told} The {item.source.replace('_', ' ')} is cut off at {item.bounds[1]:g}: its "
+                f"draws scatter by {kept * item.u:.2g}, not by the {item.u:.2g} that the budget "
+                "counts, and to one side."
+            )
+    return f"{told} The calibration is not linear in the noise or an input over its uncertainty."
+
+
+def shortest_interval(draws: FloatArray) -> FloatArray:
+    """Shortest interval that holds 95 % of the draws (JCGM 101, 7.7.4), shape (2, ...)."""
+    ordered = np.sort(draws, axis=0)
+    held = min(int(np.rint(_COVERAGE * len(draws))), len(draws) - 1)
+    first = np.argmin(ordered[held:] - ordered[:-held], axis=0)[None]
+    lower = np.take_along_axis(ordered, first, axis=0)
+    return np.concatenate([lower, np.take_along_axis(ordered, first + held, axis=0)])
+
+
+def _sampling_error(draws: FloatArray) -> float:
+    """Relative standard uncertainty of the draws' standard deviation, by their kurtosis."""
+    centred = draws - draws.mean()
+    variance = float(np.mean(centred**2))
+    kurtosis = float(np.mean(centred**4)) / variance**2 if variance > 0 else 1.0
+    return float(np.sqrt(max(kurtosis - 1, 0.0) / (4 * draws.size)))
 
 
 def _messages(
-    calibration: Calibration, model: DrawModel, comparisons: list[Comparison]
-) -> tuple[Message, ...]:
+    calibration: Calibration,
+    comparisons: Sequence[Comparison],
+    failures: Sequence[str],
+    draws: int,
+) -> Iterator[Message]:
     """What was drawn, and what no draw shows."""
-    messages = []
-    if not model.inputs.sources:
+    if not calibration.effects:
         text = "No input states an uncertainty: the draws are of noise alone."
-        messages.append(Message("uncertainty_unstated", text))
-    elif len(calibration.solution.scans) > 1:
-        text = "Inputs of several scans are drawn by their first-order effects on the voltages."
-        messages.append(Message("first_order", text))
+        yield Message("uncertainty_unstated", text)
     hidden = [
-        f"{1 - (each.first_order / each.stated) ** 2:.0%} of {each.name}"
-        for each in comparisons
-        if each.first_order < (1 - TOLERANCE) * each.stated
+        f"{1 - (comparison.first_order / comparison.stated) ** 2:.0%} of {comparison.name}"
+        for comparison in comparisons
+        if comparison.first_order < (1 - _TOLERANCE) * comparison.stated
     ]
     if hidden:
-        text = (
+        yield Message(
+            "regularisation",
             "Not all of the stated uncertainty scatters: of its square, what regularisation hides "
             f"makes up {', '.join(hidden)}. It is the same error in every draw, so it is counted, "
-            "but not drawn; the comparison is with the rest."
+            "but not drawn; the comparison is with the rest.",
         )
-        messages.append(Message("regularisation", text))
     if (calibration.solution.estimate.outlier_weight < OUTLIER_WEIGHT).any():
-        text = "Outliers keep their reduced weight in every draw."
-        messages.append(Message("outlier", text))
-    return tuple(messages)
+        yield Message("outlier", "Outliers keep their distance from the prediction in every draw.")
+    if failures:
+        yield Message(
+            "failed_draws",
+            f"{len(failures)} of {draws} draws could not be calibrated and are left out. The "
+            f"first one: {failures[0]}",
+            "warning",
+        )

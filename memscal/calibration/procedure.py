@@ -29,7 +29,7 @@ from memscal.mechanics.contact import Contact
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = ["Calibration", "Reference", "calibrate"]
+__all__ = ["Calibration", "Reference", "calibrate", "uncertainties"]
 
 Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 """A base stress, the path of a file that holds one, or nothing: the rod is solved."""
@@ -156,7 +156,7 @@ def calibrate(
     solution = solve(scans, stresses, regulariser, channel)
     others = None if alternative is None else _each(alternative, scans)
     effects = _effects(solution, others)
-    results = _uncertainties(solution, effects, correlations or {})
+    results = uncertainties(solution, effects, correlations or {})
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)
     configuration = {"method": regulariser.name, "seed": seed, **_settings(regulariser)}
@@ -232,11 +232,12 @@ def _effects(
     return input_effects(scans, solution.stresses, estimate, spectra)
 
 
-def _uncertainties(
+def uncertainties(
     solution: Solution,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
 ) -> Results:
+    """Propagate noise and inputs through a calibration's steps."""
     wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
     return propagate(
         solution.estimate,

@@ -25,7 +25,7 @@ from memscal.estimation.profile_estimate import ProfileEstimate
 from memscal.model.apparatus import ParameterSet
 from memscal.model.validation import FloatArray
 
-__all__ = ["Results", "propagate"]
+__all__ = ["BUDGETED", "NOT_RANDOM", "Results", "propagate"]
 
 #: What sums of squares lose to rounding.
 _ROUNDING = 1e-9
@@ -47,6 +47,8 @@ class Results:
         Covariance of G(r) with the parameters, in their units.
     transfer_errors : ndarray, shape (m,)
         Standard uncertainty of the transfer function.
+    radial_scatter : ndarray, shape (n,)
+        Standard uncertainty by what scatters of G(r) as it is given back, in 1/m^2.
     """
 
     parameters: ParameterSet
@@ -54,10 +56,11 @@ class Results:
     radial_covariance: FloatArray
     cross_covariance: FloatArray
     transfer_errors: FloatArray
+    radial_scatter: FloatArray
 
 
 #: Parameters whose uncertainty is broken down by source.
-_BUDGETED = (
+BUDGETED = (
     "conversion_constant",
     "gaussian_sigma",
     "gaussian_sigma_deconvolved",
@@ -66,12 +69,17 @@ _BUDGETED = (
 )
 
 
+#: Sources that are the same error in every scan.
+NOT_RANDOM = ("regularisation", "window")
+
+
 @dataclass(frozen=True, eq=False)
 class _Rows:
     """Derivatives of all results by (w, f), and what the window hides of each.
 
     The results are the parameters, ``names`` with ``values``, then G at its radii, then the
-    transfer function at its wavenumbers: the rows of ``matrix`` and ``hidden``.
+    transfer function at its wavenumbers: the rows of ``matrix`` and ``hidden``.  ``opened`` are the
+    rows of G as it is given back, through the window.
     """
 
     names: tuple[str, ...]
@@ -79,6 +87,7 @@ class _Rows:
     radii: int
     matrix: FloatArray
     hidden: FloatArray
+    opened: FloatArray
 
     @property
     def stored(self) -> int:
@@ -127,16 +136,24 @@ def propagate(
     columns |= {name: _input_column(rows, estimate, effect) for name, effect in effects.items()}
     if effects:
         together = np.hstack([columns[name] for name in effects])
-        independent.append(together @ _root(correlation_matrix(list(effects), correlations)))
+        joined = _root(correlation_matrix(list(effects), correlations))
+        independent.append(together @ joined)
     everything = np.hstack(independent)
     stored = everything[: rows.stored] @ everything[: rows.stored].T
     count = len(rows.names)
+    scatter = [rows.opened @ random[: rows.opened.shape[1]]]
+    if effects:
+        moved = estimate.weighed.gain @ np.stack([e.voltage for e in effects.values()], axis=1)
+        scatter.append(rows.opened @ moved @ joined)
+    if raster is not None:
+        scatter.append(raster.radial)
     return Results(
         parameters=ParameterSet(rows.names, rows.values, stored[:count, :count]),
-        budget={name: _budget(rows, columns, stored, name) for name in _BUDGETED},
+        budget={name: _budget(rows, columns, stored, name) for name in BUDGETED},
         radial_covariance=stored[count:, count:],
         cross_covariance=stored[count:, :count],
         transfer_errors=np.linalg.norm(everything[rows.stored :], axis=1),
+        radial_scatter=np.linalg.norm(np.hstack(scatter), axis=1),
     )
 
 
@@ -192,6 +209,7 @@ def _rows(
         radii=r.size,
         matrix=np.vstack([scalars, np.pad(profiles, ((0, 0), (0, fitted)))]),
         hidden=np.concatenate([hidden_scalars, hidden_radial, np.interp(wavenumbers, k, hidden)]),
+        opened=opened,
     )
 
 

@@ -129,7 +129,7 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     type=click.IntRange(min=2),
     metavar="DRAWS",
     help="Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
-    "scatters with the budget of uncertainties. For methods evidence, white-noise and tikhonov.",
+    "scatters with the budget of uncertainties. Each draw is calibrated like the scan.",
 )
 @force_option
 @click.option(
@@ -196,7 +196,11 @@ def command(
     if sweeping or sweep_figure:
         with working("Sweeping the noise amplitude"):
             swept = found.sweep(seed=seed or 0)
-    drawn = None if draws is None else _drawn(found, draws, seed or 0)
+    drawn = None
+    if draws is not None:
+        from memscal.cli.monte_carlo_view import drawn_with_progress
+
+        drawn = drawn_with_progress(found, draws, seed or 0)
     with working("Drawing"):
         ready = outputs.rendered(found, swept)
     outputs.write(found, ready, force=force)
@@ -263,16 +267,6 @@ def _rehearse(
     else:
         emit_tables(rehearsal_table(scans[0], points, stresses[0], regulariser.name, outputs.paths))
     message("Nothing was written (--dry-run).")
-
-
-def _drawn(found: Calibration, draws: int, seed: int) -> MonteCarlo:
-    from memscal.calibration.monte_carlo import monte_carlo
-    from memscal.cli.monte_carlo_view import monte_carlo_notes
-
-    with working(f"Drawing {draws} scans"):
-        drawn = monte_carlo(found, draws=draws, seed=seed)
-    show_messages(monte_carlo_notes(drawn))
-    return drawn
 
 
 def _tell(

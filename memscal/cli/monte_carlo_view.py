@@ -2,16 +2,42 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
-from memscal.calibration.comparison import Comparison
-from memscal.calibration.monte_carlo import MonteCarlo
-from memscal.cli.output import finite, texts_of
+from memscal.calibration.monte_carlo import Comparison, MonteCarlo, monte_carlo
+from memscal.calibration.procedure import Calibration
+from memscal.cli.output import finite, show_messages, texts_of
+from memscal.cli.progress import working
 from memscal.cli.tables import Table
 from memscal.model.checks import Message
 from memscal.model.quantities import estimated_quantity
 
-__all__ = ["monte_carlo_json", "monte_carlo_notes", "monte_carlo_table"]
+__all__ = ["drawn_with_progress", "monte_carlo_json", "monte_carlo_table"]
+
+#: Processes that share the draws, where there are as many cores.
+_MOST_WORKERS = 8
+
+
+def drawn_with_progress(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
+    """Draw in processes, say how far it is, and tell what the numbers rest on."""
+    # Starting a process takes about as long as forty draws of a line.
+    workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
+    with working(f"Drawing {draws} scans") as show:
+        drawn = monte_carlo(
+            calibration,
+            draws=draws,
+            seed=seed,
+            workers=workers,
+            progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
+        )
+    disagreements = [
+        Message("disagreement", f"{estimated_quantity(c.name).words}: {c.reason}")
+        for c in drawn.comparisons
+        if not c.agrees
+    ]
+    show_messages([*drawn.messages, *disagreements])
+    return drawn
 
 
 def monte_carlo_table(found: MonteCarlo) -> Table:
@@ -34,16 +60,6 @@ def monte_carlo_table(found: MonteCarlo) -> Table:
     title = f"What scatters, by {found.draws} draws of {_listed(found.sources)} (seed {found.seed})"
     head = ("", "u by the budget", "u of the draws", "95 % interval", "agrees")
     return Table(title, head, rows, apart)
-
-
-def monte_carlo_notes(found: MonteCarlo) -> list[Message]:
-    """Return what the numbers rest on, and why draws and budget disagree."""
-    disagreements = [
-        Message("disagreement", f"{estimated_quantity(each.name).words}: {each.reason}")
-        for each in found.comparisons
-        if not each.agrees
-    ]
-    return [*found.messages, *disagreements]
 
 
 def monte_carlo_json(found: MonteCarlo) -> dict[str, Any]:

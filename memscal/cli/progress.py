@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 __all__ = ["working"]
@@ -14,10 +14,14 @@ _CLEAR = "\r\x1b[K"
 
 
 @contextmanager
-def working(what: str) -> Iterator[None]:
-    """Show what is being done, and for how long, on a terminal and only if it takes long."""
+def working(what: str) -> Iterator[Callable[[str], None]]:
+    """Show what is being done, and for how long, on a terminal and only if it takes long.
+
+    Yields a function that replaces the text.
+    """
+    shown = [what]
     if sys.stderr is None or not sys.stderr.isatty():
-        yield
+        yield lambda _: None
         return
     from threading import Event, Thread
     from time import monotonic
@@ -29,7 +33,7 @@ def working(what: str) -> Iterator[None]:
             return
         with suppress(OSError, ValueError):
             while True:
-                stream.write(f"{_CLEAR}{what} ... {monotonic() - start:.0f} s")
+                stream.write(f"{_CLEAR}{shown[0]} ... {monotonic() - start:.0f} s")
                 stream.flush()
                 if done.wait(_EVERY):
                     break
@@ -39,7 +43,7 @@ def working(what: str) -> Iterator[None]:
     thread = Thread(target=show, daemon=True)
     thread.start()
     try:
-        yield
+        yield lambda text: shown.__setitem__(0, text)
     finally:
         done.set()
         thread.join()

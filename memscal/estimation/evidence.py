@@ -21,7 +21,7 @@ from memscal.estimation.gaussian_fit import GaussianFit
 from memscal.estimation.restricted_likelihood import Outcome, Projected
 from memscal.model.validation import FloatArray
 
-__all__ = ["HYPOTHESES", "Hypothesis", "WeighedFit", "weigh_departures"]
+__all__ = ["HYPOTHESES", "WeighedFit", "weigh_departures"]
 
 _NEGLIGIBLE = 1e-4
 

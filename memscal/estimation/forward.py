@@ -45,7 +45,7 @@ def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
     return np.asarray(np.exp(-0.5 * (sigma * k) ** 2))
 
 
-def unit_gaussian(r: FloatArray, sigma: float | FloatArray) -> FloatArray:
+def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
     """Gaussian of unit integral over the plane, in 1/m^2."""
     return np.asarray(np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2))
 

@@ -14,7 +14,7 @@ from memscal.estimation.channels import channel_order, channel_signal
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
-__all__ = ["ScanPoints", "joined_points", "measured_points"]
+__all__ = ["ScanPoints", "joined_points", "measured_mask", "measured_points"]
 
 #: Conversion constant, width, centre, baseline, slope; one more to estimate the noise.
 MINIMUM_POSITIONS = 6
@@ -156,9 +156,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     u, errors = channel_signal(scan, channel)
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
     x, y, repeat = _positions(scan)
-    keep: NDArray[np.bool_] = np.isfinite(u) & np.isfinite(load)
-    if errors is not None:
-        keep &= np.isfinite(errors)
+    keep = measured_mask(scan, channel)
     if not keep.any():
         raise InputError(
             f"Every point of u_{channel} is missing (NaN).",
@@ -181,6 +179,16 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     )
     _require_usable(points)
     return points
+
+
+def measured_mask(scan: Scan, channel: str = "zz") -> NDArray[np.bool_]:
+    """Say which voltages of a channel were measured: they, their loads and errors are numbers."""
+    u, errors = channel_signal(scan, channel)
+    keep: NDArray[np.bool_] = np.isfinite(u)
+    for further in (errors, scan.normal_load):
+        if further is not None:
+            keep &= np.isfinite(further)
+    return keep
 
 
 def joined_points(parts: Sequence[ScanPoints]) -> ScanPoints:

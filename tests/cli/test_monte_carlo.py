@@ -9,23 +9,23 @@ import memscal
 
 
 def test_draws_are_compared_with_the_budget_in_a_table(run: Run, scan: Path) -> None:
-    shown = run("calibrate", scan, "--method", "evidence", "--monte-carlo", 200)
+    shown = run("calibrate", scan, "--method", "evidence", "--monte-carlo", 20)
     assert shown.code == 0, shown.err
-    assert "200 draws of noise" in shown.out
+    assert "20 draws of noise" in shown.out
     for column in ("u by the budget", "u of the draws", "95 % interval", "agrees"):
         assert column in shown.out
     assert "full width of G at half maximum" in shown.out
 
 
 def test_draws_are_given_as_json_in_the_units_of_the_rest(run: Run, scan: Path) -> None:
-    arguments = ("calibrate", scan, "--method", "evidence", "--monte-carlo", 300, "--seed", 4)
+    arguments = ("calibrate", scan, "--method", "evidence", "--monte-carlo", 80, "--seed", 4)
     found = run(*arguments, "--json").json["monte_carlo"]
-    assert (found["draws"], found["seed"]) == (300, 4)
+    assert (found["draws"], found["seed"]) == (80, 4)
     assert found["sources"][0] == "noise"
     assert {"thickness", "poisson_ratio", "rod_radius", "load"} < set(found["sources"])
     width = found["parameters"]["gaussian_sigma"]
     calibration = memscal.calibrate(memscal.read_scan(scan), method="evidence")
-    drawn = memscal.monte_carlo(calibration, draws=300, seed=4)["gaussian_sigma"]
+    drawn = memscal.monte_carlo(calibration, draws=80, seed=4)["gaussian_sigma"]
     assert width["unit"] == "mm"
     assert width["standard_uncertainty"] == pytest.approx(drawn.uncertainty * 1e3, rel=1e-6)
     assert width["first_order"] == pytest.approx(drawn.first_order * 1e3, rel=1e-6)
@@ -40,11 +40,4 @@ def test_a_number_of_draws_that_makes_no_sense_is_refused(run: Run, scan: Path, 
     refused = run("calibrate", scan, f"--monte-carlo={draws}")
     assert refused.code == 2
     assert "--monte-carlo" in refused.err
-    assert not scan.with_suffix(".apparatus.h5").exists()
-
-
-def test_a_method_without_draws_is_refused_and_nothing_is_written(run: Run, scan: Path) -> None:
-    refused = run("calibrate", scan, "--method", "richardson-lucy", "--monte-carlo", 50)
-    assert refused.code == 3
-    assert "richardson-lucy" in refused.err
     assert not scan.with_suffix(".apparatus.h5").exists()
