@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.estimation.channels import channel_order, channel_signal
+from memscal.model.places import Places, places_of
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
@@ -91,13 +92,31 @@ class ScanPoints:
         return 2 if self.planar else int(self.free.any(axis=0).all())
 
     @cached_property
-    def step(self) -> float:
-        """Median distance of neighbouring positions, in m; of several scans the smallest."""
-        return min(self._step(i) for i in range(self.scans))
+    def places(self) -> tuple[Places, ...]:
+        """The places of each scan's points."""
+        chosen = [self.scan == scan for scan in range(self.scans)]
+        return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in chosen)
 
-    def _step(self, scan: int) -> float:
-        along = self.x if self.free[scan, 0] else self.y
-        return float(np.median(np.diff(np.unique(along[self.scan == scan]))))
+    def of_places(self, name: str) -> NDArray[np.intp]:
+        """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
+        values = np.empty(self.u.size, dtype=np.intp)
+        for scan, places in enumerate(self.places):
+            values[self.scan == scan] = getattr(places, name)
+        return values
+
+    @cached_property
+    def step(self) -> float:
+        """Typical distance of neighbouring positions, in m; of several scans the smallest."""
+        along_x = self.free[:, 0]
+        return min(p.steps[0 if x else 1] for p, x in zip(self.places, along_x, strict=True))
+
+    @property
+    def cell(self) -> float:
+        """Area of the plane for each place of a raster, in m^2."""
+        planar = self.free.all(axis=1)
+        return self.step * min(
+            p.steps[1] for p, is_planar in zip(self.places, planar, strict=True) if is_planar
+        )
 
     def only(self, scan: int) -> ScanPoints:
         """Return one of the scans."""
@@ -155,7 +174,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     """
     u, errors = channel_signal(scan, channel)
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
-    x, y, repeat = _positions(scan)
+    x, y = scan.positions
+    repeat = scan.passes
     keep: NDArray[np.bool_] = np.isfinite(u) & np.isfinite(load)
     if errors is not None:
         keep &= np.isfinite(errors)
@@ -174,7 +194,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         x_errors=np.zeros(int(keep.sum())) if scan.x_errors is None else _along(scan)[keep],
         repeat=repeat[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
-        free=np.array([[scan.direction == "x", scan.direction == "y" or scan.kind == "raster"]]),
+        free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
         missing=int(u.size - keep.sum()),
         decorrelation=None if channel_order(channel) else _decorrelation(scan, keep),
         channel=channel,
@@ -244,17 +264,6 @@ def _along(scan: Scan) -> FloatArray:
     return np.broadcast_to(np.asarray(scan.x_errors), scan.u_zz.shape)
 
 
-def _positions(scan: Scan) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
-    shape = scan.u_zz.shape
-    x = np.broadcast_to(scan.x, shape)
-    if scan.y is not None:
-        return x, np.broadcast_to(scan.y[:, None], shape), np.zeros(shape, dtype=np.intp)
-    rows = np.arange(shape[0] if scan.kind == "repeats" else 1, dtype=np.intp)
-    repeat = np.repeat(rows, scan.x.size).reshape(shape)
-    across = np.zeros(shape)
-    return (across, x, repeat) if scan.direction == "y" else (x, across, repeat)
-
-
 def _stated_errors(
     errors: FloatArray | None, keep: NDArray[np.bool_], channel: str
 ) -> FloatArray | None:
@@ -270,7 +279,7 @@ def _stated_errors(
 
 
 def _require_usable(points: ScanPoints) -> None:
-    positions = np.unique(np.stack([points.x, points.y]), axis=1).shape[1]
+    positions = points.places[0].count
     needed = MINIMUM_POSITIONS + 2 * points.planar
     if positions < needed:
         raise FitError(
