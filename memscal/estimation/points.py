@@ -107,16 +107,14 @@ class ScanPoints:
     @cached_property
     def step(self) -> float:
         """Typical distance of neighbouring positions, in m; of several scans the smallest."""
-        along_x = self.free[:, 0]
-        return min(p.steps[0 if x else 1] for p, x in zip(self.places, along_x, strict=True))
+        # Along x, but for a line along y.
+        return min(places.steps[0] or places.steps[1] for places in self.places)
 
     @property
     def cell(self) -> float:
         """Area of the plane for each place of a raster, in m^2."""
-        planar = self.free.all(axis=1)
-        return self.step * min(
-            p.steps[1] for p, is_planar in zip(self.places, planar, strict=True) if is_planar
-        )
+        # A line has no step across it.
+        return self.step * min(places.steps[1] for places in self.places if all(places.steps))
 
     def only(self, scan: int) -> ScanPoints:
         """Return one of the scans."""

@@ -109,7 +109,7 @@ def _even_axis(positions: FloatArray) -> EvenAxis | None:
     # One of the gaps is about the step; the others are noise and missing rows.
     candidates = np.unique(gaps[gaps > max(_ROUNDING, 1e-9 * np.ptp(positions))])[::-1]
     if candidates.size > _CANDIDATES:
-        candidates = candidates[np.linspace(0, candidates.size - 1, _CANDIDATES).astype(int)]
+        candidates = candidates[np.geomspace(1, candidates.size, _CANDIDATES).astype(int) - 1]
     for step in candidates:
         number = np.concatenate([[0], np.cumsum(np.rint(gaps / step))])
         axis = _fitted(positions[order], number)
