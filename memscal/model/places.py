@@ -61,7 +61,8 @@ class EvenAxis:
 def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
     """Group points by place: equal positions, and of several passes those close to each other.
 
-    Close is a tenth of the usual distance within a pass.  On a plane the readings at one node of an even lattice share a place too.
+    Close is a tenth of the usual distance within a pass.  On a plane the readings at one node of
+    an even lattice share a place too.
 
     Parameters
     ----------
