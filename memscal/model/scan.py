@@ -14,7 +14,7 @@ from memscal.errors import InputError
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import SourceFile
-from memscal.model.scan_checks import checked_correlation, require_contacts
+from memscal.model.scan_checks import checked_correlation, require_contacts, require_plane
 from memscal.model.stress import StressProfile
 from memscal.model.validation import (
     FloatArray,
@@ -25,9 +25,6 @@ from memscal.model.validation import (
 )
 
 __all__ = ["Scan", "StressSensor"]
-
-#: Points that spread by less of their length across it are a line.
-_LINE = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +213,7 @@ class Scan:
         if self.kind in ("line", "raster"):
             return self  # one pass
         if self.kind == "repeats":
-            keep = np.asarray(numbers)
+            keep = np.atleast_1d(numbers)
         else:
             keep = np.flatnonzero(np.isin(self.passes, numbers))
             names = ("x", "y", "repeat", "x_errors")
@@ -250,20 +247,7 @@ class Scan:
                 "themselves.",
             )
         if self.kind == "points" and self.y is not None:
-            self._require_plane(self.y)
-
-    def _require_plane(self, y: FloatArray) -> None:
-        spread = float(np.ptp(self.x)), float(np.ptp(y))
-        thin = int(np.argmin(spread))
-        if spread[thin] <= _LINE * spread[1 - thin]:
-            cure = "Leave y out." if thin else "Give the positions along y as x; direction='y'."
-            raise InputError(
-                f"The points spread over {spread[0] * 1e3:.4g} mm along x and "
-                f"{spread[1] * 1e3:.4g} mm along y.",
-                why=f"With less than {_LINE:.0%} of the one along the other they are a line, which "
-                "tells no centre across it.",
-                cure=cure,
-            )
+            require_plane(self.x, self.y)
 
     def _like_signal(self, name: str, values: FloatArray) -> FloatArray:
         array = frozen_array(values)
