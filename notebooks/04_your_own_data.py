@@ -116,8 +116,8 @@ run(
 # in proportion at the others. `--load-scatter`, in percent, is each contact's own, as of a lens
 # that is set down by hand: it is noise, and repeats average it.
 #
-# Read the notes. They say how many places and lines were found, what is missing, and how far a
-# reading lies from its place. Had the load that was set not been named among the columns of
+# Read the notes. They say how many readings, lines and places the table holds, and what is
+# missing. Had the load that was set not been named among the columns of
 # `--repeat`, the contacts of three loads would stand in one line, and the import would warn of it.
 #
 # ## 3. Look at the scans

@@ -64,7 +64,7 @@ def make_profile(**changes: Any) -> StressProfile:
 
 
 def make_scan(kind: str = "line", **changes: Any) -> Scan:
-    """A Gaussian response, as a line, as repeats or as a raster, with a missing point."""
+    """A Gaussian response: a line, repeats, a raster or points; with a missing point."""
     x = np.linspace(-8e-3, 8e-3, 33)
     y = np.linspace(-4e-3, 4e-3, 9)
     u = 3e-3 * np.exp(-(x**2) / (2 * 1.2e-3**2))
@@ -72,11 +72,15 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
         u = np.stack([u, 1.01 * u, 0.99 * u])
     elif kind == "raster":
         u = u * np.exp(-(y[:, None] ** 2) / (2 * 1.2e-3**2))
+    elif kind == "points":
+        y = np.linspace(-4e-3, 4e-3, 33)[np.arange(33) * 7 % 33]
+        u = u * np.exp(-(y**2) / (2 * 1.2e-3**2))
     u = u.copy()
     u[..., 5] = np.nan
     scan = Scan(
         x=x,
-        y=y if kind == "raster" else None,
+        y=y if kind in ("raster", "points") else None,
+        repeat=np.arange(33) % 3 + 1 if kind == "points" else None,
         u_zz=u,
         u_zz_errors=np.full(u.shape, 1e-5),
         normal_load=np.full(u.shape, 1.01),

@@ -42,6 +42,20 @@ def estimated(scan: Scan) -> ProfileEstimate:
     return estimate_profile(points, reference_spectrum(contact, points, scan.film.thickness))
 
 
+def as_points(scan: Scan, seed: int = 0) -> Scan:
+    """Return the same readings as single points, in random order."""
+    order = np.random.default_rng(seed).permutation(scan.u_zz.size)
+    x, y = (positions.ravel()[order] for positions in scan.positions)
+    along = y if scan.direction == "y" else x
+    names = ("u_zz", "u_zz_errors", "normal_load", "normal_load_errors")
+    values = {name: getattr(scan, name) for name in names if getattr(scan, name) is not None}
+    if scan.x_errors is not None:
+        values["x_errors"] = np.broadcast_to(scan.x_errors, scan.u_zz.shape)
+    changes = {name: array.ravel()[order] for name, array in values.items()}
+    changes |= {"x": along, "y": y} if scan.planar else {"x": along}
+    return replace(scan, **changes, repeat=scan.passes.ravel()[order], channels={})
+
+
 def plane_error(r: np.ndarray, found: np.ndarray, truth: np.ndarray) -> float:
     """Relative L2 error over the plane, for a radial function on even radii."""
     return float(np.sqrt(np.sum(r * (found - truth) ** 2) / np.sum(r * truth**2)))

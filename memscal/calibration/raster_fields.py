@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from memscal.axisymmetry.grids import Lattice, on_grid
 from memscal.calibration.fields import GridChoice, taper
@@ -15,12 +16,12 @@ from memscal.errors import InputError
 from memscal.estimation.ellipse import elliptic_departure
 from memscal.estimation.gaussian_fit import GaussianFit
 from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.model.places import EvenAxis, even_lattice
 from memscal.model.validation import FloatArray
 
 __all__ = ["RasterFields"]
 
 _REFINEMENT = 5
-_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,20 +46,45 @@ class RasterFields:
     support: float
     step: float
     oval: _Oval
-    index: tuple[FloatArray, FloatArray]
+    index: tuple[NDArray[np.intp], NDArray[np.intp]]
 
     @classmethod
-    def place(cls, estimate: ProfileEstimate, choice: GridChoice) -> RasterFields:
-        """Place the raster, and continue it by the fitted profile."""
+    def place(cls, estimate: ProfileEstimate, choice: GridChoice, *, divided: bool) -> RasterFields:
+        """Place the raster, and continue it by the fitted profile.
+
+        ``divided``: whether its field is divided, and so needs an even lattice; else points off
+        any lattice get one of their own step, which the fitted profile fills alone.
+
+        Raises
+        ------
+        InputError
+            If it is divided, and the points lie on no even lattice.
+        """
         points = estimate.points
-        x, columns = _even_axis("x", points.x, choice.extent)
-        y, rows = _even_axis("y", points.y, choice.extent)
+        lattice = even_lattice(points.x, points.y, points.places[0].count)
+        if lattice is None and divided:
+            raise InputError(
+                f"The raster's {points.u.size} points are not evenly spaced: they lie on no "
+                "lattice of rows and columns within a tenth of its step.",
+                why="This method divides a raster as a field, on its own lattice.",
+                cure='Use method="evidence" (--method evidence), which needs no lattice; or scan '
+                "evenly.",
+            )
+        if lattice is None:
+            steps, nowhere = points.places[0].steps, np.zeros(0, dtype=np.intp)
+            lattice = (
+                EvenAxis(float(points.x.min()), steps[0], nowhere),
+                EvenAxis(float(points.y.min()), steps[1], nowhere),
+            )
+        x, columns = _continued(lattice[0], float(np.ptp(points.x)), choice.extent)
+        y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
         voltage = on_grid(estimate.spectrum.at, grid, step)
-        # A point that is missing keeps the profile; an outlier keeps most of it.
-        departure = estimate.weighed.residual * estimate.outlier_weight + estimate.oval
-        voltage[rows, columns] += departure / points.load
+        if rows.size:
+            # A point that is missing keeps the profile; an outlier keeps most of it.
+            departure = estimate.weighed.residual * estimate.outlier_weight + estimate.oval
+            voltage += _mean_at(voltage.shape, (rows, columns), departure / points.load)
         stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
         oval = _Oval(estimate.gaussian)
         index = (rows, columns)
@@ -104,21 +130,20 @@ def _about_zero(axis: FloatArray) -> FloatArray:
     return np.asarray(axis - axis[axis.size // 2])
 
 
-def _even_axis(name: str, positions: FloatArray, extent: float) -> tuple[FloatArray, FloatArray]:
-    """Continue a raster's axis on both sides, to an odd number of points; index the points."""
-    unique = np.unique(positions)
-    reach = unique[-1] - unique[0]
-    # Whole rows or columns may be missing: steps are counted, not positions.
-    steps = int(np.rint(reach / np.median(np.diff(unique))))
-    step = reach / steps
-    index = (positions - unique[0]) / step
-    if np.any(np.abs(index - np.rint(index)) > _TOLERANCE * steps):
-        raise InputError(
-            f"The raster's {name} positions are not evenly spaced.",
-            why="A raster is transformed as it is, on its own lattice.",
-            cure="Import it with positions snapped to a grid, or scan evenly.",
-        )
-    padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * step))) + 1
+def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Continue a raster's axis on both sides, to an odd number of nodes; index the points."""
+    steps = int(np.rint(reach / axis.step))
+    padding = int(np.ceil(max(2 * extent - reach, 0.0) / (2 * axis.step))) + 1
     count = steps + 1 + 2 * padding + steps % 2
-    axis = unique[0] + step * (np.arange(count) - padding)
-    return axis, np.rint(index).astype(int) + padding
+    nodes = axis.start + axis.step * (np.arange(count) - padding)
+    return np.asarray(nodes, dtype=np.float64), axis.index + padding
+
+
+def _mean_at(
+    shape: tuple[int, ...], index: tuple[NDArray[np.intp], ...], values: FloatArray
+) -> FloatArray:
+    """Mean of the values at each node of a lattice, zero where there is none."""
+    total, number = np.zeros(shape), np.zeros(shape)
+    np.add.at(total, index, values)
+    np.add.at(number, index, 1.0)
+    return total / np.maximum(number, 1.0)

@@ -169,7 +169,7 @@ def solve(
     estimate = estimate_profile(joined_points(parts), *references)
     band = find_band(estimate)
     choice = choose_grid(estimate, band)
-    fields = prepare_fields(estimate, choice)
+    fields = prepare_fields(estimate, choice, divided=regulariser.name != "evidence")
     return Solution(
         scans=tuple(scans),
         stresses=tuple(stresses),
@@ -200,10 +200,15 @@ def require_channel_method(channel: str, regulariser: Regulariser) -> None:
         )
 
 
-def prepare_fields(estimate: ProfileEstimate, choice: GridChoice) -> Fields:
-    """Lift the profile of lines or of several scans, or place a raster as it was measured."""
+def prepare_fields(
+    estimate: ProfileEstimate, choice: GridChoice, *, divided: bool = True
+) -> Fields:
+    """Lift the profile of lines or of several scans, or place a raster as it was measured.
+
+    ``divided``: whether a raster's field is divided, for which it needs an even lattice.
+    """
     if estimate.points.as_raster:
-        return RasterFields.place(estimate, choice)
+        return RasterFields.place(estimate, choice, divided=divided)
     return LineFields.lift(estimate, choice)
 
 

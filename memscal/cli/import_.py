@@ -38,7 +38,7 @@ Examples:
   memscal import scan.csv -o scan.h5 --x position --x-unit mm --u voltage --u-unit mV
       --load 1 --radius 0.25 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
   memscal import raster.csv -o raster.h5 --x 1 --y 2 --x-unit um --u 5 --u-unit V
-      --repeats average --grid-tolerance 0.2 --load-column 4
+      --repeat 3 --load-column 4
       --radius 0.5 --young-modulus 2.2 --poisson-ratio 0.5 --thickness 2
   memscal import sphere.csv -o dry.h5 --x x --x-unit mm --u U --u-unit mV --load-column "load set"
       --repeat "load set" --repeat pass --load-scatter 2 --lubrication dry
@@ -55,7 +55,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 
 _SCAN_NAMES = [
     *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "u_xz", "u_yz"),
-    *("load_column", "load_unit", "load_uncertainty", "grid_tolerance", "repeats", "title"),
+    *("load_column", "load_unit", "load_uncertainty", "title"),
     *("lubrication", "lubricant"),
 ]
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
@@ -86,7 +86,9 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @click.option("--x-unit", metavar="UNIT", help="Scan: unit of the positions, such as mm.")
 @click.option("--u", metavar="COLUMN", help="Scan: column of the normal channel's voltage.")
 @click.option("--u-unit", metavar="UNIT", help="Scan: unit of the voltages, such as mV.")
-@click.option("--y", metavar="COLUMN", help="Raster scan: column of the second position.")
+@click.option(
+    "--y", metavar="COLUMN", help="Scan: column of the second position, of points in a plane."
+)
 @click.option(
     "--repeat",
     metavar="COLUMN",
@@ -134,19 +136,6 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
     type=click.Choice(["1", "-1"]),
     help="Scan: -1 where the voltage falls when the indenter presses.  [default: 1]",
 )
-@click.option(
-    "--grid-tolerance",
-    type=float,
-    metavar="SHARE",
-    help="Scan: largest distance of a reading from its place, as a share of the grid's step.  "
-    "[default: 0.1]",
-)
-@click.option(
-    "--repeats",
-    type=click.Choice(["keep", "average"]),
-    help="Scan: what to do with repeated readings; averages leave out outlying readings and name "
-    "them.  [default: keep]",
-)
 @click.option("--sensor-name", metavar="TEXT", help="Scan: name of the sensor.")
 @click.option("--sensor-model", metavar="TEXT", help="Scan: model of the sensor.")
 @click.option("--channel", metavar="TEXT", help="Scan: name of the channel.  [default: zz]")
@@ -175,9 +164,9 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **given: Any) -> int:
     """Convert a TABLE (CSV) to a scan or to a reference, or a mesh (VTU, VTK, XDMF) to a reference.
 
-    A table says neither its units nor what was pressed on what: the options do. What was done to
-    the readings (places found, points missing, repeats averaged) is printed, and kept in the
-    notes of the file.
+    A table says neither its units nor what was pressed on what: the options do. Readings are kept
+    as they are. How many readings, repeats and places were read, and what is missing, is printed,
+    and kept in the notes of the file.
     """
     given["repeat"] = given["repeat"] or None
     _check_usage(table, kind, given)

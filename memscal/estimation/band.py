@@ -146,6 +146,6 @@ def _planar_noise(estimate: ProfileEstimate) -> FloatArray:
     A raster is used as it is, so that every point brings its noise, be there signal or not.
     """
     points = estimate.points
-    cell = points.step * float(np.median(np.diff(np.unique(points.y))))
+    share = points.cell / points.of_places("readings")
     noise = estimate.noise / points.load * estimate.outlier_weight
-    return np.full(estimate.model.k.size, cell * np.sqrt(np.sum(noise**2)))
+    return np.full(estimate.model.k.size, np.sqrt(np.sum((share * noise) ** 2)))

@@ -83,7 +83,7 @@ def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | N
             cure=f"Import it (memscal import --{name.replace('_', '-')} COLUMN), or calibrate "
             "channel zz.",
         )
-    if scan.kind == "raster":
+    if scan.planar:
         raise InputError(
             f"Channel {channel} cannot be calibrated with a raster.",
             why="A raster is used as a field, and the shear's has a line of zeros through it.",

@@ -104,8 +104,10 @@ def _bessel(
     Where the argument is small the recurrence loses digits and the function is nothing: its
     power series' first term decides.
     """
-    x = np.multiply.outer(radius, k)
-    even, below, above = [bessel0], bessel0, bessel1
+    # Repeats share their positions.
+    unique, first, back = np.unique(radius, return_index=True, return_inverse=True)
+    x = np.multiply.outer(unique, k)
+    even, below, above = [bessel0], bessel0[first], bessel1[first]
     factorial = 1.0
     for order in range(2, 2 * _HARMONICS):
         small = x < 0.1 * order
@@ -115,5 +117,5 @@ def _bessel(
         upward = 2 * (order - 1) / safe * above - below
         below, above = above, np.where(small, series, upward)
         if order % 2 == 0:
-            even.append(above)
+            even.append(above[back])
     return even

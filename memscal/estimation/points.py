@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.estimation.channels import channel_order, channel_signal
+from memscal.model.places import Places, places_of
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
@@ -91,13 +92,29 @@ class ScanPoints:
         return 2 if self.planar else int(self.free.any(axis=0).all())
 
     @cached_property
-    def step(self) -> float:
-        """Median distance of neighbouring positions, in m; of several scans the smallest."""
-        return min(self._step(i) for i in range(self.scans))
+    def places(self) -> tuple[Places, ...]:
+        """The places of each scan's points."""
+        chosen = [self.scan == scan for scan in range(self.scans)]
+        return tuple(places_of(self.x[i], self.y[i], self.repeat[i]) for i in chosen)
 
-    def _step(self, scan: int) -> float:
-        along = self.x if self.free[scan, 0] else self.y
-        return float(np.median(np.diff(np.unique(along[self.scan == scan]))))
+    def of_places(self, name: str) -> NDArray[np.intp]:
+        """Return ``index``, ``row`` or ``readings`` of the places for all points, shape (n,)."""
+        values = np.empty(self.u.size, dtype=np.intp)
+        for scan, places in enumerate(self.places):
+            values[self.scan == scan] = getattr(places, name)
+        return values
+
+    @cached_property
+    def step(self) -> float:
+        """Typical distance of neighbouring positions, in m; of several scans the smallest."""
+        # Along x, but for a line along y.
+        return min(places.steps[0] or places.steps[1] for places in self.places)
+
+    @property
+    def cell(self) -> float:
+        """Area of the plane for each place of a raster, in m^2."""
+        # A line has no step across it.
+        return self.step * min(places.steps[1] for places in self.places if all(places.steps))
 
     def only(self, scan: int) -> ScanPoints:
         """Return one of the scans."""
@@ -155,7 +172,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     """
     u, errors = channel_signal(scan, channel)
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
-    x, y, repeat = _positions(scan)
+    x, y = scan.positions
+    repeat = scan.passes
     keep = measured_mask(scan, channel)
     if not keep.any():
         raise InputError(
@@ -172,7 +190,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         x_errors=np.zeros(int(keep.sum())) if scan.x_errors is None else _along(scan)[keep],
         repeat=repeat[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
-        free=np.array([[scan.direction == "x", scan.direction == "y" or scan.kind == "raster"]]),
+        free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
         missing=int(u.size - keep.sum()),
         decorrelation=None if channel_order(channel) else _decorrelation(scan, keep),
         channel=channel,
@@ -252,17 +270,6 @@ def _along(scan: Scan) -> FloatArray:
     return np.broadcast_to(np.asarray(scan.x_errors), scan.u_zz.shape)
 
 
-def _positions(scan: Scan) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
-    shape = scan.u_zz.shape
-    x = np.broadcast_to(scan.x, shape)
-    if scan.y is not None:
-        return x, np.broadcast_to(scan.y[:, None], shape), np.zeros(shape, dtype=np.intp)
-    rows = np.arange(shape[0] if scan.kind == "repeats" else 1, dtype=np.intp)
-    repeat = np.repeat(rows, scan.x.size).reshape(shape)
-    across = np.zeros(shape)
-    return (across, x, repeat) if scan.direction == "y" else (x, across, repeat)
-
-
 def _stated_errors(
     errors: FloatArray | None, keep: NDArray[np.bool_], channel: str
 ) -> FloatArray | None:
@@ -278,7 +285,7 @@ def _stated_errors(
 
 
 def _require_usable(points: ScanPoints) -> None:
-    positions = np.unique(np.stack([points.x, points.y]), axis=1).shape[1]
+    positions = points.places[0].count
     needed = MINIMUM_POSITIONS + 2 * points.planar
     if positions < needed:
         raise FitError(

@@ -45,6 +45,8 @@ __all__ = [
 _DECAY = 0.5
 _FARTHEST = 8
 _LEAST_SKEWNESS = 1e-3
+#: Columns of the design differ within a place where more than this share of them does.
+_APART = 1e-6
 #: With fewer independent residuals there is nothing to test.
 FEWEST_RESIDUALS = 3
 
@@ -149,26 +151,40 @@ def chi_square_test(residuals: Residuals) -> TestOutcome:
 def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
     r"""Test the misfit against the scatter of repeats: F of lack of fit over pure error.
 
-    Repeats at one position and load scatter by noise alone, whatever G; with their mean square
-    :math:`s^2` of :math:`m` degrees, a misfit of :math:`l` degrees gives :math:`F(l, m)`.
+    Repeats at one place and load scatter by noise alone, whatever G.  With a mean of its own for
+    each place beside the design, what is left has :math:`m` degrees and the mean square
+    :math:`s^2`; what the means took, of :math:`l` degrees, gives :math:`F(l, m)`.  That is exact
+    also where the repeats lie only near each other (Christensen, Ann. Stat. 17, 1989): the design
+    tells them apart.
 
     Returns
     -------
     TestOutcome or None
-        ``None`` where no position was measured twice at one load.
+        ``None`` where no place was measured twice at one load.
     """
     model, points = free_model(estimate), estimate.points
-    place = np.stack([points.scan, points.x, points.y, points.load], axis=1)[model.kept]
+    place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.kept]
     group = np.unique(place, axis=0, return_inverse=True)[1].ravel()
     if points.decorrelation is not None or group.max() + 1 == group.size:
         return None
     weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.kept]
-    mean = np.bincount(group, weight * model.data) / np.bincount(group, weight**2)
-    scatter = model.data - weight * mean[group]
+    square = np.bincount(group, weight**2)
+
+    def within(columns: FloatArray) -> FloatArray:
+        """Take from each column its weighted mean at each place."""
+        mean = (
+            np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1) / square[:, None]
+        )
+        return np.asarray(columns - weight[:, None] * mean[group])
+
     basis = _orthonormal(model.design)
     left_over = model.data - basis @ (basis.T @ model.data)
+    near, singular, _ = np.linalg.svd(within(basis), full_matrices=False)
+    near = near[:, singular > _APART]
+    scatter = within(model.data[:, None])[:, 0]
+    scatter = scatter - near @ (near.T @ scatter)
     pure = float(scatter @ scatter)
-    pure_degrees = group.size - int(group.max()) - 1
+    pure_degrees = group.size - int(group.max()) - 1 - near.shape[1]
     misfit = max(float(left_over @ left_over) - pure, 0.0)
     degrees = group.size - basis.shape[1] - pure_degrees
     if degrees < FEWEST_RESIDUALS or pure_degrees < FEWEST_RESIDUALS or pure == 0.0:
@@ -278,7 +294,7 @@ def _passes(estimate: ProfileEstimate) -> tuple[NDArray[np.intp], NDArray[np.int
     points = estimate.points
     runs_along_x = points.free[points.scan, 0]
     along = np.where(runs_along_x, points.x, points.y)
-    across = np.where(runs_along_x, points.y, points.x)
+    across = np.where(runs_along_x, points.of_places("row"), 0)
     order = np.lexsort((along, across, points.repeat, points.scan))
     keys = np.stack([points.scan, points.repeat, across])[:, order]
     new = np.concatenate([[0], np.any(np.diff(keys, axis=1) != 0, axis=0)])

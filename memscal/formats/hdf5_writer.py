@@ -110,27 +110,28 @@ def _write_number(file: Any, path: str, node: Number) -> None:
 
 
 def _write_text(file: Any, path: str, text: str) -> None:
-    encoded, dtype = _fixed_text(text)
-    file.create_dataset(path, data=np.array(encoded, dtype=dtype), track_times=False)
+    file.create_dataset(path, data=_plain_text(text), dtype=_text_type(), track_times=False)
 
 
 def _write_attribute(item: Any, name: str, value: Attribute) -> None:
     if isinstance(value, int):
         item.attrs.create(name, value, dtype=np.int64)
     elif isinstance(value, tuple):
-        item.attrs.create(name, np.array([text.encode("ascii") for text in value]))
+        texts = [_plain_text(text) for text in value]
+        item.attrs.create(name, np.array(texts, dtype=object), dtype=_text_type())
     else:
-        encoded, dtype = _fixed_text(value)
-        item.attrs.create(name, np.array(encoded, dtype=dtype), dtype=dtype)
+        item.attrs.create(name, _plain_text(value), dtype=_text_type())
 
 
-def _fixed_text(text: str) -> tuple[bytes, Any]:
-    """Encode text for a fixed-length string: no heap, so the same text gives the same bytes."""
+def _text_type() -> Any:
+    """Text of variable length in UTF-8, as most programs write it."""
     from memscal.formats.hdf5_library import h5py
 
-    encoded = printable(text, len(text)).encode("utf-8", "replace")
-    charset = "ascii" if encoded.isascii() else "utf-8"
-    return encoded, h5py.string_dtype(charset, max(1, len(encoded)))
+    return h5py.string_dtype("utf-8")
+
+
+def _plain_text(text: str) -> bytes:
+    return printable(text, len(text)).encode("utf-8", "replace")
 
 
 def _attach_scales(file: Any, root: Group) -> None:

@@ -32,7 +32,7 @@ from memscal.formats.parts import (
     sample_group,
 )
 from memscal.formats.schema import SCAN_SCHEMA
-from memscal.formats.tree import Group, Node, index_axis, note, si
+from memscal.formats.tree import Group, Node, Number, index_axis, note, si
 from memscal.model.scan import Scan
 
 __all__ = ["read_scan", "write_scan"]
@@ -42,8 +42,9 @@ _DATA = "/entry/data"
 _SAMPLE = "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
+_POINTS = ("point",)
 # One name for each axis of the correlation: netCDF tools want each dimension once.
-_POINTS = ("point", "point_prime")
+_PAIRS = ("point", "point_prime")
 _SYNTHETIC = (
     "The data of this file are synthetic: calculated from the known truth below, not measured."
 )
@@ -91,7 +92,9 @@ def scan_from(file: SafeFile) -> Scan:
     load = require_scalar(file, "/entry/indenter/load", "force")
     film = read_film(file, f"{_SAMPLE}/film")
     indenter = read_round_indenter(file, "/entry/indenter")
-    along_y = _check_axes(file) in _ALONG_Y.values()
+    axes = _check_axes(file)
+    only_y = axes == _POINTS and not file.has(f"{_DATA}/x")
+    along_y = only_y or axes in _ALONG_Y.values()
     along = "y" if along_y else "x"
     channels = {
         name: require_array(file, f"{_DATA}/{name}", "voltage")
@@ -105,6 +108,7 @@ def scan_from(file: SafeFile) -> Scan:
     return Scan(
         x=require_array(file, f"{_DATA}/{along}", "length", ndim=1),
         y=None if along_y else optional_array(file, f"{_DATA}/y", "length", ndim=1),
+        repeat=file.array(f"{_DATA}/repeat") if _numbered(file, axes) else None,
         x_errors=optional_array(file, f"{_DATA}/{along}_errors", "length", ndim=1),
         direction=along,
         position_scale_uncertainty=optional_scalar(
@@ -174,23 +178,27 @@ def _entry(scan: Scan) -> Group:
 
 
 def _data_group(scan: Scan) -> Group:
-    axes = _ALONG_Y[scan.kind] if scan.direction == "y" else _AXES[scan.kind]
-    along = axes[-1]
+    along, points = scan.direction, scan.kind == "points"
+    axes = _POINTS if points else (_ALONG_Y if along == "y" else _AXES)[scan.kind]
     data: dict[str, Node] = {}
+    if points:
+        data["point"] = index_axis("point", scan.x.size)
     if scan.y is not None:
-        data["y"] = si(scan.y, "length", ("y",))
-    if scan.kind == "repeats":
+        data["y"] = si(scan.y, "length", axes if points else ("y",))
+    if scan.repeat is not None:
+        data["repeat"] = Number(scan.repeat, "1", axes)
+    elif scan.kind == "repeats":
         data["repeat"] = index_axis("repeat", scan.u_zz.shape[0])
-    data[along] = si(scan.x, "length", (along,))
+    data[along] = si(scan.x, "length", axes if points else (along,))
     if scan.x_errors is not None:
-        data[f"{along}_errors"] = si(scan.x_errors, "length", (along,))
+        data[f"{along}_errors"] = si(scan.x_errors, "length", axes if points else (along,))
     if scan.position_scale_uncertainty is not None:
         data["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
     data["u_zz"] = si(scan.u_zz, "voltage", axes)
     if scan.u_zz_correlation is not None:
-        for axis in _POINTS:
+        for axis in _PAIRS:
             data[axis] = index_axis(axis, scan.u_zz_correlation.shape[0])
-        data["u_zz_correlation"] = si(scan.u_zz_correlation, "dimensionless", _POINTS)
+        data["u_zz_correlation"] = si(scan.u_zz_correlation, "dimensionless", _PAIRS)
     if scan.u_zz_errors is not None:
         data["u_zz_errors"] = si(scan.u_zz_errors, "voltage", axes)
     if scan.normal_load is not None:
@@ -209,13 +217,14 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
         axes = tuple(axes.replace(":", " ").replace(",", " ").split())
     if axes is None:
         return None
-    if not isinstance(axes, tuple) or axes not in (*_AXES.values(), *_ALONG_Y.values()):
+    if axes not in (_POINTS, *_AXES.values(), *_ALONG_Y.values()):
         raise FormatError(
             f"{file.where(_DATA)}@axes is {axes}.",
-            why="A scan is stored along [x], [repeat, x], [y], [repeat, y] or, a raster, [y, x].",
+            why="A scan is stored along [x], [repeat, x], [y], [repeat, y], [y, x] (a raster) or "
+            "[point].",
             cure="Transpose the data, or correct the attribute.",
         )
-    if ("y" in axes) != file.has(f"{_DATA}/y"):
+    if axes != _POINTS and ("y" in axes) != file.has(f"{_DATA}/y"):
         stated = "names y, but there is no" if "y" in axes else "does not name y, but there is a"
         raise FormatError(
             f"{file.where(_DATA)}@axes {stated} {_DATA}/y.",
@@ -223,6 +232,11 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
             cure="Add the missing axis, or correct the attribute.",
         )
     return axes
+
+
+def _numbered(file: SafeFile, axes: tuple[str, ...] | None) -> bool:
+    """Whether each point has the number of its pass; else ``repeat`` only counts rows."""
+    return axes == _POINTS and file.has(f"{_DATA}/repeat")
 
 
 def _synthetic_group(truth: Mapping[str, float | str]) -> Group:

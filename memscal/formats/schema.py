@@ -19,7 +19,7 @@ SCAN_SCHEMA = "memscal-scan"
 REFERENCE_SCHEMA = "memscal-reference"
 ARTIFACT_SCHEMA = "memscal-artifact"
 STRESS_SCHEMA = "memscal-stress"
-SCHEMA_VERSION = "1.0.0"
+SCHEMA_VERSION = "1.1.0"
 
 SCHEMA_ATTRIBUTE = "memscal_schema"
 VERSION_ATTRIBUTE = "memscal_schema_version"

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from memscal.errors import InputError, UnitError
 from memscal.formats.csv_table import Table, read_table
-from memscal.formats.placement import place_readings
 from memscal.formats.reference_profile import ImportedProfile
 from memscal.formats.reference_table import read_reference_table
 from memscal.formats.units import to_si
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.places import places_of
 from memscal.model.scan import Scan, StressSensor
 from memscal.model.validation import FloatArray
 
@@ -24,6 +24,9 @@ __all__ = ["ImportedProfile", "ImportedScan", "read_reference_table", "read_scan
 
 Column = str | int
 
+#: Positions closer than this share of the typical spacing are probably one place, and a table with
+#: so large a share of them was probably repeated.
+_CLOSE, _MANY = 0.1, 0.25
 #: Loads of one line that differ by more than this share were hardly meant to be one.
 _MIXED = 0.3
 
@@ -59,8 +62,6 @@ def read_scan_table(
     lubricant: str = "",
     u_scale: float | None = None,
     u_sign: int = 1,
-    grid_tolerance: float = 0.1,
-    repeats: str = "keep",
     sensor: StressSensor | None = None,
     title: str = "",
     delimiter: str | None = None,
@@ -68,9 +69,9 @@ def read_scan_table(
 ) -> ImportedScan:
     """Read a scan from a table with one row per reading.
 
-    A line scan without repeats keeps its positions as they are.  Repeats of a line are
-    brought to common places, and a raster (``y`` given) to an evenly spaced grid; places
-    without a reading become NaN.
+    Positions and readings are kept as they are, in the order of the file.  Without ``y`` and
+    ``repeat`` they are a line; repeats over exactly the same positions become rows of one array
+    (repeat, x); all else is a scan of single points.
 
     Parameters
     ----------
@@ -85,9 +86,9 @@ def read_scan_table(
     load : float, optional
         Nominal load in N; by default the median of ``load_column``.
     y : str or int, optional
-        Column of the second position, for a raster.
+        Column of the second position, of points in a plane.
     repeat : str or int, or several, optional
-        Column that numbers the repeats; without it equal positions are counted in file order.
+        Column that numbers the repeats.
         Of several columns each combination is a line: of the load that was set and of the pass,
         where a table holds several of both.
     u_xz, u_yz, load_column : str or int, optional
@@ -109,12 +110,6 @@ def read_scan_table(
     u_sign : {1, -1}
         -1 where the voltage falls under compression, as with swapped leads: ``u`` is turned, and
         the notes of the scan record it.  The other channels stay as they are.
-    grid_tolerance : float
-        Largest distance of a reading from its place, as a fraction of the grid's step.
-    repeats : {"keep", "average"}
-        What to do with repeats.  A raster can only average: the mean of each place, with a
-        standard uncertainty from the spread pooled over all places.  Outlying readings are
-        left out of the mean and named in the notes.
     sensor, title
         Carried into the scan.
     delimiter, decimal : str, optional
@@ -128,24 +123,10 @@ def read_scan_table(
     Raises
     ------
     InputError
-        If a column is missing, or the positions do not fit a grid within the tolerance.
+        If a column is missing, or no row has a position.
     UnitError
         If ``u_unit`` is not a voltage and no ``u_scale`` is given.
     """
-    if repeats not in ("keep", "average"):
-        raise InputError(f'repeats is "{repeats}".', cure='Give "keep" or "average".')
-    if not (np.isfinite(grid_tolerance) and 0 < grid_tolerance < 0.5):
-        raise InputError(
-            f"The grid tolerance is {grid_tolerance:g} of the step, but it must lie between 0 and "
-            "0.5.",
-            why="Beyond half a step a reading has no nearest place.",
-        )
-    if load_scatter is not None and repeats == "average":
-        raise InputError(
-            "load_scatter is given, but repeats are averaged.",
-            why="The mean of several contacts has a smaller scatter than one of them.",
-            cure='Keep the repeats (repeats="keep").',
-        )
     if u_sign not in (1, -1):
         raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
     table = read_table(path, delimiter=delimiter, decimal=decimal)
@@ -174,31 +155,29 @@ def read_scan_table(
         raise InputError(
             "The load of the scan is not given.", cure="Give the load in N, or its column."
         )
-    placed = place_readings(
-        columns,
-        xs=to_si(table.column(x), x_unit, "length", table.where(x)),
-        ys=None if y is None else to_si(table.column(y), x_unit, "length", table.where(y)),
-        numbers=None if repeat is None else _lines(table, repeat, notes),
-        tolerance=grid_tolerance,
-        averaged=repeats == "average",
-        notes=notes,
-    )
-    fields = dict(placed.fields)
-    loads = fields.pop("normal_load", None)
-    if load_scatter is not None and loads is None:
-        loads = np.full(fields["u_zz"].shape, load)
+    if load_scatter is not None and "normal_load" not in columns:
+        columns["normal_load"] = np.full(columns["u_zz"].shape, load)
+    columns["x"] = to_si(table.column(x), x_unit, "length", table.where(x))
+    if y is not None:
+        columns["y"] = to_si(table.column(y), x_unit, "length", table.where(y))
+    if repeat is not None:
+        columns["repeat"] = _lines(table, repeat, notes)
+    columns = _placed(columns, notes)
+    notes += _counted(columns)
     messages = import_notes(notes)
-    if loads is not None and placed.y is None:
-        messages += _mixed_loads(loads, indenter)
+    if "y" not in columns and "normal_load" in columns:
+        messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), indenter)
+    arrays = _as_rows(columns)
+    loads = arrays.get("normal_load")
     scan = Scan(
-        x=placed.x,
-        y=placed.y,
-        x_errors=None if x_error is None else np.full(placed.x.size, x_error),
-        u_zz=fields.pop("u_zz"),
-        u_zz_errors=placed.errors,
+        x=arrays["x"],
+        y=arrays.get("y"),
+        repeat=None if "repeat" not in arrays else arrays["repeat"].astype(np.int64),
+        x_errors=None if x_error is None else np.full(arrays["x"].size, x_error),
+        u_zz=arrays["u_zz"],
         normal_load=loads,
         normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
-        channels=fields,
+        channels={name: arrays[name] for name in ("u_xz", "u_yz") if name in arrays},
         load=load,
         load_uncertainty=load_uncertainty,
         lubrication=lubrication,
@@ -228,19 +207,85 @@ def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) ->
     return lines
 
 
-def _mixed_loads(loads: FloatArray, indenter: RoundIndenter) -> list[Message]:
+def _placed(columns: Mapping[str, FloatArray], notes: list[str]) -> dict[str, FloatArray]:
+    """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
+    stated = [columns[name] for name in ("x", "y", "repeat") if name in columns]
+    known = np.isfinite(stated).all(axis=0)
+    if not known.any():
+        raise InputError("No row of the table has a position.", cure="Check the columns.")
+    if not known.all():
+        notes.append(f"{int((~known).sum())} rows without a position were left out.")
+    kept = {name: values[known] for name, values in columns.items()}
+    if "repeat" in kept:
+        kept["repeat"] = np.unique(kept["repeat"], return_inverse=True)[1].astype(np.float64)
+    return kept
+
+
+def _counted(columns: Mapping[str, FloatArray]) -> list[str]:
+    """Say how many readings, repeats and places there are, and what is missing."""
+    x, y = columns["x"], columns.get("y", np.zeros(columns["x"].size))
+    repeat = columns.get("repeat", np.zeros(x.size)).astype(np.intp)
+    places = places_of(x, y, repeat)
+    number = int(repeat.max()) + 1
+    in_repeats = f" in {number} repeats" if number > 1 else ""
+    step = " x ".join(f"{step * 1e3:.4g}" for step in places.steps if step)
+    apart = f", typically {step} mm apart" if step else ""
+    reach = ", ".join(
+        f"{name} from {values.min() * 1e3:.4g} to {values.max() * 1e3:.4g} mm"
+        for name, values in (("x", x), ("y", y))
+        if name in columns
+    )
+    notes = [f"{x.size} readings{in_repeats} at {places.count} places{apart}; {reach}."]
+    missing = {name: int(np.isnan(values).sum()) for name, values in columns.items()}
+    notes += [
+        f"{count} values of {name} are missing (NaN)." for name, count in missing.items() if count
+    ]
+    full = number * places.count - x.size
+    if number > 1 and full > 0:
+        notes.append(f"{full} more would make every repeat complete.")
+    if "repeat" not in columns and "y" not in columns:
+        gaps = np.sort(np.diff(np.sort(x)))
+        # The gap in which half of the length lies: repeated positions do not change it.
+        typical = gaps[np.searchsorted(np.cumsum(gaps), 0.5 * np.ptp(x))] if np.ptp(x) else 0.0
+        close = int(np.sum(gaps < _CLOSE * typical))
+        if close > _MANY * x.size:
+            notes.append(
+                f"{close} of {x.size} positions lie closer to another than {_CLOSE:.0%} of the "
+                "typical spacing. If they are repeats, name the column that numbers them "
+                '(repeat="..."; --repeat COLUMN): then each is predicted from the others.'
+            )
+    return notes
+
+
+def _as_rows(columns: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
+    """Make rows of repeats over exactly the same positions; leave all other columns as they are."""
+    if "repeat" not in columns or "y" in columns:
+        return columns
+    number = int(columns["repeat"].max()) + 1
+    order = np.lexsort((columns["x"], columns["repeat"]))
+    if number > 1 and order.size % number:
+        return columns
+    rows = {name: values[order].reshape(number, -1) for name, values in columns.items()}
+    x = rows.pop("x")
+    if np.any(np.diff(x[0]) == 0) or np.any(x != x[0]) or np.any(np.diff(rows.pop("repeat"))):
+        return columns
+    return {"x": x[0], **rows}
+
+
+def _mixed_loads(
+    loads: FloatArray, repeat: FloatArray | None, indenter: RoundIndenter
+) -> list[Message]:
     """Warn of lines at several loads: only a rod's voltage is proportional to its load."""
-    lines = np.atleast_2d(loads)
-    known = lines[np.isfinite(lines).any(axis=1)]
-    low, high = np.nanmin(known, axis=1), np.nanmax(known, axis=1)
-    mixed = high - low > _MIXED * np.nanmedian(known, axis=1)
-    if isinstance(indenter, Rod) or not mixed.any():
+    line = np.zeros(loads.size) if repeat is None else repeat
+    of_lines = [loads[(line == i) & np.isfinite(loads)] for i in np.unique(line)]
+    mixed = [v for v in of_lines if v.size and np.ptp(v) > _MIXED * np.median(v)]
+    if isinstance(indenter, Rod) or not mixed:
         return []
-    i = int(np.argmax(mixed))
     text = (
-        f"The loads of a line go from {low[i]:.4g} to {high[i]:.4g} N, but each load has "
-        "a profile of its own. Name the column of the loads that were set among those that number "
-        'the repeats (repeat=("set load", "pass"); --repeat "set load" --repeat pass).'
+        f"The loads of a line go from {mixed[0].min():.4g} to {mixed[0].max():.4g} N, "
+        "but each load has a profile of its own. Name the column of the loads that were set among "
+        'those that number the repeats (repeat=("set load", "pass"); --repeat "set load" --repeat '
+        "pass)."
     )
     return [Message("mixed_loads", text, "warning")]
 

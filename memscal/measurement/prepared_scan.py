@@ -133,7 +133,7 @@ def _electronic(estimate: ProfileEstimate, of_load: FloatArray) -> float:
 
 def _distance(scan: Scan, centre: FloatArray) -> FloatArray:
     """Distance of every point of a scan from a centre, shape of ``u_zz``, in m."""
-    if scan.y is not None:
-        return np.asarray(np.hypot(scan.x - centre[0], scan.y[:, None] - centre[1]))
-    along = np.abs(scan.x - centre[0 if scan.direction == "x" else 1])
-    return np.asarray(np.broadcast_to(along, scan.u_zz.shape))
+    x, y = scan.positions
+    if scan.planar:
+        return np.asarray(np.hypot(x - centre[0], y - centre[1]))
+    return np.asarray(np.abs(y - centre[1] if scan.direction == "y" else x - centre[0]))

@@ -47,9 +47,9 @@ class SingleLoad:
 def single_loads(scan: Scan) -> tuple[SingleLoad, ...]:
     """Take a scan apart by load, the smallest first.
 
-    Lines (rows of ``u_zz``) whose median loads lie within 5 % of each other are repeats of one
-    load; its nominal value is the median of all of their recorded loads.  A scan that records no
-    loads is one part, at its own load.
+    Lines (rows of ``u_zz``, or points of one ``repeat``) whose median loads lie within 5 % of
+    each other are repeats of one load; its nominal value is the median of all of their recorded
+    loads.  A scan that records no loads is one part, at its own load.
 
     Raises
     ------
@@ -68,10 +68,11 @@ def single_loads(scan: Scan) -> tuple[SingleLoad, ...]:
     """
     if scan.normal_load is None:
         return (SingleLoad(scan, scan.load, scan.lubrication),)
-    if scan.kind != "repeats":
+    passes = scan.passes
+    if scan.kind != "repeats" and not passes.any():
         load = _line_load(scan, scan.normal_load, "")
         return (SingleLoad(replace(scan, load=load), load, scan.lubrication),)
-    rows = scan.normal_load
+    rows = [scan.normal_load[passes == i] for i in range(int(passes.max()) + 1)]
     loads = np.array([_line_load(scan, row, f", line {i + 1}") for i, row in enumerate(rows)])
     order = np.argsort(loads, kind="stable")
     starts = np.flatnonzero(np.diff(loads[order]) > _SAME_LOAD * loads[order][:-1]) + 1
@@ -97,26 +98,18 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
         raise InputError(
             f"{place_of(scan)}{line}: its loads go from {known.min():.4g} to {known.max():.4g} N.",
             why="A line is one profile, made at one load; each load has a stress of its own.",
-            cure="Store each load as a line of its own: u_zz with the axes (repeat, x).",
+            cure="Store each load as a line of its own: u_zz with the axes (repeat, x), or points "
+            "with a number in repeat.",
         )
     return load
 
 
 def _part(scan: Scan, rows: NDArray[np.intp]) -> SingleLoad:
-    assert scan.normal_load is not None
-    load = float(np.nanmedian(scan.normal_load[rows]))
-    only = replace(
-        scan,
-        u_zz=scan.u_zz[rows],
-        u_zz_errors=None if scan.u_zz_errors is None else scan.u_zz_errors[rows],
-        normal_load=scan.normal_load[rows],
-        normal_load_errors=(
-            None if scan.normal_load_errors is None else scan.normal_load_errors[rows]
-        ),
-        channels={name: values[rows] for name, values in scan.channels.items()},
-        load=load,
-        load_uncertainty=(
-            None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
-        ),
+    only = scan.only_passes(rows)
+    assert only.normal_load is not None
+    load = float(np.nanmedian(only.normal_load))
+    common = scan.load_uncertainty
+    uncertainty = None if common is None else common * load / scan.load
+    return SingleLoad(
+        replace(only, load=load, load_uncertainty=uncertainty), load, scan.lubrication
     )
-    return SingleLoad(only, load, scan.lubrication)

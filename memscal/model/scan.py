@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import SourceFile
-from memscal.model.scan_checks import checked_correlation, require_contacts
+from memscal.model.scan_checks import checked_correlation, require_contacts, require_plane
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray, finite_vector, frozen_array, require_non_negative
+from memscal.model.validation import (
+    FloatArray,
+    finite_vector,
+    frozen_array,
+    require_non_negative,
+    whole_numbers,
+)
 
 __all__ = ["Scan", "StressSensor"]
 
@@ -33,18 +40,32 @@ class StressSensor:
 class Scan:
     """Sensor voltage against the position of the indenter, with what it was measured on.
 
+    A scan has one of four forms, named by ``kind``:
+
+    ========= ============= ======== =========== =================================
+    kind      ``u_zz``      ``y``    ``repeat``  what it is
+    ========= ============= ======== =========== =================================
+    line      (n,)          none     none        one pass along a line
+    repeats   (repeat, n)   none     none        passes over the same positions
+    raster    (m, n)        (m,)     none        rows and columns
+    points    (n,)          (n,)     optional    readings anywhere in the plane
+    points    (n,)          none     (n,)        readings along a line, in passes
+    ========= ============= ======== =========== =================================
+
     Parameters
     ----------
     x : ndarray, shape (n,)
         Positions along the scan, in m; need not be sorted, centred or evenly spaced.
-    u_zz : ndarray, shape (n,), (repeat, n), or (m, n) where ``y`` is given
+    u_zz : ndarray, shape (n,), (repeat, n) or (m, n)
         Normal channel's voltage, in V; NaN marks a missing point.
     load : float
         Nominal load of the indenter, in N.
     indenter, film, sensor
         What was pressed, on what, measured by what.
-    y : ndarray, shape (m,), optional
-        Second axis of a raster scan, in m.
+    y : ndarray, shape (m,) of a raster, (n,) of points, optional
+        Second axis of a raster, or second position of each point, in m.
+    repeat : ndarray of int, shape (n,), optional
+        Which pass each of the points belongs to: any whole numbers.
     u_zz_errors : ndarray, shape of ``u_zz``, optional
         Standard uncertainty of each voltage (electronic noise), in V.
     normal_load : ndarray, shape of ``u_zz``, optional
@@ -55,7 +76,8 @@ class Scan:
     x_errors : ndarray, shape of ``x``, optional
         Standard uncertainty of each position, independent from point to point, in m.
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
-        Correlation of the noise between the points of one repeat; none where absent.
+        Correlation of the noise between the points of one repeat (of kind points: between all);
+        none where absent.
     direction : str
         ``"x"`` or ``"y"``: which way a line scan ran across the sensor.  The positions of a scan
         along y are given as ``x`` all the same.
@@ -101,6 +123,7 @@ class Scan:
     film: ElasticFilm
     sensor: StressSensor = field(default_factory=StressSensor)
     y: FloatArray | None = None
+    repeat: NDArray[np.int64] | None = None
     u_zz_errors: FloatArray | None = None
     normal_load: FloatArray | None = None
     normal_load_errors: FloatArray | None = None
@@ -125,6 +148,8 @@ class Scan:
         if self.y is not None:
             object.__setattr__(self, "y", finite_vector("y of the scan", self.y))
         object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
+        if self.repeat is not None:
+            object.__setattr__(self, "repeat", whole_numbers("repeat of the scan", self.repeat))
         self._check_signal_shape()
         for name in ("u_zz_errors", "normal_load", "normal_load_errors"):
             if getattr(self, name) is not None:
@@ -135,7 +160,7 @@ class Scan:
         self._check_positions()
         require_contacts(self)
         if self.u_zz_correlation is not None:
-            points = self.u_zz.size if self.kind == "raster" else self.x.size
+            points = self.u_zz.size if self.planar else self.x.size
             correlation = checked_correlation(self.u_zz_correlation, points)
             object.__setattr__(self, "u_zz_correlation", correlation)
 
@@ -147,26 +172,82 @@ class Scan:
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
         shape = " x ".join(str(n) for n in self.u_zz.shape)
+        what = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
-        return f"<Scan: {self.kind}, {shape} points, x from {reach}, load {self.load:.4g} N>"
+        return f"<Scan: {what} points, x from {reach}, load {self.load:.4g} N>"
 
     @property
     def kind(self) -> str:
-        """``"line"``, ``"repeats"`` or ``"raster"``, by the axes of ``u_zz``."""
+        """``"line"``, ``"repeats"``, ``"raster"`` or ``"points"``."""
+        if self.u_zz.ndim == 1:
+            return "line" if self.y is None and self.repeat is None else "points"
+        return "repeats" if self.y is None else "raster"
+
+    @property
+    def planar(self) -> bool:
+        """Whether the positions spread over x and y."""
+        return self.y is not None
+
+    @property
+    def positions(self) -> tuple[FloatArray, FloatArray]:
+        """Position of every voltage along x and y, in m; each like ``u_zz``, zero across a line."""
+        along = np.broadcast_to(self.x, self.u_zz.shape)
         if self.y is not None:
-            return "raster"
-        return "line" if self.u_zz.ndim == 1 else "repeats"
+            return along, np.broadcast_to(
+                self.y.reshape(-1, *[1] * (self.u_zz.ndim - 1)), along.shape
+            )
+        across = np.zeros(self.u_zz.shape)
+        return (across, along) if self.direction == "y" else (along, across)
+
+    @property
+    def passes(self) -> NDArray[np.intp]:
+        """Which pass each voltage belongs to, counted from zero, of the shape of ``u_zz``."""
+        if self.repeat is not None:
+            return np.unique(self.repeat, return_inverse=True)[1]
+        rows = np.arange(self.u_zz.shape[0]) if self.kind == "repeats" else np.zeros(1, np.intp)
+        return np.broadcast_to(rows.reshape(-1, *[1] * (self.u_zz.ndim - 1)), self.u_zz.shape)
+
+    def only_passes(self, numbers: ArrayLike) -> Scan:
+        """Return the passes with these numbers (of ``passes``), as a scan of the same kind."""
+        changes: dict[str, Any] = {}
+        if self.kind in ("line", "raster"):
+            return self  # one pass
+        if self.kind == "repeats":
+            keep = np.atleast_1d(numbers)
+        else:
+            keep = np.flatnonzero(np.isin(self.passes, numbers))
+            names = ("x", "y", "repeat", "x_errors")
+            changes = {
+                name: values[keep] for name in names if (values := getattr(self, name)) is not None
+            }
+            if self.u_zz_correlation is not None:
+                changes["u_zz_correlation"] = self.u_zz_correlation[np.ix_(keep, keep)]
+        for name in ("u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
+            if (values := getattr(self, name)) is not None:
+                changes[name] = values[keep]
+        channels = {name: values[keep] for name, values in self.channels.items()}
+        return replace(self, **changes, channels=channels)
 
     def _check_signal_shape(self) -> None:
-        n = self.x.size
+        n, shape = self.x.size, self.u_zz.shape
         if self.y is not None:
-            good = self.u_zz.shape == (self.y.size, n)
+            good = shape == (self.y.size, n) or shape == (n,) == self.y.shape
             wanted = f"({self.y.size}, {n}), from y and x"
+            if self.y.size == n:
+                wanted += f", or ({n},), one voltage for each point"
         else:
-            good = self.u_zz.ndim in (1, 2) and self.u_zz.shape[-1:] == (n,) and self.u_zz.size > 0
+            good = self.u_zz.ndim in (1, 2) and shape[-1:] == (n,) and self.u_zz.size > 0
             wanted = f"({n},) or (repeat, {n})"
         if not good:
-            raise InputError(f"u_zz has shape {self.u_zz.shape}, but it should be {wanted}.")
+            raise InputError(f"u_zz has shape {shape}, but it should be {wanted}.")
+        if self.repeat is not None and not self.repeat.shape == self.x.shape == shape:
+            raise InputError(
+                f"repeat has shape {self.repeat.shape}, but x has {self.x.shape} and u_zz {shape}.",
+                why="It numbers the pass of each point; the rows of a u_zz of two axes say it "
+                "themselves.",
+            )
+        if self.kind == "points" and self.y is not None:
+            require_plane(self.x, self.y)
 
     def _like_signal(self, name: str, values: FloatArray) -> FloatArray:
         array = frozen_array(values)

@@ -1,4 +1,4 @@
-"""What a scan is proven to hold beside its voltages: the noise's correlation, and its contacts."""
+"""Checks of a scan beside its voltages: the noise's correlation, its contacts, its plane."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike
 from memscal.errors import InputError
 from memscal.model.validation import FloatArray, frozen_array
 
-__all__ = ["LUBRICATIONS", "checked_correlation", "require_contacts"]
+__all__ = ["LUBRICATIONS", "checked_correlation", "require_contacts", "require_plane"]
 
 LUBRICATIONS = ("", "dry", "lubricated")
 """What can be between indenter and film; empty where a scan does not say."""
 
 #: A combination of voltages with less of the noise than this would outweigh all others.
 _LEAST_EIGENVALUE = 1e-8
+#: Points that spread by less of their length across it are a line.
+_LINE = 0.01
 
 
 class _Contacts(Protocol):
@@ -100,3 +102,17 @@ def checked_correlation(given: ArrayLike, size: int) -> FloatArray:
             cure="Add the electronic noise, which is independent from point to point.",
         )
     return found
+
+
+def require_plane(x: FloatArray, y: FloatArray) -> None:
+    """Refuse points of a plane that lie along a line: they tell no centre across it."""
+    spread = float(np.ptp(x)), float(np.ptp(y))
+    thin = int(np.argmin(spread))
+    if spread[thin] <= _LINE * spread[1 - thin]:
+        raise InputError(
+            f"The points spread over {spread[0] * 1e3:.4g} mm along x and {spread[1] * 1e3:.4g} mm "
+            "along y.",
+            why=f"With less than {_LINE:.0%} of the one along the other they are a line, which "
+            "tells no centre across it.",
+            cure="Leave y out." if thin else "Give the positions along y as x; direction='y'.",
+        )

@@ -19,6 +19,7 @@ __all__ = [
     "require_non_negative",
     "require_positive",
     "require_range",
+    "whole_numbers",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -75,3 +76,16 @@ def require_increasing(what: str, values: FloatArray) -> None:
     """Refuse an axis that does not strictly increase."""
     if np.any(np.diff(values) <= 0):
         raise InputError(f"{what} must increase strictly.", cure="Sort it; merge equal positions.")
+
+
+def whole_numbers(what: str, values: ArrayLike) -> NDArray[np.int64]:
+    """Return a read-only copy of a vector of whole numbers."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 1 or not np.isfinite(array).all() or np.any(array != np.rint(array)):
+        raise InputError(
+            f"{what} has shape {array.shape}, or holds values that are no whole numbers.",
+            cure="Give one whole number for each point.",
+        )
+    numbers = array.astype(np.int64)
+    numbers.setflags(write=False)
+    return numbers

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from scans import CONVERSION, RING, SIGMA, TAILS, plane_error, simulated
+from scans import CONVERSION, RING, SIGMA, TAILS, as_points, plane_error, simulated
 
 import memscal
 from memscal.calibration import fields as fields_room
@@ -149,8 +150,45 @@ def test_a_raster_off_its_lattice_is_refused() -> None:
     scan = simulated(raster=True, points=17)
     x = scan.x.copy()
     x[4] += 0.3e-3
-    with pytest.raises(InputError, match="not evenly spaced"):
+    with pytest.raises(InputError, match=r"not evenly spaced(.|\n)*--method evidence"):
         memscal.calibrate(replace(scan, x=x))
+    apparatus = memscal.calibrate(replace(scan, x=x), method="evidence").apparatus
+    assert apparatus.process.configuration["method"] == "evidence"
+
+
+@pytest.mark.parametrize("method", ["evidence", "white-noise"])
+@pytest.mark.parametrize(
+    "options", [{"raster": True, "points": 17}, {"load": [0.5, 1.0], "points": 21}], ids=str
+)
+def test_single_points_give_what_rows_give(options: dict[str, Any], method: str) -> None:
+    scan = simulated(noise=0.005, **options)
+    rows, points = (memscal.calibrate(s, method=method).apparatus for s in (scan, as_points(scan)))
+    assert points.conversion_constant == pytest.approx(rows.conversion_constant, rel=1e-9)
+    np.testing.assert_allclose(points.field.g, rows.field.g, atol=1e-9 * rows.field.g.max())
+    assert [c.name for c in points.checks] == [c.name for c in rows.checks]
+    values = [[c.value for c in apparatus.checks] for apparatus in (points, rows)]
+    np.testing.assert_allclose(*values, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["evidence", "white-noise"])
+def test_a_raster_s_points_may_repeat_and_lie_off_their_places(method: str) -> None:
+    clean = simulated(raster=True, points=25, noise=0.002, centre=(0.3e-3, -0.4e-3))
+    rng = np.random.default_rng(4)
+    x, y = (np.tile(positions.ravel(), 3) for positions in clean.positions)
+    u = np.tile(clean.u_zz.ravel(), 3) + 0.005 * clean.u_zz.max() * rng.normal(size=x.size)
+    off = rng.normal(scale=1e-6, size=(2, x.size))
+    scan = replace(
+        clean, x=x + off[0], y=y + off[1], u_zz=u, u_zz_errors=None,
+        repeat=np.repeat([0, 1, 2], clean.u_zz.size),
+    )  # fmt: skip
+    apparatus = memscal.calibrate(scan, method=method).apparatus
+    parameters = apparatus.parameters
+    assert abs(parameters["conversion_constant"] - CONVERSION) < 4 * parameters.uncertainty(
+        "conversion_constant"
+    )
+    assert parameters["centre"] == pytest.approx(0.3e-3, abs=10e-6)
+    # The repeats tell the noise: chi-square has a p-value though no noise is stated.
+    assert {"chi_square", "held_out_repeat"} <= {c.name for c in apparatus.checks}
 
 
 @pytest.mark.parametrize("name", regulariser_names()[:6])

@@ -59,26 +59,25 @@ def test_the_options_say_what_the_table_does_not(run: Run, table: Path) -> None:
     assert scan.title == "Monday's scan"
 
 
-def test_messy_repeats_are_snapped_and_averaged_and_it_is_said(run: Run, folder: Path) -> None:
+def test_messy_repeats_are_kept_as_points_and_it_is_said(run: Run, folder: Path) -> None:
     rng = np.random.default_rng(0)
     places = np.repeat(np.arange(-8.0, 8.5, 0.5), 3)
     numbers = np.tile([0, 1, 2], 33)
     messy = places + rng.uniform(-0.02, 0.02, places.size)
     u = 3 * np.exp(-(places**2) / 2)
-    rows = np.stack([messy, u, numbers], axis=1)
-    write_table(folder / "scan.csv", "position,voltage,repeat", np.delete(rows, 10, axis=0))
-    repeats = ["--repeat", "repeat", "--repeats"]
-    done = run("import", "scan.csv", "-o", "mean.h5", *COLUMNS, *SET_UP, *repeats, "average")
+    rows = np.delete(np.stack([messy, u, numbers], axis=1), 10, axis=0)
+    write_table(folder / "scan.csv", "position,voltage,repeat", rows)
+    repeats = [*COLUMNS, *SET_UP, "--repeat", "repeat"]
+    done = run("import", "scan.csv", "-o", "scan.h5", *repeats)
     assert done.code == 0, done.err
-    assert "averaged" in done.out
-    assert memscal.read_scan("mean.h5").u_zz.shape == (33,)
-    done = run("import", "scan.csv", "-o", "kept.h5", *COLUMNS, *SET_UP, *repeats, "keep", "--json")
-    assert any("1 of 99 points are missing" in note for note in done.json["notes"])
-    assert memscal.read_scan("kept.h5").u_zz.shape == (3, 33)
-    strict = [*COLUMNS, *SET_UP, *repeats, "keep", "--grid-tolerance", 0.001]
-    refused = run("import", "scan.csv", "-o", "strict.h5", *strict)
-    assert refused.code == 3
-    assert "grid tolerance" in refused.err
+    assert "98 readings in 3 repeats at 33 places, typically 0.5" in done.out
+    assert "1 more would make every repeat complete." in done.out
+    scan = memscal.read_scan("scan.h5")
+    assert scan.kind == "points"
+    np.testing.assert_allclose(scan.x, rows[:, 0] * 1e-3, rtol=1e-12)
+    assert "98" in run("inspect", "scan.h5").out
+    as_json = run("import", "scan.csv", "-o", "again.h5", *repeats, "--json")
+    assert any("98 readings" in note for note in as_json.json["notes"])
 
 
 def test_a_raster_of_another_kind_of_sensor_states_its_scale(run: Run, folder: Path) -> None:
@@ -93,8 +92,8 @@ def test_a_raster_of_another_kind_of_sensor_states_its_scale(run: Run, folder: P
     assert done.code == 0, done.err
     assert "1e-06 V was taken for one uT" in done.out
     scan = memscal.read_scan("raster.h5")
-    assert scan.u_zz.shape == (6, 8)
-    assert scan.u_zz[3, 4] == pytest.approx(5e-6)
+    assert (scan.kind, scan.u_zz.shape) == ("points", (48,))
+    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.hypot(scan.x, scan.y), rtol=1e-12)
 
 
 def test_a_column_of_loads_is_kept_per_point(run: Run, folder: Path) -> None:
@@ -125,9 +124,6 @@ def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(
     each = memscal.read_scan("each.h5")
     np.testing.assert_allclose(each.normal_load_errors, 0.02 * rows[:, 2], rtol=1e-12)
     assert "glycerol" in run("inspect", "each.h5").out
-    mean = [*COLUMNS, *SET_UP, *wet, "--repeats", "average"]
-    refused = run("import", "scan.csv", "-o", "mean.h5", *mean)
-    assert (refused.code, "averaged" in refused.err) == (3, True)
 
 
 def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path) -> None:
@@ -140,12 +136,15 @@ def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path) -> 
     done = run("import", "sphere.csv", "-o", "sphere.h5", *sphere, *both)
     assert done.code == 0, done.err
     scan = memscal.read_scan("sphere.h5")
-    assert scan.u_zz.shape == (4, 9)
-    assert np.isnan(scan.u_zz).sum() == 1
-    assert scan.normal_load is not None
-    np.testing.assert_array_equal(np.nanmedian(scan.normal_load, axis=1), [0.5, 0.5, 2.0, 2.0])
-    np.testing.assert_allclose(np.nanmedian(scan.u_zz, axis=1), [6e-3, 7e-3, 21e-3, 22e-3])
-    np.testing.assert_allclose(scan.x_errors, np.full(9, 5e-6))
+    assert scan.u_zz.shape == (35,)
+    np.testing.assert_allclose(scan.x_errors, np.full(35, 5e-6))
+    passes = [(0.5, 6e-3), (0.5, 7e-3), (2.0, 21e-3), (2.0, 22e-3)]
+    for i, (load, voltage) in enumerate(passes):
+        line = scan.only_passes(i)
+        assert line.normal_load is not None
+        assert line.x.size == (8 if i == 2 else 9)
+        np.testing.assert_allclose(line.normal_load, load)
+        np.testing.assert_allclose(line.u_zz, voltage)
 
 
 def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(
@@ -236,7 +235,6 @@ def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path) 
         ([*COLUMNS, "--load", 1], ["--young-modulus", "--poisson-ratio", "--thickness"]),
         ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
         (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
-        ([*COLUMNS, *SET_UP, "--repeats", "drop"], ["average"]),
     ],
 )
 def test_what_is_missing_is_named_all_at_once(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import RING, TAILS, estimated, simulated
+from scans import RING, TAILS, as_points, estimated, simulated
 from scipy.stats import binom, chi2, f
 
 import memscal
@@ -161,11 +161,19 @@ def test_the_neighbours_correlation_does_not_depend_on_the_noise_s_size() -> Non
     assert other.p_value == pytest.approx(one.p_value)
 
 
-def test_repeats_take_the_place_of_stated_noise() -> None:
+@pytest.mark.parametrize("scatter", [0.0, 5e-6])
+def test_repeats_take_the_place_of_stated_noise(scatter: float) -> None:
+    """Where the stage comes to rest elsewhere each time, as well."""
     scans, level = 150, 0.1
     p_values = []
+    fine = simulated(points=2001, noise=0.0)
     for seed in range(scans):
         scan = simulated(repeats=3, points=33, state_noise=False, seed=seed)
+        if scatter:
+            scan = as_points(scan)
+            x = scan.x + np.random.default_rng(seed).normal(scale=scatter, size=scan.x.size)
+            moved = np.interp(x, fine.x, fine.u_zz) - np.interp(scan.x, fine.x, fine.u_zz)
+            scan = replace(scan, x=x, u_zz=scan.u_zz + moved)
         p_values.append(pure_error_test(estimated(scan)).p_value)
     low, high = rejected_share_bounds(scans, level)
     assert low <= np.mean(np.array(p_values) < level) <= high

@@ -20,7 +20,7 @@ from memscal.formats.hdf5_reader import open_hdf5
 from memscal.formats.inspection import describe
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
-from memscal.formats.schema import CONTENTS_PATH
+from memscal.formats.schema import CONTENTS_PATH, SCHEMA_VERSION
 from memscal.formats.verify import stored_items
 
 
@@ -125,7 +125,7 @@ def versioned(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
         with h5py.File(path, "r+") as file:
             file.attrs["memscal_schema_version"] = version
             file["/entry/of_the_future"] = h5py.Empty("f8")
-            if version != "1.0.0" and request.param == "artifact":
+            if version != SCHEMA_VERSION and request.param == "artifact":
                 rewrite_digest(file)
         return read(path)
 
@@ -146,7 +146,7 @@ def test_a_newer_major_version_is_refused_in_plain_words(versioned: Any, version
         versioned(version)
 
 
-@pytest.mark.parametrize("version", ["1.0.0", "1.7.3"])
+@pytest.mark.parametrize("version", ["1.0.0", SCHEMA_VERSION, "1.7.3"])
 def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, version: str):
     assert versioned(version).load == 1.0
 

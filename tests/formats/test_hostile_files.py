@@ -312,7 +312,7 @@ def test_variable_text_is_read_in_every_version_of_the_format(
                 item.attrs[f"further_{i}"] = "y" * i
         x.attrs["units"] = "um"
         for name, value in ours.attrs.items():
-            file.attrs[name] = value.decode()
+            file.attrs[name] = value
     scan = read_scan(tmp_path / "scan.h5")
     assert (scan.title, scan.x[0]) == ("variable", pytest.approx(-8e-6))
 

@@ -51,7 +51,7 @@ def assert_same(found: Any, expected: Any, *, but: tuple[str, ...] = (), where: 
         assert found == expected, where
 
 
-@pytest.mark.parametrize("kind", ["line", "repeats", "raster"])
+@pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
 def test_a_scan_comes_back_with_its_source_named(tmp_path: Path, kind: str):
     path = tmp_path / "scan.h5"
     write_scan(make_scan(kind), path)
@@ -63,7 +63,7 @@ def test_a_scan_comes_back_with_its_source_named(tmp_path: Path, kind: str):
 
 
 @pytest.mark.parametrize("direction", ["x", "y"])
-@pytest.mark.parametrize("kind", ["line", "repeats"])
+@pytest.mark.parametrize("kind", ["line", "repeats", "points"])
 def test_errors_of_positions_and_correlated_noise_come_back(
     tmp_path: Path, kind: str, direction: str
 ):
@@ -75,13 +75,15 @@ def test_errors_of_positions_and_correlated_noise_come_back(
         "u_zz_correlation": 0.5**apart,
         "film": dataclasses.replace(make_scan().film, name="film A"),
     }
+    if kind == "points":
+        extra["y"] = None  # a line, the repeats of which are numbered
     write_scan(make_scan(kind, **extra), tmp_path / "scan.h5")
     # The reference's own film has no name of its own: it is the scan's.
     found = read_scan(tmp_path / "scan.h5")
     assert_same(found, make_scan(kind, **extra), but=("source", "reference"))
 
 
-@pytest.mark.parametrize("kind", ["line", "repeats", "raster"])
+@pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
 def test_what_was_between_the_contacts_comes_back(tmp_path: Path, kind: str):
     plain = make_scan(kind)
     errors = 0.02 * plain.normal_load * (1 + np.arange(plain.u_zz.size).reshape(plain.u_zz.shape))
@@ -92,7 +94,7 @@ def test_what_was_between_the_contacts_comes_back(tmp_path: Path, kind: str):
     write_scan(wet, tmp_path / "scan.h5")
     assert_same(read_scan(tmp_path / "scan.h5"), wet, but=("source",))
     with h5py.File(tmp_path / "scan.h5") as file:
-        assert file["/entry/data/normal_load_errors"].attrs["units"] == b"N"
+        assert file["/entry/data/normal_load_errors"].attrs["units"] == "N"
 
 
 def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):

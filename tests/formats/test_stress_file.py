@@ -100,11 +100,11 @@ def test_memscal_reads_it_by_name(path: Path) -> None:
 def test_other_programs_find_a_plottable_group_for_each_load(path: Path) -> None:
     with h5py.File(path) as file:
         default = file["entry"][file["entry"].attrs["default"]]
-        assert default.attrs["NX_class"] == b"NXdata"
+        assert default.attrs["NX_class"] == "NXdata"
         signal = default[default.attrs["signal"]]
         assert signal.shape == (9,)
-        assert signal.attrs["units"] == b"Pa"
-        assert default["covariance"].attrs["units"] == b"Pa^2"
+        assert signal.attrs["units"] == "Pa"
+        assert default["covariance"].attrs["units"] == "Pa^2"
         errors = default["s_zz_errors"][()]
         np.testing.assert_allclose(errors**2, np.diag(default["covariance"][()]), rtol=1e-12)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ from hypothesis import strategies as st
 
 from memscal.errors import FormatError, InputError, UnitError
 from memscal.formats.csv_table import read_table
-from memscal.formats.grid import find_grid
 from memscal.formats.inspection import describe
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
@@ -41,6 +41,7 @@ def test_a_line_keeps_its_uneven_unsorted_positions(tmp_path: Path):
     assert found.scan.kind == "line"
     assert found.scan.x.tolist() == [1.5e-3, -1e-3, 0.25e-3]
     assert found.scan.u_zz.tolist() == [2e-3, 1e-3, 3e-3]
+    assert any("3 readings at 3 places" in note.text for note in found.notes)
 
 
 def test_what_was_done_travels_with_the_scan(tmp_path: Path):
@@ -52,140 +53,98 @@ def test_what_was_done_travels_with_the_scan(tmp_path: Path):
     assert found.scan.source.sha256 in again.notes
 
 
-def test_repeats_with_messy_positions_share_places(tmp_path: Path):
-    text = "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1.02,2.2,2\n-0.01,1.1,2\n2.99,4.4,2\n"
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x,u,n\n0,1,4\n1,2,4\n3,4,4\n3,4.4,7\n1,2.2,7\n0,1.1,7\n",
+        "x,u,n\n3,4.4,7\n0,1,4\n1,2.2,7\n1,2,4\n0,1.1,7\n3,4,4\n",
+    ],
+    ids=["forth and back", "mixed"],
+)
+def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text: str):
     found = scan_table(tmp_path, text, repeat="n")
     assert found.scan.kind == "repeats"
-    np.testing.assert_allclose(found.scan.x, [-0.005e-3, 1.01e-3, 2.995e-3], rtol=1e-12)
+    assert found.scan.x.tolist() == [0.0, 1e-3, 3e-3]
     np.testing.assert_allclose(
         found.scan.u_zz, [[1e-3, 2e-3, 4e-3], [1.1e-3, 2.2e-3, 4.4e-3]], rtol=1e-12
     )
-    assert any("0.01 mm from theirs" in note.text for note in found.notes)
+    assert any("6 readings in 2 repeats at 3 places" in note.text for note in found.notes)
 
 
-def test_a_repeat_that_lacks_a_point_has_nan_there(tmp_path: Path):
-    found = scan_table(tmp_path, "x,u,n\n0,1,1\n1,2,1\n2,3,1\n0,1,2\n2,5,2\n", repeat="n")
-    np.testing.assert_array_equal(np.isnan(found.scan.u_zz), [[0, 0, 0], [0, 1, 0]])
-    assert any("1 of 6 points are missing" in note.text for note in found.notes)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1.02,2.2,2\n-0.01,1.1,2\n2.99,4.4,2\n",
+        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n",
+        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n0,4.4,2\n",
+    ],
+    ids=["scattered positions", "a row that is missing", "a position read twice"],
+)
+def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, text: str):
+    found = scan_table(tmp_path, text, repeat="n")
+    stated = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
+    assert found.scan.kind == "points"
+    np.testing.assert_allclose(found.scan.x, stated[:, 0] * 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(found.scan.u_zz, stated[:, 1] * 1e-3, rtol=1e-12)
+    np.testing.assert_array_equal(found.scan.passes, stated[:, 2] - 1)
+    assert any("in 2 repeats at 3 places" in note.text for note in found.notes)
 
 
-def test_equal_positions_without_a_repeat_column_are_counted(tmp_path: Path):
+def test_what_is_missing_is_counted(tmp_path: Path):
+    found = scan_table(tmp_path, "x,u,n\n0,1,1\n1,,1\n2,3,1\n0,1,2\n2,5,2\n", repeat="n")
+    texts = [note.text for note in found.notes]
+    assert "1 values of u_zz are missing (NaN)." in texts
+    assert "1 more would make every repeat complete." in texts
+
+
+def test_equal_positions_without_a_column_of_repeats_are_one_line(tmp_path: Path):
     found = scan_table(tmp_path, "x,u\n0,1\n1,2\n0,3\n1,4\n")
-    assert found.scan.u_zz.tolist() == [[1e-3, 2e-3], [3e-3, 4e-3]]
+    assert (found.scan.kind, found.scan.u_zz.tolist()) == ("line", [1e-3, 2e-3, 3e-3, 4e-3])
+    (note,) = [note.text for note in found.notes if "--repeat COLUMN" in note.text]
+    assert "2 of 4 positions" in note
 
 
-def test_repeats_of_a_line_can_be_averaged_with_their_pooled_spread(tmp_path: Path):
-    text = "x,u\n0,1\n1,2\n0,3\n1,6\n"
-    found = scan_table(tmp_path, text, repeats="average").scan
-    assert found.u_zz.tolist() == [2e-3, 4e-3]
-    # Sums of squares 2 and 8 over one degree of freedom each: s = sqrt(5), over sqrt(2).
-    assert found.u_zz_errors is not None
-    np.testing.assert_allclose(found.u_zz_errors, np.sqrt(2.5) * 1e-3, rtol=1e-12)
-
-
-def test_repeats_spread_beyond_the_tolerance_are_refused(tmp_path: Path):
-    text = "x,u,n\n0,1,1\n1,2,1\n0.3,1,2\n1,2,2\n"
-    with pytest.raises(InputError, match=r"0\.15 mm(.|\n)*tolerance"):
-        scan_table(tmp_path, text, repeat="n")
-
-
-def messy_raster(seed: int, *, noise: float, missing: int, repeats: int) -> tuple[str, Any, Any]:
-    """A table of a raster in random order, and the raster."""
+@given(seed=st.integers(0, 2**16), spread=st.floats(0.0, 0.4))
+def test_a_single_line_is_not_told_of_repeats(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, spread: float
+) -> None:
     rng = np.random.default_rng(seed)
-    x, y = -4.0 + 0.5 * np.arange(7), 100.0 + 0.25 * np.arange(5)
-    u = rng.normal(size=(5, 7))
-    lost = rng.choice(35, missing, replace=False)
-    jj, ii = np.divmod(np.repeat(np.setdiff1d(np.arange(35), lost), repeats), 7)
-    order = rng.permutation(ii.size)
-    ii, jj = ii[order], jj[order]
-    xs = x[ii] + noise * 0.5 * rng.uniform(-1, 1, ii.size)
-    ys = y[jj] + noise * 0.25 * rng.uniform(-1, 1, ii.size)
-    u.ravel()[lost] = np.nan
-    return rows(xs.tolist(), ys.tolist(), u[jj, ii].tolist(), header="x,y,u"), u, lost
+    x = rng.permutation(np.arange(33.0) + spread * rng.uniform(-1, 1, 33))
+    text = rows(x.tolist(), [1.0] * 33, header="x,u")
+    found = scan_table(tmp_path_factory.mktemp("t"), text)
+    assert not any("--repeat COLUMN" in note.text for note in found.notes)
 
 
-@given(
-    seed=st.integers(0, 2**16),
-    noise=st.sampled_from([0.0, 1e-4, 0.03]),
-    missing=st.integers(0, 6),
-    repeats=st.integers(1, 3),
-)
-def test_a_messy_raster_finds_its_grid(
-    tmp_path_factory: pytest.TempPathFactory, seed: int, noise: float, missing: int, repeats: int
+@pytest.mark.parametrize("numbered", [True, False])
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 0.02])
+def test_a_raster_is_points_and_its_places_and_steps_are_named(
+    tmp_path: Path, noise: float, numbered: bool
 ):
-    text, u, _ = messy_raster(seed, noise=noise, missing=missing, repeats=repeats)
-    options = {"y": "y", "repeats": "average" if repeats > 1 else "keep"}
-    scan = scan_table(tmp_path_factory.mktemp("t"), text, **options).scan
-    assert scan.y is not None
-    np.testing.assert_allclose(scan.x, (-4.0 + 0.5 * np.arange(7)) * 1e-3, atol=0.02e-3)
-    np.testing.assert_allclose(scan.y, (100.0 + 0.25 * np.arange(5)) * 1e-3, atol=0.01e-3)
-    np.testing.assert_allclose(scan.u_zz, u * 1e-3, rtol=1e-12, atol=1e-18)
+    """In random order, with three places missing and scattered positions."""
+    rng = np.random.default_rng(3)
+    place = rng.permutation(np.repeat(np.setdiff1d(np.arange(35), [4, 17, 30]), 3))
+    order = np.argsort(place, kind="stable")
+    repeat = np.empty(96, dtype=int)
+    repeat[order] = np.tile([0, 1, 2], 32)
+    row, column = np.divmod(place, 7)
+    x = -4.0 + 0.5 * column + noise * 0.25 * rng.uniform(-1, 1, 96)
+    y = 100.0 + 0.25 * row + noise * 0.25 * rng.uniform(-1, 1, 96)
+    columns = x.tolist(), y.tolist(), rng.normal(size=96).tolist(), repeat.tolist()
+    text = rows(*columns, header="x,y,u,n")
+    found = scan_table(tmp_path, text, y="y", repeat="n" if numbered else None)
+    assert (found.scan.kind, found.scan.u_zz.shape) == ("points", (96,))
+    np.testing.assert_allclose(found.scan.y, y * 1e-3, rtol=1e-12)
+    (note,) = [note for note in found.notes if "96 readings" in note]
+    assert ("in 3 repeats" in note) == numbered
+    if numbered or noise in (0.0, 0.02):
+        assert "at 32 places" in note
+    step_x, step_y = map(float, re.findall(r"typically (\S+) x (\S+) mm", note)[0])
+    assert (step_x, step_y) == (pytest.approx(0.5, rel=0.01), pytest.approx(0.25, rel=0.01))
 
 
-def test_a_raster_with_repeats_asks_before_it_averages(tmp_path: Path):
-    text, *_ = messy_raster(1, noise=0.01, missing=0, repeats=3)
-    with pytest.raises(InputError, match=r"up to 3 readings(.|\n)*average"):
-        scan_table(tmp_path, text, y="y")
-
-
-def test_the_uncertainty_of_averaged_repeats_is_that_of_the_mean(tmp_path: Path):
-    rng = np.random.default_rng(5)
-    x, y = np.meshgrid(np.arange(10.0), np.arange(9.0))
-    x, y = np.tile(x.ravel(), 5), np.tile(y.ravel(), 5)
-    noise = 0.2
-    text = rows(x.tolist(), y.tolist(), rng.normal(0, noise, x.size).tolist(), header="x,y,u")
-    scan = scan_table(tmp_path, text, y="y", repeats="average").scan
-    assert scan.u_zz_errors is not None
-    # 360 degrees of freedom: a relative standard deviation of 3.7 %.
-    expected = noise * 1e-3 / np.sqrt(5)
-    np.testing.assert_allclose(scan.u_zz_errors, expected, rtol=0.2)
-    assert np.std(scan.u_zz) == pytest.approx(expected, rel=0.35)
-
-
-def test_positions_off_the_grid_are_refused_with_the_best_grid_named(tmp_path: Path):
-    with pytest.raises(InputError, match=r"along x(.|\n)*best one has a step"):
-        scan_table(tmp_path, "x,y,u\n0,0,1\n1,0,1\n2.3,1,1\n3,1,1\n4,1,1\n", y="y")
-
-
-def test_a_misread_column_does_not_make_a_huge_grid(tmp_path: Path):
-    x = np.linspace(0, 1, 40) ** 2
-    text = rows(x.tolist(), x.tolist(), x.tolist(), header="x,y,u")
-    with pytest.raises(InputError, match="grid"):
-        scan_table(tmp_path, text, y="y", grid_tolerance=1e-6)
-
-
-@given(
-    step=st.floats(1e-6, 1.0),
-    start=st.floats(-10, 10),
-    size=st.integers(8, 40),
-    seed=st.integers(0, 2**16),
-)
-def test_the_grid_found_is_the_one_the_positions_were_made_on(
-    step: float, start: float, size: int, seed: int
-):
-    rng = np.random.default_rng(seed)
-    index = np.delete(np.arange(size), rng.choice(size, size // 4, replace=False))
-    index -= index[0]
-    positions = start * step + step * (index + rng.uniform(-0.02, 0.02, index.size))
-    grid = find_grid("x", positions, 0.1)
-    assert grid.deviation <= 0.1 * grid.step
-    assert grid.step == pytest.approx(step, rel=0.02)
-    np.testing.assert_array_equal(grid.index, index)
-
-
-def test_a_grid_that_would_merge_readings_of_one_repeat_is_refused(tmp_path: Path):
-    """Dense readings among wide gaps must not pass for repeats of one place."""
-    x = [0.0, 2.0, 4.0, 4.1, 4.2, 6.0, 8.0]
-    text = rows(x * 2, [0.0] * 7 + [2.0] * 7, [1.0] * 14, [1] * 14, header="x,y,u,n")
-    with pytest.raises(InputError, match="two readings"):
-        scan_table(tmp_path, text, y="y", repeat="n", repeats="average")
-
-
-def test_a_place_read_twice_in_one_repeat_is_averaged_and_reported(tmp_path: Path):
-    text = "x,y,u,n\n0,0,1,1\n1,0,2,1\n0,1,3,1\n1,1,4,1\n0,0,5,1\n1,0.0001,6,2\n"
-    found = scan_table(tmp_path, text, y="y", repeat="n", repeats="average")
-    np.testing.assert_allclose(found.scan.u_zz, [[3e-3, 4e-3], [3e-3, 4e-3]], rtol=1e-12)
-    assert any("1 readings share their place" in note.text for note in found.notes)
+def test_points_that_spread_along_one_axis_only_are_refused_as_a_plane(tmp_path: Path):
+    with pytest.raises(InputError, match=r"0 mm along y(.|\n)*Leave y out"):
+        scan_table(tmp_path, "x,y,u\n0,5,1\n1,5,2\n2,5,1\n", y="y")
 
 
 def test_a_foreign_sensor_needs_a_scale_and_the_scale_is_recorded(tmp_path: Path):
@@ -264,12 +223,6 @@ def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):
 def test_a_file_without_a_table_is_refused(tmp_path: Path, text: str):
     with pytest.raises(InputError, match=r"table\.csv"):
         scan_table(tmp_path, text)
-
-
-@pytest.mark.parametrize("options", [{"repeats": "drop"}, {"grid_tolerance": 0.7}])
-def test_options_without_a_meaning_are_refused(tmp_path: Path, options: dict[str, Any]):
-    with pytest.raises(InputError):
-        scan_table(tmp_path, "x,u\n0,1\n1,2\n", **options)
 
 
 def reference_table(path: Path, text: str, **options: Any) -> Any:
@@ -405,3 +358,14 @@ def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path: Path):
     assert "The sign of u_zz was changed." in found.scan.notes
     with pytest.raises(InputError, match="Give 1 or -1"):
         scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_sign=2)
+
+
+def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path) -> None:
+    head = "# SYNTHETIC: made up\x1b[2J\n%  rod 3\n#\n" + "# " + "z" * 5000 + "\n" + "# more\n" * 40
+    found = scan_table(tmp_path, head + "x,u\n0,1\n# within the table\n1,2\n")
+    lines = found.scan.notes.splitlines()
+    assert "The table says: SYNTHETIC: made up[2J" in lines
+    assert "The table says: rod 3" in lines
+    assert "24 more lines of comment were left out." in lines
+    assert "within the table" not in found.scan.notes
+    assert max(map(len, lines)) < 400

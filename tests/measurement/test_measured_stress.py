@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contacts import CENTRE, LOADS, contact_scan, measured
-from scans import CONVERSION, EXACT_FILM, SIGMA
+from scans import CONVERSION, EXACT_FILM, SIGMA, as_points
 from spheres import GAUSSIAN, known_apparatus, pressed
 
 import memscal
@@ -142,6 +142,16 @@ def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
         assert not names & {"chi_square", "noise_as_stated"}
     assert np.median(ratios) == pytest.approx(1.0, abs=0.15)
     assert 0.5 < min(ratios) <= max(ratios) < 1.7
+
+
+def test_contacts_at_single_points_give_what_rows_give() -> None:
+    scan = contact_scan(repeats=2, record_loads=True)
+    rows, points = (memscal.measure_stress(s, SENSOR).profiles for s in (scan, as_points(scan)))
+    assert len(points) == len(rows) == len(LOADS)
+    for one, other in zip(points, rows, strict=True):
+        assert one.load == pytest.approx(other.load, rel=1e-12)
+        assert one.force == pytest.approx(other.force, rel=1e-9)
+        np.testing.assert_allclose(one.s_zz, other.s_zz, atol=1e-9 * other.maximum)
 
 
 def test_repeats_at_one_position_are_averaged() -> None:

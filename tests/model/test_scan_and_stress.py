@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from memscal.errors import InputError
 
 
-@pytest.mark.parametrize("kind", ["line", "repeats", "raster"])
+@pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
 def test_a_scan_knows_its_kind(kind: str) -> None:
     assert make_scan(kind).kind == kind
 
@@ -41,6 +41,12 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
         ("line", {"u_zz": 1.0}, "u_zz has shape"),
         ("raster", {"u_zz": np.zeros((33, 9))}, r"\(33, 9\).*\(9, 33\), from y and x"),
         ("raster", {"u_zz": np.zeros(33)}, "u_zz has shape"),
+        ("points", {"y": np.zeros(32)}, r"\(32, 33\), from y and x"),
+        ("points", {"repeat": np.zeros(32)}, r"repeat has shape \(32,\)"),
+        ("points", {"repeat": np.full(33, 0.5)}, "no whole numbers"),
+        ("raster", {"repeat": np.zeros(33)}, r"repeat has shape(.|\n)*rows of a u_zz"),
+        ("points", {"y": np.full(33, 1e-3)}, r"0 mm along y(.|\n)*Leave y out"),
+        ("points", {"x": np.full(33, 1e-3)}, r"0 mm along x(.|\n)*direction='y'"),
         ("line", {"u_zz_errors": np.zeros(3)}, "u_zz_errors has shape"),
         ("line", {"normal_load": np.ones((2, 33))}, "normal_load has shape"),
         ("line", {"channels": {"u_yz": np.zeros(7)}}, "u_yz has shape"),
