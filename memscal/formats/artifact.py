@@ -36,7 +36,7 @@ from memscal.model.apparatus import (
 )
 from memscal.model.validation import FloatArray
 
-__all__ = ["read_artifact", "write_artifact"]
+__all__ = ["artifact_tree", "read_artifact", "write_artifact"]
 
 _RECONVOLUTION = ("u_zz", "u_zz_errors", "u_zz_predicted", "u_zz_gaussian", "residual")
 
@@ -117,7 +117,12 @@ def write_artifact(
     InputError
         If the data hold a name that is no name, or a value without a known unit.
     """
-    write_tree(file_tree(ARTIFACT_SCHEMA, _entry(data)), path, overwrite=overwrite)
+    write_tree(artifact_tree(data), path, overwrite=overwrite)
+
+
+def artifact_tree(data: ApparatusData) -> Group:
+    """Return what a memscal-artifact file holds; its root states the content digest."""
+    return file_tree(ARTIFACT_SCHEMA, _entry(data))
 
 
 def _entry(data: ApparatusData) -> Group:

@@ -2,32 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from os import PathLike
+from typing import Any
 
 import numpy as np
+import scipy
 
-from memscal.apparatus import ApparatusFunction, load_apparatus
+from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
+from memscal.formats.opened import Scans, opened_scans
+from memscal.formats.timestamp import timestamp
 from memscal.measurement.belonging import accept_mismatches
 from memscal.measurement.contact_signal import ContactSignal, contact_signal
-from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.measurement.prepared_scan import PreparedScan, prepared_scan
 from memscal.measurement.procedure import restore_known
 from memscal.measurement.requirements import require_covariance
+from memscal.measurement.restoration import Restoration
 from memscal.measurement.single_loads import SingleLoad, place_of, single_loads
-from memscal.measurement.single_profile import measured_profile
-from memscal.measurement.stress_checks import stress_checks
+from memscal.measurement.single_profile import measured_profile, measured_scan
+from memscal.measurement.stress_checks import checks_of_restoration, stress_checks
 from memscal.measurement.usable_scan import require_ends, require_points
 from memscal.model.apparatus import QualityCheck
-from memscal.model.provenance import SourceFile
+from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
+from memscal.model.provenance import Process
 from memscal.model.scan import Scan
+from memscal.model.validation import FloatArray
+from memscal.version import __version__
 
 __all__ = ["measure_stress"]
 
 
 def measure_stress(
-    scan: Scan | Sequence[Scan],
+    scan: Scans,
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
     override: bool = False,
@@ -42,7 +51,7 @@ def measure_stress(
 
     Parameters
     ----------
-    scan : Scan or sequence of Scan
+    scan : Scan or path, or a sequence of them
         Scans with a sphere or a rod; ``normal_load`` tells the loads of one scan apart, line by
         line.
     apparatus : ApparatusFunction or path
@@ -75,55 +84,61 @@ def measure_stress(
     >>> abs(profile.force - profile.load) < 3 * profile.force_uncertainty
     True
     """
-    known, artifact = _opened(apparatus)
-    scans = (scan,) if isinstance(scan, Scan) else tuple(scan)
-    _require_scans(scans)
+    known, scans = opened_apparatus(apparatus), opened_scans(scan)
     require_covariance(known)
     overridden = tuple(
         text
         for one in scans
         for text in accept_mismatches(one, known, place_of(one), override=override)
     )
-    parts = [single_loads(one) for one in scans]
-    profiles = tuple(_measure(part, known) for of_scan in parts for part in of_scan)
-    checks = stress_checks(profiles)
+    origins = tuple(measured_scan(one) for one in scans)
+    loads = [
+        _measure(origin, part, known)
+        for origin, one in zip(origins, scans, strict=True)
+        for part in single_loads(one)
+    ]
+    profiles = tuple(load.profile for load in loads)
+    checks = stress_checks(profiles, [load.checks for load in loads])
     return MeasuredStress(
         profiles=profiles,
-        apparatus=known,
-        scans=scans,
+        scans=origins,
+        conversion_constant=known.conversion_constant,
+        conversion_constant_uncertainty=known.parameters.uncertainty("conversion_constant"),
         checks=checks,
-        messages=tuple(_messages(profiles, known, checks, overridden)),
         overridden=overridden,
-        configuration={"override": bool(override)},
-        artifact=artifact,
-        parts=tuple(len(of_scan) for of_scan in parts),
+        process=_process(
+            {"override": bool(override)}, tuple(_messages(loads, known, checks, overridden))
+        ),
+        artifact=known.source,
+        artifact_digest=known.content_digest,
     )
 
 
-def _opened(
-    apparatus: ApparatusFunction | str | PathLike[str],
-) -> tuple[ApparatusFunction, SourceFile | None]:
-    if isinstance(apparatus, ApparatusFunction):
-        return apparatus, None
-    from memscal.formats.hdf5_reader import open_hdf5
-
-    known = load_apparatus(apparatus)
-    with open_hdf5(apparatus) as file:
-        return known, file.source
-
-
-def _require_scans(scans: tuple[Scan, ...]) -> None:
-    if not scans:
-        raise InputError("There is no scan.", cure="Give a scan, or several.")
-    for one in scans:
-        if not isinstance(one, Scan):
-            raise InputError(
-                f"measure_stress() was given a {type(one).__name__}, not a Scan.",
-                cure="Read a scan file with memscal.read_scan(path).",
-            )
+def _process(configuration: Mapping[str, Any], messages: tuple[str, ...]) -> Process:
+    return Process(
+        program="memscal",
+        version=__version__,
+        date=timestamp(),
+        configuration=configuration,
+        environment={
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+        },
+        messages=messages,
+    )
 
 
-def _measure(part: SingleLoad, known: ApparatusFunction) -> MeasuredProfile:
+@dataclass(frozen=True, eq=False)
+class _MeasuredLoad:
+    """The profile of one load, and what its restoration says of it."""
+
+    profile: MeasuredProfile
+    checks: tuple[QualityCheck, ...]
+    messages: tuple[str, ...]
+
+
+def _measure(origin: MeasuredScan, part: SingleLoad, known: ApparatusFunction) -> _MeasuredLoad:
     signal = contact_signal(part, known)
     require_points(part, signal)
     prepared = _prepared(part, known, signal)
@@ -132,7 +147,14 @@ def _measure(part: SingleLoad, known: ApparatusFunction) -> MeasuredProfile:
     except (FitError, InputError) as failure:
         raise _placed(failure, part) from failure
     require_ends(part, signal, found.centre)
-    return measured_profile(part, prepared, found, signal)
+    profile = measured_profile(origin, part, prepared, found, signal)
+    estimated = prepared.noise_found or found.points.u_errors is None
+    noise = profile.points["zz"].noise if estimated else None
+    return _MeasuredLoad(
+        profile=profile,
+        checks=checks_of_restoration(found, stated=not estimated),
+        messages=tuple(_of_profile(part.scan, found, noise)),
+    )
 
 
 def _prepared(part: SingleLoad, known: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
@@ -155,7 +177,7 @@ def _placed(failure: FitError | InputError, part: SingleLoad) -> FitError | Inpu
 
 
 def _messages(
-    profiles: Sequence[MeasuredProfile],
+    loads: Sequence[_MeasuredLoad],
     known: ApparatusFunction,
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
@@ -173,18 +195,18 @@ def _messages(
         yield "A quality check of the calibration itself had failed: see its artifact."
     # What is true of every profile is said once.
     said: dict[str, list[str]] = {}
-    for i, profile in enumerate(profiles):
-        for text in _of_profile(profile):
+    for i, load in enumerate(loads):
+        for text in load.messages:
             said.setdefault(text, []).append(str(i + 1))
     for text, where in said.items():
-        yield text if len(where) == len(profiles) else f"Profile {', '.join(where)}: {text}"
+        yield text if len(where) == len(loads) else f"Profile {', '.join(where)}: {text}"
 
 
-def _of_profile(profile: MeasuredProfile) -> Iterator[str]:
-    found, scan = profile.restoration, profile.part.scan
-    if profile.noise_found:
-        noise = float(np.nanmin(profile.electronic_noise)) * 1e3
-        yield f"u_zz_errors is absent: a noise of {noise:.3g} mV was estimated from the scatter."
+def _of_profile(scan: Scan, found: Restoration, noise: FloatArray | None) -> Iterator[str]:
+    """Yield what one load should be known for; ``noise``: where it was estimated, in V."""
+    if noise is not None:
+        least = float(noise.min()) * 1e3
+        yield f"u_zz_errors is absent: a noise of {least:.3g} mV was estimated from the scatter."
     if scan.normal_load is not None and scan.normal_load_errors is None:
         yield "normal_load_errors is absent: the recorded loads are taken as exact."
     if not scan.lubrication:

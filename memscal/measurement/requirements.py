@@ -24,14 +24,9 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     Raises
     ------
     InputError
-        If one of them is none, their sensors differ, the artifact's uncertainty is no number, or a
+        If their sensors differ, the artifact's uncertainty is no number, or a
         curved indenter was pressed at several loads.
     """
-    if not isinstance(scan, Scan):
-        raise InputError(
-            f"restore() was given a {type(scan).__name__}, not a Scan.",
-            cure="Read a scan file with memscal.read_scan(path).",
-        )
     _require_same_sensor(scan, apparatus)
     require_covariance(apparatus)
     load = scan.normal_load

@@ -11,6 +11,7 @@ import pytest
 from builders import make_artifact, make_film
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from memscal.model.stress_record import StressRecord, StressRecordProfile
 
 import memscal
 from memscal.errors import FormatError, MemscalError, OutputError, UnitError
@@ -21,7 +22,6 @@ from memscal.model.apparatus import QualityCheck
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import StressSensor
-from memscal.model.stress_record import StressRecord, StressRecordProfile
 
 EXACT = 1e-14
 

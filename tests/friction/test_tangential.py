@@ -24,7 +24,7 @@ from memscal.friction.load_points import LoadPoints
 from memscal.friction.predicted import members_of, predict, sensor_of
 from memscal.friction.tangential import compare_shear
 from memscal.laboratory.experiment import Experiment
-from memscal.measurement.measured_stress import MeasuredStress
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.validation import FloatArray
 
 EXPERIMENTS = 80 if os.environ.get("MEMSCAL_FULL_STUDY") else 8

@@ -13,7 +13,7 @@ from spheres import GAUSSIAN, known_apparatus, pressed
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
-from memscal.measurement.measured_stress import MeasuredProfile
+from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan, StressSensor
 
