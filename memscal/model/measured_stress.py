@@ -15,7 +15,7 @@ saved and read again is equal to the last bit.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import Any, TypeVar
@@ -28,7 +28,7 @@ from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import StressSensor
-from memscal.model.validation import FloatArray, frozen_array
+from memscal.model.validation import FloatArray, frozen_array, same_content
 
 __all__ = ["MeasuredPoints", "MeasuredProfile", "MeasuredScan", "MeasuredStress"]
 
@@ -83,10 +83,10 @@ class MeasuredPoints:
 
     def __post_init__(self) -> None:
         _freeze(self, "weight", "load", "load_errors", "correlation")
-        _freeze(self, "x", "y", "x_errors", "u", "noise", scale=True)
+        _freeze(self, "x", "y", "x_errors", "u", "noise", scale=_FILE_SCALE)
 
     def __eq__(self, other: object) -> bool:
-        return _same(self, other) if isinstance(other, MeasuredPoints) else NotImplemented
+        return same_content(self, other) if isinstance(other, MeasuredPoints) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -162,14 +162,14 @@ class MeasuredProfile:
 
     def __post_init__(self) -> None:
         _freeze(self, "s_zz", "curve_s_zz")
-        _freeze(self, "x", "y", "r", "centre", "centre_uncertainty", "curve_r", scale=True)
+        _freeze(self, "x", "y", "r", "centre", "centre_uncertainty", "curve_r", scale=_FILE_SCALE)
         frozen = {source: frozen_array(values) for source, values in self.covariances.items()}
         object.__setattr__(self, "covariances", frozen)
         for name in ("baseline", "baseline_uncertainty", "contact_radius"):
             object.__setattr__(self, name, _kept(getattr(self, name)))
 
     def __eq__(self, other: object) -> bool:
-        return _same(self, other) if isinstance(other, MeasuredProfile) else NotImplemented
+        return same_content(self, other) if isinstance(other, MeasuredProfile) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -257,7 +257,7 @@ class MeasuredStress:
             object.__setattr__(self, name, _kept(getattr(self, name)))
 
     def __eq__(self, other: object) -> bool:
-        return _same(self, other) if isinstance(other, MeasuredStress) else NotImplemented
+        return same_content(self, other) if isinstance(other, MeasuredStress) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -312,26 +312,8 @@ def _kept_record(record: Record, *lengths: str) -> Record:
     return replace(record, **kept)
 
 
-def _freeze(owner: object, *names: str, scale: bool = False) -> None:
-    """Replace arrays by read-only copies; ``scale``: those of lengths and voltages, rounded."""
+def _freeze(owner: object, *names: str, scale: float = 1.0) -> None:
+    """Replace arrays by read-only copies, those of lengths and voltages (``scale``) rounded."""
     for name in names:
-        values = getattr(owner, name)
-        if values is not None:
-            values = np.asarray(values, dtype=np.float64)
-            rounded = values * _FILE_SCALE / _FILE_SCALE if scale else values
-            object.__setattr__(owner, name, frozen_array(rounded))
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Whether two records hold the same, array by array; NaN is equal to NaN."""
-    if isinstance(one, np.ndarray):
-        return isinstance(other, np.ndarray) and np.array_equal(one, other, equal_nan=True)
-    if isinstance(one, float) and isinstance(other, float):
-        return one == other or (one != one and other != other)
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
-    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
-        return len(one) == len(other) and all(map(_same, one, other))
-    if is_dataclass(one) and type(one) is type(other):
-        return all(_same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
-    return bool(one == other)
+        if (values := getattr(owner, name)) is not None:
+            object.__setattr__(owner, name, frozen_array(np.asarray(values) * scale / scale))
