@@ -15,16 +15,19 @@ from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
 from memscal.formats.opened import Scans, opened_scans
 from memscal.formats.timestamp import timestamp
-from memscal.measurement.belonging import accept_mismatches
-from memscal.measurement.contact_signal import ContactSignal, contact_signal
+from memscal.measurement.contact_signal import (
+    ContactSignal,
+    contact_signal,
+    require_ends,
+    require_points,
+)
 from memscal.measurement.prepared_scan import PreparedScan, prepared_scan
 from memscal.measurement.procedure import restore_known
-from memscal.measurement.requirements import require_covariance
+from memscal.measurement.requirements import accept_mismatches, require_covariance
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.single_loads import SingleLoad, place_of, single_loads
 from memscal.measurement.single_profile import measured_profile, measured_scan
 from memscal.measurement.stress_checks import checks_of_restoration, stress_checks
-from memscal.measurement.usable_scan import require_ends, require_points
 from memscal.model.apparatus import QualityCheck
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process

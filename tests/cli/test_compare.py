@@ -119,7 +119,7 @@ def test_stress_of_another_calibration_is_refused_or_overridden(
     run: Run, compare: Callable[..., Any], bench: Path, folder: Path
 ) -> None:
     known = memscal.load_apparatus(bench / "sensor.apparatus.h5")
-    replace(known, budget={}).save(folder / "other.apparatus.h5")
+    replace(known, load=2 * known.load).save(folder / "other.apparatus.h5")
     written = folder / "dry.stress.h5"
     assert run("apply", "other.apparatus.h5", bench / "dry.h5", "-o", written).code == 0
     refused(compare(*QUICK, scans=(str(written),)), "other.apparatus.h5")
