@@ -38,7 +38,7 @@ Examples:
 
 @click.command("compare", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
-@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...|STRESS")
+@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN|STRESS...")
 @click.option(
     "--friction",
     "friction",
@@ -150,12 +150,11 @@ def command(
 
     from memscal.apparatus import load_apparatus
     from memscal.formats.opened import opened_contacts
-    from memscal.model.measured_stress import MeasuredStress
+    from memscal.friction.requirements import scans_of
 
     known, data = load_apparatus(artifact), opened_contacts(scans)
     tables = _read_references(references)
-    of_scans = data.scans if isinstance(data, MeasuredStress) else data
-    lubrications = tuple(dict.fromkeys(scan.lubrication for scan in of_scans))
+    lubrications = tuple(dict.fromkeys(scan.lubrication for scan in scans_of(data)))
     files = FigureFiles(single, folder, figure_format, lubrications, interface)
     files.prove(force=force, inputs=[artifact, *scans, *references])
 

@@ -20,7 +20,7 @@ Path: TypeAlias = str | PathLike[str]
 Scans: TypeAlias = Scan | Path | Sequence[Scan | Path]
 """One scan or several, each itself or as the path of its file."""
 
-Contacts: TypeAlias = MeasuredStress | Scans
+Contacts: TypeAlias = Scan | MeasuredStress | Path | Sequence[Scan | MeasuredStress | Path]
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
 
@@ -44,28 +44,16 @@ def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
         return stress_from(file)
 
 
-def opened_contacts(contacts: Contacts) -> MeasuredStress | tuple[Scan, ...]:
-    """Return measured stress, or scans; a path may lead to either.
-
-    Raises
-    ------
-    InputError
-        If nothing is given, or a measured stress beside something else.
-    """
-    opened = [_scan_or_stress(item) for item in _listed(contacts)]
-    stresses = [item for item in opened if isinstance(item, MeasuredStress)]
-    if stresses and len(opened) > 1:
-        raise InputError(
-            f"Measured stress is one of {len(opened)} things to compare.",
-            why="Its checks are those of all loads that were measured together.",
-            cure="Measure all scans together (memscal apply ARTIFACT SCAN...), or give the scans.",
-        )
-    return stresses[0] if stresses else tuple(_required(item) for item in opened)
+def opened_contacts(contacts: Contacts) -> tuple[Scan | MeasuredStress, ...]:
+    """Return scans and measured stresses that are given themselves or as paths, at least one."""
+    return tuple(_scan_or_stress(item) for item in _listed(contacts))
 
 
-def _scan_or_stress(item: Any) -> Any:
-    if not isinstance(item, str | PathLike):
+def _scan_or_stress(item: Any) -> Scan | MeasuredStress:
+    if isinstance(item, MeasuredStress):
         return item
+    if not isinstance(item, str | PathLike):
+        return _required(item)
     with open_hdf5(item) as file:
         if file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA:
             return stress_from(file)

@@ -24,16 +24,22 @@ from memscal.friction.load_comparison import load_comparison
 from memscal.friction.load_points import LoadPoints, load_points
 from memscal.friction.messages import comparison_messages
 from memscal.friction.predicted import members_of, sensor_of
-from memscal.friction.requirements import require_contacts, require_macroscopic, same_apparatus
+from memscal.friction.requirements import (
+    require_contacts,
+    require_macroscopic,
+    same_apparatus,
+    scans_of,
+)
 from memscal.friction.results import (
     DryAgainstLubricated,
     EffectiveFriction,
     FrictionComparison,
     LoadComparison,
 )
-from memscal.measurement.application import measure_stress
+from memscal.measurement.application import joined_stress, measure_stress
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredStress
+from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
 
@@ -69,7 +75,7 @@ def compare(
 
     Parameters
     ----------
-    contacts : MeasuredStress, Scan or path, or a sequence of scans or paths
+    contacts : Scan, MeasuredStress or path, or a sequence of them
         Contact scans of a sphere at one load or several, dry or lubricated, on one film with one
         sphere; or the stress that was measured of them, which holds their points.
     apparatus : ApparatusFunction or path
@@ -118,14 +124,8 @@ def compare(
     True
     """
     opened, known = opened_contacts(contacts), opened_apparatus(apparatus)
-    require_contacts(opened.scans if isinstance(opened, MeasuredStress) else opened)
     require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
-    if isinstance(opened, MeasuredStress):
-        for profile in opened.profiles:
-            load_points(profile)  # refuses a file without points before anything is calculated
-        measured = same_apparatus(opened, known, override=override)
-    else:
-        measured = measure_stress(opened, known, override=override)
+    measured = _measured(opened, known, override)
     loadings = (loading,) if isinstance(loading, str) else tuple(loading)
     families = _families(measured, friction, loadings, references, cache, workers)
     given = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
@@ -143,6 +143,25 @@ def compare(
         workers=workers,
     )
     return replace(found, interface=laws, messages=(*found.messages, *laws.messages))
+
+
+def _measured(
+    contacts: Sequence[Scan | MeasuredStress], apparatus: ApparatusFunction, override: bool
+) -> MeasuredStress:
+    """Return the stress of all contacts, measured here where it was not before."""
+    require_contacts(scans_of(contacts))
+    scans = [item for item in contacts if isinstance(item, Scan)]
+    if len(scans) == len(contacts):
+        return measure_stress(scans, apparatus, override=override)
+    parts = []
+    for item in contacts:
+        if isinstance(item, Scan):
+            parts.append(measure_stress(item, apparatus, override=override))
+            continue
+        for profile in item.profiles:
+            load_points(profile)  # refuses a file without points before anything is calculated
+        parts.append(same_apparatus(item, apparatus, override=override))
+    return joined_stress(parts)
 
 
 def compare_measured(

@@ -12,10 +12,19 @@ from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.scan import Scan
 from memscal.model.validation import require_non_negative
 
-__all__ = ["require_contacts", "require_macroscopic", "same_apparatus"]
+__all__ = ["require_contacts", "require_macroscopic", "same_apparatus", "scans_of"]
 
 
-def require_contacts(scans: Sequence[Scan] | Sequence[MeasuredScan]) -> None:
+def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredScan]:
+    """Return the scans, and those of which a stress was measured."""
+    return [
+        scan
+        for item in contacts
+        for scan in (item.scans if isinstance(item, MeasuredStress) else (item,))
+    ]
+
+
+def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
     """Refuse what is no scan of a sphere's contacts, or not all on one film with one sphere."""
     for one in scans:
         place = one.source.file_name if one.source else "The scan"

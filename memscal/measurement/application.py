@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import platform
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
 
@@ -27,7 +28,11 @@ from memscal.measurement.requirements import accept_mismatches, require_covarian
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.single_loads import SingleLoad, place_of, single_loads
 from memscal.measurement.single_profile import measured_profile, measured_scan
-from memscal.measurement.stress_checks import checks_of_restoration, stress_checks
+from memscal.measurement.stress_checks import (
+    check_of_all_forces,
+    checks_of_restoration,
+    stress_checks,
+)
 from memscal.model.apparatus import QualityCheck
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process
@@ -35,7 +40,9 @@ from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 from memscal.version import __version__
 
-__all__ = ["measure_stress"]
+__all__ = ["joined_stress", "measure_stress"]
+
+_NUMBERED = re.compile(r"(\w+)_(\d+)")
 
 
 def measure_stress(
@@ -115,6 +122,53 @@ def measure_stress(
         artifact=known.source,
         artifact_digest=known.content_digest,
     )
+
+
+def joined_stress(parts: Sequence[MeasuredStress]) -> MeasuredStress:
+    """Return several measured stresses as one: profiles in their order, checks numbered anew.
+
+    Raises
+    ------
+    InputError
+        If they were measured with different apparatus functions.
+    """
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    if len({part.artifact_digest for part in parts}) > 1:
+        raise InputError(
+            "The measured stresses are of different apparatus functions: their digests differ.",
+            why="What is compared together shares one sensor and its calibration.",
+            cure="Measure all of them with one artifact (memscal apply ARTIFACT SCAN...).",
+        )
+    profiles = tuple(profile for part in parts for profile in part.profiles)
+    starts = np.cumsum([0, *(len(part.profiles) for part in parts)])
+    checks = [
+        replace(one, name=f"{numbered[1]}_{int(numbered[2]) + start}")
+        for part, start in zip(parts, starts, strict=False)
+        for one in part.checks
+        if (numbered := _NUMBERED.fullmatch(one.name))
+    ]
+    # What failed is said by the checks, under their new numbers.
+    messages = [
+        f"{_files_of(part)}: {text}"
+        for part in parts
+        for text in part.messages
+        if not text.startswith("Quality check")
+    ]
+    return replace(
+        first,
+        profiles=profiles,
+        scans=tuple(scan for part in parts for scan in part.scans),
+        checks=(*checks, check_of_all_forces(profiles)),
+        overridden=tuple(text for part in parts for text in part.overridden),
+        process=replace(first.process, messages=tuple(dict.fromkeys(messages))),
+    )
+
+
+def _files_of(measured: MeasuredStress) -> str:
+    names = [scan.source.file_name for scan in measured.scans if scan.source]
+    return ", ".join(names) or f"{measured.profiles[0].label} and on"
 
 
 def _process(configuration: Mapping[str, Any], messages: tuple[str, ...]) -> Process:

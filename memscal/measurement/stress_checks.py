@@ -25,7 +25,7 @@ from memscal.measurement.restoration import Restoration
 from memscal.model.apparatus import QualityCheck
 from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = ["checks_of_restoration", "pooled_force", "stress_checks"]
+__all__ = ["check_of_all_forces", "checks_of_restoration", "pooled_force", "stress_checks"]
 
 _FORCE_LIMIT = 3.0
 #: One check of all profiles together may be stricter than one for each.
@@ -61,7 +61,7 @@ def stress_checks(
         for one in (_force(profile), *own)
     ]
     if len(profiles) > 1:
-        found.append(_all_forces(profiles))
+        found.append(check_of_all_forces(profiles))
     return tuple(found)
 
 
@@ -111,7 +111,8 @@ def _force(profile: MeasuredProfile) -> QualityCheck:
     )
 
 
-def _all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
+def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
+    """Return the check of the force of all profiles together."""
     mean, spread = pooled_force(profiles)
     allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
     return check(

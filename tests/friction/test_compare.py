@@ -254,7 +254,7 @@ def test_options_that_make_no_sense_are_refused(
 
 
 def test_what_is_no_scan_is_refused(apparatus: memscal.ApparatusFunction) -> None:
-    with pytest.raises(InputError, match="not a Scan"):
-        memscal.compare(["sphere_dry.h5"], apparatus)  # type: ignore[list-item]
-    with pytest.raises(InputError, match="No scan"):
+    with pytest.raises(InputError, match="where a Scan is needed"):
+        memscal.compare([1.0], apparatus)  # type: ignore[list-item]
+    with pytest.raises(InputError, match="no scan"):
         memscal.compare([], apparatus)

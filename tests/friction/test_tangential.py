@@ -171,8 +171,12 @@ def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
     silent = replace(made.dry, channels={"u_xz": made.dry.channels["u_xz"]})
     with pytest.raises(InputError, match="u_xz_errors"):
         compare_shear(memscal.measure_stress(silent, normal), shear, **options)
+    without = memscal.measure_stress(replace(made.dry, channels={}), normal)
+    with pytest.raises(InputError, match="no usable voltage u_xz"):
+        compare_shear(without, shear, **options)
+    measured.save(cache / "dry.stress.h5")
     with pytest.raises(InputError, match="No loading"):
-        compare_shear(measured, shear, loading=(), cache=cache)
+        compare_shear(cache / "dry.stress.h5", shear, loading=(), cache=cache)
     assert len(FRICTIONS) > 2
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from spheres import GAUSSIAN, known_apparatus, pressed
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
+from memscal.measurement.application import joined_stress
 from memscal.measurement.contact_signal import contact_signal
 from memscal.measurement.prepared_scan import prepared_scan
 from memscal.measurement.procedure import restore_known
@@ -243,6 +245,37 @@ def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
     heavy = replace(scan, normal_load=scan.normal_load * 1e6, source=SourceFile("heavy.h5", ""))
     with pytest.raises(DomainError, match=r"heavy\.h5, 1\.37e\+06 N, dry"):
         memscal.measure_stress(heavy, SENSOR)
+
+
+def test_paths_are_taken_wherever_objects_are(tmp_path: Path) -> None:
+    scan, rod = tmp_path / "sphere.h5", tmp_path / "rod.h5"
+    sensor = tmp_path / "sensor.apparatus.h5"
+    memscal.write_scan(contact_scan(3, load=(1.37,)), scan)
+    memscal.write_scan(memscal.simulate(seed=3), rod)
+    SENSOR.save(sensor)
+    read, known = memscal.read_scan(scan), memscal.load_apparatus(sensor)
+    assert memscal.measure_stress(scan, sensor).profiles == (
+        memscal.measure_stress(read, known).profiles
+    )
+    assert memscal.restore(str(scan), sensor).force == memscal.restore(read, known).force
+    by_path, by_scan = (
+        memscal.calibrate(given, method="evidence").apparatus
+        for given in (rod, memscal.read_scan(rod))
+    )
+    assert by_path.conversion_constant == by_scan.conversion_constant
+
+
+def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
+    dry = contact_scan(1, load=LOADS[:2])
+    wet = contact_scan(2, load=LOADS[:1], lubrication="lubricated")
+    together = memscal.measure_stress([dry, wet], SENSOR)
+    joined = joined_stress([memscal.measure_stress(scan, SENSOR) for scan in (dry, wet)])
+    assert joined.profiles == together.profiles
+    assert joined.scans == together.scans
+    assert joined.checks == together.checks
+    other = memscal.measure_stress(wet, known_apparatus(conversion_uncertainty=0.01))
+    with pytest.raises(InputError, match="digests differ"):
+        joined_stress([joined, other])
 
 
 def test_what_is_no_scan_is_refused() -> None:
