@@ -209,7 +209,8 @@ def _families(
     """Return the calculated profiles at every load that was measured, by loading."""
     scan = measured.scans[0]
     loads = np.unique(measured.loads)
-    reach = _reach(measured)
+    # In whole millimetres.
+    reach = math.ceil(_REACH * max(one.width for one in measured.scans) / _MM) * _MM
     assert isinstance(scan.indenter, Sphere)
     if references is not None:
         given = external_family(
@@ -243,11 +244,6 @@ def _families(
         )
         for name in dict.fromkeys(loadings)
     }
-
-
-def _reach(measured: MeasuredStress) -> float:
-    """Return how far calculated stresses are asked for, in whole millimetres."""
-    return math.ceil(_REACH * max(scan.width for scan in measured.scans) / _MM) * _MM
 
 
 def _confronted(
