@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from memscal.laboratory.experiment import Experiment, simulate_experiment
     from memscal.laboratory.rod_scan import simulate
     from memscal.measurement.application import measure_stress
-    from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
     from memscal.measurement.procedure import restore
     from memscal.measurement.restoration import Restoration
     from memscal.mechanics.contact import Contact
@@ -44,6 +43,7 @@ if TYPE_CHECKING:
     from memscal.model.checks import Message
     from memscal.model.film import ElasticFilm
     from memscal.model.indenter import Cone, Profile, Rod, Sphere
+    from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
     from memscal.model.scan import Scan, StressSensor
     from memscal.model.stress import StressProfile
     from memscal.planning.outcome import Design
@@ -70,8 +70,8 @@ _HOMES = {
     "GaussianMixture": "memscal.axisymmetry.kernels",
     "GreenwoodTripp": "memscal.mechanics.interface",
     "Interface": "memscal.mechanics.interface",
-    "MeasuredProfile": "memscal.measurement.measured_stress",
-    "MeasuredStress": "memscal.measurement.measured_stress",
+    "MeasuredProfile": "memscal.model.measured_stress",
+    "MeasuredStress": "memscal.model.measured_stress",
     "MemscalError": "memscal.errors",
     "Message": "memscal.model.checks",
     "MonteCarlo": "memscal.calibration.monte_carlo",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from os import PathLike
 
 import numpy as np
@@ -14,9 +15,10 @@ from memscal.axisymmetry.quadrature import ring_areas
 from memscal.errors import InputError
 from memscal.estimation.channels import TANGENTIAL
 from memscal.model.apparatus import ApparatusData
+from memscal.model.provenance import SourceFile
 from memscal.model.validation import FloatArray, finite_vector, require_increasing
 
-__all__ = ["ApparatusFunction", "load_apparatus"]
+__all__ = ["ApparatusFunction", "load_apparatus", "opened_apparatus"]
 
 #: A base stress reaches no farther than this, in m; a larger radius is in another unit.
 _LARGEST_RADIUS = 1.0
@@ -47,6 +49,17 @@ class ApparatusFunction(ApparatusData):
     >>> bool(apparatus.stress(volts)[0] < contact.base_stress(0.0))
     True
     """
+
+    source: SourceFile | None = field(default=None, init=False)
+    """The file it was read from.  Like ``content_digest`` it does not pass to a changed copy."""
+
+    @cached_property
+    def content_digest(self) -> str:
+        """The digest that its artifact states, or would state if it were saved."""
+        from memscal.formats.artifact import artifact_tree
+        from memscal.formats.schema import DIGEST_ATTRIBUTE
+
+        return str(artifact_tree(self).attributes[DIGEST_ATTRIBUTE])
 
     @property
     def order(self) -> int:
@@ -223,7 +236,20 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
     SchemaVersionError
         If it was written under a newer major version of the format.
     """
-    from memscal.formats.artifact import read_artifact
+    from memscal.formats.artifact import artifact_from
+    from memscal.formats.hdf5_reader import open_hdf5
+    from memscal.formats.schema import DIGEST_ATTRIBUTE
 
-    data = read_artifact(path)
-    return ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
+    with open_hdf5(path) as file:
+        data = artifact_from(file)
+        digest, source = file.attribute("/", DIGEST_ATTRIBUTE), file.source
+    apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
+    object.__setattr__(apparatus, "source", source)
+    # Rounding may give another one if it were written again: the file's own is what counts.
+    object.__setattr__(apparatus, "content_digest", str(digest))
+    return apparatus
+
+
+def opened_apparatus(apparatus: ApparatusFunction | str | PathLike[str]) -> ApparatusFunction:
+    """Return an apparatus function that is given itself or as the path of its artifact."""
+    return apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)

@@ -10,7 +10,7 @@ from spheres import SPHERE, known_apparatus
 
 import memscal
 from memscal.laboratory.contact_scan import simulate_contacts
-from memscal.measurement.measured_stress import MeasuredStress
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 
 LOADS = (0.34, 0.69, 1.37, 2.75)

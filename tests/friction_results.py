@@ -83,7 +83,8 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
     errors = np.maximum(errors * np.exp(-r / 2e-3), 2e-4 * clean.max())
     top = float(clean.max())
     return SimpleNamespace(
-        part=SimpleNamespace(lubrication=lubrication, load=load, scan=_scan(lubrication)),
+        scan=_scan(lubrication),
+        lubrication=lubrication,
         x=x,
         r=r,
         s_zz=clean + rng.normal(0.0, errors),
@@ -176,11 +177,6 @@ def comparison(
     )
     measured = SimpleNamespace(
         profiles=tuple(profiles),
-        apparatus=SimpleNamespace(
-            process=SimpleNamespace(input_scan=SourceFile("scan.h5", "ab" * 32)),
-            source=SourceFile("sensor.apparatus.h5", "cd" * 32),
-            sensor=SimpleNamespace(name="array 3", model="", channel="zz"),
-        ),
         scans=tuple(_scan(lubrication) for lubrication in lubrications),
         checks=(),
         messages=(),
@@ -260,8 +256,8 @@ def _joint(of_each: Sequence[LoadComparison], lubrication: str) -> EffectiveFric
 
 def _differences(profiles: Sequence[Any]) -> tuple[DryAgainstLubricated, ...]:
     found = []
-    for dry in (p for p in profiles if p.part.lubrication == "dry"):
-        for wet in (p for p in profiles if p.part.lubrication == "lubricated"):
+    for dry in (p for p in profiles if p.lubrication == "dry"):
+        for wet in (p for p in profiles if p.lubrication == "lubricated"):
             if wet.load != dry.load:
                 continue
             difference = dry.s_zz - wet.s_zz

@@ -48,8 +48,20 @@ def room(module: str) -> str:
     return [*module.split("."), "__init__"][1]
 
 
+LATE = {"save"}
+"""Methods by which a result uses what stands above it: they import it when they are called."""
+
+
+def early(tree: ast.AST) -> Iterator[ast.AST]:
+    """Every node that is not within a late method."""
+    for node in ast.iter_child_nodes(tree):
+        if not (isinstance(node, ast.FunctionDef) and node.name in LATE):
+            yield node
+            yield from early(node)
+
+
 def imported(tree: ast.AST) -> Iterator[str]:
-    for node in ast.walk(tree):
+    for node in early(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:

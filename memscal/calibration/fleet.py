@@ -126,10 +126,6 @@ def _calibrated(item: tuple[int, FleetScan], options: Mapping[str, Any]) -> Flee
     """Calibrate one scan; whatever goes wrong is its own matter."""
     index, scan = item
     try:
-        if isinstance(scan, str | PathLike):
-            from memscal.formats.scan import read_scan
-
-            scan = read_scan(scan)
         apparatus = calibrate(scan, **options).apparatus
     except MemscalError as failure:
         return FleetCalibration(index=index, budget={}, error=failure)

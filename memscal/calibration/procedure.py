@@ -25,6 +25,7 @@ from memscal.estimation.reference import (
     require_calibration_rod,
     require_one_sensor,
 )
+from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import Contact
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -86,7 +87,7 @@ class Calibration:
 
 
 def calibrate(
-    scan: Scan | Sequence[Scan],
+    scan: Scans,
     *,
     reference: Reference | Sequence[Reference] = None,
     alternative: Reference | Sequence[Reference] = None,
@@ -104,7 +105,7 @@ def calibrate(
 
     Parameters
     ----------
-    scan : Scan or sequence of Scan
+    scan : Scan or path, or a sequence of them
         Voltage against the rod's position.  Several scans of one sensor, at other loads, with
         other rods or films, along x or y, are fitted together: A and G are shared, and each has
         its own centre and baseline.
@@ -147,7 +148,7 @@ def calibrate(
     >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
     True
     """
-    scans = require_one_sensor(scan)
+    scans = require_one_sensor(opened_scans(scan))
     for each in scans:
         require_calibration_rod(each)
     given = _each(reference, scans)

@@ -14,7 +14,7 @@ from memscal.cli.progress import working
 from memscal.cli.targets import FigurePath, beside, prove_writable
 
 if TYPE_CHECKING:
-    from memscal.measurement.measured_stress import MeasuredStress
+    from memscal.model.measured_stress import MeasuredStress
 
 __all__ = ["command"]
 

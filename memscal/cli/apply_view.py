@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from memscal.cli.output import finite, texts_of
 from memscal.cli.quality_view import checks_json, checks_table
 from memscal.cli.tables import Table
-from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.measurement.stress_checks import pooled_force
 from memscal.model.checks import QualityCheck
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, MV
 
@@ -24,28 +22,25 @@ _PER_PASCAL = 1e-3
 
 def stress_json(found: MeasuredStress, output: Path) -> dict[str, Any]:
     """Return the object that ``apply --json`` prints; its form is part of the contract."""
-    known = found.apparatus
     ratio, spread = pooled_force(found.profiles)
     return {
         "schema_version": "1",
         "output": str(output),
         "conversion_constant": {
-            "value": finite(known.conversion_constant / _PER_PASCAL),
-            "standard_uncertainty": finite(
-                known.parameters.uncertainty("conversion_constant") / _PER_PASCAL
-            ),
+            "value": finite(found.conversion_constant / _PER_PASCAL),
+            "standard_uncertainty": finite(found.conversion_constant_uncertainty / _PER_PASCAL),
             "unit": "mV/Pa",
         },
         "force_over_load": {"value": finite(ratio), "standard_uncertainty": finite(spread)},
-        "profiles": [_profile_json(found, profile) for profile in found.profiles],
+        "profiles": [_profile_json(profile) for profile in found.profiles],
         "overridden": list(found.overridden),
         "checks": checks_json(found.checks),
         "warnings": texts_of(found.messages),
     }
 
 
-def _profile_json(found: MeasuredStress, profile: MeasuredProfile) -> dict[str, Any]:
-    source = found.scans[found.scan_of(profile)].source
+def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
+    source = profile.scan.source
     quantities = (
         ("force", profile.force, profile.force_uncertainty, "N"),
         ("maximum", profile.maximum / KPA, profile.maximum_uncertainty / KPA, "kPa"),
@@ -107,8 +102,7 @@ def stress_tables(found: MeasuredStress) -> list[Table]:
 
 
 def _common(found: MeasuredStress) -> list[tuple[str, str]]:
-    known = found.apparatus
-    a, u = known.conversion_constant, known.parameters.uncertainty("conversion_constant")
+    a, u = found.conversion_constant, found.conversion_constant_uncertainty
     ratio, spread = pooled_force(found.profiles)
     points = sum(profile.r.size for profile in found.profiles)
     return [
@@ -137,5 +131,5 @@ def _shown(found: MeasuredStress) -> list[QualityCheck]:
 
 def _centre(profile: MeasuredProfile) -> tuple[float, float]:
     """Centre along the scan and its standard uncertainty, in mm."""
-    axis = int(np.argmax(profile.restoration.points.free[0]))
+    axis = profile.axis
     return profile.centre[axis] / MM, profile.centre_uncertainty[axis] / MM

@@ -28,6 +28,7 @@ _COEFFICIENT = Quantity("ratio", open_low=False, infinite=True)
 EXAMPLES = """\b
 Examples:
   memscal compare sensor.apparatus.h5 dry.h5
+  memscal compare sensor.apparatus.h5 dry.stress.h5
   memscal compare sensor.apparatus.h5 dry.h5 lubricated.h5 --macroscopic 1.6 --figure friction.pdf
   memscal compare sensor.apparatus.h5 dry.h5 --friction 0.1 --friction 0.2 --json
   memscal compare sensor.apparatus.h5 dry.h5 --loading incremental --interface --macroscopic 1.6
@@ -37,7 +38,7 @@ Examples:
 
 @click.command("compare", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
-@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
+@click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN|STRESS...")
 @click.option(
     "--friction",
     "friction",
@@ -135,11 +136,12 @@ def command(
 ) -> int:
     """Compare the stress that contact SCANs measured with calculated contacts.
 
-    The sensor's conversion constant and apparatus function come from ARTIFACT. A sphere is pressed
-    on the film by calculation, at the measured loads and with several friction coefficients; what
-    reaches the sensor is held against what it measured, load by load and over all loads. The
-    effective friction coefficient comes with a confidence interval, or as a bound where the data
-    tell no more, by the maximum of each profile and by the whole of it.
+    In place of the scans, give the measured STRESS that memscal apply wrote of them. The sensor's
+    conversion constant and apparatus function come from ARTIFACT. A sphere is pressed on the film
+    by calculation, at the measured loads and with several friction coefficients; what reaches the
+    sensor is held against what it measured, load by load and over all loads. The effective friction
+    coefficient comes with a confidence interval, or as a bound where the data tell no more, by the
+    maximum of each profile and by the whole of it.
 
     A failed quality check is exit code 1: the results are printed all the same.
     """
@@ -147,11 +149,12 @@ def command(
     kept = cache_from(cache, no_cache)
 
     from memscal.apparatus import load_apparatus
-    from memscal.formats.scan import read_scan
+    from memscal.formats.opened import opened_contacts
+    from memscal.friction.requirements import scans_of
 
-    known, data = load_apparatus(artifact), [read_scan(path) for path in scans]
+    known, data = load_apparatus(artifact), opened_contacts(scans)
     tables = _read_references(references)
-    lubrications = tuple(dict.fromkeys(scan.lubrication for scan in data))
+    lubrications = tuple(dict.fromkeys(scan.lubrication for scan in scans_of(data)))
     files = FigureFiles(single, folder, figure_format, lubrications, interface)
     files.prove(force=force, inputs=[artifact, *scans, *references])
 

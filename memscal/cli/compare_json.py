@@ -37,7 +37,9 @@ def comparison_json(
     return {
         "schema_version": "1",
         "artifact": _file(artifact),
-        "scans": [_file(scan.source) | {"lubrication": scan.lubrication} for scan in _scans(found)],
+        "scans": [
+            _file(scan.source) | {"lubrication": scan.lubrication} for scan in found.measured.scans
+        ],
         "references": [_file(source) for source in references],
         "figures": [str(path) for path in files],
         "loads": [
@@ -58,11 +60,6 @@ def comparison_json(
     }
 
 
-def _scans(found: FrictionComparison) -> list[Any]:
-    """Return the scans that were compared, each once, in their order."""
-    return list(found.measured.scans)
-
-
 def _file(source: SourceFile | None) -> dict[str, Any]:
     if source is None:
         return {"file_name": None, "sha256": None}
@@ -80,7 +77,7 @@ def _coefficient(friction: float) -> dict[str, Any]:
 def _load(index: int, found: FrictionComparison, first: LoadComparison) -> dict[str, Any]:
     """Return what was measured at one load, and what each loading makes of it."""
     profile = first.profile
-    source = profile.part.scan.source
+    source = profile.scan.source
     return {
         "scan": None if source is None else source.file_name,
         "lubrication": first.lubrication,

@@ -43,7 +43,7 @@ def comparison_tables(found: FrictionComparison) -> list[Table]:
 def _maxima_table(found: FrictionComparison) -> Table:
     """Return the measured force and maximum of each load, beside the frictionless maximum."""
     first = found.loads[found.loadings[0]]
-    sphere = found.measured.profiles[0].part.scan.indenter
+    sphere = found.measured.profiles[0].scan.indenter
     title = (
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -38,24 +37,14 @@ _LARGEST_KH = 20.0
 _DECAYED = 1e-3
 
 
-def require_one_sensor(scans: Any) -> tuple[Scan, ...]:
+def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     """Refuse scans that cannot be fitted together.
 
     Raises
     ------
     InputError
-        If there is none, one of them is no scan, or they contradict each other: other sensors,
-        or one name for films that differ.
+        If they contradict each other: other sensors, or one name for films that differ.
     """
-    scans = scans if isinstance(scans, list | tuple) else [scans]
-    for scan in scans:
-        if not isinstance(scan, Scan):
-            raise InputError(
-                f"calibrate() was given a {type(scan).__name__}, not a Scan.",
-                cure="Read a scan file with memscal.read_scan(path).",
-            )
-    if not scans:
-        raise InputError("calibrate() was given no scan.")
     sensors = {(scan.sensor.name, scan.sensor.channel): None for scan in scans}
     if len(sensors) > 1:
         named = ", ".join(f"{name or 'unnamed'} ({channel})" for name, channel in sensors)

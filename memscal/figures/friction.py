@@ -84,7 +84,7 @@ def comparison_figures(found: FrictionComparison) -> Mapping[str, Callable[[], F
         draws when it is called.
     """
     figures: dict[str, Callable[[], Figure]] = {}
-    measured = (profile.part.lubrication for profile in found.measured.profiles)
+    measured = (profile.lubrication for profile in found.measured.profiles)
     for lubrication in dict.fromkeys(measured):
         tail = f"-{lubrication}" if lubrication else ""
         figures[f"profiles{tail}"] = _of(profile_figure, found, lubrication)

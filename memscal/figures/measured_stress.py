@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from memscal.figures.style import house_style, new_figure, panel_letter
-from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
 
 __all__ = ["measured_stress_figure"]
@@ -21,7 +21,6 @@ _DECADES = 1e-3
 #: Okabe and Ito's colours once more, one for each load, from the smallest up.
 _LOADS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#0072B2", "#7B3F8C", "#6B6B6B")
 _SAME_LOAD = 0.05
-_CURVE = 301
 
 
 def measured_stress_figure(found: MeasuredStress) -> Figure:
@@ -78,9 +77,13 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, told: bool) -> N
     On a logarithmic axis their bars have no lower end.
     """
     lubricated = profile.lubrication == "lubricated"
-    r = np.linspace(0.0, float(profile.r[-1]), _CURVE)
-    curve = profile.restoration.blurred_stress(r) / KPA
-    axes.plot(r / MM, curve, color=colour, lw=0.8, ls="--" if lubricated else "-", alpha=0.7)
+    line: dict[str, Any] = {
+        "color": colour,
+        "lw": 0.8,
+        "ls": "--" if lubricated else "-",
+        "alpha": 0.7,
+    }
+    axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, **line)
     bars = _EXPANDED * profile.s_zz_errors
     shown = profile.s_zz > bars if told else np.ones(profile.r.size, dtype=np.bool_)
     look: dict[str, Any] = {

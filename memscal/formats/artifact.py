@@ -35,7 +35,7 @@ from memscal.model.apparatus import (
     TransferFunction,
 )
 
-__all__ = ["read_artifact", "write_artifact"]
+__all__ = ["artifact_tree", "read_artifact", "write_artifact"]
 
 
 def read_artifact(path: str | os.PathLike[str]) -> ApparatusData:
@@ -89,7 +89,12 @@ def write_artifact(
 
     The same data give the same bytes; the only time in the file is ``data.process.date``.
     """
-    write_tree(file_tree(ARTIFACT_SCHEMA, _entry(data)), path, overwrite=overwrite)
+    write_tree(artifact_tree(data), path, overwrite=overwrite)
+
+
+def artifact_tree(data: ApparatusData) -> Group:
+    """Return what a memscal-artifact file holds; its root states the content digest."""
+    return file_tree(ARTIFACT_SCHEMA, _entry(data))
 
 
 def _entry(data: ApparatusData) -> Group:

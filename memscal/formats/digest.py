@@ -4,8 +4,9 @@ Beside the data every file of ours lists what it holds (``/entry/contents``): ea
 the names of its attributes.  The digest goes over the paths in alphabetical order, one line
 of JSON for each: path, type, shape, attributes, and the SHA-256 of the values as little-endian
 64-bit numbers or UTF-8 text.  A reader can follow the list by known paths, without listing a
-group; what other programs add beside it is not ours and is not covered.  The digest shows
-accidents and careless edits; it is not a signature.
+group.  What other programs add under names that the reader does not know stays unread; at a path
+that it knows but the list lacks, it is refused.  The digest shows accidents and careless edits; it
+is not a signature.
 """
 
 from __future__ import annotations

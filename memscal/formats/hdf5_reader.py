@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from io import BytesIO
 from typing import Any
 
@@ -96,10 +96,15 @@ class SafeFile:
         self._budget = _MAX_TOTAL_BYTES
         self._arrays: dict[str, np.ndarray[Any, Any]] = {}
         self._texts: dict[str, str] = {}
+        self._listed: frozenset[str] | None = None
 
     def where(self, path: str) -> str:
         """Return file and path as messages name them."""
         return f"{self.name}: {path}"
+
+    def limit_to(self, paths: Iterable[str]) -> None:
+        """From now on refuse what stands at any other path: no digest covers it."""
+        self._listed = frozenset(paths)
 
     def has(self, path: str) -> bool:
         """Return whether a path exists; a link that is not a hard link is refused."""
@@ -144,7 +149,14 @@ class SafeFile:
         if path not in self._opened:
             folder, _, name = path.rpartition("/")
             self._opened[path] = self._follow(self._open(folder or "/"), path, name)
-        return self._opened[path]
+        found = self._opened[path]
+        if found is not None and self._listed is not None and path not in self._listed:
+            raise FormatError(
+                f"{self.where(path)} was added after the file was written.",
+                why="The list of its contents lacks it, so that no digest covers it.",
+                cure="Remove it, or make the file again.",
+            )
+        return found
 
     def _follow(self, folder: Any, path: str, name: str) -> Any:
         from memscal.formats.hdf5_library import h5py

@@ -21,26 +21,18 @@ from memscal.formats.fields import (
 from memscal.formats.hdf5_reader import SafeFile, open_hdf5
 from memscal.formats.hdf5_writer import file_tree, write_tree
 from memscal.formats.json_text import to_json
+from memscal.formats.measured_points import points_groups, read_points, read_scans, scans_group
 from memscal.formats.parameters import budget_group, read_budget
-from memscal.formats.parts import (
-    indenter_group,
-    instrument_group,
-    read_film,
-    read_round_indenter,
-    read_sensor,
-    sample_group,
-)
+from memscal.formats.parts import indenter_group, instrument_group, sample_group
 from memscal.formats.process import process_group, quality_group, read_process, read_quality
 from memscal.formats.schema import STRESS_SCHEMA
 from memscal.formats.tree import Group, Node, count, si
 from memscal.formats.verify import altered
+from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import SourceFile
-from memscal.model.stress_record import StressRecord, StressRecordProfile
 from memscal.model.validation import FloatArray
 
 __all__ = [
-    "PROFILE_ARRAYS",
-    "PROFILE_NUMBERS",
     "profile_paths",
     "read_stress",
     "stress_from",
@@ -48,16 +40,15 @@ __all__ = [
 ]
 
 #: Numbers and arrays of one profile that ``memscal inspect`` lists.
-PROFILE_NUMBERS = "load lubrication force maximum centre centre_y baseline contact_radius"
-PROFILE_ARRAYS = "r x y s_zz s_zz_errors covariance"
 
 _BUDGET = {"force": "force", "maximum": "stress"}
 _PREFIX = "covariance_"
+_MOST_SCANS = 10_000
 # The covariance's second axis has its own name: netCDF tools want each dimension once.
 _AXES = ("r", "r_prime")
 
 
-def read_stress(path: str | os.PathLike[str]) -> StressRecord:
+def read_stress(path: str | os.PathLike[str]) -> MeasuredStress:
     """Read measured stress from a memscal-stress file.
 
     Parameters
@@ -67,7 +58,8 @@ def read_stress(path: str | os.PathLike[str]) -> StressRecord:
 
     Returns
     -------
-    StressRecord
+    MeasuredStress
+        Equal to what was saved.  A file of version 1.0 holds no measured points.
 
     Raises
     ------
@@ -79,7 +71,7 @@ def read_stress(path: str | os.PathLike[str]) -> StressRecord:
         return stress_from(file)
 
 
-def stress_from(file: SafeFile) -> StressRecord:
+def stress_from(file: SafeFile) -> MeasuredStress:
     """Read the measured stress of an open memscal-stress file."""
     require_schema(file, STRESS_SCHEMA)
     problem = altered(file)
@@ -95,18 +87,15 @@ def stress_from(file: SafeFile) -> StressRecord:
             f"{file.where('/entry/profiles')} names no profile.",
             why="It lists the groups that hold one.",
         )
-    inputs = {
-        str(name): SourceFile(
-            require_text(file, f"/entry/inputs/{name}/file_name"),
-            require_text(file, f"/entry/inputs/{name}/checksum"),
-        )
-        for name in json_value(file, "/entry/inputs/names", list, [])
-    }
-    return StressRecord(
-        profiles=tuple(_read_profile(file, path) for path in paths),
-        film=read_film(file, "/entry/sample/film"),
-        indenter=read_round_indenter(file, "/entry/indenter"),
-        sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
+    sources = _read_sources(file)
+    numbers = [_scan_number(file, path) for path in paths]
+    scans = read_scans(file, paths, numbers, sources)
+    return MeasuredStress(
+        profiles=tuple(
+            _read_profile(file, path, scans[number - 1])
+            for path, number in zip(paths, numbers, strict=True)
+        ),
+        scans=scans,
         conversion_constant=require_scalar(
             file, "/entry/sensor/conversion_constant", "voltage per stress"
         ),
@@ -115,32 +104,23 @@ def stress_from(file: SafeFile) -> StressRecord:
         ),
         checks=read_quality(file, "/entry/quality"),
         overridden=tuple(str(text) for text in json_value(file, "/entry/overridden", list, [])),
-        artifact=inputs.pop("artifact", None),
-        scans=tuple(inputs.values()),
         process=read_process(file, "/entry/process"),
+        artifact=sources.get("artifact"),
+        artifact_digest=optional_text(file, "/entry/sensor/content_sha256"),
     )
 
 
 def write_stress(
-    record: StressRecord, path: str | os.PathLike[str], *, overwrite: bool = False
+    measured: MeasuredStress, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
     """Write measured stress as a memscal-stress file, whole or not at all.
-
-    Parameters
-    ----------
-    record : StressRecord
-        The profiles and where they come from; :meth:`memscal.MeasuredStress.save` makes it.
-    path : path
-        The file.
-    overwrite : bool
-        Whether an existing file may be replaced.
 
     Raises
     ------
     OutputError
-        If the file exists or cannot be written.
+        If the file exists and ``overwrite`` is false, or cannot be written.
     """
-    write_tree(file_tree(STRESS_SCHEMA, _entry(record)), path, overwrite=overwrite)
+    write_tree(file_tree(STRESS_SCHEMA, _entry(measured)), path, overwrite=overwrite)
 
 
 def profile_paths(file: SafeFile) -> list[str]:
@@ -148,49 +128,75 @@ def profile_paths(file: SafeFile) -> list[str]:
     return [f"/entry/{name}" for name in json_value(file, "/entry/profiles", list, [])]
 
 
-def _entry(record: StressRecord) -> Group:
-    names = [f"profile_{i + 1}" for i in range(len(record.profiles))]
-    sensor = record.sensor.name
-    a, u_a = record.conversion_constant, record.conversion_constant_uncertainty
+def _entry(measured: MeasuredStress) -> Group:
+    names = [f"profile_{i + 1}" for i in range(len(measured.profiles))]
+    first = measured.scans[0]
+    sensor = first.sensor.name
+    a, u_a = measured.conversion_constant, measured.conversion_constant_uncertainty
+    used: dict[str, Node] = {
+        "conversion_constant": si(a, "voltage per stress"),
+        "conversion_constant_errors": si(u_a, "voltage per stress"),
+    }
+    if measured.artifact_digest:
+        used["content_sha256"] = measured.artifact_digest
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json("profiles", names),
         **{
-            name: _profile_group(profile)
-            for name, profile in zip(names, record.profiles, strict=True)
+            name: _profile_group(profile, measured.scans)
+            for name, profile in zip(names, measured.profiles, strict=True)
         },
-        "sensor": Group(
-            "NXcollection",
-            {
-                "conversion_constant": si(a, "voltage per stress"),
-                "conversion_constant_errors": si(u_a, "voltage per stress"),
-            },
-        ),
-        "quality": quality_group(record.checks),
-        "overridden": to_json("overridden", list(record.overridden)),
-        "sample": sample_group(record.film),
-        "instrument": instrument_group(record.sensor),
-        "indenter": indenter_group(record.indenter),
-        "inputs": _inputs_group(record),
-        "process": process_group(record.process),
+        "sensor": Group("NXcollection", used),
+        "quality": quality_group(measured.checks),
+        "overridden": to_json("overridden", list(measured.overridden)),
+        # Those of the first scan; each scan states its own beside them.
+        "sample": sample_group(first.film),
+        "instrument": instrument_group(first.sensor),
+        "indenter": indenter_group(first.indenter),
+        "scans": scans_group(measured.scans),
+        "inputs": _inputs_group(measured),
+        "process": process_group(measured.process),
     }
     return Group("NXentry", children, {"default": names[-1]})
 
 
-def _inputs_group(record: StressRecord) -> Group:
-    inputs = {} if record.artifact is None else {"artifact": record.artifact}
-    inputs |= {f"scan_{i + 1}": source for i, source in enumerate(record.scans)}
+def _inputs_group(measured: MeasuredStress) -> Group:
+    sources = {"artifact": measured.artifact}
+    sources |= {f"scan_{i + 1}": scan.source for i, scan in enumerate(measured.scans)}
     groups: dict[str, Node] = {
         name: Group(
             "NXnote",
             {"file_name": source.file_name, "checksum": source.sha256, "algorithm": "sha256"},
         )
-        for name, source in inputs.items()
+        for name, source in sources.items()
+        if source is not None
     }
-    return Group("NXcollection", {"names": to_json("inputs", list(inputs)), **groups})
+    return Group("NXcollection", {"names": to_json("inputs", list(groups)), **groups})
 
 
-def _profile_group(profile: StressRecordProfile) -> Group:
+def _read_sources(file: SafeFile) -> dict[str, SourceFile]:
+    return {
+        str(name): SourceFile(
+            require_text(file, f"/entry/inputs/{name}/file_name"),
+            require_text(file, f"/entry/inputs/{name}/checksum"),
+        )
+        for name in json_value(file, "/entry/inputs/names", list, [])
+    }
+
+
+def _scan_number(file: SafeFile, path: str) -> int:
+    """Which scan a profile comes from, counted from one."""
+    number = require_scalar(file, f"{path}/scan", "dimensionless")
+    if not 1 <= number <= _MOST_SCANS:
+        raise FormatError(
+            f"{file.where(path)}/scan is {number:g}.",
+            why=f"Scans are counted from 1 to {_MOST_SCANS} at most.",
+            cure="Run memscal apply again.",
+        )
+    return int(number)
+
+
+def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
     centre, spread = profile.centre, profile.centre_uncertainty
     children: dict[str, Node] = {
         "r": si(profile.r, "length", ("r",)),
@@ -205,18 +211,21 @@ def _profile_group(profile: StressRecordProfile) -> Group:
             _PREFIX + source: si(values, "stress squared", _AXES)
             for source, values in profile.covariances.items()
         },
-        "scan": count(profile.scan + 1),
+        "scan": count(scans.index(profile.scan) + 1),
         "load": si(profile.load, "force"),
         "force": si(profile.force, "force"),
-        "force_errors": si(profile.uncertainty("force"), "force"),
+        "force_errors": si(profile.force_uncertainty, "force"),
         "maximum": si(profile.maximum, "stress"),
-        "maximum_errors": si(profile.uncertainty("maximum"), "stress"),
+        "maximum_errors": si(profile.maximum_uncertainty, "stress"),
         "centre": si(centre[0], "length"),
         "centre_errors": si(spread[0], "length"),
         "baseline": si(profile.baseline, "voltage"),
         "baseline_errors": si(profile.baseline_uncertainty, "voltage"),
         "contact_radius": si(profile.contact_radius, "length"),
-        "budget": budget_group(profile.budget, _BUDGET),
+        "budget": budget_group(
+            {"force": profile.force_budget, "maximum": profile.maximum_budget}, _BUDGET
+        ),
+        **points_groups(profile.points),
     }
     if spread[1] > 0:
         children["centre_y"] = si(centre[1], "length")
@@ -225,10 +234,16 @@ def _profile_group(profile: StressRecordProfile) -> Group:
         children["load_errors"] = si(profile.load_uncertainty, "force")
     if profile.lubrication:
         children["lubrication"] = profile.lubrication
+    if profile.curve_r.size:
+        curve: dict[str, Node] = {
+            "r": si(profile.curve_r, "length", ("r",)),
+            "s_zz": si(profile.curve_s_zz, "stress", ("r",)),
+        }
+        children["curve"] = Group("NXdata", curve, {"signal": "s_zz", "axes": ("r",)})
     return Group("NXdata", children, {"signal": "s_zz", "axes": ("r",)})
 
 
-def _read_profile(file: SafeFile, path: str) -> StressRecordProfile:
+def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProfile:
     def number(name: str, dimension: str) -> float:
         return require_scalar(file, f"{path}/{name}", dimension)
 
@@ -258,22 +273,27 @@ def _read_profile(file: SafeFile, path: str) -> StressRecordProfile:
             why="Measured stress without uncertainty means little.",
         )
     y = optional_array(file, f"{path}/y", "length", ndim=1)
-    return StressRecordProfile(
+    curve_r = optional_array(file, f"{path}/curve/r", "length", ndim=1)
+    m = 0 if curve_r is None else curve_r.size
+    return MeasuredProfile(
+        scan=scan,
         load=number("load", "force"),
         load_uncertainty=optional_scalar(file, f"{path}/load_errors", "force"),
-        lubrication=optional_text(file, f"{path}/lubrication"),
-        scan=int(number("scan", "dimensionless")) - 1,
         r=r,
         x=array("x", "length", (n,)),
         y=np.zeros(n) if y is None else y,
         s_zz=array("s_zz", "stress", (n,)),
         covariances=covariances,
         force=number("force", "force"),
+        force_budget=budget["force"],
         maximum=number("maximum", "stress"),
-        budget=budget,
+        maximum_budget=budget["maximum"],
         centre=along("centre", "centre_y"),
         centre_uncertainty=along("centre_errors", "centre_y_errors"),
         baseline=number("baseline", "voltage"),
         baseline_uncertainty=number("baseline_errors", "voltage"),
         contact_radius=number("contact_radius", "length"),
+        curve_r=np.zeros(0) if curve_r is None else curve_r,
+        curve_s_zz=array("curve/s_zz", "stress", (m,)) if m else np.zeros(0),
+        points=read_points(file, path),
     )

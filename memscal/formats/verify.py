@@ -20,7 +20,8 @@ _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 def altered(file: SafeFile) -> str:
     """Return how a file differs from what was written, or ``""`` where it does not.
 
-    A file without a digest counts as altered: every file of ours has one.
+    A file without a digest counts as altered: every file of ours has one.  Of one that is not
+    altered only what it lists can be read from here on; what was added is refused by its path.
     """
     stated = file.attribute("/", DIGEST_ATTRIBUTE)
     if stated is None:
@@ -33,6 +34,7 @@ def altered(file: SafeFile) -> str:
         return f"{missing[0]} is missing."
     if content_digest(stored_items(file, contents)) != stated:
         return "its content does not fit its digest."
+    file.limit_to(contents)
     return ""
 
 

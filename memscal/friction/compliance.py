@@ -34,7 +34,7 @@ from memscal.model.checks import Message
 from memscal.model.validation import require_positive
 
 if TYPE_CHECKING:
-    from memscal.measurement.measured_stress import MeasuredProfile
+    from memscal.model.measured_stress import MeasuredProfile
 
 __all__ = ["InterfaceComparison", "compare_interface"]
 
@@ -92,8 +92,8 @@ def compare_interface(
     require_positive("macroscopic friction coefficient", macroscopic)
     if macroscopic_uncertainty is not None:
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)
-    wet = [profile for profile in profiles if profile.part.lubrication == "lubricated"]
-    dry = [profile for profile in profiles if profile.part.lubrication != "lubricated"]
+    wet = [profile for profile in profiles if profile.lubrication == "lubricated"]
+    dry = [profile for profile in profiles if profile.lubrication != "lubricated"]
     calculated = LawFamilies(profiles, cache, workers)
     tangential = normal = None
     if dry:
@@ -103,7 +103,7 @@ def compare_interface(
             _measured(dry, apparatus, rigid),
             _measured(dry, apparatus, elastic),
             macroscopic=macroscopic,
-            lubrication=dry[0].part.lubrication,
+            lubrication=dry[0].lubrication,
         )
     if wet:
         normal = weigh_normal_compliance(
@@ -135,7 +135,7 @@ def _messages(
     uncertainty: float | None,
     dry: Sequence[MeasuredProfile],
 ) -> Iterator[Message]:
-    if any(not profile.part.lubrication for profile in dry):
+    if any(not profile.lubrication for profile in dry):
         yield Message(
             "lubrication_unstated", "Scans that do not state their lubrication were taken as dry."
         )

@@ -22,7 +22,7 @@ from memscal.friction.results import DryAgainstLubricated
 from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:
-    from memscal.measurement.measured_stress import MeasuredProfile
+    from memscal.model.measured_stress import MeasuredProfile
 
 __all__ = ["dry_against_lubricated", "lubricated_pairs"]
 
@@ -35,7 +35,7 @@ _FEWEST_PLACES = 6
 
 def lubricated_pairs(profiles: Sequence[MeasuredProfile]) -> list[tuple[int, int]]:
     """Return the indices of dry and lubricated profiles of one load."""
-    kinds = [profile.part.lubrication for profile in profiles]
+    kinds = [profile.lubrication for profile in profiles]
     return [
         (i, j)
         for i, dry in enumerate(profiles)
@@ -51,6 +51,7 @@ def dry_against_lubricated(
     sensor: Sensor,
     frictionless: Members,
     loads: tuple[int, int],
+    conversion_share: float,
 ) -> DryAgainstLubricated | None:
     """Compare the dry and the lubricated profile of one load.
 
@@ -65,6 +66,8 @@ def dry_against_lubricated(
         where those of the two scans differ.
     loads : tuple of int
         Its loads of the two.
+    conversion_share : float
+        Relative standard uncertainty of A.
 
     Returns
     -------
@@ -90,11 +93,11 @@ def dry_against_lubricated(
     flat = np.column_stack([sides[0].flat, found[0].slope[0] * sides[0].side])[kept[0]]
     chi_square = _chi_square(dry - wet, np.asarray(covariance), flat)
     degrees = kept[0].size - flat.shape[1]
-    difference, errors = _difference(profiles, sides, found, kept)
+    difference, errors = _difference(profiles, sides, found, kept, sensor, conversion_share)
     top = profiles[0].maximum - profiles[1].maximum
     u_top = float(
         np.hypot(
-            _conversion_share(profiles[0]) * top,
+            conversion_share * top,
             math.hypot(*(random_uncertainty(each.maximum_budget) for each in profiles)),
         )
     )
@@ -144,6 +147,8 @@ def _difference(
     sides: Sequence[LoadPoints],
     found: Sequence[Predicted],
     kept: tuple[NDArray[np.intp], NDArray[np.intp]],
+    sensor: Sensor,
+    conversion_share: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Return dry minus lubricated stress at the dry scan's places, and its uncertainty, in Pa."""
     orders = [np.argsort(profile.x) for profile in profiles]
@@ -151,20 +156,13 @@ def _difference(
         profile.s_zz[order][places]
         for profile, order, places in zip(profiles, orders, kept, strict=True)
     ]
-    a = profiles[0].restoration.apparatus.conversion_constant
     farther = sides[0].radius[kept[0]] - sides[1].radius[kept[1]]
     heavier = math.log(profiles[0].load / profiles[1].load)
     moved = found[1].slope[0][kept[1]] * farther + found[1].by_load[0][kept[1]] * heavier
-    difference = stresses[0] - stresses[1] - moved / a
-    variance = (_conversion_share(profiles[0]) * difference) ** 2
+    difference = stresses[0] - stresses[1] - moved / sensor.conversion_constant
+    variance = (conversion_share * difference) ** 2
     for profile, order, places in zip(profiles, orders, kept, strict=True):
         for source, covariance in profile.covariances.items():
             if source != "conversion_constant":
                 variance = variance + np.diag(covariance)[order][places]
     return difference, np.sqrt(variance)
-
-
-def _conversion_share(profile: MeasuredProfile) -> float:
-    apparatus = profile.restoration.apparatus
-    u = apparatus.parameters.uncertainty("conversion_constant")
-    return float(u / apparatus.conversion_constant)

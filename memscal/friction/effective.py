@@ -19,7 +19,7 @@ from memscal.friction.results import EffectiveFriction
 from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:
-    from memscal.measurement.measured_stress import MeasuredProfile
+    from memscal.model.measured_stress import MeasuredProfile
 
 __all__ = ["Confrontation", "confront", "fine_values", "random_uncertainty", "with_loading"]
 

@@ -18,7 +18,7 @@ from memscal.model.indenter import Indenter
 from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:
-    from memscal.measurement.measured_stress import MeasuredProfile
+    from memscal.model.measured_stress import MeasuredProfile
 
 __all__ = ["LawFamilies", "at_loads"]
 
@@ -42,7 +42,7 @@ class LawFamilies:
     def __init__(
         self, profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
     ) -> None:
-        scan = profiles[0].part.scan
+        scan = profiles[0].scan
         self.film: ElasticFilm = scan.film
         self.indenter: Indenter = scan.indenter
         self.reach = _REACH * max(float(profile.r[-1]) for profile in profiles)

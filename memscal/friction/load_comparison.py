@@ -15,7 +15,7 @@ from memscal.friction.results import LoadComparison
 from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:
-    from memscal.measurement.measured_stress import MeasuredProfile
+    from memscal.model.measured_stress import MeasuredProfile
 
 __all__ = ["load_comparison"]
 

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from memscal.estimation.points import ScanPoints, measured_points
-from memscal.model.scan import Scan
+from memscal.errors import InputError
+from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.validation import FloatArray
-
-if TYPE_CHECKING:
-    from memscal.measurement.measured_stress import MeasuredProfile
 
 __all__ = ["LoadPoints", "load_points", "single_point"]
 
@@ -96,27 +91,53 @@ class LoadPoints:
         )
 
 
-def load_points(profile: MeasuredProfile) -> LoadPoints:
-    """Return the points of a measured profile, with the noise that is stated, or was found.
+def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
+    """Return the points of a measured profile, with the noise that is stated, or was estimated.
 
     A stated noise is taken at its word: raised by a misfit, it would hide it.
+
+    Raises
+    ------
+    InputError
+        If the profile holds no points of the channel, or not their noise.
     """
-    scan, found = profile.part.scan, profile.restoration
-    points = measured_points(scan)
-    along, position = (0, points.x) if points.free[0, 0] else (1, points.y)
-    outlier = found.posterior.estimate.outlier_weight
-    kept = _kept(scan)
+    points = profile.points.get(channel)
+    if points is None:
+        raise _missing(profile, channel)
+    if points.noise is None:
+        raise InputError(
+            f"{profile.label}: u_{channel} is there, but not its noise, u_{channel}_errors.",
+            why="Contacts are told apart by a chi-square.",
+            cure=f"State the electronic noise of u_{channel}.",
+        )
+    position = (points.x, points.y)[profile.axis]
     return LoadPoints(
         u=points.u,
-        offset=position - float(found.centre[along]),
+        offset=position - float(profile.centre[profile.axis]),
         log_load=np.log(points.load / profile.load),
-        noise=np.asarray(profile.electronic_noise[kept] / np.sqrt(outlier)),
-        load_errors=_load_errors(scan, kept) / profile.load,
+        noise=np.asarray(points.noise / np.sqrt(points.weight)),
+        load_errors=points.load_errors / profile.load,
         x_errors=points.x_errors,
         flat=np.stack([np.ones_like(position), _unit_range(position)], axis=1),
-        load_share=(scan.load_uncertainty or 0.0) / scan.load,
-        position_share=scan.position_scale_uncertainty or 0.0,
-        correlation=_correlation(points),
+        load_share=(profile.load_uncertainty or 0.0) / profile.load,
+        position_share=profile.scan.position_scale_uncertainty or 0.0,
+        correlation=points.correlation,
+    )
+
+
+def _missing(profile: MeasuredProfile, channel: str) -> InputError:
+    """Say why a profile holds no points of a channel."""
+    if not profile.points:
+        return InputError(
+            f"{profile.label}: the measured stress holds no measured points.",
+            why="Its file is of version 1.0, which kept the profiles alone.",
+            cure="Make it again with memscal apply, or give the scans.",
+        )
+    return InputError(
+        f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",
+        why="The scan has none, or it does not change, or the scan does not run along "
+        f"{channel[0]}: across it the shear is zero.",
+        cure=f"Give a line scan along {channel[0]} through the sensor, with u_{channel}.",
     )
 
 
@@ -137,29 +158,6 @@ def single_point(u: float, noise: float, like: LoadPoints) -> LoadPoints:
     )
 
 
-def _kept(scan: Scan) -> NDArray[np.bool_]:
-    """Which points were measured, shape of ``u_zz``."""
-    kept: NDArray[np.bool_] = np.isfinite(scan.u_zz)
-    for other in (scan.normal_load, scan.u_zz_errors):
-        if other is not None:
-            kept &= np.isfinite(other)
-    return kept
-
-
-def _load_errors(scan: Scan, kept: NDArray[np.bool_]) -> FloatArray:
-    """Uncertainty of each load of the points that were measured, in N."""
-    if scan.normal_load_errors is None:
-        return np.zeros(int(kept.sum()))
-    return np.nan_to_num(scan.normal_load_errors[kept])
-
-
 def _unit_range(position: FloatArray) -> FloatArray:
     middle = (position.max() + position.min()) / 2
     return np.asarray((position - middle) / (np.ptp(position) / 2))
-
-
-def _correlation(points: ScanPoints) -> FloatArray | None:
-    if points.decorrelation is None:
-        return None
-    root = np.linalg.inv(points.decorrelation)
-    return np.asarray(root @ root.T)

@@ -9,8 +9,8 @@ import numpy as np
 
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import EffectiveFriction
-from memscal.measurement.measured_stress import MeasuredStress
 from memscal.model.checks import Message, QualityCheck, failed_check_messages
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.notation import format_bound
 
 __all__ = ["SYNTHETIC_SCANS", "comparison_messages"]
@@ -119,14 +119,14 @@ def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
 def _unstated(measured: MeasuredStress) -> Iterator[Message]:
     """Name what no uncertainty is stated for: the intervals count nothing for it."""
     names = []
-    for scan in measured.scans:
-        film = scan.film
+    for profile in measured.profiles:
+        film, indenter = profile.scan.film, profile.scan.indenter
         stated = {
             "Young's modulus": film.young_modulus_uncertainty,
             "Poisson's ratio": film.poisson_ratio_uncertainty,
             "film thickness": film.thickness_uncertainty,
-            f"{scan.indenter.shape} radius": scan.indenter.radius_uncertainty,
-            "load": scan.load_uncertainty,
+            f"{indenter.shape} radius": indenter.radius_uncertainty,
+            "load": profile.load_uncertainty,
         }
         names += [name for name, value in stated.items() if value is None]
     if names:

@@ -9,8 +9,9 @@ from os import PathLike
 
 import numpy as np
 
-from memscal.apparatus import ApparatusFunction, load_apparatus
+from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
+from memscal.formats.opened import Contacts, opened_contacts
 from memscal.friction.amontons import FRICTIONS, amontons_family
 from memscal.friction.cache import CacheFolder
 from memscal.friction.checks import comparison_checks
@@ -23,16 +24,21 @@ from memscal.friction.load_comparison import load_comparison
 from memscal.friction.load_points import LoadPoints, load_points
 from memscal.friction.messages import comparison_messages
 from memscal.friction.predicted import members_of, sensor_of
-from memscal.friction.requirements import contact_scans, require_macroscopic
+from memscal.friction.requirements import (
+    require_contacts,
+    require_macroscopic,
+    same_apparatus,
+    scans_of,
+)
 from memscal.friction.results import (
     DryAgainstLubricated,
     EffectiveFriction,
     FrictionComparison,
     LoadComparison,
 )
-from memscal.measurement.application import measure_stress
-from memscal.measurement.measured_stress import MeasuredStress
+from memscal.measurement.application import joined_stress, measure_stress
 from memscal.model.indenter import Sphere
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
@@ -45,7 +51,7 @@ _MM = 1e-3
 
 
 def compare(
-    scan: Scan | Sequence[Scan],
+    contacts: Contacts,
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
     friction: Sequence[float] | None = None,
@@ -69,10 +75,11 @@ def compare(
 
     Parameters
     ----------
-    scan : Scan or sequence of Scan
-        Contact scans of a sphere at one load or several, dry or lubricated; one film, one sphere.
+    contacts : Scan, MeasuredStress or path, or a sequence of them
+        Contact scans of a sphere at one load or several, dry or lubricated, on one film with one
+        sphere; or the stress that was measured of them, which holds their points.
     apparatus : ApparatusFunction or path
-        The calibrated sensor.
+        The calibrated sensor; of a measured stress the one by which it was measured.
     friction : sequence of float, optional
         Friction coefficients of the calculated profiles, increasing; the last may be ``inf``.
     loading : str or sequence of str
@@ -116,14 +123,13 @@ def compare(
     >>> found.joint["dry"]["total"].interval.low < 0.1
     True
     """
-    scans = contact_scans([scan] if isinstance(scan, Scan) else list(scan))
-    known = apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
+    opened, known = opened_contacts(contacts), opened_apparatus(apparatus)
     require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
-    measured = measure_stress(scans, known, override=override)
+    measured = _measured(opened, known, override)
     loadings = (loading,) if isinstance(loading, str) else tuple(loading)
     families = _families(measured, friction, loadings, references, cache, workers)
     given = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
-    found = compare_measured(measured, families, macroscopic=given)
+    found = compare_measured(measured, known, families, macroscopic=given)
     if not interface:
         return found
     assert macroscopic is not None
@@ -139,8 +145,28 @@ def compare(
     return replace(found, interface=laws, messages=(*found.messages, *laws.messages))
 
 
+def _measured(
+    contacts: Sequence[Scan | MeasuredStress], apparatus: ApparatusFunction, override: bool
+) -> MeasuredStress:
+    """Return the stress of all contacts, measured here where it was not before."""
+    require_contacts(scans_of(contacts))
+    scans = [item for item in contacts if isinstance(item, Scan)]
+    if len(scans) == len(contacts):
+        return measure_stress(scans, apparatus, override=override)
+    parts = []
+    for item in contacts:
+        if isinstance(item, Scan):
+            parts.append(measure_stress(item, apparatus, override=override))
+            continue
+        for profile in item.profiles:
+            load_points(profile)  # refuses a file without points before anything is calculated
+        parts.append(same_apparatus(item, apparatus, override=override))
+    return joined_stress(parts)
+
+
 def compare_measured(
     measured: MeasuredStress,
+    apparatus: ApparatusFunction,
     families: Mapping[str, ProfileFamily],
     *,
     macroscopic: tuple[float, float | None] | None = None,
@@ -150,7 +176,9 @@ def compare_measured(
     Parameters are those of :func:`compare`; the families' loads hold every measured one.
     """
     points = [load_points(profile) for profile in measured.profiles]
-    confronted = {name: _confronted(measured, family, points) for name, family in families.items()}
+    confronted = {
+        name: _confronted(measured, apparatus, family, points) for name, family in families.items()
+    }
     loads = {
         name: tuple(load_comparison(p, one, i) for i, p in enumerate(measured.profiles))
         for name, one in confronted.items()
@@ -180,8 +208,9 @@ def _families(
 ) -> dict[str, ProfileFamily]:
     """Return the calculated profiles at every load that was measured, by loading."""
     scan = measured.scans[0]
-    loads = np.unique([profile.load for profile in measured.profiles])
-    reach = _reach(measured)
+    loads = np.unique(measured.loads)
+    # In whole millimetres.
+    reach = math.ceil(_REACH * max(one.width for one in measured.scans) / _MM) * _MM
     assert isinstance(scan.indenter, Sphere)
     if references is not None:
         given = external_family(
@@ -217,19 +246,13 @@ def _families(
     }
 
 
-def _reach(measured: MeasuredStress) -> float:
-    """Return how far calculated stresses are asked for, in whole millimetres."""
-    widths = [
-        math.hypot(float(np.ptp(s.x)), 0.0 if s.y is None else float(np.ptp(s.y)))
-        for s in measured.scans
-    ]
-    return math.ceil(_REACH * max(widths) / _MM) * _MM
-
-
 def _confronted(
-    measured: MeasuredStress, family: ProfileFamily, points: Sequence[LoadPoints]
+    measured: MeasuredStress,
+    apparatus: ApparatusFunction,
+    family: ProfileFamily,
+    points: Sequence[LoadPoints],
 ) -> Confrontation:
-    sensor = sensor_of(measured.apparatus, family, float(max(p.radius.max() for p in points)))
+    sensor = sensor_of(apparatus, family, float(max(p.radius.max() for p in points)))
     return confront(family, sensor, points, _load_indices(measured, family.loads))
 
 
@@ -241,9 +264,9 @@ def _joint(
     measured: MeasuredStress, confronted: Mapping[str, Confrontation]
 ) -> dict[str, dict[str, EffectiveFriction]]:
     """Return the coefficient of all loads together, for each state of lubrication."""
-    kinds = dict.fromkeys(profile.part.lubrication for profile in measured.profiles)
+    kinds = dict.fromkeys(profile.lubrication for profile in measured.profiles)
     chosen = {
-        kind: [i for i, p in enumerate(measured.profiles) if p.part.lubrication == kind]
+        kind: [i for i, p in enumerate(measured.profiles) if p.lubrication == kind]
         for kind in kinds
     }
     return {
@@ -288,6 +311,7 @@ def _pairs(measured: MeasuredStress, confronted: Confrontation) -> tuple[DryAgai
             confronted.sensor,
             frictionless,
             (confronted.loads[i], confronted.loads[j]),
+            measured.conversion_constant_uncertainty / measured.conversion_constant,
         )
         for i, j in lubricated_pairs(measured.profiles)
     ]

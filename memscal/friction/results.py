@@ -13,7 +13,7 @@ from memscal.model.validation import FloatArray
 
 if TYPE_CHECKING:
     from memscal.friction.compliance import InterfaceComparison
-    from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
+    from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 __all__ = [
     "DryAgainstLubricated",
@@ -159,7 +159,7 @@ class LoadComparison:
     @property
     def lubrication(self) -> str:
         """``"dry"``, ``"lubricated"``, or ``""`` where it is not stated."""
-        return self.profile.part.lubrication
+        return self.profile.lubrication
 
 
 @dataclass(frozen=True, eq=False)

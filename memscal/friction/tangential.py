@@ -13,22 +13,21 @@ from os import PathLike
 
 import numpy as np
 
-from memscal.apparatus import ApparatusFunction, load_apparatus
+from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
 from memscal.estimation.channels import TANGENTIAL
-from memscal.estimation.points import measured_points
+from memscal.formats.opened import opened_stress
 from memscal.friction.amontons import FRICTIONS, amontons_family
 from memscal.friction.assembly import require_sphere
 from memscal.friction.cache import CacheFolder
 from memscal.friction.effective import confront
-from memscal.friction.load_points import LoadPoints
+from memscal.friction.load_points import load_points
 from memscal.friction.messages import SYNTHETIC_SCANS
 from memscal.friction.predicted import sensor_of
-from memscal.friction.requirements import contact_scans
+from memscal.friction.requirements import require_contacts
 from memscal.friction.results import EffectiveFriction
-from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.checks import Message
-from memscal.model.scan import Scan
+from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.validation import FloatArray
 
 __all__ = ["ShearComparison", "compare_shear"]
@@ -66,7 +65,7 @@ class ShearComparison:
 
 
 def compare_shear(
-    measured: MeasuredStress,
+    measured: MeasuredStress | str | PathLike[str],
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
     friction: Sequence[float] = FRICTIONS,
@@ -82,7 +81,7 @@ def compare_shear(
 
     Parameters
     ----------
-    measured : MeasuredStress
+    measured : MeasuredStress or path
         From :func:`memscal.measure_stress`, of scans that hold ``u_xz`` and ``u_xz_errors`` beside
         ``u_zz`` (``u_yz`` of a line along y).
     apparatus : ApparatusFunction or path
@@ -121,12 +120,13 @@ def compare_shear(
     >>> found.joint["dry"]["total"].interval.low < 0.15
     True
     """
-    known = apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
-    scan = contact_scans(measured.scans)[0]
+    known, measured = opened_apparatus(apparatus), opened_stress(measured)
+    require_contacts(measured.scans)
+    scan = measured.scans[0]
     _require_tangential(known, scan)
-    points = [_shear_points(profile, known.sensor.channel) for profile in measured.profiles]
-    loads = np.unique([profile.load for profile in measured.profiles])
-    reach = _REACH * max(float(np.ptp(one.x)) for one in measured.scans)
+    points = [load_points(profile, known.sensor.channel) for profile in measured.profiles]
+    loads = np.unique(measured.loads)
+    reach = _REACH * max(one.width for one in measured.scans)
     names = (loading,) if isinstance(loading, str) else tuple(dict.fromkeys(loading))
     if not names:
         raise InputError('No loading was given: "incremental", "total", or both.')
@@ -164,7 +164,7 @@ def compare_shear(
     )
 
 
-def _require_tangential(apparatus: ApparatusFunction, scan: Scan) -> None:
+def _require_tangential(apparatus: ApparatusFunction, scan: MeasuredScan) -> None:
     channel = apparatus.sensor.channel
     if channel not in TANGENTIAL:
         raise InputError(
@@ -181,41 +181,7 @@ def _require_tangential(apparatus: ApparatusFunction, scan: Scan) -> None:
         )
 
 
-def _shear_points(profile: MeasuredProfile, channel: str) -> LoadPoints:
-    """Return the channel's points of one load, about the normal channel's centre."""
-    scan = profile.part.scan
-    points = measured_points(scan, channel)
-    if points.u_errors is None:
-        raise InputError(
-            f"{profile.label}: u_{channel} is there, but not its noise, u_{channel}_errors.",
-            why="Contacts are told apart by a chi-square.",
-            cure=f"State the electronic noise of u_{channel}.",
-        )
-    axis = 0 if points.free[0, 0] else 1
-    position = (points.x, points.y)[axis]
-    kept = np.isfinite(scan.channels[f"u_{channel}"])
-    for other in (scan.normal_load, scan.channels[f"u_{channel}_errors"]):
-        if other is not None:
-            kept &= np.isfinite(other)
-    scatter = np.zeros(points.u.size)
-    if scan.normal_load_errors is not None:
-        scatter = np.nan_to_num(scan.normal_load_errors[kept])
-    middle = (position.max() + position.min()) / 2
-    along = (position - middle) / (np.ptp(position) / 2)
-    return LoadPoints(
-        u=points.u,
-        offset=position - float(profile.centre[axis]),
-        log_load=np.log(points.load / profile.load),
-        noise=points.u_errors,
-        load_errors=scatter / profile.load,
-        x_errors=points.x_errors,
-        flat=np.stack([np.ones_like(position), along], axis=1),
-        load_share=(scan.load_uncertainty or 0.0) / scan.load,
-        position_share=scan.position_scale_uncertainty or 0.0,
-    )
-
-
-def _messages(scan: Scan, apparatus: ApparatusFunction) -> Iterator[Message]:
+def _messages(scan: MeasuredScan, apparatus: ApparatusFunction) -> Iterator[Message]:
     channel = apparatus.sensor.channel
     yield Message(
         "experimental",

@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+import platform
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from os import PathLike
+from typing import Any
 
 import numpy as np
+import scipy
 
-from memscal.apparatus import ApparatusFunction, load_apparatus
+from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
-from memscal.measurement.belonging import accept_mismatches
-from memscal.measurement.contact_signal import ContactSignal, contact_signal
-from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
+from memscal.formats.opened import Scans, opened_scans
+from memscal.formats.timestamp import timestamp
+from memscal.measurement.contact_signal import (
+    ContactSignal,
+    contact_signal,
+    require_ends,
+    require_points,
+)
 from memscal.measurement.prepared_scan import PreparedScan, prepared_scan
 from memscal.measurement.procedure import restore_known
-from memscal.measurement.requirements import require_covariance
+from memscal.measurement.requirements import accept_mismatches, require_covariance
+from memscal.measurement.restoration import Restoration
 from memscal.measurement.restoration_checks import (
     failed_calibration_messages,
     noise_unstated_message,
 )
 from memscal.measurement.single_loads import SingleLoad, place_of, single_loads
-from memscal.measurement.single_profile import measured_profile
-from memscal.measurement.stress_checks import stress_checks
-from memscal.measurement.usable_scan import require_ends, require_points
+from memscal.measurement.single_profile import measured_profile, measured_scan
+from memscal.measurement.stress_checks import (
+    check_of_all_forces,
+    checks_of_restoration,
+    stress_checks,
+)
 from memscal.model.checks import (
     FAILED_CALIBRATION,
     FAILED_CHECK,
@@ -32,17 +45,22 @@ from memscal.model.checks import (
     QualityCheck,
     failed_check_messages,
 )
-from memscal.model.provenance import SourceFile
+from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
+from memscal.model.provenance import Process
 from memscal.model.scan import Scan
+from memscal.model.validation import FloatArray
+from memscal.version import __version__
 
-__all__ = ["measure_stress"]
+__all__ = ["joined_stress", "measure_stress"]
+
+_NUMBERED = re.compile(r"(\w+)_(\d+)")
 
 #: Messages of a restoration that the measured stress gives itself.
 _SAID_OF_ALL = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 
 
 def measure_stress(
-    scan: Scan | Sequence[Scan],
+    scan: Scans,
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
     override: bool = False,
@@ -57,7 +75,7 @@ def measure_stress(
 
     Parameters
     ----------
-    scan : Scan or sequence of Scan
+    scan : Scan or path, or a sequence of them
         Scans with a sphere or a rod; ``normal_load`` tells the loads of one scan apart, line by
         line.
     apparatus : ApparatusFunction or path
@@ -90,55 +108,108 @@ def measure_stress(
     >>> abs(profile.force - profile.load) < 3 * profile.force_uncertainty
     True
     """
-    known, artifact = _opened(apparatus)
-    scans = (scan,) if isinstance(scan, Scan) else tuple(scan)
-    _require_scans(scans)
+    known, scans = opened_apparatus(apparatus), opened_scans(scan)
     require_covariance(known)
     overridden = tuple(
         text
         for one in scans
         for text in accept_mismatches(one, known, place_of(one), override=override)
     )
-    parts = [single_loads(one) for one in scans]
-    profiles = tuple(_measure(part, known) for of_scan in parts for part in of_scan)
-    checks = stress_checks(profiles)
+    origins = tuple(measured_scan(one) for one in scans)
+    loads = [
+        _measure(origin, part, known)
+        for origin, one in zip(origins, scans, strict=True)
+        for part in single_loads(one)
+    ]
+    profiles = tuple(load.profile for load in loads)
+    checks = stress_checks(profiles, [load.checks for load in loads])
     return MeasuredStress(
         profiles=profiles,
-        apparatus=known,
-        scans=scans,
+        scans=origins,
+        conversion_constant=known.conversion_constant,
+        conversion_constant_uncertainty=known.parameters.uncertainty("conversion_constant"),
         checks=checks,
-        messages=tuple(_messages(profiles, known, checks, overridden)),
         overridden=overridden,
-        configuration={"override": bool(override)},
-        artifact=artifact,
-        parts=tuple(len(of_scan) for of_scan in parts),
+        process=_process(
+            {"override": bool(override)}, tuple(_messages(loads, known, checks, overridden))
+        ),
+        artifact=known.source,
+        artifact_digest=known.content_digest,
     )
 
 
-def _opened(
-    apparatus: ApparatusFunction | str | PathLike[str],
-) -> tuple[ApparatusFunction, SourceFile | None]:
-    if isinstance(apparatus, ApparatusFunction):
-        return apparatus, None
-    from memscal.formats.hdf5_reader import open_hdf5
+def joined_stress(parts: Sequence[MeasuredStress]) -> MeasuredStress:
+    """Return several measured stresses as one: profiles in their order, checks numbered anew.
 
-    known = load_apparatus(apparatus)
-    with open_hdf5(apparatus) as file:
-        return known, file.source
+    Raises
+    ------
+    InputError
+        If they were measured with different apparatus functions.
+    """
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    if len({part.artifact_digest for part in parts}) > 1:
+        raise InputError(
+            "The measured stresses are of different apparatus functions: their digests differ.",
+            why="What is compared together shares one sensor and its calibration.",
+            cure="Measure all of them with one artifact (memscal apply ARTIFACT SCAN...).",
+        )
+    profiles = tuple(profile for part in parts for profile in part.profiles)
+    starts = np.cumsum([0, *(len(part.profiles) for part in parts)])
+    checks = [
+        replace(one, name=f"{numbered[1]}_{int(numbered[2]) + start}")
+        for part, start in zip(parts, starts, strict=False)
+        for one in part.checks
+        if (numbered := _NUMBERED.fullmatch(one.name))
+    ]
+    # What failed is said by the checks, under their new numbers.
+    messages = [
+        replace(message, text=f"{_files_of(part)}: {message.text}")
+        for part in parts
+        for message in part.messages
+        if message.kind != FAILED_CHECK
+    ]
+    return replace(
+        first,
+        profiles=profiles,
+        scans=tuple(scan for part in parts for scan in part.scans),
+        checks=(*checks, check_of_all_forces(profiles)),
+        overridden=tuple(text for part in parts for text in part.overridden),
+        process=replace(first.process, messages=tuple(dict.fromkeys(messages))),
+    )
 
 
-def _require_scans(scans: tuple[Scan, ...]) -> None:
-    if not scans:
-        raise InputError("There is no scan.", cure="Give a scan, or several.")
-    for one in scans:
-        if not isinstance(one, Scan):
-            raise InputError(
-                f"measure_stress() was given a {type(one).__name__}, not a Scan.",
-                cure="Read a scan file with memscal.read_scan(path).",
-            )
+def _files_of(measured: MeasuredStress) -> str:
+    names = [scan.source.file_name for scan in measured.scans if scan.source]
+    return ", ".join(names) or f"{measured.profiles[0].label} and on"
 
 
-def _measure(part: SingleLoad, known: ApparatusFunction) -> MeasuredProfile:
+def _process(configuration: Mapping[str, Any], messages: tuple[Message, ...]) -> Process:
+    return Process(
+        program="memscal",
+        version=__version__,
+        date=timestamp(),
+        configuration=configuration,
+        environment={
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+        },
+        messages=messages,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _MeasuredLoad:
+    """The profile of one load, and what its restoration says of it."""
+
+    profile: MeasuredProfile
+    checks: tuple[QualityCheck, ...]
+    messages: tuple[Message, ...]
+
+
+def _measure(origin: MeasuredScan, part: SingleLoad, known: ApparatusFunction) -> _MeasuredLoad:
     signal = contact_signal(part, known)
     require_points(part, signal)
     prepared = _prepared(part, known, signal)
@@ -147,7 +218,14 @@ def _measure(part: SingleLoad, known: ApparatusFunction) -> MeasuredProfile:
     except (FitError, InputError) as failure:
         raise _placed(failure, part) from failure
     require_ends(part, signal, found.centre)
-    return measured_profile(part, prepared, found, signal)
+    profile = measured_profile(origin, part, prepared, found, signal)
+    estimated = prepared.noise_found or found.points.u_errors is None
+    noise = profile.points["zz"].noise if estimated else None
+    return _MeasuredLoad(
+        profile=profile,
+        checks=checks_of_restoration(found, stated=not estimated),
+        messages=tuple(_of_profile(part.scan, found, noise)),
+    )
 
 
 def _prepared(part: SingleLoad, known: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
@@ -170,7 +248,7 @@ def _placed(failure: FitError | InputError, part: SingleLoad) -> FitError | Inpu
 
 
 def _messages(
-    profiles: Sequence[MeasuredProfile],
+    loads: Sequence[_MeasuredLoad],
     known: ApparatusFunction,
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
@@ -182,19 +260,19 @@ def _messages(
     yield from failed_calibration_messages(known)
     # What is true of every profile is said once.
     numbers: dict[Message, list[str]] = {}
-    for i, profile in enumerate(profiles):
-        for message in _of_profile(profile):
+    for i, load in enumerate(loads):
+        for message in load.messages:
             numbers.setdefault(message, []).append(str(i + 1))
     for message, of_profiles in numbers.items():
-        everywhere = len(of_profiles) == len(profiles)
+        everywhere = len(of_profiles) == len(loads)
         place = "" if everywhere else f"Profile {', '.join(of_profiles)}: "
         yield replace(message, text=f"{place}{message.text}")
 
 
-def _of_profile(profile: MeasuredProfile) -> Iterator[Message]:
-    found, scan = profile.restoration, profile.part.scan
-    if profile.noise_found:
-        yield noise_unstated_message(float(np.nanmin(profile.electronic_noise)))
+def _of_profile(scan: Scan, found: Restoration, noise: FloatArray | None) -> Iterator[Message]:
+    """Yield what one load should be known for; ``noise``: where it was estimated, in V."""
+    if noise is not None:
+        yield noise_unstated_message(float(noise.min()))
     if scan.normal_load is not None and scan.normal_load_errors is None:
         yield Message(
             "load_errors_unstated",

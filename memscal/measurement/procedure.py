@@ -7,10 +7,11 @@ from os import PathLike
 
 import numpy as np
 
-from memscal.apparatus import ApparatusFunction, load_apparatus
+from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile_estimate import ProfileEstimate, estimate_profile
+from memscal.formats.opened import opened_scan
 from memscal.measurement.comparison import Expected
 from memscal.measurement.posterior import reach_of, restore_posterior, sensor_transfer
 from memscal.measurement.pressure import film_transfer
@@ -29,7 +30,7 @@ _RADII = 161
 
 
 def restore(
-    scan: Scan,
+    scan: Scan | str | PathLike[str],
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
     expected: Expected = None,
@@ -42,7 +43,7 @@ def restore(
 
     Parameters
     ----------
-    scan : Scan
+    scan : Scan or path
         Voltage against the indenter's position, at one load; a rod's loads may differ.
     apparatus : ApparatusFunction or path
         The calibrated sensor.
@@ -69,9 +70,9 @@ def restore(
     >>> abs(restored.force - 1.0) < 3 * restored.force_uncertainty
     True
     """
-    known = apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
-    require_measurement(scan, known)
-    return restore_known(scan, known, expected)
+    known, measured = opened_apparatus(apparatus), opened_scan(scan)
+    require_measurement(measured, known)
+    return restore_known(measured, known, expected)
 
 
 def restore_known(scan: Scan, known: ApparatusFunction, expected: Expected = None) -> Restoration:

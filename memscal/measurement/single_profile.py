@@ -17,23 +17,49 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
+from memscal.errors import FitError, InputError
+from memscal.estimation.channels import TANGENTIAL, channel_signal
+from memscal.estimation.points import ScanPoints, measured_points
 from memscal.measurement.contact_signal import ContactSignal
-from memscal.measurement.measured_stress import MeasuredProfile
 from memscal.measurement.posterior import apparatus_changes, sensor_transfer
 from memscal.measurement.prepared_scan import PreparedScan
 from memscal.measurement.pressure import film_transfer
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.single_loads import SingleLoad
+from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
+from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
 
-__all__ = ["measured_profile"]
+__all__ = ["measured_profile", "measured_scan"]
+
+#: Radii of the smooth curve.
+_CURVE = 301
+
+
+def measured_scan(scan: Scan) -> MeasuredScan:
+    """Return what is known of a scan beside its points."""
+    return MeasuredScan(
+        film=scan.film,
+        indenter=scan.indenter,
+        sensor=scan.sensor,
+        width=float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y))),
+        lubrication=scan.lubrication,
+        position_scale_uncertainty=scan.position_scale_uncertainty,
+        synthetic=bool(scan.synthetic),
+        source=scan.source,
+    )
 
 
 def measured_profile(
-    part: SingleLoad, prepared: PreparedScan, found: Restoration, signal: ContactSignal
+    scan: MeasuredScan,
+    part: SingleLoad,
+    prepared: PreparedScan,
+    found: Restoration,
+    signal: ContactSignal,
 ) -> MeasuredProfile:
-    """Return the measured profile of one load from its restored stress."""
+    """Return the measured profile of one load of a scan from its restored stress."""
     a, estimate = found.apparatus.conversion_constant, found.posterior.estimate
     noise = found.noise / np.sqrt(estimate.outlier_weight)
     average, x, y = _averaging(found, noise)
@@ -49,20 +75,78 @@ def measured_profile(
         **_of_place(found, average),
     }
     maximum, budget = _on_axis(found)
+    curve_r = np.linspace(0.0, float(r[order][-1]), _CURVE)
     return MeasuredProfile(
-        part=part,
-        restoration=found,
+        scan=scan,
+        load=part.load,
+        load_uncertainty=part.scan.load_uncertainty,
         x=x[order],
         y=y[order],
         r=r[order],
         s_zz=s_zz,
         covariances=covariances,
+        force=found.force,
+        force_budget=found.force_budget,
         maximum=maximum,
         maximum_budget=budget,
-        electronic_noise=_electronic(prepared, found),
+        centre=found.centre,
+        centre_uncertainty=found.centre_uncertainty,
+        baseline=found.baseline,
+        baseline_uncertainty=found.baseline_uncertainty,
         contact_radius=signal.contact_radius,
-        noise_found=prepared.noise_found or found.points.u_errors is None,
+        curve_r=curve_r,
+        curve_s_zz=found.blurred_stress(curve_r),
+        points=_points(part.scan, prepared, found),
     )
+
+
+def _points(scan: Scan, prepared: PreparedScan, found: Restoration) -> Mapping[str, MeasuredPoints]:
+    """Return the points of one load by channel, as they were measured."""
+    normal = measured_points(scan)
+    weight = found.posterior.estimate.outlier_weight
+    noise = _electronic(prepared, found)[_kept(scan, "zz")]
+    points = {"zz": _of_channel(scan, normal, noise, weight)}
+    for channel in TANGENTIAL:
+        try:
+            shear = measured_points(scan, channel)
+        except (InputError, FitError):
+            # The normal stress does not need it; a comparison of the shear says what is missing.
+            continue
+        points[channel] = _of_channel(scan, shear, shear.u_errors, np.ones_like(shear.u))
+    return points
+
+
+def _of_channel(
+    scan: Scan, points: ScanPoints, noise: FloatArray | None, weight: FloatArray
+) -> MeasuredPoints:
+    load_errors = np.zeros_like(points.u)
+    if scan.normal_load_errors is not None:
+        load_errors = np.nan_to_num(scan.normal_load_errors[_kept(scan, points.channel)])
+    correlation = None
+    if points.decorrelation is not None:
+        root = np.linalg.inv(points.decorrelation)
+        correlation = root @ root.T
+    return MeasuredPoints(
+        x=points.x,
+        y=points.y,
+        u=points.u,
+        noise=noise,
+        weight=weight,
+        load=points.load,
+        load_errors=load_errors,
+        x_errors=points.x_errors,
+        correlation=correlation,
+    )
+
+
+def _kept(scan: Scan, channel: str) -> NDArray[np.bool_]:
+    """Which points of a channel were measured, shape of ``u_zz``."""
+    u, errors = channel_signal(scan, channel)
+    kept: NDArray[np.bool_] = np.isfinite(u)
+    for other in (scan.normal_load, errors):
+        if other is not None:
+            kept &= np.isfinite(other)
+    return kept
 
 
 def _averaging(found: Restoration, noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

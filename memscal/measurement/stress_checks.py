@@ -14,16 +14,17 @@ weighted by :math:`1/u_j^2` has the variance :math:`w^T(\mathrm{diag}(u^2) + cc^
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.special import erfc
 
-from memscal.measurement.measured_stress import MeasuredProfile
+from memscal.measurement.restoration import Restoration
 from memscal.model.checks import QualityCheck, check
+from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = ["pooled_force", "stress_checks"]
+__all__ = ["check_of_all_forces", "checks_of_restoration", "pooled_force", "stress_checks"]
 
 _FORCE_LIMIT = 3.0
 #: One check of all profiles together may be stricter than one for each.
@@ -46,15 +47,20 @@ _REPLACED = "restored_force"
 _OF_STATED_NOISE = ("noise_as_stated", "chi_square")
 
 
-def stress_checks(profiles: Sequence[MeasuredProfile]) -> tuple[QualityCheck, ...]:
-    """Return the checks of each profile, numbered from one, then those of all together."""
+def stress_checks(
+    profiles: Sequence[MeasuredProfile], restored: Sequence[Sequence[QualityCheck]]
+) -> tuple[QualityCheck, ...]:
+    """Return the checks of each profile, numbered from one, then those of all together.
+
+    ``restored``: what :func:`checks_of_restoration` says of each profile.
+    """
     found = [
         replace(one, name=f"{one.name}_{i + 1}", meaning=f"{profile.label}: {one.meaning}")
-        for i, profile in enumerate(profiles)
-        for one in _of_profile(profile)
+        for i, (profile, own) in enumerate(zip(profiles, restored, strict=True))
+        for one in (_force(profile), *own)
     ]
     if len(profiles) > 1:
-        found.append(_all_forces(profiles))
+        found.append(check_of_all_forces(profiles))
     return tuple(found)
 
 
@@ -77,16 +83,17 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
     """Standard uncertainties of force over load, by source."""
     budget = {source: u / profile.load for source, u in profile.force_budget.items()}
     own = budget.pop("scan")
-    common = profile.part.scan.load_uncertainty or 0.0
+    common = profile.load_uncertainty or 0.0
     return {"own": own, **budget, "load": common / profile.load}
 
 
-def _of_profile(profile: MeasuredProfile) -> Iterator[QualityCheck]:
-    yield _force(profile)
-    for one in profile.restoration.checks:
-        stated = not profile.noise_found or one.name not in _OF_STATED_NOISE
-        if one.name != _REPLACED and stated:
-            yield one
+def checks_of_restoration(restoration: Restoration, *, stated: bool) -> tuple[QualityCheck, ...]:
+    """Return the checks of a restoration that hold for its profile.
+
+    ``stated``: whether the noise is, or was estimated from the scatter.
+    """
+    left_out = {_REPLACED} if stated else {_REPLACED, *_OF_STATED_NOISE}
+    return tuple(one for one in restoration.checks if one.name not in left_out)
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:
@@ -103,7 +110,8 @@ def _force(profile: MeasuredProfile) -> QualityCheck:
     )
 
 
-def _all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
+def check_of_all_forces(profiles: Sequence[MeasuredProfile]) -> QualityCheck:
+    """Return the check of the force of all profiles together."""
     mean, spread = pooled_force(profiles)
     allowed = math.hypot(spread, _NEGLIGIBLE_MEAN)
     return check(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ __all__ = [
     "require_non_negative",
     "require_positive",
     "require_range",
+    "same_content",
     "whole_numbers",
 ]
 
@@ -89,3 +92,18 @@ def whole_numbers(what: str, values: ArrayLike) -> NDArray[np.int64]:
     numbers = array.astype(np.int64)
     numbers.setflags(write=False)
     return numbers
+
+
+def same_content(one: Any, other: Any) -> bool:
+    """Whether two records hold the same, array by array; NaN is equal to NaN."""
+    if isinstance(one, np.ndarray):
+        return isinstance(other, np.ndarray) and np.array_equal(one, other, equal_nan=True)
+    if isinstance(one, float) and isinstance(other, float):
+        return one == other or (one != one and other != other)
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(same_content(one[key], other[key]) for key in one)
+    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
+        return len(one) == len(other) and all(map(same_content, one, other))
+    if is_dataclass(one) and type(one) is type(other):
+        return all(same_content(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    return bool(one == other)

@@ -67,7 +67,7 @@ def outcome(friction: float, seed: int, gain: float = 1.0, thickness: float = 1.
     )
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
     measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
-    return Outcome(friction, compare_measured(measured, families()))
+    return Outcome(friction, compare_measured(measured, apparatus, families()))
 
 
 def outcomes(*frictions: float, **mistakes: float) -> list[Outcome]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -90,6 +90,44 @@ def test_it_finds_the_friction_of_an_experiment_from_its_files(
         profiles = load["by_loading"]["incremental"]["profiles"]
         assert [p["friction_coefficient"] for p in profiles] == [0.0, 0.1, 0.2, None]
     assert names(folder) == []
+
+
+@pytest.mark.usefixtures("folder")
+def test_measured_stress_gives_the_same_numbers_as_its_scans(
+    run: Run, compare: Callable[..., Any], bench: Path
+) -> None:
+    scans = ("dry.h5", "lubricated.h5")
+    written = bench / "contacts.stress.h5"
+    run("apply", bench / "sensor.apparatus.h5", *(bench / n for n in scans), "-o", written)
+    of_scans = compare(*QUICK, "--json", scans=scans)
+    of_stress = compare(*QUICK, "--json", scans=("contacts.stress.h5",))
+    assert of_stress.code == of_scans.code
+    for one, other in zip(flat(of_scans.json), flat(of_stress.json), strict=True):
+        assert other == (pytest.approx(one, rel=1e-9) if isinstance(one, float) else one)
+
+
+def flat(told: Any) -> Iterator[Any]:
+    """Every value of a JSON object, in order."""
+    if isinstance(told, dict | list):
+        for value in told.values() if isinstance(told, dict) else told:
+            yield from flat(value)
+    else:
+        yield told
+
+
+def test_stress_of_another_calibration_is_refused_or_overridden(
+    run: Run, compare: Callable[..., Any], bench: Path, folder: Path
+) -> None:
+    known = memscal.load_apparatus(bench / "sensor.apparatus.h5")
+    replace(known, load=2 * known.load).save(folder / "other.apparatus.h5")
+    written = folder / "dry.stress.h5"
+    assert run("apply", "other.apparatus.h5", bench / "dry.h5", "-o", written).code == 0
+    refused(compare(*QUICK, scans=(str(written),)), "other.apparatus.h5")
+    done = compare(*QUICK, "--override", "--json", scans=(str(written),))
+    assert "another apparatus function" in done.json["overridden"][0]
+    memscal.measure_stress(bench / "lubricated.h5", known).save(folder / "wet.stress.h5")
+    both = (str(written), str(folder / "wet.stress.h5"))
+    refused(compare(*QUICK, scans=both), "other.apparatus.h5")
 
 
 def test_profiles_calculated_elsewhere_take_the_place_of_ours(

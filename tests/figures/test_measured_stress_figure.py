@@ -11,7 +11,7 @@ from spheres import known_apparatus
 import memscal
 from memscal.figures.measured_stress import measured_stress_figure
 from memscal.figures.render import render_figure
-from memscal.measurement.measured_stress import MeasuredStress
+from memscal.model.measured_stress import MeasuredStress
 
 
 @pytest.fixture(scope="module")

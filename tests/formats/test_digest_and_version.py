@@ -17,7 +17,7 @@ from memscal.formats.artifact import read_artifact, write_artifact
 from memscal.formats.digest import content_digest
 from memscal.formats.fields import json_value
 from memscal.formats.hdf5_reader import open_hdf5
-from memscal.formats.inspection import describe
+from memscal.formats.inspection import check, describe
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 from memscal.formats.schema import CONTENTS_PATH, SCHEMA_VERSION
@@ -107,6 +107,26 @@ def test_what_other_programs_add_is_ignored(artifact: Path):
         file["/entry/loop"] = file["/entry"]
         file["/entry/apparatus_function"].attrs["colour"] = "red"
     assert read_artifact(artifact).load == 1.0
+
+
+def test_what_was_added_at_a_path_that_is_read_is_refused(artifact: Path):
+    """A number that the digest does not cover must not be taken for ours."""
+    with h5py.File(artifact, "r+") as file:
+        file["/entry/parameters/budget/added"] = 1.0  # unknown to the reader: left unread
+    assert read_artifact(artifact).load == 1.0
+    with h5py.File(artifact, "r+") as file:
+        file["/entry/sample/film/name"] = "another film"
+    with pytest.raises(FormatError, match="film/name was added after the file was written"):
+        read_artifact(artifact)
+    assert not all(finding.passed for finding in check(artifact))
+
+
+def test_a_scan_is_told_the_same_by_check(tmp_path: Path):
+    write_scan(make_scan(title=""), tmp_path / "a.h5")
+    assert all(finding.passed for finding in check(tmp_path / "a.h5"))
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        file["/entry/title"] = "of another scan"
+    assert not all(finding.passed for finding in check(tmp_path / "a.h5"))
 
 
 @pytest.fixture(params=["scan", "reference", "artifact"])

@@ -172,7 +172,7 @@ def test_a_stress_beyond_full_stick_fails_checks(
 ) -> None:
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
-    found = compare_measured(memscal.measure_stress(wrong, apparatus), families)
+    found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
     assert "lubricated_frictionless" in failed(found)
     assert found.joint["dry"]["incremental"].value is None
 
@@ -183,7 +183,7 @@ def test_noise_that_is_understated_fails_the_chi_square(
     families: dict[str, ProfileFamily],
 ) -> None:
     wrong = scaled(made.dry, 1.0, noise=0.25)
-    found = compare_measured(memscal.measure_stress(wrong, apparatus), families)
+    found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
     assert "joint_chi_square_dry" in failed(found)
     assert found.joint["dry"]["incremental"].p_value < 1e-6
 
@@ -254,7 +254,7 @@ def test_options_that_make_no_sense_are_refused(
 
 
 def test_what_is_no_scan_is_refused(apparatus: memscal.ApparatusFunction) -> None:
-    with pytest.raises(InputError, match="not a Scan"):
-        memscal.compare(["sphere_dry.h5"], apparatus)  # type: ignore[list-item]
-    with pytest.raises(InputError, match="No scan"):
+    with pytest.raises(InputError, match="where a Scan is needed"):
+        memscal.compare([1.0], apparatus)  # type: ignore[list-item]
+    with pytest.raises(InputError, match="no scan"):
         memscal.compare([], apparatus)

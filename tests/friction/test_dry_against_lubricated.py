@@ -24,14 +24,9 @@ LOAD = 1
 def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
     """What a comparison reads of a measured profile."""
     stress = points.u / CONVERSION
-    apparatus = SimpleNamespace(
-        conversion_constant=CONVERSION,
-        parameters=SimpleNamespace(uncertainty=lambda _: 0.01 * CONVERSION),
-    )
     noise = np.diag((points.noise / CONVERSION) ** 2)
     return SimpleNamespace(
-        part=SimpleNamespace(lubrication=lubrication, load=load),
-        restoration=SimpleNamespace(apparatus=apparatus),
+        lubrication=lubrication,
         load=load,
         x=points.offset,
         s_zz=stress,
@@ -60,6 +55,7 @@ def compared(
         laboratory.sensor,
         members_of(laboratory.family, np.zeros(1)),
         (LOAD, LOAD),
+        conversion_share=0.01,
     )
 
 

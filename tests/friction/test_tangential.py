@@ -24,7 +24,7 @@ from memscal.friction.load_points import LoadPoints
 from memscal.friction.predicted import members_of, predict, sensor_of
 from memscal.friction.tangential import compare_shear
 from memscal.laboratory.experiment import Experiment
-from memscal.measurement.measured_stress import MeasuredStress
+from memscal.model.measured_stress import MeasuredStress
 from memscal.model.validation import FloatArray
 
 EXPERIMENTS = 80 if os.environ.get("MEMSCAL_FULL_STUDY") else 8
@@ -158,20 +158,25 @@ def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
 def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
     made = experiment(0.1, seed=1)
     measured, shear = measured_with(made)
+    normal = memscal.calibrate(made.rod, method="evidence").apparatus
     options = {"friction": (0.0, math.inf), "loading": "total", "cache": cache}
     with pytest.raises(InputError, match="not of a tangential"):
-        compare_shear(measured, measured.apparatus, **options)
+        compare_shear(measured, normal, **options)
     other = replace(shear, sensor=replace(shear.sensor, name="another"))
     with pytest.raises(InputError, match="another"):
         compare_shear(measured, other, **options)
-    rod = memscal.measure_stress(made.rod, measured.apparatus)
+    rod = memscal.measure_stress(made.rod, normal)
     with pytest.raises(InputError, match="rod"):
         compare_shear(rod, shear, **options)
     silent = replace(made.dry, channels={"u_xz": made.dry.channels["u_xz"]})
     with pytest.raises(InputError, match="u_xz_errors"):
-        compare_shear(memscal.measure_stress(silent, measured.apparatus), shear, **options)
+        compare_shear(memscal.measure_stress(silent, normal), shear, **options)
+    without = memscal.measure_stress(replace(made.dry, channels={}), normal)
+    with pytest.raises(InputError, match="no usable voltage u_xz"):
+        compare_shear(without, shear, **options)
+    measured.save(cache / "dry.stress.h5")
     with pytest.raises(InputError, match="No loading"):
-        compare_shear(measured, shear, loading=(), cache=cache)
+        compare_shear(cache / "dry.stress.h5", shear, loading=(), cache=cache)
     assert len(FRICTIONS) > 2
 
 

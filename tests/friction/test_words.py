@@ -40,14 +40,12 @@ def reading(
 
 
 def measured(**film: float) -> Any:
-    scan = SimpleNamespace(
-        synthetic=None,
-        film=replace(FILM, **film),
-        indenter=Sphere(radius=0.1),
-        load_uncertainty=None,
-    )
+    scan = SimpleNamespace(synthetic=False, film=replace(FILM, **film), indenter=Sphere(radius=0.1))
+    profile = SimpleNamespace(scan=scan, load_uncertainty=None)
     return SimpleNamespace(
-        scans=(scan,), messages=(Message("measured", "from the measured stress"),)
+        scans=(scan,),
+        profiles=(profile,),
+        messages=(Message("measured", "from the measured stress"),),
     )
 
 

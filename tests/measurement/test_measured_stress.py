@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,12 @@ from spheres import GAUSSIAN, known_apparatus, pressed
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
-from memscal.measurement.measured_stress import MeasuredProfile
+from memscal.measurement.application import joined_stress
+from memscal.measurement.contact_signal import contact_signal
+from memscal.measurement.prepared_scan import prepared_scan
+from memscal.measurement.procedure import restore_known
+from memscal.measurement.single_loads import single_loads
+from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan, StressSensor
 
@@ -89,14 +95,16 @@ def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum()
 
 
 def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() -> None:
-    for profile in measured(2).profiles:
-        found, a = profile.restoration, CONVERSION
+    for profile, part in zip(measured(2).profiles, single_loads(contact_scan(2)), strict=True):
+        prepared = prepared_scan(part, SENSOR, contact_signal(part, SENSOR))
+        found, a = restore_known(prepared.scan, SENSOR), CONVERSION
         nodes = found.posterior.nodes
         sigma = found.posterior.covariance[nodes:, nodes:]
         # Columns by differences: a shifted centre moves every point on the blurred profile.
         step = 1e-6
         towards = np.sign(profile.x - profile.centre[0])
-        slope = blurred_slope(profile, step) * towards
+        above, below = (found.blurred_stress(profile.r + s) for s in (step, -step))
+        slope = (above - below) / (2 * step) * towards
         xi = 2 * (profile.x - profile.x.min()) / np.ptp(profile.x) - 1
         columns = np.column_stack([slope, -np.ones_like(xi) / a, -xi / a])
         joint = columns @ sigma @ columns.T
@@ -105,12 +113,6 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
         for source in ("centre", "baseline"):
             values = np.linalg.eigvalsh(profile.covariances[source])
             assert values.min() > -1e-9 * values.max()
-
-
-def blurred_slope(profile: MeasuredProfile, step: float) -> np.ndarray:
-    restored = profile.restoration
-    above, below = (restored.blurred_stress(profile.r + s) for s in (step, -step))
-    return np.asarray((above - below) / (2 * step))
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.15, np.inf])
@@ -137,7 +139,7 @@ def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
         assert scan.u_zz_errors is not None
         found = memscal.measure_stress(replace(scan, u_zz_errors=None), SENSOR)
         truth = float(scan.u_zz_errors[0, 0])
-        ratios += [float(p.electronic_noise.min()) / truth for p in found.profiles]
+        ratios += [float(p.points["zz"].noise.min()) / truth for p in found.profiles]
         names = {check.name.rpartition("_")[0] for check in found.checks}
         assert not names & {"chi_square", "noise_as_stated"}
     assert np.median(ratios) == pytest.approx(1.0, abs=0.15)
@@ -172,7 +174,7 @@ def test_profiles_of_several_scans_know_theirs() -> None:
     found = memscal.measure_stress(
         [contact_scan(1), contact_scan(2, load=(0.69,), lubrication="lubricated")], SENSOR
     )
-    assert [found.scan_of(profile) for profile in found.profiles] == [0, 0, 0, 0, 1]
+    assert [found.scans.index(profile.scan) for profile in found.profiles] == [0, 0, 0, 0, 1]
     assert [p.lubrication for p in found.profiles] == ["dry"] * 4 + ["lubricated"]
 
 
@@ -203,7 +205,7 @@ def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
     assert len(found.overridden) == 1
     assert "film 2" in found.overridden[0]
     assert [m.severity for m in found.messages if m.kind == "overridden"] == ["warning"]
-    assert found.configuration["override"] is True
+    assert found.process.configuration["override"] is True
 
 
 def test_films_that_agree_within_their_uncertainties_are_one() -> None:
@@ -255,8 +257,40 @@ def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
         memscal.measure_stress(heavy, SENSOR)
 
 
+def test_paths_are_taken_wherever_objects_are(tmp_path: Path) -> None:
+    scan, rod = tmp_path / "sphere.h5", tmp_path / "rod.h5"
+    sensor = tmp_path / "sensor.apparatus.h5"
+    memscal.write_scan(contact_scan(3, load=(1.37,)), scan)
+    memscal.write_scan(memscal.simulate(seed=3), rod)
+    SENSOR.save(sensor)
+    read, known = memscal.read_scan(scan), memscal.load_apparatus(sensor)
+    assert memscal.measure_stress(scan, sensor).profiles == (
+        memscal.measure_stress(read, known).profiles
+    )
+    by_path, by_scan = memscal.restore(str(scan), sensor), memscal.restore(read, known)
+    assert by_path.force == pytest.approx(by_scan.force, rel=1e-12)
+    of_path, of_scan = (
+        memscal.calibrate(given, method="evidence").apparatus
+        for given in (rod, memscal.read_scan(rod))
+    )
+    assert of_path.conversion_constant == pytest.approx(of_scan.conversion_constant, rel=1e-12)
+
+
+def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
+    dry = contact_scan(1, load=LOADS[:2])
+    wet = contact_scan(2, load=LOADS[:1], lubrication="lubricated")
+    together = memscal.measure_stress([dry, wet], SENSOR)
+    joined = joined_stress([memscal.measure_stress(scan, SENSOR) for scan in (dry, wet)])
+    assert joined.profiles == together.profiles
+    assert joined.scans == together.scans
+    assert joined.checks == together.checks
+    other = memscal.measure_stress(wet, known_apparatus(conversion_uncertainty=0.01))
+    with pytest.raises(InputError, match="digests differ"):
+        joined_stress([joined, other])
+
+
 def test_what_is_no_scan_is_refused() -> None:
-    with pytest.raises(InputError, match="given a str"):
-        memscal.measure_stress(["sphere.h5"], SENSOR)  # type: ignore[list-item]
+    with pytest.raises(InputError, match="a float where a Scan is needed"):
+        memscal.measure_stress([1.0], SENSOR)  # type: ignore[list-item]
     with pytest.raises(InputError, match="no scan"):
         memscal.measure_stress([], SENSOR)

@@ -222,7 +222,7 @@ BAD = {
         EXACT,
         "determines no stress",
     ),
-    "no scan": ("scan.h5", EXACT, "not a Scan"),
+    "no scan": (1.0, EXACT, "where a Scan is needed"),
 }
 
 

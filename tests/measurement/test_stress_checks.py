@@ -11,8 +11,8 @@ from scans import EXACT_FILM, SIGMA
 from spheres import known_apparatus
 
 import memscal
-from memscal.measurement.measured_stress import MeasuredStress
 from memscal.measurement.stress_checks import pooled_force
+from memscal.model.measured_stress import MeasuredStress
 
 SENSOR = known_apparatus()
 QUIET = {"noise": 0.001, "load_scatter": 0.002, "position_error": 0.0}

@@ -1,0 +1,77 @@
+"""Scans and measured stress, given as objects or as the paths of their files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from typing import Any, TypeAlias
+
+from memscal.errors import InputError
+from memscal.formats.hdf5_reader import open_hdf5
+from memscal.formats.scan import read_scan, scan_from
+from memscal.formats.schema import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
+from memscal.formats.stress import stress_from
+from memscal.model.measured_stress import MeasuredStress
+from memscal.model.scan import Scan
+
+__all__ = ["Contacts", "Scans", "opened_contacts", "opened_scan", "opened_scans", "opened_stress"]
+
+Path: TypeAlias = str | PathLike[str]
+Scans: TypeAlias = Scan | Path | Sequence[Scan | Path]
+"""One scan or several, each itself or as the path of its file."""
+
+Contacts: TypeAlias = Scan | MeasuredStress | Path | Sequence[Scan | MeasuredStress | Path]
+"""Scans, or the stress that was measured of them; each itself or as the path of its file."""
+
+
+def opened_scan(scan: Scan | Path) -> Scan:
+    """Return a scan that is given itself or as a path."""
+    if isinstance(scan, str | PathLike):
+        return read_scan(scan)
+    return _required(scan)
+
+
+def opened_scans(scans: Scans) -> tuple[Scan, ...]:
+    """Return scans that are given themselves or as paths, at least one."""
+    return tuple(opened_scan(scan) for scan in _listed(scans))
+
+
+def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
+    """Return measured stress that is given itself or as a path."""
+    if isinstance(measured, MeasuredStress):
+        return measured
+    with open_hdf5(measured) as file:
+        return stress_from(file)
+
+
+def opened_contacts(contacts: Contacts) -> tuple[Scan | MeasuredStress, ...]:
+    """Return scans and measured stresses that are given themselves or as paths, at least one."""
+    return tuple(_scan_or_stress(item) for item in _listed(contacts))
+
+
+def _scan_or_stress(item: Any) -> Scan | MeasuredStress:
+    if isinstance(item, MeasuredStress):
+        return item
+    if not isinstance(item, str | PathLike):
+        return _required(item)
+    with open_hdf5(item) as file:
+        if file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA:
+            return stress_from(file)
+        return scan_from(file)
+
+
+def _listed(items: Any) -> list[Any]:
+    single = isinstance(items, str | PathLike | Scan | MeasuredStress)
+    listed = [items] if single or not isinstance(items, Iterable) else list(items)
+    if not listed:
+        raise InputError("There is no scan.", cure="Give a scan, or several.")
+    return listed
+
+
+def _required(item: Any) -> Scan:
+    if not isinstance(item, Scan):
+        raise InputError(
+            f"There is a {type(item).__name__} where a Scan is needed.",
+            cure="Give a scan, or the path of its file.",
+        )
+    return item

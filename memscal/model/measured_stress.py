@@ -1,0 +1,319 @@
+r"""Measured stress: what a calibrated sensor measured at the base of a film, load by load.
+
+.. math::
+
+    S_{zz}(r) = \frac{U_{zz} - b - d\,\xi}{A} = (G \otimes \sigma_{zz})(r)
+
+It is the base stress as the sensor blurs it, to be compared with calculated stress blurred by the
+same G.  A profile also holds the measured points, so that a comparison needs no scan.
+
+Files state lengths in mm and voltages in mV.  Every length and voltage here is rounded to a number
+that this conversion gives back (a change of one unit in the last place at most), so that what was
+saved and read again is equal to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from os import PathLike
+from typing import Any, TypeVar
+
+import numpy as np
+
+from memscal.model.checks import Message, QualityCheck
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import RoundIndenter
+from memscal.model.notation import format_measured
+from memscal.model.provenance import Process, SourceFile
+from memscal.model.scan import StressSensor
+from memscal.model.validation import FloatArray, frozen_array, same_content
+
+__all__ = ["MeasuredPoints", "MeasuredProfile", "MeasuredScan", "MeasuredStress"]
+
+#: Millimetres in a metre, millivolts in a volt.
+_FILE_SCALE = 1e3
+
+Record = TypeVar("Record", ElasticFilm, RoundIndenter)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredScan:
+    """What is known of a scan beside its points.
+
+    ``width``: its largest extent, in m; ``position_scale_uncertainty``: relative, of the stage;
+    ``synthetic``: whether it was simulated; ``source``: the file it was read from.
+    """
+
+    film: ElasticFilm
+    indenter: RoundIndenter
+    sensor: StressSensor
+    width: float
+    lubrication: str = ""
+    position_scale_uncertainty: float | None = None
+    synthetic: bool = False
+    source: SourceFile | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "film", _kept_record(self.film, "thickness", "roughness_rms"))
+        object.__setattr__(self, "indenter", _kept_record(self.indenter, "radius"))
+        object.__setattr__(self, "width", _kept(self.width))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredPoints:
+    """The measured points of one load and channel, missing ones left out; arrays of shape (n,).
+
+    ``x``, ``y``: positions, zero across a line, ``x_errors``: standard uncertainty along the
+    scan, in m; ``u``: voltage, ``noise``: its electronic noise, stated or estimated, in V,
+    ``None`` where a tangential channel states none; ``weight``: of outliers, one of ordinary
+    points; ``load``, ``load_errors`` in N; ``correlation`` (n, n) of the noise, if stated.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    u: FloatArray
+    noise: FloatArray | None
+    weight: FloatArray
+    load: FloatArray
+    load_errors: FloatArray
+    x_errors: FloatArray
+    correlation: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        _freeze(self, "weight", "load", "load_errors", "correlation")
+        _freeze(self, "x", "y", "x_errors", "u", "noise", scale=_FILE_SCALE)
+
+    def __eq__(self, other: object) -> bool:
+        return same_content(self, other) if isinstance(other, MeasuredPoints) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Return the number of points in place of arrays."""
+        return f"<MeasuredPoints: {self.u.size}>"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class MeasuredProfile:
+    """The measured stress of one load, from the centre outward.
+
+    Profiles are equal if all that they hold is, to the last bit.
+
+    Parameters
+    ----------
+    scan : MeasuredScan
+        What was scanned: film, indenter, sensor, lubrication, file.
+    load : float
+        Nominal load, in N.
+    load_uncertainty : float or None
+        Its standard uncertainty, common to all loads of a scan, in N.
+    x, y, r : ndarray, shape (n,)
+        Positions and their distance from the centre, by which they are sorted, in m.  Repeats at
+        one position are averaged by their weights.
+    s_zz : ndarray, shape (n,)
+        Stress there, in Pa, positive in compression.
+    covariances : mapping of str to ndarray, shape (n, n)
+        Its covariance by source, in Pa^2: ``noise`` (electronic, of loads and of positions),
+        ``conversion_constant``, ``centre``, ``baseline`` (with drift; what centre and baseline
+        share is the centre's).
+    force : float
+        Integral of the stress over the plane, in N.
+    force_budget : mapping of str to float
+        Its standard uncertainty by source, in N.
+    maximum : float
+        Stress on the axis, in Pa: the restored stress blurred by G.
+    maximum_budget : mapping of str to float
+        Its standard uncertainty by source, in Pa.
+    centre, centre_uncertainty : ndarray, shape (2,)
+        Centre (x0, y0) of the profile, in m; zero where a line does not tell.
+    baseline, baseline_uncertainty : float
+        Baseline in the middle of the scan, in V.
+    contact_radius : float
+        Of the frictionless contact at the nominal load, in m.
+    curve_r, curve_s_zz : ndarray, shape (m,)
+        The restored stress blurred by G, in Pa, at radii in m: a smooth curve through the points.
+    points : mapping of str to MeasuredPoints
+        The measured points by channel (``"zz"``, ``"xz"``, ``"yz"``); none if it was read from a
+        file of version 1.0.
+    """
+
+    scan: MeasuredScan
+    load: float
+    load_uncertainty: float | None
+    x: FloatArray
+    y: FloatArray
+    r: FloatArray
+    s_zz: FloatArray
+    covariances: Mapping[str, FloatArray]
+    force: float
+    force_budget: Mapping[str, float]
+    maximum: float
+    maximum_budget: Mapping[str, float]
+    centre: FloatArray
+    centre_uncertainty: FloatArray
+    baseline: float
+    baseline_uncertainty: float
+    contact_radius: float
+    curve_r: FloatArray = field(default_factory=lambda: np.zeros(0))
+    curve_s_zz: FloatArray = field(default_factory=lambda: np.zeros(0))
+    points: Mapping[str, MeasuredPoints] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _freeze(self, "s_zz", "curve_s_zz")
+        _freeze(self, "x", "y", "r", "centre", "centre_uncertainty", "curve_r", scale=_FILE_SCALE)
+        frozen = {source: frozen_array(values) for source, values in self.covariances.items()}
+        object.__setattr__(self, "covariances", frozen)
+        for name in ("baseline", "baseline_uncertainty", "contact_radius"):
+            object.__setattr__(self, name, _kept(getattr(self, name)))
+
+    def __eq__(self, other: object) -> bool:
+        return same_content(self, other) if isinstance(other, MeasuredProfile) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Return load, force and maximum in place of arrays."""
+        force = format_measured(self.force, self.force_uncertainty, "N")
+        top = format_measured(self.maximum * 1e-3, self.maximum_uncertainty * 1e-3, "kPa")
+        return f"<MeasuredProfile: {self.label}, force {force}, maximum {top}>"
+
+    @property
+    def label(self) -> str:
+        """Load and lubrication in words, as in ``"0.34 N, dry"``."""
+        return ", ".join(words for words in (f"{self.load:.4g} N", self.lubrication) if words)
+
+    @property
+    def lubrication(self) -> str:
+        """``"dry"``, ``"lubricated"`` or empty."""
+        return self.scan.lubrication
+
+    @property
+    def axis(self) -> int:
+        """0 or 1: along which of x and y the scan ran; 0 of a raster."""
+        return 0 if np.ptp(self.x) > 0 else 1
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of ``s_zz``, all sources together, in Pa^2."""
+        return np.asarray(np.sum(list(self.covariances.values()), axis=0))
+
+    @property
+    def s_zz_errors(self) -> FloatArray:
+        """Standard uncertainty of ``s_zz``, in Pa."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def force_uncertainty(self) -> float:
+        """Standard uncertainty of ``force``, in N."""
+        return float(np.linalg.norm(list(self.force_budget.values())))
+
+    @property
+    def maximum_uncertainty(self) -> float:
+        """Standard uncertainty of ``maximum``, in Pa."""
+        return float(np.linalg.norm(list(self.maximum_budget.values())))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class MeasuredStress:
+    """The measured stress of all loads of one or several scans, live or read from its file.
+
+    Made by :func:`memscal.measure_stress` or :func:`memscal.read_stress`; the two are equal if one
+    was saved and the other read from that file.
+
+    Parameters
+    ----------
+    profiles : tuple of MeasuredProfile
+        In the order of the scans, each from its smallest load up.
+    scans : tuple of MeasuredScan
+        What was scanned; each names its file.
+    conversion_constant, conversion_constant_uncertainty : float
+        A, by which the voltages were divided, and its standard uncertainty, in V/Pa.
+    checks : tuple of QualityCheck
+        Those of each profile, numbered from one, then those of all together.
+    overridden : tuple of str
+        Mismatches of artifact and scan that were accepted.
+    process : Process
+        What was done, with what; its messages are what a user should know.
+    artifact : SourceFile, optional
+        The file of the apparatus function, where it was read from one.
+    artifact_digest : str
+        Content digest of the apparatus function; empty if it was read from a file of version 1.0.
+    """
+
+    profiles: tuple[MeasuredProfile, ...]
+    scans: tuple[MeasuredScan, ...]
+    conversion_constant: float
+    conversion_constant_uncertainty: float
+    checks: tuple[QualityCheck, ...]
+    overridden: tuple[str, ...]
+    process: Process
+    artifact: SourceFile | None = None
+    artifact_digest: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("conversion_constant", "conversion_constant_uncertainty"):
+            object.__setattr__(self, name, _kept(getattr(self, name)))
+
+    def __eq__(self, other: object) -> bool:
+        return same_content(self, other) if isinstance(other, MeasuredStress) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Return the loads and the state of the checks."""
+        failed = [check.name for check in self.checks if not check.passed]
+        state = f"failed: {', '.join(failed)}" if failed else "all checks passed"
+        loads = "; ".join(profile.label for profile in self.profiles)
+        return f"<MeasuredStress: {loads}; {state}>"
+
+    @property
+    def loads(self) -> FloatArray:
+        """Nominal load of each profile, in N."""
+        return np.array([profile.load for profile in self.profiles])
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """What a user should know, the gravest first."""
+        return self.process.messages
+
+    @property
+    def passed(self) -> bool:
+        """Whether every quality check passed."""
+        return all(check.passed for check in self.checks)
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the measured stress to a file (memscal-stress).
+
+        Two measurements of the same files with the same options give the same bytes while
+        ``SOURCE_DATE_EPOCH`` is set.
+
+        Raises
+        ------
+        OutputError
+            If the file exists and ``overwrite`` is false, or cannot be written.
+        """
+        from memscal.formats.stress import write_stress
+
+        write_stress(self, path, overwrite=overwrite)
+
+
+def _kept(value: float) -> float:
+    """Round a length or voltage to a number that a file's unit gives back."""
+    return float(value) * _FILE_SCALE / _FILE_SCALE
+
+
+def _kept_record(record: Record, *lengths: str) -> Record:
+    """Round the lengths of a film or an indenter, and their uncertainties."""
+    names = [name + end for name in lengths for end in ("", "_uncertainty")]
+    stated = {name: getattr(record, name) for name in names}
+    kept: dict[str, Any] = {name: _kept(v) for name, v in stated.items() if v is not None}
+    return replace(record, **kept)
+
+
+def _freeze(owner: object, *names: str, scale: float = 1.0) -> None:
+    """Replace arrays by read-only copies, those of lengths and voltages (``scale``) rounded."""
+    for name in names:
+        if (values := getattr(owner, name)) is not None:
+            object.__setattr__(owner, name, frozen_array(np.asarray(values) * scale / scale))
