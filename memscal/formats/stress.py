@@ -39,7 +39,6 @@ __all__ = [
     "write_stress",
 ]
 
-#: Numbers and arrays of one profile that ``memscal inspect`` lists.
 
 _BUDGET = {"force": "force", "maximum": "stress"}
 _PREFIX = "covariance_"

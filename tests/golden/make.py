@@ -90,8 +90,6 @@ COMMANDS = {
     "import-line": 'import data/rod_scan_messy.csv -o messy.h5 --repeat repeat --x "x (mm)"'
     ' --x-unit mm --u "U (mV)" --u-unit mV --load-column "load (N)" --load 1'
     f" --load-uncertainty 0.01 {ROD}",
-    "import-average": 'import data/rod_scan_messy.csv -o mean.h5 --x "x (mm)" --x-unit mm'
-    f' --u "U (mV)" --u-unit mV --load 1 --repeats average --grid-tolerance 0.2 {ROD}',
     "import-sphere": 'import data/tables/sphere_dry.csv -o own.h5 --x "x (mm)" --x-unit mm'
     ' --u "U (mV)" --u-unit mV --load-column "set load (N)" --repeat "set load (N)" --repeat pass'
     f" --load-scatter 1 --position-error 10 --lubrication dry {OWN_SPHERE}",
