@@ -17,8 +17,8 @@ MODULES = {
 }
 
 FLOW = [
-    "version", "errors", "model", "axisymmetry", "mechanics", "deconvolution", "estimation",
-    "apparatus", "calibration", "laboratory", "measurement", "friction", "planning",
+    "version", "errors", "threads", "model", "axisymmetry", "mechanics", "deconvolution",
+    "estimation", "apparatus", "calibration", "laboratory", "measurement", "friction", "planning",
     "figures", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
@@ -60,7 +60,7 @@ def imported(tree: ast.AST) -> Iterator[str]:
 
 def allowed_rooms(importer: str) -> set[str]:
     if importer == "formats":
-        return {"version", "errors", "model", "formats"}
+        return {"version", "errors", "threads", "model", "formats"}
     earlier = set(FLOW[: FLOW.index(importer) + 1])
     return earlier | ({"formats"} if importer in USERS_OF_FORMATS else set())
 

@@ -21,6 +21,7 @@ from memscal.calibration.replicate_results import REPLICATED
 from memscal.calibration.workers import require_workers
 from memscal.errors import InputError
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 if TYPE_CHECKING:
     from memscal.calibration.procedure import Calibration
@@ -90,6 +91,7 @@ class MonteCarlo:
         raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(REPLICATED)}.")
 
 
+@single_threaded()
 def monte_carlo(
     calibration: Calibration, *, draws: int = 1000, seed: int = 0, workers: int = 1
 ) -> MonteCarlo:

@@ -28,6 +28,7 @@ from memscal.estimation.reference import (
 from memscal.mechanics.contact import Contact
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
+from memscal.threads import single_threaded
 
 __all__ = ["Calibration", "Reference", "calibrate"]
 
@@ -65,6 +66,7 @@ class Calibration:
         """Whether every quality check passed."""
         return self.apparatus.passed
 
+    @single_threaded()
     def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> Sweep:
         """Vary the white noise over two decades of amplitude, and over seeds.
 
@@ -85,6 +87,7 @@ class Calibration:
         return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
 
 
+@single_threaded()
 def calibrate(
     scan: Scan | Sequence[Scan],
     *,

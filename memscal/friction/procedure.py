@@ -36,6 +36,7 @@ from memscal.model.indenter import Sphere
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 __all__ = ["compare", "compare_measured"]
 
@@ -44,6 +45,7 @@ _REACH = 1.5
 _MM = 1e-3
 
 
+@single_threaded()
 def compare(
     scan: Scan | Sequence[Scan],
     apparatus: ApparatusFunction | str | PathLike[str],

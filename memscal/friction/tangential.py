@@ -28,6 +28,7 @@ from memscal.friction.results import EffectiveFriction
 from memscal.measurement.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 __all__ = ["ShearComparison", "compare_shear"]
 
@@ -63,6 +64,7 @@ class ShearComparison:
     messages: tuple[str, ...]
 
 
+@single_threaded()
 def compare_shear(
     measured: MeasuredStress,
     apparatus: ApparatusFunction | str | PathLike[str],

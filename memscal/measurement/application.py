@@ -22,10 +22,12 @@ from memscal.measurement.usable_scan import require_ends, require_points
 from memscal.model.apparatus import QualityCheck
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan
+from memscal.threads import single_threaded
 
 __all__ = ["measure_stress"]
 
 
+@single_threaded()
 def measure_stress(
     scan: Scan | Sequence[Scan],
     apparatus: ApparatusFunction | str | PathLike[str],

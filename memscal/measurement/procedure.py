@@ -19,6 +19,7 @@ from memscal.measurement.restoration import Restoration
 from memscal.measurement.restoration_checks import restoration_checks, restoration_messages
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 __all__ = ["gaussian_pressure", "restore", "restore_known"]
 
@@ -28,6 +29,7 @@ _LARGEST_KH = 20.0
 _RADII = 161
 
 
+@single_threaded()
 def restore(
     scan: Scan,
     apparatus: ApparatusFunction | str | PathLike[str],
