@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from statistics import median
 from time import perf_counter
@@ -13,6 +14,15 @@ def once(work: Callable[[], Any]) -> float:
     start = perf_counter()
     work()
     return perf_counter() - start
+
+
+def show(what: str, ratio: float, stated: float, *, gross: float = 5.0) -> None:
+    """Print a ratio of times beside the stated one; only a gross excess is a fault.
+
+    A busy machine may slow down one of two computations by much.
+    """
+    sys.stdout.write(f"\n{what}: {ratio:.3g} (stated: below {stated:.3g})\n")
+    assert ratio < gross * stated
 
 
 def turns(one: Callable[[], Any], other: Callable[[], Any], rounds: int) -> float:

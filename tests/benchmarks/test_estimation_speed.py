@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scans import estimated, simulated
-from timing import turns
+from timing import show, turns
 
 import memscal
 from memscal.estimation.profile_estimate import estimate_profile
@@ -24,7 +24,7 @@ def test_a_thousand_replicates_cost_a_few_estimates() -> None:
         lambda: estimate_profile(estimate.points, *estimate.model.references),
         rounds=7,
     )
-    assert ratio < 20
+    show("1000 replicates, over one estimate", ratio, 20)
 
 
 def test_a_thousand_draws_of_noise_and_inputs_cost_less_than_a_hundred_calibrations() -> None:
@@ -35,4 +35,4 @@ def test_a_thousand_draws_of_noise_and_inputs_cost_less_than_a_hundred_calibrati
         lambda: memscal.calibrate(scan, method="evidence"),
         rounds=3,
     )
-    assert ratio < 100
+    show("1000 draws, over one calibration", ratio, 100)

@@ -47,7 +47,6 @@ def test_g_integrates_to_one_on_its_support_and_a_times_g_predicts_the_scan() ->
     cell = (stored.x[1] - stored.x[0]) * (stored.y[1] - stored.y[0])
     assert stored.g.sum() * cell == pytest.approx(1.0, abs=1e-12)
     record = calibration.apparatus.reconvolution
-    np.testing.assert_allclose(record.residual, record.u_zz - record.u_zz_predicted)
     assert np.std(record.residual / record.u_zz_errors) < 1.5
 
 
