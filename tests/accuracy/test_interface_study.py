@@ -1,9 +1,9 @@
 """Virtual experiments whose interface is known: which law is preferred, and its slip length.
 
 Set MEMSCAL_FULL_STUDY for 40 experiments of each kind in place of 2 on a known film.  All inputs
-are drawn from their stated uncertainties.  An experiment like the paper's does not tell a slip length to better
-than a factor; *precise* ones, of less noise, with loads that are recorded and with more repeats,
-do; those on a film that is *known* better than the paper's do within 20 %.
+are drawn from their stated uncertainties.  An experiment like the paper's does not tell a slip
+length to better than a factor; *precise* ones, of less noise, with loads that are recorded and with
+more repeats, do; those on a film that is *known* better than the paper's do within 20 %.
 """
 
 from __future__ import annotations
