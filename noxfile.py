@@ -27,14 +27,12 @@ NOTHING_FROM_OUTSIDE = {"PYTHONPATH": "", "PYTHONNOUSERSITE": "1"}
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment in which linear algebra, here of small matrices, does not compete with itself."""
 
-# A worker to a core. A file stays on one worker, where its fixtures are made once; files start in
-# the order given, of which the long ones come first.
-IN_PARALLEL = (
-    "--numprocesses=auto",
-    "--maxprocesses=8",
-    "--dist=loadfile",
-    "--no-loadscope-reorder",
-)
+# Cores that this process may use, of which a machine can have more.
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+# A worker to a core, of half a gigabyte. A file stays on one worker, where its fixtures are made
+# once; files start in the order given, of which the long ones come first.
+IN_PARALLEL = (f"--numprocesses={min(CORES, 8)}", "--dist=loadfile", "--no-loadscope-reorder")
 
 
 def group(name: str) -> list[str]:
