@@ -24,6 +24,16 @@ GROUPS = nox.project.load_toml("pyproject.toml")
 NOTHING_FROM_OUTSIDE = {"PYTHONPATH": "", "PYTHONNOUSERSITE": "1"}
 """Environment in which only what the session installed can be imported."""
 
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Environment in which linear algebra, here of small matrices, does not compete with itself."""
+
+# Cores that this process may use, of which a machine can have more.
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+# A worker to a core, of half a gigabyte. A file stays on one worker, where its fixtures are made
+# once; files start in the order given, of which the long ones come first.
+IN_PARALLEL = (f"--numprocesses={min(CORES, 8)}", "--dist=loadfile", "--no-loadscope-reorder")
+
 
 def group(name: str) -> list[str]:
     """Requirements of one of the dependency groups in pyproject.toml."""
@@ -52,16 +62,24 @@ def outside_the_checkout(session: nox.Session, *, requirements: list[str]) -> It
 
 def run_pytest(session: nox.Session, *arguments: str) -> None:
     """Run pytest on whatever the session installed, and on nothing else."""
-    session.run("pytest", "-p", "no:cacheprovider", *arguments, env=NOTHING_FROM_OUTSIDE)
+    environment = NOTHING_FROM_OUTSIDE | ONE_THREAD
+    session.run("pytest", "-p", "no:cacheprovider", *arguments, env=environment)
 
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """Test the built wheel: unit tests, doctests, notebooks and benchmarks in one run."""
+    """Test the built wheel: notebooks, studies in reduced form, unit tests and doctests."""
     with outside_the_checkout(session, requirements=group("test")) as copy:
-        everything = [os.fspath(copy / "tests"), "--pyargs", "memscal", "--nbmake"]
-        everything += sorted(os.fspath(book) for book in copy.glob("notebooks/*.ipynb"))
-        run_pytest(session, *(session.posargs or everything))
+        everything = sorted(os.fspath(book) for book in copy.glob("notebooks/*.ipynb"))
+        everything += [os.fspath(copy / "tests"), "--pyargs", "memscal", "--nbmake"]
+        run_pytest(session, *IN_PARALLEL, "--durations=20", *(session.posargs or everything))
+
+
+@nox.session(default=False)
+def benchmarks(session: nox.Session) -> None:
+    """Print how fast memscal is beside other ways to the same numbers, on this machine."""
+    with outside_the_checkout(session, requirements=[*group("test"), *group("benchmark")]):
+        run_pytest(session, "-m", "benchmark", "--capture=no", "tests/benchmarks", *session.posargs)
 
 
 @nox.session(default=False)
@@ -69,7 +87,7 @@ def accuracy(session: nox.Session) -> None:
     """Run the statistical studies in full, over every seed."""
     with outside_the_checkout(session, requirements=group("test")):
         session.env["MEMSCAL_FULL_STUDY"] = "1"
-        run_pytest(session, "tests/accuracy", "-m", "accuracy", *session.posargs)
+        run_pytest(session, *IN_PARALLEL, "tests/accuracy", "-m", "accuracy", *session.posargs)
 
 
 @nox.session(default=False)
@@ -83,7 +101,7 @@ def notebooks(session: nox.Session) -> None:
 def coverage(session: nox.Session) -> None:
     """Show which lines of the built wheel no test reaches."""
     with outside_the_checkout(session, requirements=[*group("test"), "pytest-cov"]):
-        run_pytest(session, "tests", "--cov", "--cov-report=term-missing", "--benchmark-disable")
+        run_pytest(session, "tests", "--cov", "--cov-report=term-missing")
 
 
 @nox.session

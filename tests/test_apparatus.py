@@ -14,6 +14,7 @@ import pytest
 from builders import CONVERSION, SIGMA, make_artifact
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rounding import assert_same_to_rounding
 from scans import EXACT_FILM, EXACT_ROD, TAILS
 from scipy.integrate import dblquad
 from scipy.signal import fftconvolve
@@ -142,7 +143,7 @@ def test_uneven_radii_give_the_same_as_even_ones(apparatus: ApparatusFunction) -
 def test_a_voltage_is_the_blurred_stress_times_the_constant(apparatus: ApparatusFunction) -> None:
     stress = 2e5 * np.exp(-((RADII / 1e-3) ** 2))
     volts = apparatus.predict(RADII, stress)
-    np.testing.assert_array_equal(volts, CONVERSION * apparatus.convolve(RADII, stress))
+    assert_same_to_rounding(volts, CONVERSION * apparatus.convolve(RADII, stress))
     np.testing.assert_allclose(apparatus.stress(volts), apparatus.convolve(RADII, stress))
 
 

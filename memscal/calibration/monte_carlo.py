@@ -23,6 +23,7 @@ from memscal.calibration.workers import require_workers
 from memscal.errors import FitError, InputError
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 __all__ = ["Comparison", "MonteCarlo", "monte_carlo", "shortest_interval"]
 
@@ -133,6 +134,7 @@ class MonteCarlo:
         raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(BUDGETED)}.")
 
 
+@single_threaded()
 def monte_carlo(
     calibration: Calibration,
     *,

@@ -29,6 +29,7 @@ from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import Contact
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
+from memscal.threads import single_threaded
 
 __all__ = ["Calibration", "Reference", "calibrate", "uncertainties"]
 
@@ -66,6 +67,7 @@ class Calibration:
         """Whether every quality check passed."""
         return self.apparatus.passed
 
+    @single_threaded()
     def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> Sweep:
         """Vary the white noise over two decades of amplitude, and over seeds.
 
@@ -86,6 +88,7 @@ class Calibration:
         return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
 
 
+@single_threaded()
 def calibrate(
     scan: Scans,
     *,

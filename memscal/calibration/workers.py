@@ -11,15 +11,10 @@ from numbers import Integral
 from typing import Any
 
 from memscal.errors import InputError
+from memscal.threads import THREAD_VARIABLES
 
 __all__ = ["require_workers", "worker_pool"]
 
-_THREADS = (
-    "OPENBLAS_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
 #: Systems refuse more, and no machine gains by them.
 _MOST_WORKERS = 61
 
@@ -47,7 +42,7 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     small: threads of BLAS in every process would only wait for each other.  Their number is read
     when a process starts, from the environment, which is put back afterwards.
     """
-    unset = [name for name in _THREADS if name not in os.environ]
+    unset = [name for name in THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
     try:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:

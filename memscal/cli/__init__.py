@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from memscal.cli.commands import memscal
 from memscal.cli.failures import Session, guarded
+from memscal.threads import one_thread_per_process
 
 __all__ = ["main"]
 
@@ -34,4 +35,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = memscal.main(args, prog_name="memscal", standalone_mode=False, obj=session)
         return code if isinstance(code, int) else 0
 
+    one_thread_per_process()
     return guarded(run)

@@ -42,6 +42,7 @@ from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 __all__ = ["compare", "compare_measured"]
 
@@ -50,6 +51,7 @@ _REACH = 1.5
 _MM = 1e-3
 
 
+@single_threaded()
 def compare(
     contacts: Contacts,
     apparatus: ApparatusFunction | str | PathLike[str],

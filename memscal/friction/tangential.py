@@ -29,6 +29,7 @@ from memscal.friction.results import EffectiveFriction
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 __all__ = ["ShearComparison", "compare_shear"]
 
@@ -64,6 +65,7 @@ class ShearComparison:
     messages: tuple[Message, ...]
 
 
+@single_threaded()
 def compare_shear(
     measured: MeasuredStress | str | PathLike[str],
     apparatus: ApparatusFunction | str | PathLike[str],

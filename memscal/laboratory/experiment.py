@@ -22,6 +22,7 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan
 from memscal.model.validation import require_non_negative, require_positive
+from memscal.threads import single_threaded
 
 __all__ = ["Experiment", "simulate_experiment"]
 
@@ -55,6 +56,7 @@ class Experiment:
         }
 
 
+@single_threaded()
 def simulate_experiment(
     *,
     film: ElasticFilm = PAPER_FILM,

@@ -20,6 +20,7 @@ from memscal.model.validation import (
     require_positive,
     require_range,
 )
+from memscal.threads import single_threaded
 
 __all__ = ["simulate"]
 
@@ -37,6 +38,7 @@ PAPER_FILM = ElasticFilm(
 PAPER_ROD = Rod(radius=0.25e-3, radius_uncertainty=2.5e-6)
 
 
+@single_threaded()
 def simulate(
     *,
     film: ElasticFilm = PAPER_FILM,

@@ -49,6 +49,7 @@ from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, Measure
 from memscal.model.provenance import Process
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 from memscal.version import __version__
 
 __all__ = ["joined_stress", "measure_stress"]
@@ -59,6 +60,7 @@ _NUMBERED = re.compile(r"(\w+)_(\d+)")
 _SAID_OF_ALL = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 
 
+@single_threaded()
 def measure_stress(
     scan: Scans,
     apparatus: ApparatusFunction | str | PathLike[str],

@@ -20,6 +20,7 @@ from memscal.measurement.restoration import Restoration
 from memscal.measurement.restoration_checks import restoration_checks, restoration_messages
 from memscal.model.scan import Scan
 from memscal.model.validation import FloatArray
+from memscal.threads import single_threaded
 
 __all__ = ["gaussian_pressure", "restore", "restore_known"]
 
@@ -29,6 +30,7 @@ _LARGEST_KH = 20.0
 _RADII = 161
 
 
+@single_threaded()
 def restore(
     scan: Scan | str | PathLike[str],
     apparatus: ApparatusFunction | str | PathLike[str],

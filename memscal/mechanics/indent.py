@@ -19,6 +19,7 @@ from memscal.mechanics.solver.request import RingRequest, solve_on_rings
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.model.validation import FloatArray, require_positive
+from memscal.threads import single_threaded
 
 __all__ = ["indent"]
 
@@ -73,6 +74,7 @@ def indent(
     film_radius: float | None = None,
     rings: int | None = None,
 ) -> list[Contact]: ...
+@single_threaded()
 def indent(
     film: ElasticFilm,
     indenter: Indenter,

@@ -15,10 +15,12 @@ from memscal.model.indenter import Rod
 from memscal.planning.outcome import Design, evaluate
 from memscal.planning.plan import Plan
 from memscal.planning.wishes import least_design, require_wishes
+from memscal.threads import single_threaded
 
 __all__ = ["design", "varied_designs"]
 
 
+@single_threaded()
 def design(
     *,
     film: ElasticFilm = PAPER_FILM,

@@ -114,10 +114,11 @@ def test_a_beats_a_wiener_filter_tuned_on_the_truth_and_g_meets_it() -> None:
 
 def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
     deviates = []
-    for seed in range(SEEDS):
+    seeds = range(SEEDS // 4)  # a raster costs as much as twenty lines
+    for seed in seeds:
         scan = simulated(raster=True, points=25, seed=seed, centre=(0.3e-3, -0.2e-3))
         p = memscal.calibrate(scan).apparatus.parameters
         truths = {"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "centre_y": -0.2e-3}
         deviates.append([(p[n] - truth) / p.uncertainty(n) for n, truth in truths.items()])
     scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
-    assert (scatter < root_mean_square_limit(1.15, SEEDS, CHANCE)).all()
+    assert (scatter < root_mean_square_limit(1.15, len(seeds), CHANCE)).all()

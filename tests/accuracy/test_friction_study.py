@@ -2,7 +2,7 @@
 
 Each experiment is a rod scan and the scans of a sphere, dry and lubricated, with noise, scatter of
 loads and positions, and film, radii and loads drawn from their uncertainties.  Set
-MEMSCAL_FULL_STUDY for the 50 seeds of docs/friction.md in place of 4.
+MEMSCAL_FULL_STUDY for the 50 seeds and four coefficients of docs/friction.md in place of 3 and two.
 """
 
 from __future__ import annotations

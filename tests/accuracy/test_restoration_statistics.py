@@ -1,6 +1,6 @@
 """The restored stress over many noise draws and contacts: its error, and the truth of its band.
 
-Set MEMSCAL_FULL_STUDY for 40 seeds a case in place of 6.  Neighbouring radii of one scan share
+Set MEMSCAL_FULL_STUDY for 40 seeds a case in place of 4.  Neighbouring radii of one scan share
 their error: the scan, not the radius, is the unit of every bound.
 """
 
@@ -20,7 +20,7 @@ import memscal
 
 pytestmark = pytest.mark.accuracy
 
-SEEDS = 40 if os.environ.get("MEMSCAL_FULL_STUDY") else 6
+SEEDS = 40 if os.environ.get("MEMSCAL_FULL_STUDY") else 4
 NOISES = (0.002, 0.005, 0.01)
 SIGMAS = 4.0
 CHANCE = 1e-4

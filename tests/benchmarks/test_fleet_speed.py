@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 
 import pytest
-from timing import once
+from timing import once, show
 
 import memscal
 
@@ -19,7 +19,7 @@ SCANS = 400 if os.environ.get("MEMSCAL_FULL_STUDY") else 100
 ALLOWED = 0.9 if SCANS > 100 else 1.2
 
 
-def test_two_processes_calibrate_faster_than_a_loop(request: pytest.FixtureRequest) -> None:
+def test_two_processes_calibrate_faster_than_a_loop() -> None:
     if (os.cpu_count() or 1) < 2:
         pytest.skip("one core")
     scans = [memscal.simulate(points=65, noise=0.003, seed=seed) for seed in range(SCANS)]
@@ -34,12 +34,4 @@ def test_two_processes_calibrate_faster_than_a_loop(request: pytest.FixtureReque
         once(lambda: memscal.calibrate_many(scans, workers=2, method="evidence")) for _ in range(2)
     )
     plain = min(once(loop) for _ in range(2))
-    plugins = request.config.pluginmanager
-    reporter, capture = (plugins.get_plugin(n) for n in ("terminalreporter", "capturemanager"))
-    if reporter is not None:
-        with capture.global_and_fixture_disabled():
-            reporter.write_line(
-                f"\n{SCANS} scans of 65 points: {SCANS / fleet:.0f} a second on two processes, "
-                f"{SCANS / plain:.0f} in a loop"
-            )
-    assert fleet < ALLOWED * plain
+    show(f"{SCANS} scans on two processes, over a loop", fleet / plain, ALLOWED)

@@ -6,7 +6,7 @@ from pathlib import Path
 from statistics import median
 
 import pytest
-from timing import once
+from timing import once, show
 
 from memscal.friction.calculated import amontons_family
 from memscal.friction.family import ProfileFamily
@@ -31,4 +31,5 @@ def family(cache: Path | None) -> ProfileFamily:
 def test_a_kept_family_is_read_ten_times_faster_than_it_is_calculated(tmp_path: Path) -> None:
     family(tmp_path)
     pairs = [(once(lambda: family(None)), once(lambda: family(tmp_path))) for _ in range(3)]
-    assert median(calculated / kept for calculated, kept in pairs) > 10
+    ratio = median(kept / calculated for calculated, kept in pairs)
+    show("kept family, over a calculated one", ratio, 1 / 10)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from rounding import assert_same_to_rounding
 from scipy.integrate import simpson
 from scipy.special import j1
 
@@ -49,7 +50,7 @@ def test_the_spectrum_is_an_integral_of_the_shear_and_odd_in_k() -> None:
     direct = [simpson(measure * j1(each * r), x=r) for each in k]
     found = contact.base_shear_spectrum(k)
     np.testing.assert_allclose(found, direct, rtol=1e-5)
-    np.testing.assert_array_equal(contact.base_shear_spectrum(-k), -found)
+    assert_same_to_rounding(contact.base_shear_spectrum(-k), -found)
     assert contact.base_shear_spectrum(0.0) == 0.0
     assert contact.base_shear_spectrum(k.reshape(3, 1)).shape == (3, 1)
 
@@ -59,8 +60,8 @@ def test_both_backends_have_the_same_spectrum(friction: float) -> None:
     rod = Rod(radius=0.6e-3)
     k = np.linspace(100.0, 2500.0, 13)
     one, other = (
-        indent(film(0.45), rod, load=1.0, friction=friction, backend=backend).base_shear_spectrum(k)
-        for backend in ("hankel", "fem")
+        indent(film(0.45), rod, load=1.0, friction=friction, **backend).base_shear_spectrum(k)
+        for backend in ({}, {"backend": "fem", "rings": 48})
     )
     np.testing.assert_allclose(other, one, atol=2e-3 * np.abs(one).max())
 
