@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 # The cases are the tests' own, so that the table and the tests speak of the same scans.
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from accuracy.estimation_study import (
+from helpers.estimation_study import (
     BANDS,
     CASES,
     EFFICIENCY,
@@ -27,7 +27,7 @@ from accuracy.estimation_study import (
 )
 
 if TYPE_CHECKING:
-    from accuracy.estimation_study import Case, Outcome
+    from helpers.estimation_study import Case, Outcome
 
 PROCESSES = 2
 HEAD = (

@@ -13,9 +13,9 @@ from memscal.version import __version__
 if TYPE_CHECKING:
     from memscal.apparatus import ApparatusFunction, load_apparatus
     from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
-    from memscal.calibration.fleet import FleetCalibration, calibrate_many
+    from memscal.calibration.calibrate import Calibration, calibrate
+    from memscal.calibration.many import FleetCalibration, calibrate_many
     from memscal.calibration.monte_carlo import MonteCarlo, monte_carlo
-    from memscal.calibration.procedure import Calibration, calibrate
     from memscal.deconvolution.fourier_ratio import (
         Field,
         Quotient,
@@ -29,14 +29,11 @@ if TYPE_CHECKING:
     from memscal.formats.reference import read_reference, write_reference
     from memscal.formats.scan import read_scan, write_scan
     from memscal.formats.stress import read_stress
-    from memscal.friction.procedure import compare
+    from memscal.friction.compare import ShearComparison, compare, compare_shear
     from memscal.friction.results import FrictionComparison
-    from memscal.friction.tangential import ShearComparison, compare_shear
-    from memscal.laboratory.experiment import Experiment, simulate_experiment
-    from memscal.laboratory.rod_scan import simulate
-    from memscal.measurement.application import measure_stress
-    from memscal.measurement.procedure import restore
+    from memscal.measurement.measure_stress import measure_stress
     from memscal.measurement.restoration import Restoration
+    from memscal.measurement.restore import restore
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.indent import indent
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
@@ -46,8 +43,10 @@ if TYPE_CHECKING:
     from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
     from memscal.model.scan import Scan, StressSensor
     from memscal.model.stress import StressProfile
-    from memscal.planning.outcome import Design
-    from memscal.planning.procedure import design
+    from memscal.planning.design import design
+    from memscal.planning.expected import Design
+    from memscal.simulation.experiment import Experiment, simulate_experiment
+    from memscal.simulation.rod_scan import simulate
 
 _HOMES = {
     "reconvolve": "memscal.deconvolution.fourier_ratio",
@@ -58,14 +57,14 @@ _HOMES = {
     "Quotient": "memscal.deconvolution.fourier_ratio",
     "Field": "memscal.deconvolution.fourier_ratio",
     "ApparatusFunction": "memscal.apparatus",
-    "Calibration": "memscal.calibration.procedure",
+    "Calibration": "memscal.calibration.calibrate",
     "Cone": "memscal.model.indenter",
     "Contact": "memscal.mechanics.contact",
-    "Design": "memscal.planning.outcome",
+    "Design": "memscal.planning.expected",
     "ElasticFilm": "memscal.model.film",
-    "Experiment": "memscal.laboratory.experiment",
+    "Experiment": "memscal.simulation.experiment",
     "ExponentialCompliance": "memscal.mechanics.interface",
-    "FleetCalibration": "memscal.calibration.fleet",
+    "FleetCalibration": "memscal.calibration.many",
     "FrictionComparison": "memscal.friction.results",
     "GaussianMixture": "memscal.axisymmetry.kernels",
     "GreenwoodTripp": "memscal.mechanics.interface",
@@ -79,26 +78,26 @@ _HOMES = {
     "Restoration": "memscal.measurement.restoration",
     "Rod": "memscal.model.indenter",
     "Scan": "memscal.model.scan",
-    "ShearComparison": "memscal.friction.tangential",
+    "ShearComparison": "memscal.friction.compare",
     "SmoothedDisc": "memscal.axisymmetry.kernels",
     "Sphere": "memscal.model.indenter",
     "StressProfile": "memscal.model.stress",
     "StressSensor": "memscal.model.scan",
-    "calibrate": "memscal.calibration.procedure",
-    "calibrate_many": "memscal.calibration.fleet",
-    "compare": "memscal.friction.procedure",
-    "compare_shear": "memscal.friction.tangential",
-    "design": "memscal.planning.procedure",
+    "calibrate": "memscal.calibration.calibrate",
+    "calibrate_many": "memscal.calibration.many",
+    "compare": "memscal.friction.compare",
+    "compare_shear": "memscal.friction.compare",
+    "design": "memscal.planning.design",
     "indent": "memscal.mechanics.indent",
     "load_apparatus": "memscal.apparatus",
-    "measure_stress": "memscal.measurement.application",
+    "measure_stress": "memscal.measurement.measure_stress",
     "monte_carlo": "memscal.calibration.monte_carlo",
     "read_reference": "memscal.formats.reference",
     "read_scan": "memscal.formats.scan",
     "read_stress": "memscal.formats.stress",
-    "restore": "memscal.measurement.procedure",
-    "simulate": "memscal.laboratory.rod_scan",
-    "simulate_experiment": "memscal.laboratory.experiment",
+    "restore": "memscal.measurement.restore",
+    "simulate": "memscal.simulation.rod_scan",
+    "simulate_experiment": "memscal.simulation.experiment",
     "write_reference": "memscal.formats.reference",
     "write_scan": "memscal.formats.scan",
 }

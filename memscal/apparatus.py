@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline
-from memscal.axisymmetry.quadrature import ring_areas
+from memscal.axisymmetry.hankel import Wavenumbers, hankel_transform, radial_spline, ring_areas
 from memscal.errors import InputError
-from memscal.estimation.channels import TANGENTIAL
+from memscal.estimation.points import TANGENTIAL
 from memscal.model.apparatus import ApparatusData
+from memscal.model.arrays import FloatArray, finite_vector, require_increasing
 from memscal.model.provenance import SourceFile
-from memscal.model.validation import FloatArray, finite_vector, require_increasing
 
 __all__ = ["ApparatusFunction", "load_apparatus", "opened_apparatus"]
 
@@ -237,7 +236,7 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
         If it was written under a newer major version of the format.
     """
     from memscal.formats.artifact import artifact_from
-    from memscal.formats.hdf5_reader import open_hdf5
+    from memscal.formats.hdf5.reader import open_hdf5
     from memscal.formats.schema import DIGEST_ATTRIBUTE
 
     with open_hdf5(path) as file:

@@ -40,13 +40,12 @@ import numpy as np
 from IPython.display import Markdown
 
 import memscal
-from memscal.figures.apparatus_panels import draw_radial
-from memscal.figures.friction_interface import interface_figure
-from memscal.figures.friction_maxima import maxima_figure
+from memscal.figures.calibration import draw_radial
+from memscal.figures.friction import interface_figure, maxima_figure
 from memscal.figures.friction_profiles import draw_profiles, friction_set_figure
 from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
 from memscal.figures.friction_scale import friction_colours, friction_name, on_axis
-from memscal.figures.scan_panels import draw_scan
+from memscal.figures.scan import draw_scan
 from memscal.figures.style import house_style, legend_above, new_figure, panel_letter
 
 DATA = Path("../calibration_data/sphere_experiment")

@@ -40,10 +40,10 @@ from IPython.display import Markdown
 
 import memscal
 from memscal.figures.calibration import calibration_figure
-from memscal.figures.friction_maxima import maxima_figure
+from memscal.figures.friction import maxima_figure
 from memscal.figures.friction_profiles import friction_set_figure, profile_figure
 from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
-from memscal.figures.measured_stress import measured_stress_figure
+from memscal.figures.stress import measured_stress_figure
 
 TABLES = Path("../calibration_data/tables")
 MM, MV = 1e-3, 1e-3  # memscal computes in SI units; people read these

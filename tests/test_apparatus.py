@@ -11,11 +11,11 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from builders import CONVERSION, SIGMA, make_artifact
+from helpers.builders import CONVERSION, SIGMA, make_artifact
+from helpers.rounding import assert_same_to_rounding
+from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rounding import assert_same_to_rounding
-from scans import EXACT_FILM, EXACT_ROD, TAILS
 from scipy.integrate import dblquad
 from scipy.signal import fftconvolve
 
@@ -24,7 +24,7 @@ from memscal import ApparatusFunction, load_apparatus
 from memscal.errors import FormatError, InputError, OutputError, SchemaVersionError
 from memscal.formats.schema import VERSION_ATTRIBUTE
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, TransferFunction
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 SUPPORT = 6e-3
 RADII = np.linspace(0.0, 12e-3, 601)

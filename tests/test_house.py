@@ -17,10 +17,9 @@ MODULES = {
 }
 
 FLOW = [
-    "version", "errors", "threads", "model", "axisymmetry", "mechanics", "estimation",
-    "deconvolution", "apparatus", "calibration", "laboratory", "measurement", "friction",
-    "planning",
-    "figures", "cli", "__main__",
+    "version", "errors", "parallel", "model", "axisymmetry", "mechanics", "estimation",
+    "deconvolution", "apparatus", "calibration", "simulation", "measurement", "friction",
+    "planning", "summaries", "figures", "cli", "__main__",
 ]  # fmt: skip
 """The rooms in the order in which data passes them; a room imports only from those before it."""
 
@@ -41,7 +40,15 @@ SLOW = {
     "matplotlib", "meshio", "pint", "skfem", "skimage",
     "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats",
 }  # fmt: skip
-LONGEST = 600
+LONGEST, SHORT = 600, 120
+MOST_MODULES, MOST_LINES = 185, 42_000
+SHORT_WITH_ONE_IMPORTER = {
+    "memscal.cli.commands": "asking for help imports it and nothing that a command needs",
+}
+"""Modules that are short and have a single importer, each with the reason why it stands alone."""
+
+ONE_ROLE = {"cli", "figures", "summaries", "formats"}
+"""Rooms in which a module may have the name of what it shows, reads or commands."""
 
 
 def room(module: str) -> str:
@@ -73,7 +80,7 @@ def imported(tree: ast.AST) -> Iterator[str]:
 
 def allowed_rooms(importer: str) -> set[str]:
     if importer == "formats":
-        return {"version", "errors", "threads", "model", "formats"}
+        return {"version", "errors", "parallel", "model", "formats"}
     earlier = set(FLOW[: FLOW.index(importer) + 1])
     return earlier | ({"formats"} if importer in USERS_OF_FORMATS else set())
 
@@ -125,6 +132,70 @@ def test_slow_libraries_are_imported_only_when_needed(trees: dict[str, ast.Modul
 def test_a_module_is_short_enough_to_hold_in_the_head(sources: dict[str, str]) -> None:
     lengths = {name: len(source.splitlines()) for name, source in sources.items()}
     assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
+
+
+def test_the_house_is_small(sources: dict[str, str]) -> None:
+    assert len(sources) <= MOST_MODULES
+    assert sum(len(source.splitlines()) for source in sources.values()) <= MOST_LINES
+
+
+@pytest.fixture(scope="module")
+def arrows(trees: dict[str, ast.Module]) -> dict[str, set[str]]:
+    """The modules of ours that each module imports, wherever in it the import stands."""
+    packages = {name.removesuffix(".__init__") for name in trees}
+    return {
+        name: {other for other in imported(tree) if other in packages} - {"memscal", name}
+        for name, tree in trees.items()
+        if not name.endswith("__init__")
+    }
+
+
+def test_no_modules_import_each_other_in_a_circle(arrows: dict[str, set[str]]) -> None:
+    left = dict(arrows)
+    while free := [name for name in left if not left[name] & set(left)]:
+        for name in free:
+            del left[name]
+    assert {name: sorted(left[name] & set(left)) for name in left} == {}
+
+
+def test_a_short_module_serves_several_others(
+    arrows: dict[str, set[str]], sources: dict[str, str]
+) -> None:
+    importers = {name: [other for other in arrows if name in arrows[other]] for name in arrows}
+    alone = {
+        name
+        for name in arrows
+        if len(sources[name].splitlines()) < SHORT and len(importers[name]) == 1
+    }
+    assert alone == set(SHORT_WITH_ONE_IMPORTER)
+
+
+def test_a_name_stands_for_one_thing(trees: dict[str, ast.Module]) -> None:
+    owners: dict[str, list[str]] = {}
+    for name in trees:
+        if room(name) not in ONE_ROLE and not name.endswith("__init__"):
+            owners.setdefault(name.rpartition(".")[2], []).append(name)
+    assert {name: found for name, found in owners.items() if len(found) > 1} == NAMESAKES
+
+
+NAMESAKES = {
+    "apparatus": ["memscal.apparatus", "memscal.model.apparatus"],  # its methods, and its data
+    "checks": ["memscal.calibration.checks", "memscal.friction.checks", "memscal.model.checks"],
+}
+"""One subject in several rooms: what is computed with the records of the model."""
+
+
+def test_no_module_merely_hands_names_on(trees: dict[str, ast.Module]) -> None:
+    own = (ast.FunctionDef, ast.ClassDef, ast.Assign, ast.AnnAssign)
+    idle = [
+        name
+        for name, tree in trees.items()
+        if not name.endswith(("__init__", "__main__"))
+        and not any(
+            isinstance(node, own) and "__all__" not in ast.unparse(node)[:10] for node in tree.body
+        )
+    ]
+    assert idle == []
 
 
 def test_no_public_name_is_hidden_by_a_module_of_that_name() -> None:

@@ -12,7 +12,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import memscal
-from memscal.threads import THREAD_VARIABLES, single_threaded
+from memscal.parallel import THREAD_VARIABLES, single_threaded
 
 
 def blas_threads() -> set[int]:

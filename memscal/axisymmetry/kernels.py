@@ -15,9 +15,32 @@ from scipy.special import j1
 
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
-from memscal.model.validation import FloatArray, require_positive
+from memscal.model.arrays import FloatArray, require_positive
 
-__all__ = ["GaussianMixture", "RadialKernel", "SmoothedDisc"]
+__all__ = [
+    "GaussianMixture",
+    "RadialKernel",
+    "SmoothedDisc",
+    "gaussian_transfer",
+    "unit_gaussian",
+    "unit_gaussian_slope",
+]
+
+
+def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
+    r"""Transform :math:`\exp(-\sigma^2 k^2 / 2)` of the Gaussian of unit integral."""
+    return np.asarray(np.exp(-0.5 * (sigma * k) ** 2))
+
+
+def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
+    """Gaussian of unit integral over the plane, in 1/m^2."""
+    return np.asarray(np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2))
+
+
+def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
+    """Derivative of :func:`unit_gaussian` by its width, in 1/m^3."""
+    return np.asarray(unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma)
+
 
 # exp(-s^2 k^2 / 2) is below the rounding of 1 beyond this value of s k.
 _VANISHED = 8.6

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import radial_spline
-from memscal.axisymmetry.quadrature import ring_areas
+from memscal.axisymmetry.hankel import radial_spline, ring_areas
+from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.deconvolution.fourier_ratio import Field
-from memscal.estimation.forward import unit_gaussian, unit_gaussian_slope
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = ["Functional", "kernel_functionals"]
 

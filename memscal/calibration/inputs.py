@@ -14,16 +14,12 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.errors import InputError
-from memscal.estimation.profile_estimate import ProfileEstimate
-from memscal.estimation.reference import (
-    carried_force,
-    film_sensitivities,
-    rod_sensitivities,
-)
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reference import carried_force, film_sensitivities, rod_sensitivities
 from memscal.mechanics.contact import Contact
+from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
 
 __all__ = ["InputEffect", "correlation_matrix", "input_effects"]
 

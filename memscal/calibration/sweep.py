@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.calibration.solution import Solution, deconvolve
-from memscal.deconvolution.problem import Regulariser, require_count
-from memscal.deconvolution.white_noise import WhiteNoise, WhiteNoiseDraw
+from memscal.calibration.stages import Solution, deconvolve
+from memscal.deconvolution.division import Regulariser, require_count
+from memscal.deconvolution.windows import WhiteNoise, WhiteNoiseDraw
 from memscal.errors import FitError
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = ["Sweep", "sweep_noise"]
 

@@ -17,13 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0
 
-from memscal.calibration.field_noise import FieldNoise
 from memscal.calibration.functionals import Functional, kernel_functionals
 from memscal.calibration.inputs import InputEffect, correlation_matrix
-from memscal.calibration.solution import Deconvolution
-from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.calibration.stages import Deconvolution, FieldNoise
+from memscal.estimation.profile import ProfileEstimate
 from memscal.model.apparatus import ParameterSet
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = ["BUDGETED", "NOT_RANDOM", "Results", "propagate"]
 

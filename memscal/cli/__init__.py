@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from memscal.cli.commands import memscal
 from memscal.cli.failures import Session, guarded
-from memscal.threads import one_thread_per_process
+from memscal.parallel import one_thread_per_process
 
 __all__ = ["main"]
 

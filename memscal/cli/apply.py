@@ -9,9 +9,15 @@ import click
 
 from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, force_option, json_option
-from memscal.cli.output import emit_json, message, show_messages
-from memscal.cli.progress import working
-from memscal.cli.targets import FigurePath, beside, prove_writable
+from memscal.cli.output import (
+    FigurePath,
+    beside,
+    emit_json,
+    message,
+    prove_writable,
+    show_messages,
+    working,
+)
 
 if TYPE_CHECKING:
     from memscal.model.measured_stress import MeasuredStress
@@ -77,7 +83,7 @@ def command(
     written = output or beside(scans[0], ".stress.h5")
     prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
 
-    from memscal.measurement.application import measure_stress
+    from memscal.measurement.measure_stress import measure_stress
 
     with working("Measuring"):
         found = measure_stress(data, artifact, override=override)
@@ -85,7 +91,7 @@ def command(
         ready = _rendered(found, figures)
     found.save(written, overwrite=force)
     if ready:
-        from memscal.formats.atomic import atomic_write_bytes
+        from memscal.formats.files import atomic_write_bytes
 
         for path, content in ready.items():
             atomic_write_bytes(path, content, overwrite=force)
@@ -95,8 +101,8 @@ def command(
 def _rendered(found: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, bytes]:
     if not figures:
         return {}
-    from memscal.figures.measured_stress import measured_stress_figure
-    from memscal.figures.render import figure_format, render_figure
+    from memscal.figures.stress import measured_stress_figure
+    from memscal.figures.style import figure_format, render_figure
 
     figure = measured_stress_figure(found)
     return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}
@@ -104,9 +110,9 @@ def _rendered(found: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, by
 
 def _tell(found: MeasuredStress, output: Path, files: list[Path], as_json: bool) -> int:
     """Print the results and the messages; return the exit code."""
-    from memscal.cli.apply_view import stress_json, stress_tables
-    from memscal.cli.quality_view import exit_code_of
-    from memscal.cli.tables import emit_tables
+    from memscal.cli.failures import exit_code_of
+    from memscal.cli.output import emit_tables
+    from memscal.summaries.stress import stress_json, stress_tables
 
     if as_json:
         emit_json(stress_json(found, output))

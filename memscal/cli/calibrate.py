@@ -2,29 +2,177 @@
 
 from __future__ import annotations
 
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli.calibration_outputs import Outputs
-from memscal.cli.calibration_setup import artifact_beside, chosen_method, correlation
 from memscal.cli.failures import DONE, debug_option
 from memscal.cli.options import FILE, force_option, json_option
-from memscal.cli.output import emit_json, message, note, show_messages
-from memscal.cli.progress import working
-from memscal.cli.targets import FigurePath, prove_writable
+from memscal.cli.output import (
+    FigurePath,
+    beside,
+    emit_json,
+    message,
+    note,
+    prove_writable,
+    show_messages,
+    working,
+)
 
 if TYPE_CHECKING:
+    from memscal.calibration.calibrate import Calibration
     from memscal.calibration.monte_carlo import MonteCarlo
-    from memscal.calibration.procedure import Calibration
     from memscal.calibration.sweep import Sweep
-    from memscal.cli.tables import Table
-    from memscal.deconvolution.problem import Regulariser
+    from memscal.deconvolution.division import Regulariser
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
+    from memscal.summaries.table import Table
 
 __all__ = ["command"]
+
+#: Processes that share the draws, where there are as many cores.
+_MOST_WORKERS = 8
+
+
+def drawn_with_progress(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
+    """Draw in processes, say how far it is, and tell what the numbers rest on."""
+    from memscal.calibration.monte_carlo import monte_carlo
+    from memscal.model.checks import Message
+    from memscal.model.quantities import estimated_quantity
+
+    # Starting a process takes about as long as forty draws of a line.
+    workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
+    with working(f"Drawing {draws} scans") as show:
+        drawn = monte_carlo(
+            calibration,
+            draws=draws,
+            seed=seed,
+            workers=workers,
+            progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
+        )
+    disagreements = [
+        Message("disagreement", f"{estimated_quantity(c.name).words}: {c.reason}")
+        for c in drawn.comparisons
+        if not c.agrees
+    ]
+    show_messages([*drawn.messages, *disagreements])
+    return drawn
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where the results go."""
+
+    artifact: Path
+    report: Path | None
+    figures: tuple[Path, ...]
+    sweep_figure: Path | None
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """All of them, the artifact first."""
+        others = (self.report, *self.figures, self.sweep_figure)
+        return (self.artifact, *(path for path in others if path is not None))
+
+    def rendered(self, found: Calibration, swept: Sweep | None) -> dict[Path, bytes]:
+        """Return the figures and the report as the bytes of their files."""
+        ready: dict[Path, bytes] = {}
+        if self.figures:
+            from memscal.figures.calibration import calibration_figure
+            from memscal.figures.style import figure_format, render_figure
+
+            figure = calibration_figure(found.apparatus)
+            for path in self.figures:
+                ready[path] = render_figure(figure, figure_format(path.suffix))
+        if self.report is not None:
+            from memscal.figures.report import html_report
+
+            ready[self.report] = html_report(found.apparatus).encode("utf-8")
+        if self.sweep_figure is not None and swept is not None:
+            from memscal.figures.style import figure_format, render_figure
+            from memscal.figures.sweep import sweep_figure
+
+            kind = figure_format(self.sweep_figure.suffix)
+            ready[self.sweep_figure] = render_figure(sweep_figure(swept), kind)
+        return ready
+
+    def write(self, found: Calibration, ready: Mapping[Path, bytes], *, force: bool) -> None:
+        """Write the artifact, then what was rendered: nothing is computed any more."""
+        from memscal.formats.files import atomic_write_bytes
+
+        found.apparatus.save(self.artifact, overwrite=force)
+        for path, data in ready.items():
+            atomic_write_bytes(path, data, overwrite=force)
+
+
+def artifact_beside(scan: Path, channel: str) -> Path:
+    """Name the artifact of one of a scan's channels."""
+    return beside(scan, ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5")
+
+
+def chosen_method(
+    method: str | None, options: tuple[str, ...], seed: int | None, channel: str = "zz"
+) -> Regulariser:
+    """Set up the method, or a channel's usual one; a wrong name or option is a matter of usage."""
+    from memscal.deconvolution.division import create_regulariser
+    from memscal.errors import InputError
+
+    method = method or ("white-noise" if channel == "zz" else "evidence")
+    given = dict(_option(text) for text in options)
+    if "seed" in given:
+        raise click.UsageError("Give the seed as --seed, not as --option.")
+    try:
+        if given:
+            _check_kinds(given, create_regulariser(method))
+        regulariser = create_regulariser(method, seed=seed or 0, **given)
+    except InputError as failure:
+        raise click.UsageError(f"{failure.problem} {failure.cure}".strip()) from failure
+    if seed is not None and not hasattr(regulariser, "seed"):
+        note(f"--seed changes nothing here: {regulariser.name} draws no random numbers.")
+    return regulariser
+
+
+def correlation(text: str) -> tuple[tuple[str, str], float]:
+    """Read INPUT,INPUT=R."""
+    pair, equals, value = text.partition("=")
+    first, comma, second = (part.strip() for part in pair.partition(","))
+    try:
+        coefficient = float(value)
+    except ValueError:
+        coefficient = math.nan
+    if not (equals and comma and math.isfinite(coefficient)):
+        raise click.UsageError(f"--correlation {text!r} is not of the form INPUT,INPUT=R.")
+    return (first, second), coefficient
+
+
+def _option(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (equals and name.isidentifier()):
+        raise click.UsageError(f"--option {text!r} is not of the form NAME=VALUE.")
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value
+
+
+def _check_kinds(given: dict[str, Any], usual: Regulariser) -> None:
+    """Refuse text where the method's own default is a number, or a part where it is a count."""
+    for name, value in given.items():
+        default = getattr(usual, name, None)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if isinstance(default, float) and not (number and math.isfinite(value)):
+            raise click.UsageError(
+                f"--option {name}={value}: {name} is a number, such as {default}."
+            )
+        if type(default) is int and type(value) is not int:
+            raise click.UsageError(f"--option {name}={value}: {name} is a whole number.")
+
 
 EXAMPLES = """\b
 Examples:
@@ -38,7 +186,7 @@ Examples:
 
 
 def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
-    from memscal.deconvolution.registry import regulariser_names
+    from memscal.deconvolution.division import regulariser_names
 
     return [name for name in regulariser_names() if name.startswith(incomplete)]
 
@@ -180,7 +328,7 @@ def command(
         _rehearse(data, profile, channel, regulariser, outputs, as_json)
         return DONE
 
-    from memscal.calibration.procedure import calibrate
+    from memscal.calibration.calibrate import calibrate
 
     with working(f"Calibrating by {regulariser.name}"):
         found = calibrate(
@@ -198,8 +346,6 @@ def command(
             swept = found.sweep(seed=seed or 0)
     drawn = None
     if draws is not None:
-        from memscal.cli.monte_carlo_view import drawn_with_progress
-
         drawn = drawn_with_progress(found, draws, seed or 0)
     with working("Drawing"):
         ready = outputs.rendered(found, swept)
@@ -246,15 +392,15 @@ def _rehearse(
     as_json: bool,
 ) -> None:
     """Go as far as the calibration goes before it computes, and say what it would do."""
-    from memscal.calibration.solution import require_channel_method
-    from memscal.cli.calibration_view import rehearsal_json, rehearsal_table
-    from memscal.cli.tables import emit_tables
+    from memscal.calibration.stages import require_channel_method
+    from memscal.cli.output import emit_tables
     from memscal.estimation.points import joined_points, measured_points
     from memscal.estimation.reference import (
         reference_profile,
         reference_spectra,
         require_one_sensor,
     )
+    from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
     require_one_sensor(scans)
     require_channel_method(channel, regulariser)
@@ -277,9 +423,9 @@ def _tell(
     as_json: bool,
 ) -> int:
     """Print the results and the messages; return the exit code."""
-    from memscal.cli.calibration_view import calibration_json, calibration_tables
-    from memscal.cli.quality_view import exit_code_of
-    from memscal.cli.tables import emit_tables
+    from memscal.cli.failures import exit_code_of
+    from memscal.cli.output import emit_tables
+    from memscal.summaries.calibration import calibration_json, calibration_tables
 
     if as_json:
         emit_json(calibration_json(found, outputs.artifact) | _further_json(swept, drawn))
@@ -293,16 +439,14 @@ def _tell(
 
 
 def _further_json(swept: Sweep | None, drawn: MonteCarlo | None) -> dict[str, Any]:
-    from memscal.cli.monte_carlo_view import monte_carlo_json
-    from memscal.cli.sweep_view import sweep_json
+    from memscal.summaries.calibration import monte_carlo_json, sweep_json
 
     found: dict[str, Any] = {} if swept is None else {"sweep": sweep_json(swept)}
     return found if drawn is None else found | {"monte_carlo": monte_carlo_json(drawn)}
 
 
 def _further_tables(swept: Sweep | None, drawn: MonteCarlo | None) -> list[Table]:
-    from memscal.cli.monte_carlo_view import monte_carlo_table
-    from memscal.cli.sweep_view import sweep_table
+    from memscal.summaries.calibration import monte_carlo_table, sweep_table
 
     tables = [] if swept is None else [sweep_table(swept)]
     return tables if drawn is None else [*tables, monte_carlo_table(drawn)]

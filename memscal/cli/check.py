@@ -38,7 +38,8 @@ def command(file: Path, as_json: bool) -> int:
         head = {"schema_version": "1", "file": str(file), "passed": passed}
         emit_json({**head, "findings": listed})
     else:
-        from memscal.cli.tables import Table, emit_tables
+        from memscal.cli.output import emit_tables
+        from memscal.summaries.table import Table
 
         rows = [(f.name, "passed" if f.passed else "FAILED", f.meaning) for f in findings]
         failed = frozenset(i for i, f in enumerate(findings) if not f.passed)

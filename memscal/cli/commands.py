@@ -103,7 +103,7 @@ def _check_clock() -> None:
 
     An empty one counts as none, as it does for the files.
     """
-    from memscal.formats.timestamp import timestamp
+    from memscal.model.provenance import timestamp
 
     timestamp()
     if not os.environ["SOURCE_DATE_EPOCH"]:

@@ -3,25 +3,192 @@
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from memscal.cli.compare_outputs import FigureFiles
 from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, Quantity, force_option, json_option
-from memscal.cli.output import emit_json, message, show_messages
-from memscal.cli.progress import working
-from memscal.cli.targets import FIGURE_SUFFIXES, FigurePath
-from memscal.cli.user_cache import cache_from, cache_options
+from memscal.cli.output import (
+    FIGURE_SUFFIXES,
+    FigurePath,
+    emit_json,
+    message,
+    prove_writable,
+    show_messages,
+    working,
+)
 
 if TYPE_CHECKING:
     from memscal.friction.results import FrictionComparison
     from memscal.model.provenance import SourceFile
     from memscal.model.stress import StressProfile
 
-__all__ = ["command"]
+__all__ = [
+    "FigureFiles",
+    "cache_from",
+    "cache_options",
+    "command",
+    "figure_stems",
+    "user_cache_folder",
+]
+
+
+def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
+    """Return the stems of all figures' names: those of ``memscal.figures.friction``.
+
+    They are needed before anything is computed, without matplotlib; a test compares both.
+
+    Examples
+    --------
+    >>> figure_stems(["dry"])
+    ['profiles-dry', 'friction-set-dry', 'maxima', 'effective-friction', 'likelihood']
+    """
+    tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
+    of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
+    found = [*of_each, "maxima", "effective-friction", "likelihood"]
+    return [*found, "interface"] if interface else found
+
+
+@dataclass(frozen=True)
+class FigureFiles:
+    """Which figures are wanted, and where.
+
+    Parameters
+    ----------
+    single : tuple of Path
+        Files of the figure that shows all at a glance.
+    folder : Path or None
+        Folder of all others.
+    suffix : str
+        Their format: ``png``, ``svg`` or ``pdf``.
+    lubrications : tuple of str
+        Of the scans that are compared.
+    interface : bool
+        Whether laws of the interface are compared.
+    """
+
+    single: tuple[Path, ...]
+    folder: Path | None
+    suffix: str
+    lubrications: tuple[str, ...]
+    interface: bool = False
+
+    @property
+    def in_folder(self) -> dict[str, Path]:
+        """Files in the folder by the stem of their names."""
+        if self.folder is None:
+            return {}
+        stems = figure_stems(self.lubrications, interface=self.interface)
+        return {stem: self.folder / f"{stem}.{self.suffix}" for stem in stems}
+
+    @property
+    def paths(self) -> list[Path]:
+        """All files."""
+        return [*self.single, *self.in_folder.values()]
+
+    def prove(self, *, force: bool, inputs: Sequence[Path]) -> None:
+        """Prove that all can be written; a folder that is not there yet is made at the end.
+
+        Raises
+        ------
+        click.UsageError
+            If two have one name, or the folder is a file.
+        OutputError
+            If one cannot be written.
+        """
+        if self.folder is not None and not self.folder.is_dir():
+            if self.folder.exists():
+                raise click.UsageError(f"--figures names a folder, but {self.folder} is a file.")
+            prove_writable([*self.single, self.folder], force=force, inputs=inputs)
+        else:
+            prove_writable(self.paths, force=force, inputs=inputs)
+
+    def rendered(self, found: FrictionComparison) -> dict[Path, bytes]:
+        """Return the content of each file."""
+        if not self.paths:
+            return {}
+        from memscal.figures.friction import comparison_figure, comparison_figures
+        from memscal.figures.style import figure_format, render_figure
+
+        ready: dict[Path, bytes] = {}
+        if self.single:
+            figure = comparison_figure(found)
+            for path in self.single:
+                ready[path] = render_figure(figure, figure_format(path.suffix))
+        if self.folder is not None:
+            named = self.in_folder
+            for stem, draw in comparison_figures(found).items():
+                ready[named[stem]] = render_figure(draw(), self.suffix)
+        return ready
+
+    def write(self, ready: dict[Path, bytes], *, force: bool) -> None:
+        """Write what was rendered.
+
+        Raises
+        ------
+        OutputError
+            If a file cannot be written.
+        """
+        from memscal.formats.files import atomic_write_bytes
+
+        if self.folder is not None:
+            self.folder.mkdir(exist_ok=True)
+        for path, content in ready.items():
+            atomic_write_bytes(path, content, overwrite=force)
+
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+def user_cache_folder() -> Path | None:
+    """Return the user's folder of calculated contacts; ``None`` where there is no home.
+
+    ``memscal/contacts`` in ``XDG_CACHE_HOME``, or else in ``~/.cache``.  A relative
+    ``XDG_CACHE_HOME`` counts as none, as its specification says.
+    """
+    named = os.environ.get("XDG_CACHE_HOME", "")
+    if named and Path(named).is_absolute():
+        return Path(named, "memscal", "contacts")
+    try:
+        return Path.home() / ".cache" / "memscal" / "contacts"
+    except RuntimeError:
+        return None
+
+
+def cache_options(command: _Command) -> _Command:
+    """Add ``--cache`` and ``--no-cache``."""
+    folder = click.option(
+        "--cache",
+        type=FILE,
+        metavar="FOLDER",
+        help="Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
+        "the user's cache folder]",
+    )
+    none = click.option("--no-cache", is_flag=True, help="Calculate anew, and keep nothing.")
+    return folder(none(command))
+
+
+def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
+    """Return the folder that the options name; ``None`` for no cache.
+
+    Raises
+    ------
+    click.UsageError
+        If both options are given, or the folder is a file.
+    """
+    if no_cache and cache is not None:
+        raise click.UsageError("Give --cache or --no-cache, not both.")
+    if cache is not None and cache.exists() and not cache.is_dir():
+        raise click.UsageError(f"--cache names a folder, but {cache} is a file.")
+    if no_cache:
+        return None
+    return user_cache_folder() if cache is None else cache
+
 
 _COEFFICIENT = Quantity("ratio", open_low=False, infinite=True)
 
@@ -150,7 +317,7 @@ def command(
 
     from memscal.apparatus import load_apparatus
     from memscal.formats.opened import opened_contacts
-    from memscal.friction.requirements import scans_of
+    from memscal.friction.compare import scans_of
 
     known, data = load_apparatus(artifact), opened_contacts(scans)
     tables = _read_references(references)
@@ -158,7 +325,7 @@ def command(
     files = FigureFiles(single, folder, figure_format, lubrications, interface)
     files.prove(force=force, inputs=[artifact, *scans, *references])
 
-    from memscal.friction.procedure import compare
+    from memscal.friction.compare import compare
 
     with working("Comparing with calculated contacts"):
         found = compare(
@@ -232,7 +399,7 @@ def _source(path: Path) -> SourceFile:
     """Return the artifact's name and the SHA-256 of its bytes."""
     import hashlib
 
-    from memscal.formats.file_bytes import read_bytes
+    from memscal.formats.files import read_bytes
     from memscal.model.provenance import SourceFile
 
     return SourceFile(path.name, hashlib.sha256(read_bytes(path)).hexdigest())
@@ -246,10 +413,8 @@ def _tell(
     as_json: bool,
 ) -> None:
     """Print the results and the messages."""
-    from memscal.cli.compare_json import comparison_json
-    from memscal.cli.compare_notes import comparison_notes
-    from memscal.cli.compare_view import comparison_tables
-    from memscal.cli.tables import emit_tables
+    from memscal.cli.output import emit_tables
+    from memscal.summaries.comparison import comparison_json, comparison_notes, comparison_tables
 
     if as_json:
         sources = [profile.source for profile in references]
@@ -260,8 +425,8 @@ def _tell(
 
 
 def _judged(found: FrictionComparison) -> int:
-    from memscal.cli.compare_notes import failures
-    from memscal.cli.quality_view import exit_code_of
+    from memscal.cli.failures import exit_code_of
+    from memscal.summaries.comparison import failures
 
     named = [
         f"{kind} {' '.join(check.profile for check in failed)}".strip()

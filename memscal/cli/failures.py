@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -12,6 +12,7 @@ import click
 
 from memscal.cli.output import error, message, warn
 from memscal.errors import MemscalError
+from memscal.model.checks import QualityCheck
 
 __all__ = [
     "CHECK_FAILED",
@@ -22,6 +23,7 @@ __all__ = [
     "USAGE",
     "Session",
     "debug_option",
+    "exit_code_of",
     "guarded",
 ]
 
@@ -108,3 +110,26 @@ def _traceback(session: Session) -> None:
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
     """Show a Python warning as one plain line, without the line of code that raised it."""
     warn(f"{category.__name__}: {message}")
+
+
+def exit_code_of(
+    checks: Sequence[QualityCheck], named: Sequence[str] | None = None, then: str = ""
+) -> int:
+    """Return the exit code that quality checks give; warn of those that failed.
+
+    Parameters
+    ----------
+    checks : sequence of QualityCheck
+        All checks.
+    named : sequence of str, optional
+        How those that failed are told; by default, each by its name.
+    then : str
+        What to say after that.
+    """
+    failed = [check.name for check in checks if not check.passed]
+    if not failed:
+        return DONE
+    count = "A quality check" if len(failed) == 1 else f"{len(failed)} quality checks"
+    words = ", ".join(name.replace("_", " ") for name in (failed if named is None else named))
+    warn(f"{count} failed ({words}).{then}")
+    return CHECK_FAILED

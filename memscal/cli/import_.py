@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from memscal.cli import import_reference
 from memscal.cli.failures import DONE, debug_option
-from memscal.cli.import_reference import reference_options
 from memscal.cli.options import (
     FILE,
+    FILM,
     Quantity,
     film_from,
     film_options,
@@ -22,15 +21,132 @@ from memscal.cli.options import (
     radius_options,
     si,
 )
-from memscal.cli.output import emit, emit_json, message, readable, show_messages
-from memscal.cli.targets import prove_writable
+from memscal.cli.output import emit, emit_json, message, prove_writable, show_messages
 from memscal.model.checks import marked_texts
+from memscal.summaries.table import readable
 
 if TYPE_CHECKING:
-    from memscal.formats.reference_profile import ImportedProfile
-    from memscal.formats.table import ImportedScan
+    from memscal.formats.tables.reference import ImportedProfile
+    from memscal.formats.tables.scan import ImportedScan
 
 __all__ = ["command"]
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+_SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "solver")
+_OF_TABLES = ("r",)
+_OF_MESHES = ("vertical", "base", "centre")
+NAMES = (*_OF_TABLES, *_SHARED, *_OF_MESHES)
+"""The options that only a reference has."""
+
+_READING = ("delimiter", "decimal")
+_POSITION = Quantity("mm", low=-float("inf"))
+
+
+def reference_options(command: _Command) -> _Command:
+    """Add the options that say what a table or a mesh of stress at the base holds."""
+    signs = click.Choice(["1", "-1"])
+    options = [
+        click.option("--r", metavar="COLUMN", help="Reference: column of the radius."),
+        click.option(
+            "--r-unit",
+            metavar="UNIT",
+            help="Reference: unit of the radius, or of a mesh's coordinates, such as mm.",
+        ),
+        click.option(
+            "--sigma",
+            metavar="COLUMN|FIELD",
+            help="Reference: column of the normal stress at the base; in a mesh the field of it, "
+            "or of the stress tensor, and FIELD:2 is its component 2.",
+        ),
+        click.option(
+            "--sigma-unit", metavar="UNIT", help="Reference: unit of the stresses, such as MPa."
+        ),
+        click.option(
+            "--shear",
+            metavar="COLUMN|FIELD",
+            help="Reference: the radial shear stress; in a mesh a stress tensor's own by default.",
+        ),
+        click.option(
+            "--sign",
+            type=signs,
+            help="Reference: -1 where compression is negative.  [default: 1 for a table, -1 for a "
+            "mesh]",
+        ),
+        click.option(
+            "--shear-sign",
+            type=signs,
+            help="Reference: -1 where the shear is the stress component S13 with axis 3 from the "
+            "base to the surface; 1 where it is the base's traction on the film, positive outward."
+            "  [default: 1 for a table; for a mesh S13, whichever way its axis points]",
+        ),
+        click.option("--solver", metavar="TEXT", help="Reference: the program that calculated it."),
+        click.option(
+            "--vertical",
+            type=click.Choice(["x", "y", "z"]),
+            help="Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]",
+        ),
+        click.option(
+            "--base",
+            type=_POSITION,
+            help="Mesh: position of the base on that axis, in mm.  [default: the lowest]",
+        ),
+        click.option(
+            "--centre",
+            type=(_POSITION, _POSITION),
+            metavar="MM MM",
+            help="Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]",
+        ),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def needed(path: Path) -> tuple[str, ...]:
+    """Return the options without which a reference cannot be read."""
+    return (*(() if is_mesh(path) else _OF_TABLES), "r_unit", "sigma", "sigma_unit", "load")
+
+
+def strange(path: Path, given: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """Return the options given that a mesh, or a table, has no use for, and which it is."""
+    kind, names = ("mesh", (*_OF_TABLES, *_READING)) if is_mesh(path) else ("table", _OF_MESHES)
+    return kind, tuple(name for name in names if given[name] is not None)
+
+
+def read(path: Path, given: dict[str, Any]) -> ImportedProfile:
+    """Read the reference with the options given; for the others the library's defaults hold."""
+    setting: dict[str, Any] = {
+        "film": None if all(given[name] is None for name in FILM) else film_from(given),
+        "indenter": None if given["radius"] is None else indenter_from(given["indenter"], given),
+    }
+    if not is_mesh(path):
+        from memscal.formats.tables.reference import read_reference_table
+
+        return read_reference_table(
+            path, **_of_names(given, (*_OF_TABLES, *_SHARED, *_READING, "load")), **setting
+        )
+    from memscal.formats.meshes.reference_mesh import read_reference_mesh
+
+    places = _of_names(given, ("base", "centre"))
+    if "base" in places:
+        places["base"] = si(places["base"], -3)
+    if "centre" in places:
+        places["centre"] = tuple(si(each, -3) for each in places["centre"])
+    return read_reference_mesh(
+        path, **_of_names(given, (*_SHARED, "vertical", "load")), **places, **setting
+    )
+
+
+def _of_names(values: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    return {name: values[name] for name in names if values[name] is not None}
+
+
+def is_mesh(path: Path) -> bool:
+    """Return whether a file's name says that it is a mesh."""
+    from memscal.formats.meshes import mesh_files
+
+    return mesh_files.is_mesh(path)
 
 
 EXAMPLES = """\b
@@ -64,7 +180,7 @@ _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
     "scan": [*_SCAN_NAMES, "load_scatter", "position_error", *_SENSOR_NAMES.values()],
-    "reference": import_reference.NAMES,
+    "reference": NAMES,
 }
 _NEEDED = ("x", "x_unit", "u", "u_unit")
 
@@ -172,7 +288,7 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
     _check_usage(table, kind, given)
     given |= {name: int(given[name]) for name in _SIGNS if given[name] is not None}
     prove_writable([output], force=force, inputs=[table])
-    found = _scan(table, given) if kind == "scan" else import_reference.read(table, given)
+    found = _scan(table, given) if kind == "scan" else read(table, given)
     _write(found, output, force)
     warnings = [note for note in found.notes if note.severity == "warning"]
     if as_json:
@@ -193,9 +309,9 @@ def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **
 
 def _check_usage(path: Path, kind: str, given: dict[str, Any]) -> None:
     """Name every option that is missing, or that belongs to something else, at once."""
-    if kind == "scan" and import_reference.is_mesh(path):
+    if kind == "scan" and is_mesh(path):
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
-    names = _NEEDED if kind == "scan" else import_reference.needed(path)
+    names = _NEEDED if kind == "scan" else needed(path)
     missing = [name for name in names if given[name] is None]
     if missing:
         raise click.UsageError(
@@ -205,11 +321,11 @@ def _check_usage(path: Path, kind: str, given: dict[str, Any]) -> None:
     if kind == "scan" and given["load"] is None and given["load_column"] is None:
         raise click.UsageError("The load is not given: add --load (in N) or --load-column.")
     other = "reference" if kind == "scan" else "scan"
-    strange = [name for name in _ONLY[other] if given[name] is not None]
-    if strange:
-        raise click.UsageError(f"{_named(strange)} belong to --format {other}.")
+    misplaced = [name for name in _ONLY[other] if given[name] is not None]
+    if misplaced:
+        raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
     if kind == "reference":
-        what, unused = import_reference.strange(path, given)
+        what, unused = strange(path, given)
         if unused:
             raise click.UsageError(f"A {what} has no use for {_named(unused)}.")
 
@@ -218,20 +334,20 @@ def _named(names: Sequence[str]) -> str:
     return ", ".join("--" + name.replace("_", "-") for name in names)
 
 
-def _given(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
     """Return the options that were given, so that the library's own defaults hold."""
     return {name: values[name] for name in names if values[name] is not None}
 
 
 def _scan(path: Path, given: dict[str, Any]) -> ImportedScan:
     film, indenter = film_from(given), indenter_from(given["indenter"], given)
-    from memscal.formats.table import read_scan_table
+    from memscal.formats.tables.scan import read_scan_table
     from memscal.model.scan import StressSensor
 
     labels = {key: given[name] for key, name in _SENSOR_NAMES.items() if given[name] is not None}
     return read_scan_table(
         path,
-        **_given(given, [*_SCAN_NAMES, *_TABLE_NAMES]),
+        **_stated(given, [*_SCAN_NAMES, *_TABLE_NAMES]),
         load_scatter=si(given["load_scatter"], -2),
         x_error=si(given["position_error"], -6),
         film=film,
@@ -241,7 +357,7 @@ def _scan(path: Path, given: dict[str, Any]) -> ImportedScan:
 
 
 def _write(found: ImportedScan | ImportedProfile, output: Path, force: bool) -> None:
-    from memscal.formats.table import ImportedScan
+    from memscal.formats.tables.scan import ImportedScan
 
     if isinstance(found, ImportedScan):
         from memscal.formats.scan import write_scan

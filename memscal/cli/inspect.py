@@ -13,7 +13,7 @@ from memscal.cli.options import FILE, json_option
 from memscal.cli.output import emit_json
 
 if TYPE_CHECKING:
-    from memscal.cli.tables import Table
+    from memscal.summaries.table import Table
 
 __all__ = ["command"]
 
@@ -41,14 +41,14 @@ def command(file: Path, as_json: bool) -> int:
     if as_json:
         emit_json(found)
     else:
-        from memscal.cli.tables import emit_tables
+        from memscal.cli.output import emit_tables
 
         emit_tables(*_tables(found))
     return DONE
 
 
 def _tables(found: Mapping[str, Any]) -> Iterator[Table]:
-    from memscal.cli.tables import Table
+    from memscal.summaries.table import Table
 
     rows = [
         ("schema", f"{found['schema']} {found['schema_version']}"),

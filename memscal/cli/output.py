@@ -1,68 +1,36 @@
-"""What the user sees: results on standard output, messages on standard error."""
+"""Output of a command: tables and JSON on standard output, messages on standard error, files."""
 
 from __future__ import annotations
 
 import json
-import math
 import os
-import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, TextIO
 
 import click
 
 from memscal.errors import OutputError
-from memscal.formats.text import printable
 from memscal.model.checks import Message
+from memscal.summaries.table import Table, readable
 
 __all__ = [
+    "FIGURE_SUFFIXES",
+    "FigurePath",
+    "beside",
     "emit",
     "emit_json",
+    "emit_tables",
     "error",
-    "finite",
     "message",
     "note",
-    "readable",
+    "prove_writable",
     "show_messages",
-    "texts_of",
     "warn",
+    "working",
 ]
-
-_LONGEST = 100_000
-_SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-# How a character is written where the terminal's encoding lacks it.
-_PLAIN = {
-    "±": "+/-",
-    "×": "x",
-    "σ": "sigma",
-    "χ": "chi",
-    "²": "2",
-    "ν": "nu",
-    "Δ": "d",
-    "₀": "0",
-    "µ": "u",
-    "–": "-",
-    "…": "...",
-}
-
-
-def readable(text: str, stream: TextIO | None = None) -> str:
-    """Return text without control characters, in characters that the stream can encode.
-
-    A power of ten is spelt out: a terminal that shows ``×10⁻⁷`` as ``x10??`` shows a wrong
-    number.
-    """
-    text = printable(text, _LONGEST)
-    encoding = getattr(sys.stdout if stream is None else stream, "encoding", None) or "utf-8"
-    try:
-        text.encode(encoding)
-    except UnicodeEncodeError:
-        power = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
-        text = power.sub(lambda found: "e" + found[1].translate(_SUPERSCRIPTS), text)
-        text = "".join(_PLAIN.get(c, c) for c in text)
-        text = text.encode(encoding, "replace").decode(encoding)
-    return text
 
 
 def emit(text: str) -> None:
@@ -118,17 +86,6 @@ def emit_json(value: Mapping[str, Any]) -> None:
     emit(json.dumps(value, indent=2, allow_nan=False))
 
 
-def finite(value: float | None) -> float | None:
-    """Return a number that JSON can say, ``None`` (null) in place of any other.
-
-    Examples
-    --------
-    >>> finite(2.5), finite(float("inf")), finite(None)
-    (2.5, None, None)
-    """
-    return float(value) if value is not None and math.isfinite(value) else None
-
-
 def message(text: str) -> None:
     """Tell the user something, on standard error."""
     _to_stderr([text])
@@ -148,11 +105,6 @@ def show_messages(messages: Iterable[Message]) -> None:
     """Write the messages of a result to standard error, each as a note or a warning."""
     for each in messages:
         (warn if each.severity == "warning" else note)(each.text)
-
-
-def texts_of(messages: Iterable[Message]) -> list[str]:
-    """Return messages as the JSON output holds them."""
-    return [each.text for each in messages]
 
 
 def error(problem: str, why: str = "", cure: str = "") -> None:
@@ -176,3 +128,149 @@ def _width() -> int:
     import shutil
 
     return min(100, max(40, shutil.get_terminal_size().columns))
+
+
+_FIRST_AFTER = 0.7
+_EVERY = 0.2
+_CLEAR = "\r\x1b[K"
+
+
+@contextmanager
+def working(what: str) -> Iterator[Callable[[str], None]]:
+    """Show what is being done, and for how long, on a terminal and only if it takes long.
+
+    Yields a function that replaces the text.
+    """
+    shown = [what]
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from threading import Event, Thread
+    from time import monotonic
+
+    done, stream, start = Event(), sys.stderr, monotonic()
+
+    def show() -> None:
+        if done.wait(_FIRST_AFTER):
+            return
+        with suppress(OSError, ValueError):
+            while True:
+                stream.write(f"{_CLEAR}{shown[0]} ... {monotonic() - start:.0f} s")
+                stream.flush()
+                if done.wait(_EVERY):
+                    break
+            stream.write(_CLEAR)
+            stream.flush()
+
+    thread = Thread(target=show, daemon=True)
+    thread.start()
+    try:
+        yield lambda text: shown.__setitem__(0, text)
+    finally:
+        done.set()
+        thread.join()
+
+
+def emit_tables(*tables: Table) -> None:
+    """Print tables that have rows, with an empty line between them."""
+    filled = [table for table in tables if table.rows]
+    if sys.stdout is not None and sys.stdout.isatty():
+        emit(_drawn(filled))
+    else:
+        emit("\n\n".join(table.plain() for table in filled))
+
+
+def _drawn(tables: Sequence[Table]) -> str:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    blocks = []
+    for table in tables:
+        drawn = RichTable(
+            box=box.SIMPLE_HEAD if any(table.head) else None,
+            show_header=any(table.head),
+            padding=(0, 1),
+        )
+        for name in table.head:
+            # A narrow terminal breaks names between words, not within.
+            longest = max((len(word) for word in name.split()), default=0)
+            drawn.add_column(Text(readable(name)), overflow="fold", min_width=longest)
+        for k, row in enumerate(table.rows):
+            # Text, not markup: a cell may hold what stood in a file.
+            cells = (Text(readable(cell)) for cell in row)
+            drawn.add_row(*cells, style="bold red" if k in table.marked else "")
+        with console.capture() as capture:
+            console.print(Text(readable(table.title)), style="bold")
+            console.print(drawn)
+        blocks.append("\n".join(line for line in capture.get().splitlines() if line.strip()))
+    return "\n\n".join(blocks)
+
+
+FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
+"""Those of ``memscal.figures.style``, which would import matplotlib; a test compares them."""
+
+_HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".nxs", ".nx5")
+
+
+class FigurePath(click.Path):
+    """The name of a figure's file, whose suffix chooses the format."""
+
+    name = "figure"
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Path:
+        """Refuse a suffix in which no figure can be written."""
+        path = Path(str(value))
+        if path.suffix.lower() not in FIGURE_SUFFIXES:
+            self.fail(
+                f"{str(path)!r} does not end in {', '.join(FIGURE_SUFFIXES)}: the suffix chooses "
+                "the format.",
+                param,
+                ctx,
+            )
+        return path
+
+
+def beside(path: Path, suffix: str) -> Path:
+    """Return the name of a result beside its input.
+
+    Examples
+    --------
+    >>> beside(Path("data/scan.h5"), ".apparatus.h5").name
+    'scan.apparatus.h5'
+    >>> beside(Path("run_0.5mm"), ".apparatus.h5").name
+    'run_0.5mm.apparatus.h5'
+    """
+    stem = path.stem if path.suffix.lower() in _HDF5_SUFFIXES else path.name
+    return path.with_name(stem + suffix)
+
+
+def prove_writable(outputs: Sequence[Path], *, force: bool, inputs: Sequence[Path] = ()) -> None:
+    """Refuse outputs that share a name, and prove that each can be written.
+
+    Raises
+    ------
+    click.UsageError
+        If two outputs are the same file.
+    OutputError
+        If one cannot be written, exists (without ``force``), or is an input.
+    """
+    from memscal.formats.files import ensure_writable
+
+    seen: dict[Path, Path] = {}
+    for output in outputs:
+        real = output.resolve()
+        if real in seen:
+            raise click.UsageError(
+                f"Two outputs have the same name: {seen[real]} and {output}. Give each its own."
+            )
+        seen[real] = output
+    for output in outputs:
+        ensure_writable(output, overwrite=force, inputs=inputs)

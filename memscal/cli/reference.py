@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -14,18 +16,119 @@ from memscal.cli.options import (
     film_from,
     film_options,
     force_option,
+    indenter_from,
     json_option,
     radius_options,
     si,
 )
-from memscal.cli.output import message
-from memscal.cli.reference_setup import SHAPES, indenter_of, interface_of, interface_options
-from memscal.cli.targets import FigurePath, prove_writable
+from memscal.cli.output import FigurePath, emit_json, message, note, prove_writable
+from memscal.summaries.table import finite
 
 if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
+    from memscal.mechanics.interface import Interface
+    from memscal.model.indenter import Indenter
 
-__all__ = ["command"]
+__all__ = ["SHAPES", "command", "indenter_of", "interface_of", "interface_options", "tell"]
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+#: The paper's rod and sphere, in mm.
+_RADIUS = {"rod": 0.25, "sphere": 128.8}
+SHAPES = ("rod", "sphere", "cone", "profile")
+
+# What each shape is described by; every other of these options belongs to another shape.
+_DESCRIBED_BY = {
+    "rod": "radius",
+    "sphere": "radius",
+    "cone": "inclination",
+    "profile": "profile_table",
+}
+
+
+def interface_options(command: _Command) -> _Command:
+    """Add the options of a rough interface."""
+    slip = click.option(
+        "--slip-length",
+        type=Quantity("um", open_low=False),
+        default=0.0,
+        help="Elastic tangential displacement of the interface before it slips, in um.  "
+        "[default: 0, rigid]",
+    )
+    greenwood = click.option(
+        "--greenwood-tripp",
+        type=(Quantity("um"), Quantity("1/mm^2"), Quantity("um")),
+        metavar="UM 1/MM^2 UM",
+        help="Rough interface: rms height of the asperities (um), their number per mm^2, and the "
+        "radius of their tips (um).",
+    )
+    exponential = click.option(
+        "--exponential",
+        type=(Quantity("um"), Quantity("MPa")),
+        metavar="UM MPa",
+        help="Rough interface: pressure that falls by e within a length (um), and its value where "
+        "the mean planes meet (MPa).",
+    )
+    return slip(greenwood(exponential(command)))
+
+
+def indenter_of(shape: str, given: Mapping[str, Any]) -> Indenter:
+    """Return the indenter that the options describe.
+
+    Raises
+    ------
+    click.UsageError
+        If its own option is missing, or one of another shape is given.
+    """
+    own = _DESCRIBED_BY[shape]
+    for name in sorted(set(_DESCRIBED_BY.values()) - {own}):
+        if given[name] is not None:
+            raise click.UsageError(f"{_option(name)} does not describe a {shape}.")
+    if shape in _RADIUS:
+        return indenter_from(shape, {**given, "radius": given["radius"] or _RADIUS[shape]})
+    if given[own] is None:
+        raise click.UsageError(f"A {shape} needs {_option(own)}.")
+    if shape == "cone":
+        from memscal.model.indenter import Cone
+
+        return Cone(inclination=math.radians(given["inclination"]))
+    from memscal.formats.tables.text_table import read_indenter_table
+
+    return read_indenter_table(
+        given["profile_table"], r_unit=given["r_unit"], z_unit=given["z_unit"]
+    )
+
+
+def interface_of(given: Mapping[str, Any]) -> Interface:
+    """Return the interface that the options describe.
+
+    Raises
+    ------
+    click.UsageError
+        If two normal laws are given.
+    """
+    from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
+
+    rough, exponential = given["greenwood_tripp"], given["exponential"]
+    if rough and exponential:
+        raise click.UsageError("Give --greenwood-tripp or --exponential: one normal law.")
+    normal: GreenwoodTripp | ExponentialCompliance | None = None
+    if rough:
+        normal = GreenwoodTripp(
+            roughness=si(rough[0], -6),
+            asperity_density=si(rough[1], 6),
+            asperity_radius=si(rough[2], -6),
+        )
+    if exponential:
+        normal = ExponentialCompliance(
+            decay_length=si(exponential[0], -6), reference_pressure=si(exponential[1], 6)
+        )
+    return Interface(normal=normal, slip_length=si(given["slip_length"], -6))
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
 
 #: The paper's film.
 FILM = {"young-modulus": 2.2, "poisson-ratio": 0.5, "thickness": 2.0}
@@ -165,8 +268,6 @@ def command(
     contacts = _pressed(indenter, loads, depths, given)
     _write(contacts, output, figures, mesh, force=force)
 
-    from memscal.cli.reference_view import tell
-
     tell(contacts, given["loading"], output, as_json=as_json)
     for path in files:
         message(f"Written: {path}")
@@ -221,7 +322,7 @@ def _write(
     rendered: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.contact import contact_figure
-        from memscal.figures.render import figure_format, render_figure
+        from memscal.figures.style import figure_format, render_figure
 
         figure = contact_figure(contacts)
         for path in figures:
@@ -235,7 +336,132 @@ def _write(
 
         write_mesh(contacts[0].mesh(), mesh, overwrite=force)
     if rendered:
-        from memscal.formats.atomic import atomic_write_bytes
+        from memscal.formats.files import atomic_write_bytes
 
         for path, data in rendered.items():
             atomic_write_bytes(path, data, overwrite=force)
+
+
+#: Share of the film's thickness up to which linear elasticity is taken at its word.
+_SHALLOW = 0.1
+
+_SINGULAR = (
+    "The pressure under a flat rod grows without bound towards its edge: "
+    "there is no largest interface stress."
+)
+
+
+def tell(contacts: Sequence[Contact], loading: str, output: Path | None, *, as_json: bool) -> None:
+    """Print the contacts as a table or as one JSON object; notes go to stderr."""
+    warnings = [text for contact in contacts if (text := _deep(contact))]
+    if as_json:
+        if contacts[0].indenter.shape == "rod":
+            warnings.insert(0, _SINGULAR)
+        head = {"schema_version": "1", "output": None if output is None else str(output)}
+        solutions = [_solution(contact, loading) for contact in contacts]
+        emit_json({**head, "solutions": solutions, "warnings": warnings})
+    else:
+        from memscal.cli.output import emit_tables
+        from memscal.summaries.table import Table
+
+        emit_tables(Table(_title(contacts[0], loading), *_columns(contacts)))
+    for text in warnings:
+        if text is not _SINGULAR:
+            note(text)
+
+
+def _deep(contact: Contact) -> str:
+    """Say where linear elasticity is formal."""
+    share = contact.depth / contact.film.thickness
+    if share <= _SHALLOW or contact.strain == "finite":
+        return ""
+    return (
+        f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the film's "
+        "thickness: linear elasticity is formal there, and its error is not part of the "
+        "convergence. --strain finite shows what it changes, under a rod or a sphere."
+    )
+
+
+def _solution(contact: Contact, loading: str) -> dict[str, Any]:
+    """Return one solution in the contract's names and units."""
+
+    def quantity(value: float | None, unit: str) -> dict[str, Any]:
+        return {"value": None if value is None else finite(float(value)), "unit": unit}
+
+    return {
+        "load": quantity(contact.load, "N"),
+        "depth": quantity(contact.depth * 1e6, "um"),
+        "contact_radius": quantity(contact.contact_radius * 1e3, "mm"),
+        "stick_radius": quantity(contact.stick_radius * 1e3, "mm"),
+        "max_interface_stress": quantity(contact.max_interface_stress, "Pa"),
+        "max_base_stress": quantity(contact.max_base_stress, "Pa"),
+        "friction_coefficient": quantity(contact.friction, "1"),
+        "sticking": math.isinf(contact.friction),
+        "loading": loading,
+        "backend": contact.backend,
+        "strain": contact.strain,
+        "convergence": quantity(contact.convergence, "1"),
+        "steps": contact.steps,
+        "elastic_energy": quantity(contact.elastic_energy, "J"),
+        "work": quantity(contact.work, "J"),
+        "dissipated_energy": quantity(contact.dissipated_energy, "J"),
+        "discretisation": contact.discretisation,
+    }
+
+
+def _title(contact: Contact, loading: str) -> str:
+    """Say in one line what was pressed on what, and how it was solved."""
+    film, rod = contact.film, contact.indenter.shape == "rod"
+    if contact.friction == 0:
+        friction = "frictionless"
+    elif math.isinf(contact.friction):
+        friction = "sticking"
+    else:
+        friction = f"friction {contact.friction:.4g}"
+    way = "" if rod or contact.friction == 0 else f", {loading} loading"
+    described = contact.interface.description
+    interface = f"; interface: {described}" if described else ""
+    strain = ", finite strain" if contact.strain == "finite" else ""
+    return (
+        f"{_name(contact)} on a film of {film.thickness * 1e3:.4g} mm, "
+        f"E = {film.young_modulus * 1e-6:.4g} MPa, Poisson's ratio {film.poisson_ratio:.4g}: "
+        f"{friction}{way} ({contact.backend}{strain}){interface}"
+    )
+
+
+def _name(contact: Contact) -> str:
+    from memscal.model.indenter import Cone, RoundIndenter
+
+    body = contact.indenter
+    if isinstance(body, RoundIndenter):
+        return f"A {body.shape} of radius {body.radius * 1e3:.4g} mm"
+    if isinstance(body, Cone):
+        return f"A cone inclined by {math.degrees(body.inclination):.4g} degrees"
+    return f"A profile to {body.extent * 1e3:.4g} mm"
+
+
+def _columns(contacts: Sequence[Contact]) -> tuple[list[str], list[list[str]]]:
+    """Return head and rows; a column that says nothing under this indenter is left out."""
+    rod = contacts[0].indenter.shape == "rod"
+    frictional = contacts[0].friction > 0
+    columns: list[tuple[str, list[str]]] = [
+        ("load (N)", [f"{c.load:.4g}" for c in contacts]),
+        ("depth (um)", [f"{c.depth * 1e6:.4g}" for c in contacts]),
+    ]
+    if rod:
+        ratio = [f"{c.load / c.depth * 1e-3:.4g}" for c in contacts]
+        columns.append(("load/depth (N/mm)", ratio))
+    else:
+        columns.append(("contact radius (mm)", [f"{c.contact_radius * 1e3:.4g}" for c in contacts]))
+    if frictional:
+        columns.append(("stick radius (mm)", [f"{c.stick_radius * 1e3:.4g}" for c in contacts]))
+    if not rod:
+        peaks = [f"{c.max_interface_stress * 1e-3:.5g}" for c in contacts]
+        columns.append(("interface peak (kPa)", peaks))
+    columns += [
+        ("base peak (kPa)", [f"{c.max_base_stress * 1e-3:.5g}" for c in contacts]),
+        ("steps", [f"{c.steps}" for c in contacts]),
+        ("change", [f"{c.convergence:.1g}" for c in contacts]),
+    ]
+    rows = [list(row) for row in zip(*(cells for _, cells in columns), strict=True)]
+    return [name for name, _ in columns], rows

@@ -9,13 +9,18 @@ import click
 
 from memscal.cli.failures import debug_option
 from memscal.cli.options import FILE, force_option, json_option
-from memscal.cli.output import emit_json, message, note, show_messages
-from memscal.cli.progress import working
-from memscal.cli.targets import FigurePath, prove_writable
+from memscal.cli.output import (
+    FigurePath,
+    emit_json,
+    message,
+    note,
+    prove_writable,
+    show_messages,
+    working,
+)
 
 if TYPE_CHECKING:
-    from memscal.measurement.comparison import Comparison
-    from memscal.measurement.restoration import Restoration
+    from memscal.measurement.restoration import Comparison, Restoration
     from memscal.model.scan import Scan
 
 __all__ = ["command"]
@@ -84,7 +89,7 @@ def command(
     files = [path for path in (output, *figures) if path is not None]
     prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
-    from memscal.measurement.procedure import restore
+    from memscal.measurement.restore import restore
 
     with working("Restoring"):
         found = restore(data, known, expected=wanted)
@@ -96,7 +101,7 @@ def command(
 
         write_reference(found.profile(), output, overwrite=force)
     if ready:
-        from memscal.formats.atomic import atomic_write_bytes
+        from memscal.formats.files import atomic_write_bytes
 
         for path, content in ready.items():
             atomic_write_bytes(path, content, overwrite=force)
@@ -120,8 +125,8 @@ def _rendered(
 ) -> dict[Path, bytes]:
     if not figures:
         return {}
-    from memscal.figures.render import figure_format, render_figure
-    from memscal.figures.restoration import restoration_figure
+    from memscal.figures.stress import restoration_figure
+    from memscal.figures.style import figure_format, render_figure
 
     figure = restoration_figure(found, compared)
     return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}
@@ -135,9 +140,9 @@ def _tell(
     as_json: bool,
 ) -> int:
     """Print the results and the messages; return the exit code."""
-    from memscal.cli.quality_view import exit_code_of
-    from memscal.cli.restoration_view import restoration_json, restoration_tables
-    from memscal.cli.tables import emit_tables
+    from memscal.cli.failures import exit_code_of
+    from memscal.cli.output import emit_tables
+    from memscal.summaries.stress import restoration_json, restoration_tables
 
     if as_json:
         emit_json(restoration_json(found, compared, output))

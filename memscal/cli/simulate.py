@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.core import ParameterSource
 
 from memscal.cli.failures import DONE, debug_option
-from memscal.cli.kernel_options import kernel_from, kernel_options, require_one_kernel
 from memscal.cli.options import (
     FILE,
     Quantity,
@@ -20,19 +19,265 @@ from memscal.cli.options import (
     force_option,
     indenter_from,
     json_option,
+    kernel_from,
+    kernel_options,
     radius_options,
+    require_one_kernel,
     si,
 )
-from memscal.cli.output import message, note
-from memscal.cli.simulate_sphere import FILES, experiment_from, sphere_options
-from memscal.cli.simulate_sphere import NAMES as SPHERE_NAMES
-from memscal.cli.simulate_view import tell_experiment, tell_scan
-from memscal.cli.targets import prove_writable
+from memscal.cli.output import emit_json, message, note, prove_writable
+from memscal.cli.reference import interface_of, interface_options
 
 if TYPE_CHECKING:
     from memscal.model.scan import Scan
+    from memscal.simulation.experiment import Experiment
 
-__all__ = ["command"]
+__all__ = [
+    "FILES",
+    "NAMES",
+    "command",
+    "experiment_from",
+    "sphere_options",
+    "tell_experiment",
+    "tell_scan",
+]
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
+"""The files of an experiment; a test compares them with what the laboratory names."""
+
+NAMES = (
+    *("lubricated_loads", "sphere_radius", "sphere_radius_uncertainty", "friction", "loading"),
+    *("slip_length", "greenwood_tripp", "exponential", "contacts", "spacing", "load_scatter"),
+    *("record_loads", "position_error", "draw_inputs", "gain", "thickness_factor"),
+)
+"""The options that only an experiment with a sphere has."""
+
+_LOADS = (0.34, 0.69, 1.37, 2.75)
+
+
+_OPTIONS = (
+    click.option(
+        "--lubricated-load",
+        "lubricated_loads",
+        type=Quantity("N"),
+        multiple=True,
+        default=(0.69, 2.75),
+        show_default=True,
+        help="Sphere: load of the lubricated contacts, in N. May be repeated.",
+    ),
+    click.option(
+        "--sphere-radius",
+        type=Quantity("mm"),
+        default=128.8,
+        show_default=True,
+        help="Sphere: radius of curvature, in mm.",
+    ),
+    click.option(
+        "--sphere-radius-uncertainty",
+        type=Quantity("mm", open_low=False),
+        default=0.5,
+        show_default=True,
+        help="Sphere: standard uncertainty (k = 1) of its radius, in mm.",
+    ),
+    click.option(
+        "--friction",
+        type=Quantity("ratio", open_low=False, infinite=True),
+        default=0.2,
+        show_default=True,
+        metavar="MU",
+        help="Sphere: friction coefficient of the dry contacts; inf: they stick wherever they "
+        "touch.",
+    ),
+    click.option(
+        "--loading",
+        type=click.Choice(["incremental", "total"]),
+        default="incremental",
+        show_default=True,
+        help="Sphere: a point sticks where it first touched, or as if loaded in one step.",
+    ),
+    interface_options,
+    click.option(
+        "--contacts",
+        type=click.IntRange(min=2, max=4096),
+        default=33,
+        show_default=True,
+        help="Sphere: contacts in a row.",
+    ),
+    click.option(
+        "--spacing",
+        type=Quantity("mm"),
+        default=0.5,
+        show_default=True,
+        help="Sphere: distance of neighbouring contacts, in mm.",
+    ),
+    click.option(
+        "--load-scatter",
+        type=Quantity("percent", high=10.0, open_low=False),
+        default=2.0,
+        show_default=True,
+        help="Sphere: standard deviation of each contact's own load, in percent.",
+    ),
+    click.option(
+        "--record-loads",
+        is_flag=True,
+        help="Sphere: record the load that each contact had, read to 0.2 percent, in place of "
+        "the nominal one.",
+    ),
+    click.option(
+        "--position-error",
+        type=Quantity("um", open_low=False),
+        default=10.0,
+        show_default=True,
+        help="Sphere: standard deviation of each contact's own position, in um.",
+    ),
+    click.option(
+        "--draw-inputs",
+        is_flag=True,
+        help="Sphere: draw the true film, radii and loads from their uncertainties; the files "
+        "state the nominal ones, and the truth beside.",
+    ),
+    click.option(
+        "--gain",
+        type=Quantity("ratio"),
+        default=1.0,
+        show_default=True,
+        help="Sphere: a mistake to be found, a factor on the voltages of the sphere's scans only.",
+    ),
+    click.option(
+        "--thickness-factor",
+        type=Quantity("ratio"),
+        default=1.0,
+        show_default=True,
+        help="Sphere: a mistake to be found, the film's true thickness over the one stated.",
+    ),
+)
+
+
+def sphere_options(command: _Command) -> _Command:
+    """Add the options of an experiment with a sphere."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def experiment_from(given: Mapping[str, Any]) -> Experiment:
+    """Simulate the experiment that the options describe."""
+    film, rod = film_from(given), indenter_from("rod", given)
+    radius = {
+        "radius": given["sphere_radius"],
+        "radius_uncertainty": given["sphere_radius_uncertainty"],
+    }
+    sphere = indenter_from("sphere", radius)
+    interface = interface_of(given)
+    from memscal.model.indenter import Rod, Sphere
+    from memscal.simulation.experiment import simulate_experiment
+
+    assert isinstance(rod, Rod)
+    assert isinstance(sphere, Sphere)
+    return simulate_experiment(
+        film=film,
+        rod=rod,
+        sphere=sphere,
+        kernel=kernel_from(given),
+        conversion_constant=si(given["conversion_constant"], -3),
+        rod_points=given["points"],
+        loads=given["loads"] or _LOADS,
+        lubricated_loads=given["lubricated_loads"],
+        friction=given["friction"],
+        loading=given["loading"],
+        interface=interface,
+        points=given["contacts"],
+        spacing=si(given["spacing"], -3),
+        repeats=given["repeats"],
+        noise=si(given["noise"], -2),
+        load_scatter=si(given["load_scatter"], -2),
+        record_loads=given["record_loads"],
+        load_uncertainty=si(given["load_uncertainty"], -2),
+        position_error=si(given["position_error"], -6),
+        centre=(si(given["centre"], -3), si(given["centre_y"], -3)),
+        baseline=si(given["baseline"], -2),
+        drift=si(given["drift"], -2),
+        state_noise=given["state_noise"],
+        draw_inputs=given["draw_inputs"],
+        gain=given["gain"],
+        thickness_factor=given["thickness_factor"],
+        seed=given["seed"],
+    )
+
+
+def tell_scan(scan: Scan, output: Path, as_json: bool) -> None:
+    """Print the truth of one scan."""
+    if as_json:
+        emit_json({"schema_version": "1", **_described(scan, output)})
+        return
+    from memscal.cli.output import emit_tables
+    from memscal.summaries.table import Table
+
+    rows = [
+        ("kind", scan.kind),
+        ("points", _shape(scan)),
+        *(_entry(*item) for item in dict(scan.synthetic or {}).items()),
+    ]
+    emit_tables(Table("Synthetic scan (calculated, not measured) and its truth", ("", ""), rows))
+
+
+def tell_experiment(scans: Mapping[Path, Scan], as_json: bool) -> None:
+    """Print the truth of an experiment, one column for each scan."""
+    if as_json:
+        described = [_described(scan, path) for path, scan in scans.items()]
+        emit_json({"schema_version": "1", "synthetic": True, "scans": described})
+        return
+    from memscal.cli.output import emit_tables
+    from memscal.summaries.table import Table
+
+    truths = [dict(scan.synthetic or {}) for scan in scans.values()]
+    names: list[str] = []
+    for truth in sorted(truths, key=len, reverse=True):
+        names += [name for name in truth if name not in names]
+    rows: list[Sequence[str]] = [
+        ("kind", *(scan.kind for scan in scans.values())),
+        ("points", *(_shape(scan) for scan in scans.values())),
+    ]
+    for name in names:
+        words = next(_entry(name, truth[name])[0] for truth in truths if name in truth)
+        values = (_entry(name, truth[name])[1] if name in truth else "-" for truth in truths)
+        rows.append((words, *values))
+    head = ("", *(path.name for path in scans))
+    emit_tables(Table("Synthetic experiment (calculated, not measured) and its truth", head, rows))
+
+
+def _described(scan: Scan, path: Path) -> dict[str, Any]:
+    return {
+        "scan": str(path),
+        "synthetic": True,
+        "kind": scan.kind,
+        "shape": list(scan.u_zz.shape),
+        "truth_si": {name: _standard(value) for name, value in (scan.synthetic or {}).items()},
+    }
+
+
+def _standard(value: float | str) -> float | str:
+    """Return what standard JSON can say: a friction that always sticks is ``"inf"``."""
+    return "inf" if value == float("inf") else value
+
+
+def _shape(scan: Scan) -> str:
+    return " x ".join(str(n) for n in scan.u_zz.shape)
+
+
+def _entry(name: str, value: float | str) -> tuple[str, str]:
+    """Return a truth in words, and with its unit."""
+    if isinstance(value, str):
+        return name.replace("_", " "), value
+    if name.startswith("load_") and name.removeprefix("load_").isdigit():
+        return f"true load {name.removeprefix('load_')}", f"{value:.6g} N"
+    from memscal.model.quantities import TRUTH, estimated_quantity
+
+    shown = TRUTH.get(name) or estimated_quantity(name)
+    return shown.words, f"{value / shown.scale:.6g} {shown.unit}".rstrip()
+
 
 #: The paper's film as the virtual laboratory has it, in the units of the command line.
 FILM = {
@@ -206,7 +451,7 @@ def _check_usage(experiment: str, given: Mapping[str, Any]) -> None:
     """Refuse options that contradict each other, or belong to the other experiment."""
     context = click.get_current_context()
     typed = ParameterSource.COMMANDLINE
-    others = SPHERE_NAMES if experiment == "rod" else _ROD_NAMES
+    others = NAMES if experiment == "rod" else _ROD_NAMES
     strange = [name for name in others if context.get_parameter_source(name) == typed]
     if strange:
         options = [
@@ -228,7 +473,7 @@ def _check_usage(experiment: str, given: Mapping[str, Any]) -> None:
 
 
 def _sphere(folder: Path, given: Mapping[str, Any], as_json: bool, force: bool) -> int:
-    from memscal.formats.scan_folder import ensure_folder_writable, write_scans
+    from memscal.formats.scan import ensure_folder_writable, write_scans
 
     ensure_folder_writable(folder, FILES, overwrite=force)
     experiment = experiment_from(given)
@@ -241,8 +486,8 @@ def _sphere(folder: Path, given: Mapping[str, Any], as_json: bool, force: bool) 
 
 
 def _simulate(given: Mapping[str, Any]) -> Scan:
-    from memscal.laboratory.rod_scan import simulate
     from memscal.model.indenter import Rod
+    from memscal.simulation.rod_scan import simulate
 
     film, rod = film_from(given), indenter_from("rod", given)
     assert isinstance(rod, Rod)

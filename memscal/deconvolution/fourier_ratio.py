@@ -20,12 +20,16 @@ import numpy as np
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, on_grid
 from memscal.axisymmetry.hankel import radial_spline
-from memscal.deconvolution.problem import DivisionProblem, KernelProfile, Regulariser
-from memscal.deconvolution.registry import create_regulariser
+from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
+from memscal.deconvolution.division import (
+    DivisionProblem,
+    KernelProfile,
+    Regulariser,
+    create_regulariser,
+)
 from memscal.errors import FitError, InputError
-from memscal.estimation.forward import unit_gaussian, unit_gaussian_slope
-from memscal.estimation.newton import gauss_newton
-from memscal.model.validation import FloatArray
+from memscal.estimation.gaussian import gauss_newton
+from memscal.model.arrays import FloatArray
 
 __all__ = ["Field", "Quotient", "divide", "fit_gaussian", "lift", "normalise", "reconvolve"]
 

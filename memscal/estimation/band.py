@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0, j1
 
-from memscal.estimation.forward import gaussian_transfer
-from memscal.estimation.profile_estimate import ProfileEstimate
-from memscal.model.validation import FloatArray
+from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.estimation.profile import ProfileEstimate
+from memscal.model.arrays import FloatArray
 
 __all__ = ["Band", "find_band", "transfer_uncertainty"]
 

@@ -24,35 +24,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import j0, j1
+from scipy.special import ive, j0, j1
 
 from memscal.axisymmetry.hankel import RadialSpectrum
-from memscal.estimation.channels import channel_axis
-from memscal.estimation.points import ScanPoints
-from memscal.model.validation import FloatArray
+from memscal.estimation.points import ScanPoints, channel_axis
+from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "ForwardModel",
-    "Geometry",
-    "gaussian_transfer",
-    "unit_gaussian",
-    "unit_gaussian_slope",
-]
-
-
-def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
-    r"""Transform :math:`\exp(-\sigma^2 k^2 / 2)` of the Gaussian of unit integral."""
-    return np.asarray(np.exp(-0.5 * (sigma * k) ** 2))
-
-
-def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
-    """Gaussian of unit integral over the plane, in 1/m^2."""
-    return np.asarray(np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2))
-
-
-def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
-    """Derivative of :func:`unit_gaussian` by its width, in 1/m^3."""
-    return np.asarray(unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma)
+__all__ = ["ForwardModel", "Geometry", "elliptic_columns", "elliptic_departure"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,3 +200,99 @@ class ForwardModel:
 def _unit_range(positions: FloatArray) -> FloatArray:
     middle = (positions.max() + positions.min()) / 2
     return np.asarray((positions - middle) / (np.ptp(positions) / 2))
+
+
+_HARMONICS = 5
+_LARGEST = 0.95
+_STEP = 1e-4
+
+
+def elliptic_columns(
+    model: ForwardModel, geometry: Geometry, sigma: float, ellipticity: FloatArray
+) -> FloatArray:
+    """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2.
+
+    Parameters
+    ----------
+    model, geometry
+        The forward model, and the points about their centres.
+    sigma : float
+        Root of the mean second moment, in m.
+    ellipticity : ndarray, shape (2,)
+        e1 (along x against y) and e2 (along the diagonals).
+
+    Returns
+    -------
+    ndarray, shape (n, 4)
+        In V per V/Pa; per m in the second column.
+    """
+    steps = np.array([[0.0, 0.0, 0.0], [_STEP * sigma, 0.0, 0.0], [0, _STEP, 0], [0, 0, _STEP]])
+    here = np.concatenate([[sigma], ellipticity])
+    harmonics = _bessel(geometry.bessel0, geometry.bessel1, geometry.radius, model.k)
+    columns = [_response(model, geometry, harmonics, here)]
+    for step in steps[1:]:
+        above = _response(model, geometry, harmonics, here + step)
+        below = _response(model, geometry, harmonics, here - step)
+        columns.append((above - below) / (2 * step.sum()))
+    return np.stack(columns, axis=1)
+
+
+def elliptic_departure(
+    x: FloatArray, y: FloatArray, sigma: float, ellipticity: FloatArray
+) -> FloatArray:
+    """Elliptic Gaussian of unit integral less the round one of the same s, on a grid (y, x)."""
+    e1, e2 = _bounded(ellipticity)
+    plane_x, plane_y = np.meshgrid(x, y)
+    determinant = 1 - e1**2 - e2**2
+    round_ = plane_x**2 + plane_y**2
+    form = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
+    scale = 1 / (2 * np.pi * sigma**2)
+    elliptic = np.exp(-0.5 * form / (determinant * sigma**2)) / np.sqrt(determinant)
+    return np.asarray(scale * (elliptic - np.exp(-0.5 * round_ / sigma**2)))
+
+
+def _bounded(ellipticity: FloatArray) -> FloatArray:
+    size = float(np.hypot(*ellipticity))
+    return np.asarray(ellipticity * min(1.0, _LARGEST / size) if size > 0 else ellipticity)
+
+
+def _response(
+    model: ForwardModel, geometry: Geometry, harmonics: list[FloatArray], place: FloatArray
+) -> FloatArray:
+    sigma, (e1, e2) = float(place[0]), _bounded(place[1:])
+    e = float(np.hypot(e1, e2))
+    half = 0.5 * (sigma * model.k) ** 2
+    # The derivatives of the radius by the centre point to it: their angle is the direction's.
+    direction = np.arctan2(-geometry.towards[1], -geometry.towards[0])
+    angle = direction - 0.5 * np.arctan2(e2, e1)
+    total = np.zeros_like(geometry.radius)
+    for m, bessel in enumerate(harmonics):
+        kernel = ive(m, half * e) * np.exp(-half * (1 - e))
+        part = model.signal(Geometry(geometry.radius, geometry.towards, bessel, bessel), kernel)
+        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * part
+    return total
+
+
+def _bessel(
+    bessel0: FloatArray, bessel1: FloatArray, radius: FloatArray, k: FloatArray
+) -> list[FloatArray]:
+    """Bessel functions of even order, by recurrence upwards from orders zero and one.
+
+    Where the argument is small the recurrence loses digits and the function is nothing: its
+    power series' first term decides.
+    """
+    # Repeats share their positions.
+    unique, first, back = np.unique(radius, return_index=True, return_inverse=True)
+    x = np.multiply.outer(unique, k)
+    even, below, above = [bessel0], bessel0[first], bessel1[first]
+    factorial = 1.0
+    for order in range(2, 2 * _HARMONICS):
+        small = x < 0.1 * order
+        safe = np.where(small, 1.0, x)
+        factorial *= order
+        series = (x / 2) ** order / factorial
+        upward = 2 * (order - 1) / safe * above - below
+        below, above = above, np.where(small, series, upward)
+        if order % 2 == 0:
+            even.append(above[back])
+    return even

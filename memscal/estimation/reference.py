@@ -13,11 +13,11 @@ from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
 
 __all__ = [
     "carried_force",

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from memscal.errors import InputError
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.mechanics.contact import Contact
+from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM
-from memscal.model.validation import FloatArray
 
 __all__ = ["contact_figure"]
 

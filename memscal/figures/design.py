@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from memscal.errors import InputError
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.model.quantities import MM, PER_MM, PER_MM2
-from memscal.planning.outcome import Design
-from memscal.planning.procedure import varied_designs
+from memscal.planning.design import varied_designs
+from memscal.planning.expected import Design
 
 __all__ = ["design_figure"]
 

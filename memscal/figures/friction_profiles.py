@@ -8,16 +8,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from memscal.figures.friction_points import EXPANDED, draw_errorbar, draw_points, share_limits
 from memscal.figures.friction_scale import (
+    EXPANDED,
     LUBRICATIONS,
     chosen,
+    draw_errorbar,
+    draw_points,
     friction_colours,
     friction_name,
     load_looks,
     lubricated_words,
     main_loading,
     on_axis,
+    share_limits,
 )
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.friction.results import FrictionComparison, LoadComparison

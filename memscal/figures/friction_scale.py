@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,11 +13,15 @@ from memscal.errors import InputError
 from memscal.figures.style import COLOURS
 from memscal.friction.family import FRICTION_SCALE
 from memscal.friction.results import FrictionComparison, LoadComparison
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
+from memscal.model.quantities import KPA, MM
 
 __all__ = [
+    "EXPANDED",
     "LUBRICATIONS",
     "chosen",
+    "draw_errorbar",
+    "draw_points",
     "friction_axis",
     "friction_colours",
     "friction_name",
@@ -26,6 +30,7 @@ __all__ = [
     "lubricated_words",
     "main_loading",
     "on_axis",
+    "share_limits",
 ]
 
 #: Loads up to this multiple of another one look alike.
@@ -178,3 +183,60 @@ def _apart(r: FloatArray) -> Sequence[int]:
             kept.append(i)
             last = radius
     return kept
+
+
+#: Coverage factor of the grey band, and of what stands clear of zero.
+EXPANDED = 2.0
+#: How strongly points are drawn that do not stand clear of zero.
+_PALE = 0.25
+_LEAST_LIMIT = 3.5
+
+
+def draw_points(
+    axes: Axes, one: LoadComparison, colour: str, label: str, logarithmic: bool
+) -> None:
+    """Draw the measured points.
+
+    On a logarithmic scale those that are not above 0 are left out, and those that are less than
+    twice their uncertainty are pale: they say no more than that the stress has decayed.
+    """
+    r, s, u = (np.asarray(v) for v in (one.profile.r, one.profile.s_zz, one.profile.s_zz_errors))
+    clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
+    for shown, strength in ((clear, 1.0), (~clear & (s > 0), _PALE)):
+        if shown.any():
+            draw_errorbar(
+                axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA, one,
+                colour=colour, label=label, strength=strength,
+            )  # fmt: skip
+
+
+def draw_errorbar(
+    axes: Axes,
+    x: FloatArray,
+    y: FloatArray,
+    u: FloatArray,
+    one: LoadComparison,
+    *,
+    colour: str,
+    label: str = "",
+    strength: float = 1.0,
+) -> None:
+    """Draw points with their standard uncertainties, in the marker of their lubrication."""
+    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+    style: dict[str, Any] = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
+    face = colour if filled else "white"
+    style |= {"label": label or "_points", "alpha": None if strength == 1.0 else strength}
+    axes.errorbar(x, y, u, fmt=marker, color=colour, mfc=face, **style)
+
+
+def share_limits(panels: Sequence[Axes]) -> None:
+    """Give residual panels one scale that shows every point, and at least the band."""
+    sizes = [
+        np.abs(np.asarray(line.get_ydata()))
+        for axes in panels
+        for line in axes.lines
+        if line.get_marker() not in ("None", "", None)
+    ]
+    limit = max(_LEAST_LIMIT, 1.1 * float(np.max(np.concatenate(sizes))))
+    for axes in panels:
+        axes.set_ylim(-limit, limit)

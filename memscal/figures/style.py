@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import io
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -13,17 +16,33 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from memscal.errors import InputError
+from memscal.estimation.points import TANGENTIAL
+from memscal.formats.files import atomic_write_bytes
+from memscal.model.apparatus import ApparatusData
+
 __all__ = [
     "COLOURS",
+    "FIGURE_SUFFIXES",
     "FIGURE_WIDTH",
     "SCATTER_THRESHOLD",
+    "channel_indices",
     "drawable",
+    "figure_format",
     "house_style",
     "legend_above",
     "marker_size",
     "new_figure",
     "panel_letter",
+    "render_figure",
+    "save_figure",
 ]
+
+
+def channel_indices(data: ApparatusData) -> str:
+    """Return the indices of the stress that a sensor's channel measures: zz, xz or yz."""
+    return data.sensor.channel if data.sensor.channel in TANGENTIAL else "zz"
+
 
 FIGURE_WIDTH = 7.2
 """Width in inches of a figure across two columns of a journal."""
@@ -135,3 +154,95 @@ def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:
 def marker_size(points: int) -> float:
     """Return a marker size in points that keeps 33 points visible and 400 apart."""
     return float(min(4.0, max(1.5, 4.0 * (40.0 / max(points, 1)) ** 0.5)))
+
+
+FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
+"""What a figure's file name may end in."""
+
+# matplotlib writes the time and its own version unless it is told not to.
+_METADATA: Mapping[str, dict[str, str | None]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+
+
+def figure_format(suffix: str) -> str:
+    """Return matplotlib's name of the format that a file name's suffix asks for.
+
+    Raises
+    ------
+    InputError
+        If the suffix is none of ``.png``, ``.svg`` and ``.pdf``.
+
+    Examples
+    --------
+    >>> figure_format(".PNG")
+    'png'
+    """
+    if suffix.lower() not in FIGURE_SUFFIXES:
+        raise InputError(
+            f"A figure cannot be written as {suffix!r}."
+            if suffix
+            else "The figure's file name has no suffix.",
+            why="The suffix of the file name chooses the format.",
+            cure=f"Use one of {', '.join(FIGURE_SUFFIXES)}.",
+        )
+    return suffix.lower().removeprefix(".")
+
+
+def render_figure(figure: Figure, file_format: str, *, dpi: float = 200.0) -> bytes:
+    """Return the figure as the bytes of a PNG, SVG or PDF file, free of dates.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What to render.
+    file_format : str
+        ``"png"``, ``"svg"`` or ``"pdf"``.
+    dpi : float
+        Dots per inch of a PNG, and of the point clouds inside the others.
+
+    Returns
+    -------
+    bytes
+    """
+    metadata = _METADATA[figure_format("." + file_format)]
+    buffer = io.BytesIO()
+    with house_style():
+        figure.savefig(buffer, format=file_format, dpi=dpi, metadata=metadata)
+    return buffer.getvalue()
+
+
+def save_figure(figure: Figure, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a figure as PNG (200 dots per inch), SVG or PDF, by the suffix of its name.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What to write.
+    path : path-like
+        The file; its suffix, ``.png``, ``.svg`` or ``.pdf``, chooses the format.
+    overwrite : bool
+        Replace a file that exists.
+
+    Raises
+    ------
+    InputError
+        If the suffix is none of the three.
+    OutputError
+        If the file exists and ``overwrite`` is false, or cannot be written.  What was there
+        before is untouched.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from matplotlib.figure import Figure
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "empty.svg")
+    ...     save_figure(Figure(), path)
+    ...     path.read_text()[:5]
+    '<?xml'
+    """
+    file_format = figure_format(Path(path).suffix)
+    atomic_write_bytes(path, render_figure(figure, file_format), overwrite=overwrite)

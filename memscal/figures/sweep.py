@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
+from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM, MV
-from memscal.model.validation import FloatArray
 
 __all__ = ["SweepLike", "sweep_figure"]
 
@@ -70,7 +70,7 @@ def sweep_figure(sweep: SweepLike) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Save it with :func:`memscal.figures.save.save_figure`.
+        Save it with :func:`memscal.figures.style.save_figure`.
 
     Examples
     --------

@@ -8,24 +8,27 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats.codec import read_record, write_record
-from memscal.formats.fields import require_scalar, require_schema
-from memscal.formats.hdf5_reader import SafeFile, open_hdf5
-from memscal.formats.hdf5_writer import file_tree, write_tree
-from memscal.formats.parameters import parameter_group, read_budget, read_parameters
-from memscal.formats.parts import (
+from memscal.formats.groups import (
     indenter_group,
     instrument_group,
+    parameter_group,
+    process_group,
     profile_groups,
+    quality_group,
+    read_budget,
     read_film,
+    read_parameters,
+    read_process,
     read_profile,
+    read_quality,
     read_round_indenter,
     read_sensor,
     sample_group,
 )
-from memscal.formats.process import process_group, quality_group, read_process, read_quality
+from memscal.formats.hdf5.reader import SafeFile, open_hdf5
+from memscal.formats.hdf5.writer import Group, Node, file_tree, write_tree
 from memscal.formats.schema import ARTIFACT_SCHEMA
-from memscal.formats.tree import Group, Node
-from memscal.formats.verify import altered
+from memscal.formats.values import altered, require_scalar, require_schema
 from memscal.model import records
 from memscal.model.apparatus import (
     ApparatusData,

@@ -8,10 +8,10 @@ from types import MappingProxyType
 from typing import Any
 
 from memscal.errors import FormatError
-from memscal.formats.fields import json_value, require_array, require_scalar, require_text
-from memscal.formats.hdf5_reader import SafeFile
+from memscal.formats.hdf5.reader import SafeFile
+from memscal.formats.hdf5.writer import Attribute, Group, Node, count, note, si
 from memscal.formats.json_text import to_json
-from memscal.formats.tree import Attribute, Group, Node, count, note, si
+from memscal.formats.values import json_value, require_array, require_scalar, require_text
 from memscal.model.checks import Message, messages_from_json, messages_to_json
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Quantity, Record

@@ -12,10 +12,8 @@ import numpy as np
 from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
 from memscal.formats.codec import listed, origins
-from memscal.formats.fields import require_schema, units_of
-from memscal.formats.hdf5_reader import SafeFile, open_hdf5
-from memscal.formats.parameters import estimated_record
-from memscal.formats.process import read_quality
+from memscal.formats.groups import estimated_record, read_quality
+from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.schema import (
@@ -28,7 +26,7 @@ from memscal.formats.schema import (
 )
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
-from memscal.formats.verify import altered
+from memscal.formats.values import altered, require_schema, units_of
 from memscal.model import records
 from memscal.model.quantities import Quantity, Record, record
 

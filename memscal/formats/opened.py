@@ -7,7 +7,7 @@ from os import PathLike
 from typing import Any, TypeAlias
 
 from memscal.errors import InputError
-from memscal.formats.hdf5_reader import open_hdf5
+from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.scan import read_scan, scan_from
 from memscal.formats.schema import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.stress import stress_from

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 
-from memscal.formats.fields import require_schema
-from memscal.formats.hdf5_reader import SafeFile, open_hdf5
-from memscal.formats.hdf5_writer import file_tree, write_tree
-from memscal.formats.parts import profile_groups, read_profile
+from memscal.formats.groups import profile_groups, read_profile
+from memscal.formats.hdf5.reader import SafeFile, open_hdf5
+from memscal.formats.hdf5.writer import Group, file_tree, write_tree
 from memscal.formats.schema import REFERENCE_SCHEMA
-from memscal.formats.tree import Group
+from memscal.formats.values import require_schema
 from memscal.model.stress import StressProfile
 
 __all__ = ["read_reference", "write_reference"]

@@ -2,12 +2,41 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Mapping
+import shutil
+import tempfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
-from memscal.errors import FormatError
-from memscal.formats.fields import (
+from memscal.errors import FormatError, OutputError
+from memscal.formats.files import ensure_writable
+from memscal.formats.groups import (
+    indenter_group,
+    instrument_group,
+    parameter_dimension,
+    profile_groups,
+    read_film,
+    read_profile,
+    read_round_indenter,
+    read_sensor,
+    sample_group,
+)
+from memscal.formats.hdf5.reader import SafeFile, open_hdf5
+from memscal.formats.hdf5.writer import (
+    Group,
+    Node,
+    Number,
+    file_tree,
+    index_axis,
+    note,
+    si,
+    write_tree,
+)
+from memscal.formats.json_text import to_json
+from memscal.formats.schema import SCAN_SCHEMA
+from memscal.formats.values import (
     any_scalar,
     json_value,
     optional_array,
@@ -17,25 +46,9 @@ from memscal.formats.fields import (
     require_scalar,
     require_schema,
 )
-from memscal.formats.hdf5_reader import SafeFile, open_hdf5
-from memscal.formats.hdf5_writer import file_tree, write_tree
-from memscal.formats.json_text import to_json
-from memscal.formats.parameters import parameter_dimension
-from memscal.formats.parts import (
-    indenter_group,
-    instrument_group,
-    profile_groups,
-    read_film,
-    read_profile,
-    read_round_indenter,
-    read_sensor,
-    sample_group,
-)
-from memscal.formats.schema import SCAN_SCHEMA
-from memscal.formats.tree import Group, Node, Number, index_axis, note, si
 from memscal.model.scan import Scan
 
-__all__ = ["read_scan", "write_scan"]
+__all__ = ["ensure_folder_writable", "read_scan", "write_scan", "write_scans"]
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
@@ -259,3 +272,81 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
         item = f"{path}/{name}"
         truth[str(name)] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
     return truth
+
+
+def ensure_folder_writable(
+    folder: str | os.PathLike[str], names: Iterable[str], *, overwrite: bool
+) -> None:
+    """Prove that files of these names can be written in a folder, which need not exist yet.
+
+    Raises
+    ------
+    OutputError
+        If one cannot be written, or exists and may not be replaced.
+    """
+    target = Path(folder)
+    if not target.exists() and not target.is_symlink():
+        ensure_writable(target)
+        return
+    if not target.is_dir():
+        raise OutputError(
+            f"The output {target} is not a folder.",
+            why="An experiment is several scans, each a file of its own.",
+            cure="Give the name of a folder; a new one is made.",
+        )
+    for name in names:
+        ensure_writable(target / name, overwrite=overwrite)
+
+
+def write_scans(
+    scans: Mapping[str, Scan], folder: str | os.PathLike[str], *, overwrite: bool = False
+) -> None:
+    """Write scans as memscal-scan files of one folder, all of them or none.
+
+    All are written whole under other names first, and only then take their own.
+
+    Parameters
+    ----------
+    scans : mapping of str to Scan
+        The scans by the names of their files.
+    folder : path
+        The folder; it is made if it does not exist.
+    overwrite : bool
+        Whether existing files may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If a file exists or cannot be written; what was there before is then untouched.
+
+    Examples
+    --------
+    >>> from memscal.simulation.rod_scan import simulate
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     write_scans({"one.h5": simulate(), "two.h5": simulate(seed=1)}, f"{place}/run")
+    ...     sorted(os.listdir(f"{place}/run"))
+    ['one.h5', 'two.h5']
+    """
+    target = Path(folder)
+    ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
+    made = not target.exists()
+    staging: str | None = None
+    try:
+        target.mkdir(exist_ok=True)
+        staging = tempfile.mkdtemp(prefix=".memscal-", dir=target)
+        for name, scan in scans.items():
+            write_scan(scan, Path(staging, name))
+        for name in scans:
+            os.replace(Path(staging, name), target / name)
+    except OSError as error:
+        raise OutputError(
+            f"The output {target} cannot be written: {error.strerror}.",
+            cure="Choose another folder.",
+        ) from error
+    finally:
+        if staging is not None:
+            shutil.rmtree(staging, ignore_errors=True)
+        if made:
+            # Of a folder that holds the scans this takes nothing away.
+            with contextlib.suppress(OSError):
+                target.rmdir()

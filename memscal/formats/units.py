@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import UnitError
+from memscal.model.arrays import FloatArray
 from memscal.model.quantities import DIMENSIONS
-from memscal.model.validation import FloatArray
 
 __all__ = ["FILE_UNITS", "SI_UNITS", "dimension_of", "from_si", "to_si"]
 

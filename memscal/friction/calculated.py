@@ -1,30 +1,419 @@
-"""Calculated profiles: families of base stresses to hold a measured one against.
-
-- :func:`amontons_family`: rigid interface, along the friction coefficient;
-- :func:`elasto_plastic_family`: given friction, along the slip length;
-- :func:`normal_compliance_family`: no friction, along the length of a normal compliance;
-- :func:`external_family`: tables from another program, along their friction coefficients.
-
-All are solved by :func:`memscal.indent` but for the last, hold transforms of the base stress (so
-that a sensor's apparatus function is a factor), and carry what the stated uncertainties of film
-and sphere change in them; see :class:`memscal.friction.family.ProfileFamily`.
-"""
+"""Base stresses of a sphere on a film under Amontons friction, along the friction coefficient."""
 
 from __future__ import annotations
 
-from memscal.friction.amontons import FRICTIONS, amontons_family
-from memscal.friction.compliant import (
-    SLIP_LENGTHS,
-    elasto_plastic_family,
-    normal_compliance_family,
-)
-from memscal.friction.external import external_family
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.errors import InputError
+from memscal.friction.family import FRICTION_SCALE, ProfileFamily
+from memscal.friction.paths import STRONGER, CacheFolder, FamilySetup, parameter_values
+from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
+from memscal.model.arrays import FloatArray
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+
+if TYPE_CHECKING:
+    from memscal.model.measured_stress import MeasuredProfile
 
 __all__ = [
     "FRICTIONS",
     "SLIP_LENGTHS",
+    "LawFamilies",
     "amontons_family",
+    "at_loads",
     "elasto_plastic_family",
-    "external_family",
     "normal_compliance_family",
 ]
+
+FRICTIONS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, math.inf)
+"""Friction coefficients between which profiles are interpolated to 1e-3 of their maximum."""
+
+
+def amontons_family(
+    film: ElasticFilm,
+    indenter: Indenter,
+    loads: ArrayLike,
+    *,
+    friction: Sequence[float] = FRICTIONS,
+    loading: str = "incremental",
+    reach: float,
+    cache: CacheFolder = None,
+    workers: int = 1,
+    order: int = 0,
+) -> ProfileFamily:
+    r"""Return the base stresses of a sphere on a film for a range of friction coefficients.
+
+    Parameters
+    ----------
+    film : ElasticFilm
+        The film; its stated uncertainties become ``changes`` of the family.
+    indenter : Sphere
+        The sphere.
+    loads : array_like, shape (L,)
+        Loads in N.
+    friction : sequence of float
+        Amontons' coefficients, increasing from 0 or above; the last may be ``inf``.
+    loading : str
+        ``"incremental"`` or ``"total"``: see :func:`memscal.indent`.
+    reach : float
+        Largest distance from the axis at which stresses will be asked for, in m.
+    cache : path, optional
+        Folder in which families are kept from one run to the next; without it nothing is written.
+    workers : int
+        Processes that share the work; the result is the same to rounding.
+    order : int
+        Zero for the normal stress at the base; one for its shear, which a tangential channel sees.
+
+    Returns
+    -------
+    ProfileFamily
+
+    Raises
+    ------
+    InputError
+        If the indenter is no sphere, or an argument makes no sense.
+    DomainError
+        If a load lies outside what the model holds for.
+    ConvergenceError
+        If a contact does not settle.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from memscal.model.indenter import Sphere
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> family = amontons_family(
+    ...     film, Sphere(radius=128.8e-3), [0.34], friction=[0, math.inf], reach=8e-3
+    ... )
+    >>> maxima = family.wavenumbers.synthesise(family.spectra[:, 0].T, np.array(0.0))
+    >>> (maxima / 1e3).round(1)
+    array([27.7, 30.9])
+    """
+    setup = FamilySetup.of(
+        film, indenter, loads, reach=reach, cache=cache, workers=workers, order=order
+    )
+    values = parameter_values("friction coefficients", friction)
+    if loading not in ("incremental", "total"):
+        raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')
+    paths = [setup.path(friction=float(mu), loading=loading) for mu in values]
+    return setup.family(
+        paths, name="amontons", loading=loading, values=values, scale=FRICTION_SCALE
+    )
+
+
+SLIP_LENGTHS = (0.0, 0.15e-6, 0.5e-6, 1.5e-6, 4e-6, 1e-5, 3e-5, 1e-4, 4e-4, math.inf)
+"""Slip lengths in m, from the rigid interface to the one that bears no shear."""
+
+#: Lengths of a normally compliant interface in units of the film's roughness.
+_LENGTHS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0)
+#: Roughness in m where a film states none.
+_USUAL_ROUGHNESS = 2e-6
+#: Greenwood and Tripp's surfaces: asperity density times radius times roughness, and the ratio
+#: of radius and roughness.
+_ASPERITIES = 0.05
+_SLENDERNESS = 100.0
+#: Pressure at which mean planes meet, in units of the contact's modulus (exponential law): so
+#: light that no contact rests above them, and no depth is zero.
+_MEETING = 1e-6
+
+
+def elasto_plastic_family(
+    film: ElasticFilm,
+    indenter: Indenter,
+    loads: ArrayLike,
+    *,
+    friction: float,
+    slip_lengths: Sequence[float] = SLIP_LENGTHS,
+    reach: float,
+    cache: CacheFolder = None,
+    workers: int = 1,
+) -> ProfileFamily:
+    r"""Return the base stresses for a range of slip lengths at a given friction coefficient.
+
+    The interface yields elastically before it slips: :math:`q = -\mu p\,e/\ell` for
+    :math:`|e| \le \ell` (see :class:`memscal.Interface`).  Loading is incremental.
+
+    Parameters
+    ----------
+    film, indenter, loads, reach, cache, workers
+        As for :func:`memscal.friction.calculated.amontons_family`.
+    friction : float
+        The macroscopic coefficient :math:`\mu`, positive and finite.
+    slip_lengths : sequence of float
+        Slip lengths :math:`\ell` in m, increasing.  0 is the rigid interface at that friction;
+        ``inf`` bears no shear, as the contact without friction.
+
+    Returns
+    -------
+    ProfileFamily
+        Its values are the slip lengths.
+
+    Raises
+    ------
+    InputError, DomainError, ConvergenceError
+        As there; and if the friction is not positive and finite.
+
+    Examples
+    --------
+    The softer the interface, the nearer to the contact without friction:
+
+    >>> import numpy as np
+    >>> from memscal.model.indenter import Sphere
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> family = elasto_plastic_family(
+    ...     film, Sphere(radius=128.8e-3), [0.34], friction=1.6, reach=8e-3,
+    ...     slip_lengths=[0, 6e-6, math.inf],
+    ... )
+    >>> maxima = family.wavenumbers.synthesise(family.spectra[:, 0].T, np.array(0.0))
+    >>> (maxima / 1e3).round(1)
+    array([30.9, 29.9, 27.7])
+    """
+    setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    values = parameter_values("slip lengths", slip_lengths)
+    if not 0 < friction < math.inf:
+        raise InputError(
+            f"The macroscopic friction coefficient is {friction:g}.",
+            why="A slip length says at which displacement the shear reaches friction times "
+            "pressure: without friction, or with an unlimited one, it says nothing.",
+            cure="Give the coefficient at which the indenter slides, such as 1.6.",
+        )
+    paths = [
+        setup.path(friction=0.0)
+        if math.isinf(length)
+        else setup.path(friction=float(friction), interface=Interface(slip_length=float(length)))
+        for length in values
+    ]
+    return setup.family(
+        paths,
+        name="elasto-plastic",
+        loading="incremental",
+        values=values,
+        scale=_natural_length(setup),
+        a_length=True,
+        notes=(f"Macroscopic friction coefficient {friction:g}.",),
+    )
+
+
+def normal_compliance_family(
+    film: ElasticFilm,
+    indenter: Indenter,
+    loads: ArrayLike,
+    *,
+    lengths: Sequence[float] | None = None,
+    law: str = "exponential",
+    reach: float,
+    cache: CacheFolder = None,
+    workers: int = 1,
+) -> ProfileFamily:
+    r"""Return the base stresses without friction for a range of normal compliances.
+
+    Parameters
+    ----------
+    film, indenter, loads, reach, cache, workers
+        As for :func:`memscal.friction.calculated.amontons_family`.
+    lengths : sequence of float, optional
+        The law's length in m, increasing and finite; 0 is the rigid interface.  By default up to
+        eight times the film's roughness (2 um where it states none).
+    law : str
+        ``"exponential"``: :math:`p = p_1 e^{-d/\lambda}`, with the length :math:`\lambda`.  The
+        pressure :math:`p_1` only shifts the depth: the base stress does not depend on it.
+        ``"greenwood-tripp"``: asperities with the length :math:`\sigma`, their roughness; fixed
+        are :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.
+
+    Returns
+    -------
+    ProfileFamily
+        Its values are the lengths.
+
+    Raises
+    ------
+    InputError, DomainError, ConvergenceError
+        As there; and if a length is not finite or the law is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from memscal.model.indenter import Sphere
+    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
+    >>> family = normal_compliance_family(
+    ...     film, Sphere(radius=128.8e-3), [0.34], lengths=[0, 2e-6], reach=8e-3
+    ... )
+    >>> maxima = family.wavenumbers.synthesise(family.spectra[:, 0].T, np.array(0.0))
+    >>> (maxima / 1e3).round(1)
+    array([27.7, 25.5])
+    """
+    setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    if law not in ("exponential", "greenwood-tripp"):
+        raise InputError(f'law is {law!r}, but it is "exponential" or "greenwood-tripp".')
+    if lengths is None:
+        unit = film.roughness_rms or _USUAL_ROUGHNESS
+        lengths = [share * unit for share in _LENGTHS]
+    values = parameter_values("lengths of the normal compliance", lengths)
+    if math.isinf(values[-1]):
+        raise InputError(
+            "A length of the normal compliance is infinite: such a film bears no load."
+        )
+    paths, stronger = (
+        [setup.path(friction=0.0, interface=_normal(law, film, float(v), s)) for v in values]
+        for s in (1.0, STRONGER)
+    )
+    return setup.family(
+        paths,
+        name="normal-compliance",
+        loading="",
+        values=values,
+        scale=_natural_length(setup),
+        a_length=True,
+        stronger=stronger if law == "greenwood-tripp" else None,
+        notes=(_NORMAL_NOTES[law],),
+    )
+
+
+_NORMAL_NOTES = {
+    "exponential": "Exponential law; the length is free.  Depths count from a pressure of "
+    f"{_MEETING:g} times the contact modulus; the base stress does not depend on it.",
+    "greenwood-tripp": "Greenwood-Tripp law; the roughness is free, density times radius times "
+    f"roughness is {_ASPERITIES:g}, and the radius is {_SLENDERNESS:g} times the roughness.",
+}
+
+
+def _normal(law: str, film: ElasticFilm, length: float, strength: float) -> Interface:
+    if length == 0:
+        return Interface()
+    if law == "exponential":
+        meeting = _MEETING * film.contact_modulus
+        return Interface(
+            normal=ExponentialCompliance(decay_length=length, reference_pressure=meeting)
+        )
+    radius = _SLENDERNESS * length
+    density = strength * _ASPERITIES / (radius * length)
+    return Interface(
+        normal=GreenwoodTripp(roughness=length, asperity_density=density, asperity_radius=radius)
+    )
+
+
+def _natural_length(setup: FamilySetup) -> float:
+    """Return h^2/R, in m."""
+    return setup.film.thickness**2 / setup.indenter.radius
+
+
+#: Stresses are calculated out to this multiple of the largest distance from the centre.
+_REACH = 1.1
+#: Loads are near whose logarithms differ by less: stresses are linear between to 2e-5.
+_NEAR = 0.01
+
+
+class LawFamilies:
+    """Families of calculated contacts of what was measured, each at its profiles' loads.
+
+    Parameters
+    ----------
+    profiles : sequence of MeasuredProfile
+        Measured loads of one sphere on one film.
+    cache, workers
+        As for :func:`memscal.friction.calculated.amontons_family`.
+    """
+
+    def __init__(
+        self, profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
+    ) -> None:
+        scan = profiles[0].scan
+        self.film: ElasticFilm = scan.film
+        self.indenter: Indenter = scan.indenter
+        self.reach = _REACH * max(float(profile.r[-1]) for profile in profiles)
+        self.cache, self.workers = cache, workers
+
+    def rigid(
+        self, profiles: Sequence[MeasuredProfile], known: ProfileFamily | None
+    ) -> ProfileFamily:
+        """Return incremental contacts of Amontons' law: those that are known, where they do."""
+        if known is not None and known.values[0] == 0 and math.isinf(known.values[-1]):
+            found = at_loads(known, _loads(profiles))
+            if found is not None:
+                return found
+        made = amontons_family(self.film, self.indenter, _distinct(profiles), **self._how)
+        return _required(at_loads(made, _loads(profiles)))
+
+    def slipping(
+        self,
+        profiles: Sequence[MeasuredProfile],
+        friction: float,
+        uncertainty: float | None,
+        known: ProfileFamily | None,
+    ) -> ProfileFamily:
+        """Return contacts of the elasto-plastic law at a macroscopic coefficient.
+
+        The difference to those at one standard uncertainty more is the change named
+        ``"macroscopic_friction"``.
+        """
+        loads = _loads(profiles)
+        found = None if known is None else at_loads(known, loads)
+        if found is not None:
+            return found
+
+        def family(film: ElasticFilm, mu: float) -> ProfileFamily:
+            return elasto_plastic_family(
+                film, self.indenter, _distinct(profiles), friction=mu, **self._how
+            )
+
+        made = family(self.film, friction)
+        if uncertainty is not None:
+            # Only its stresses are wanted: without uncertainties it takes a third of the time.
+            bare = replace(
+                self.film,
+                young_modulus_uncertainty=None,
+                thickness_uncertainty=None,
+                poisson_ratio_uncertainty=None,
+            )
+            change = family(bare, friction + uncertainty).spectra - made.spectra
+            made = replace(made, changes={**made.changes, "macroscopic_friction": change})
+        return _required(at_loads(made, loads))
+
+    def yielding(
+        self, profiles: Sequence[MeasuredProfile], known: ProfileFamily | None
+    ) -> ProfileFamily:
+        """Return contacts without friction that yield normally."""
+        found = None if known is None else at_loads(known, _loads(profiles))
+        if found is not None:
+            return found
+        made = normal_compliance_family(self.film, self.indenter, _distinct(profiles), **self._how)
+        return _required(at_loads(made, _loads(profiles)))
+
+    @property
+    def _how(self) -> dict[str, Any]:
+        return {"reach": self.reach, "cache": self.cache, "workers": self.workers}
+
+
+def at_loads(family: ProfileFamily, loads: FloatArray) -> ProfileFamily | None:
+    """Return a family at the nearest of its loads; ``None`` where one is not near enough.
+
+    What is left of a difference is in the points' own loads, to first order.
+    """
+    apart = np.abs(np.log(np.divide.outer(loads, family.loads)))
+    if np.any(apart.min(axis=1) > _NEAR):
+        return None
+    return family.only(apart.argmin(axis=1).tolist())
+
+
+def _required(family: ProfileFamily | None) -> ProfileFamily:
+    assert family is not None
+    return family
+
+
+def _loads(profiles: Sequence[MeasuredProfile]) -> FloatArray:
+    return np.array([profile.load for profile in profiles])
+
+
+def _distinct(profiles: Sequence[MeasuredProfile]) -> FloatArray:
+    """Return the loads that are not near to a smaller one."""
+    found: list[float] = []
+    for load in sorted(profile.load for profile in profiles):
+        if not found or math.log(load / found[-1]) > _NEAR:
+            found.append(load)
+    return np.array(found)

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.special import chdtrc
 
+from memscal.friction.family import ProfileFamily
 from memscal.friction.results import EffectiveFriction, LoadComparison
-from memscal.model.checks import QualityCheck, check, chi_square_limit
+from memscal.model.checks import (
+    Message,
+    QualityCheck,
+    check,
+    chi_square_limit,
+    failed_check_messages,
+)
+from memscal.model.measured_stress import MeasuredStress
+from memscal.model.notation import format_bound
 
-__all__ = ["comparison_checks"]
+__all__ = ["SYNTHETIC_SCANS", "comparison_checks", "comparison_messages"]
 
 #: Share of points that may lie outside of what friction can explain, beyond those of chance.
 _OUTSIDE = 0.15
@@ -95,3 +105,136 @@ def _frictionless(by_loading: Mapping[str, EffectiveFriction]) -> QualityCheck:
 def _place(found: LoadComparison) -> str:
     words = f"the {found.lubrication} load" if found.lubrication else "the load"
     return f"{words} of {np.format_float_positional(found.load, precision=3, trim='-')} N"
+
+
+SYNTHETIC_SCANS = Message("synthetic", "The scans are synthetic: nothing here was measured.")
+
+#: Calculated contacts that are less certain than this share of their stress are named.
+_COARSE = 2e-3
+#: Coverage factor of 95 %.
+_EXPANDED = 1.96
+
+
+def comparison_messages(
+    measured: MeasuredStress,
+    families: Mapping[str, ProfileFamily],
+    joint: Mapping[str, Mapping[str, EffectiveFriction]],
+    checks: tuple[QualityCheck, ...],
+    macroscopic: tuple[float, float | None] | None,
+) -> tuple[Message, ...]:
+    """Return the messages that accompany a comparison, the gravest first.
+
+    Those of the measured stress are among them.
+    """
+    own = [
+        *failed_check_messages(checks),
+        *_synthetic(measured),
+        *_loadings(joint),
+        *_against_macroscopic(joint, macroscopic),
+        *_calculated(families),
+        *_unstated(measured),
+    ]
+    return tuple(dict.fromkeys([*own, *measured.messages]))
+
+
+def _synthetic(measured: MeasuredStress) -> Iterator[Message]:
+    if any(scan.synthetic for scan in measured.scans):
+        yield SYNTHETIC_SCANS
+
+
+def _loadings(joint: Mapping[str, Mapping[str, EffectiveFriction]]) -> Iterator[Message]:
+    for lubrication, by_loading in joint.items():
+        if not {"incremental", "total"} <= by_loading.keys():
+            continue
+        first, second = by_loading["incremental"], by_loading["total"]
+        of = f"the {lubrication} loads" if lubrication else "the loads"
+        if first.value is None or second.value is None:
+            if (first.value is None) != (second.value is None):
+                yield Message(
+                    "loading",
+                    f"The definitions of the loading disagree for {of}: incremental loading gives "
+                    f"{in_words(first)}, total loading {in_words(second)}.",
+                )
+            continue
+        apart = abs(first.value - second.value)
+        errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
+        if errors and apart > max(errors):
+            yield Message(
+                "loading",
+                f"The definitions of the loading disagree for {of} by {apart:.2g}, more than one "
+                f"standard uncertainty: incremental loading gives {in_words(first)}, total "
+                f"loading {in_words(second)}.",
+            )
+
+
+def _against_macroscopic(
+    joint: Mapping[str, Mapping[str, EffectiveFriction]],
+    macroscopic: tuple[float, float | None] | None,
+) -> Iterator[Message]:
+    if macroscopic is None:
+        return
+    value, u = macroscopic
+    spread = _EXPANDED * (u or 0.0)
+    for lubrication, by_loading in joint.items():
+        if lubrication == "lubricated":
+            continue
+        for loading, found in by_loading.items():
+            low, high = found.interval.low, found.interval.high
+            if value + spread < low:
+                verdict = "is larger than the macroscopic one"
+            elif high is not None and value - spread > high:
+                verdict = "is smaller than the macroscopic one"
+            elif high is None:
+                verdict = "has no upper bound, so that it does not contradict the macroscopic one"
+            else:
+                verdict = "agrees with the macroscopic one"
+            words = f" ({loading} loading)" if loading else ""
+            yield Message(
+                "macroscopic",
+                f"The effective friction coefficient{words} {verdict}, {value:.3g}.",
+            )
+
+
+def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
+    for loading, family in families.items():
+        known = family.convergence[np.isfinite(family.convergence)]
+        if known.size and float(known.max()) > _COARSE:
+            words = f" ({loading} loading)" if loading else ""
+            yield Message(
+                "convergence",
+                f"The calculated contacts{words} have converged to {float(known.max()):.1%} of "
+                "their stress only.",
+            )
+        yield from (Message("calculated", text) for text in family.notes)
+
+
+def _unstated(measured: MeasuredStress) -> Iterator[Message]:
+    """Name what no uncertainty is stated for: the intervals count nothing for it."""
+    names = []
+    for profile in measured.profiles:
+        film, indenter = profile.scan.film, profile.scan.indenter
+        stated = {
+            "Young's modulus": film.young_modulus_uncertainty,
+            "Poisson's ratio": film.poisson_ratio_uncertainty,
+            "film thickness": film.thickness_uncertainty,
+            f"{indenter.shape} radius": indenter.radius_uncertainty,
+            "load": profile.load_uncertainty,
+        }
+        names += [name for name, value in stated.items() if value is None]
+    if names:
+        yield Message(
+            "uncertainty_unstated",
+            f"No uncertainty is stated for {', '.join(dict.fromkeys(names))}: the intervals of "
+            "the friction coefficient count nothing for it.",
+        )
+
+
+def in_words(found: EffectiveFriction) -> str:
+    """Return a coefficient with its interval, or its bound, in words."""
+    low, high = found.interval.low, found.interval.high
+    if high is None or math.isinf(high):
+        return f"at least {format_bound(low, upper=False)}" if low > 0 else "no bound"
+    above = format_bound(high, upper=True)
+    if found.value is None or low == 0:
+        return f"at most {above}"
+    return f"{found.value:.2g} ({format_bound(low, upper=False)} to {above})"

@@ -3,25 +3,214 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, chdtri
 
 from memscal.friction.family import ProfileFamily
-from memscal.friction.interval import profiled, reason_of
 from memscal.friction.likelihood import Likelihood, likelihood
-from memscal.friction.load_points import LoadPoints, single_point
-from memscal.friction.predicted import Members, Sensor, members_of
-from memscal.friction.results import EffectiveFriction
-from memscal.model.validation import FloatArray
+from memscal.friction.prediction import (
+    LoadPoints,
+    Members,
+    Sensor,
+    members_of,
+    predict,
+    single_point,
+)
+from memscal.friction.results import EffectiveFriction, Interval, LoadComparison
+from memscal.model.arrays import FloatArray
+from memscal.model.notation import format_bound
 
 if TYPE_CHECKING:
     from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = ["Confrontation", "confront", "fine_values", "random_uncertainty", "with_loading"]
+__all__ = [
+    "Confrontation",
+    "Profiled",
+    "bracketed_share",
+    "confront",
+    "fine_values",
+    "load_comparison",
+    "profiled",
+    "random_uncertainty",
+    "reason_of",
+    "with_loading",
+]
+
+#: Coverage factor of 95 %.
+_EXPANDED = 1.96
+
+
+def bracketed_share(
+    measured: FloatArray, errors: FloatArray, calculated: FloatArray, calculated_errors: FloatArray
+) -> float:
+    """Return the share of points between the extremes of a family, within 1.96 u.
+
+    Where the profiles of different friction cross, away from the axis, the larger of the two
+    extremes is above.
+
+    Parameters
+    ----------
+    measured, errors : ndarray, shape (n,)
+        Measured stress and its standard uncertainty, in Pa.
+    calculated, calculated_errors : ndarray, shape (m, n)
+        Calculated stress of each member, the extremes first and last, and its standard
+        uncertainty, in Pa.
+
+    Examples
+    --------
+    >>> calculated = np.array([[10.0, 5.0], [12.0, 4.0]])
+    >>> bracketed_share(np.array([13.0, 8.0]), np.ones(2), calculated, np.zeros((2, 2)))
+    0.5
+    """
+    ends, end_errors = calculated[[0, -1]], calculated_errors[[0, -1]]
+    allowed = _EXPANDED * np.hypot(errors, end_errors)
+    above = (ends + allowed).max(axis=0)
+    below = (ends - allowed).min(axis=0)
+    return float(np.mean((below <= measured) & (measured <= above)))
+
+
+LEVEL = 0.95
+#: Level of one standard deviation of a normal distribution.
+_ONE_SIGMA = 0.6827
+_STEPS = 40
+
+
+@dataclass(frozen=True)
+class Profiled:
+    """What a profile likelihood says.
+
+    Parameters
+    ----------
+    best : float
+        Value of least chi-square; at an end it may be ``inf``.
+    least : float
+        Least chi-square.
+    interval, narrow : Interval
+        At the level that was asked for, and at 68.3 %.
+    open_low, open_high : bool
+        Whether the interval reaches the first and the last value.
+    """
+
+    best: float
+    least: float
+    interval: Interval
+    narrow: Interval
+    open_low: bool
+    open_high: bool
+
+    @property
+    def standard_uncertainty(self) -> float | None:
+        """Half of the interval of 68.3 %; ``None`` where an end is open."""
+        if self.narrow.high is None or self.narrow.low <= 0:
+            return None
+        return (self.narrow.high - self.narrow.low) / 2
+
+
+def profiled(
+    coordinates: FloatArray,
+    chi_square: FloatArray,
+    value_at: Callable[[float], float],
+    *,
+    level: float = LEVEL,
+) -> Profiled:
+    """Return best value and intervals of chi-square along a bounded coordinate.
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (m,)
+        Increasing, fine enough for a cubic spline.
+    chi_square : ndarray, shape (m,)
+        Least chi-square over everything else.
+    value_at : callable
+        Takes a coordinate to the parameter's value.
+    level : float
+        Coverage of the interval.
+
+    Examples
+    --------
+    >>> t = np.linspace(0, 1, 101)
+    >>> found = profiled(t, ((t - 0.4) / 0.1) ** 2, lambda t: t)
+    >>> print(f"{found.best:.2f}, {found.interval.low:.3f} to {found.interval.high:.3f}")
+    0.40, 0.204 to 0.596
+    """
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(coordinates, chi_square)
+    best = _minimum(spline, coordinates, chi_square)
+    least = float(spline(best))
+    first, last = float(coordinates[0]), float(coordinates[-1])
+
+    def interval(at: float) -> tuple[Interval, bool, bool]:
+        rise = float(chdtri(1, 1 - at))
+        inside = np.append(coordinates[chi_square - least <= rise], best)
+        low = _crossing(spline, coordinates, float(inside.min()), -1, least + rise)
+        high = _crossing(spline, coordinates, float(inside.max()), 1, least + rise)
+        bounds = Interval(
+            0.0 if low is None else value_at(low), None if high is None else value_at(high), at
+        )
+        return bounds, low is None, high is None
+
+    wide, open_low, open_high = interval(level)
+    end = best if first < best < last else (first if best <= first else last)
+    return Profiled(value_at(end), least, wide, interval(_ONE_SIGMA)[0], open_low, open_high)
+
+
+def _minimum(spline: Any, coordinates: FloatArray, chi_square: FloatArray) -> float:
+    """Lowest point of the spline next to the lowest node."""
+    i = int(np.argmin(chi_square))
+    around = slice(max(i - 1, 0), i + 2)
+    low, high = coordinates[around][0], coordinates[around][-1]
+    turns = spline.derivative().roots(extrapolate=False)
+    candidates = [float(coordinates[i]), *(float(t) for t in turns if low < t < high)]
+    return min(candidates, key=lambda t: float(spline(t)))
+
+
+def _crossing(
+    spline: Any, coordinates: FloatArray, start: float, side: int, level: float
+) -> float | None:
+    """Where the spline rises through a level next to an inside point; None beyond the ends."""
+    beyond = coordinates[coordinates * side > start * side]
+    if not beyond.size:
+        return None
+    inside, outside = start, float(beyond.min() if side > 0 else beyond.max())
+    if spline(outside) <= level:
+        return None
+    for _ in range(_STEPS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if spline(middle) <= level else (inside, middle)
+    return (inside + outside) / 2
+
+
+def reason_of(found: Profiled, last: float, what: str = "friction coefficient") -> str:
+    """Say in words why a profile likelihood gives no value; empty where it gives one.
+
+    Parameters
+    ----------
+    found : Profiled
+        What the likelihood says.
+    last : float
+        Last value that was calculated; ``inf`` is full stick.
+    what : str
+        Name of the parameter.
+    """
+    if not found.open_high:
+        return ""
+    end = "full stick" if np.isinf(last) else f"{last:.3g}, the last one calculated,"
+    if found.open_low:
+        return (
+            f"The {what} is not identifiable: no friction and {end} agree with the data "
+            "equally well."
+        )
+    bound = format_bound(found.interval.low, upper=False)
+    return (
+        f"The {what} is not identifiable above {bound}: every larger one, {end} included, agrees "
+        "with the data as well. This is a lower bound."
+    )
+
 
 #: Values along which chi-square is drawn.
 _FINE = 200
@@ -154,3 +343,88 @@ def with_loading(found: EffectiveFriction, other: EffectiveFriction | None) -> E
         return found
     apart = abs(found.value - other.value) / math.sqrt(12)
     return replace(found, budget={**found.budget, "loading": apart})
+
+
+def load_comparison(
+    profile: MeasuredProfile, confronted: Confrontation, index: int
+) -> LoadComparison:
+    """Compare a measured load with every calculated profile of a family.
+
+    Parameters
+    ----------
+    profile : MeasuredProfile
+        What was measured.
+    confronted : Confrontation
+        All measured loads against the family.
+    index : int
+        Which of them this one is.
+    """
+    family, load = confronted.family, confronted.loads[index]
+    own = members_of(family, family.values)
+    calculated, errors = _blurred(confronted.sensor, own, load, profile.r, confronted.points[index])
+    top, top_errors = _blurred(confronted.sensor, own, load, np.zeros(1), confronted.points[index])
+    chi_square = confronted.at(family.values, index)
+    degrees = confronted.points[index].degrees
+    ratio = profile.maximum / float(top[0, 0])
+    return LoadComparison(
+        profile=profile,
+        loading=family.loading,
+        s_max=profile.maximum,
+        s_max_uncertainty=profile.maximum_uncertainty,
+        p0_max=float(top[0, 0]),
+        p0_max_uncertainty=float(top_errors[0, 0]),
+        ratio=ratio,
+        ratio_uncertainty=_ratio_uncertainty(profile, confronted, own, index) * ratio,
+        calculated=calculated,
+        calculated_errors=errors,
+        p_max=top[:, 0],
+        chi_square=chi_square,
+        p_values=np.asarray(chdtrc(degrees, chi_square)),
+        degrees=degrees,
+        bracketed=bracketed_share(profile.s_zz, profile.s_zz_errors, calculated, errors),
+        by_maximum=confronted.effective_of_maximum(profile, index),
+        by_profile=confronted.effective([index]),
+    )
+
+
+def _blurred(
+    sensor: Sensor, members: Members, load: int, r: FloatArray, like: LoadPoints
+) -> tuple[FloatArray, FloatArray]:
+    """Return G convolved with the base stress of each member at radii, and its uncertainty.
+
+    That of A is not counted: it is the measured stress's.
+    """
+    places = _places(r, like)
+    found = predict(places, sensor.of_shape, members, load)
+    parts = [np.sum(column**2, axis=-1) for column in found.columns.values()]
+    variance = np.sum(parts, axis=0) if parts else np.zeros_like(found.signal)
+    a = sensor.conversion_constant
+    return found.signal / a, np.sqrt(variance) / a
+
+
+def _places(r: FloatArray, like: LoadPoints) -> LoadPoints:
+    """Return radii as points of the nominal load, with the uncertainties of others."""
+    nothing = np.zeros(r.size)
+    return LoadPoints(
+        u=nothing,
+        offset=r,
+        log_load=nothing,
+        noise=nothing,
+        load_errors=nothing,
+        x_errors=nothing,
+        flat=np.zeros((r.size, 0)),
+        free_centre=False,
+        load_share=like.load_share,
+        position_share=like.position_share,
+    )
+
+
+def _ratio_uncertainty(
+    profile: MeasuredProfile, confronted: Confrontation, members: Members, index: int
+) -> float:
+    """Relative uncertainty of measured over frictionless maximum: A and G err together."""
+    top = single_point(0.0, 0.0, confronted.points[index])
+    found = predict(top, confronted.sensor, members, confronted.loads[index])
+    parts = [float(np.linalg.norm(column[0, 0])) for column in found.columns.values()]
+    systematic = float(np.linalg.norm(parts)) / float(found.signal[0, 0])
+    return float(np.hypot(systematic, random_uncertainty(profile.maximum_budget) / profile.maximum))

@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
-from memscal.friction.amontons import amontons_family
-from memscal.friction.assembly import base_wavenumbers, require_loads
-from memscal.friction.cache import CacheFolder
+from memscal.friction.calculated import amontons_family
 from memscal.friction.family import FRICTION_SCALE, ProfileFamily
+from memscal.friction.paths import CacheFolder, base_wavenumbers, require_loads
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
 
 __all__ = ["external_family"]
 
@@ -57,7 +56,7 @@ def external_family(
         are solved at the tables' friction coefficients, and their sensitivities taken over; where
         they are not known there are none, and the stress counts as proportional to the load.
     cache, workers
-        As for :func:`memscal.friction.amontons.amontons_family`, for those contacts.
+        As for :func:`memscal.friction.calculated.amontons_family`, for those contacts.
 
     Returns
     -------

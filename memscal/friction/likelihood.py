@@ -22,10 +22,9 @@ from functools import cached_property
 
 import numpy as np
 
-from memscal.friction.evidence import Tables
-from memscal.friction.load_points import LoadPoints
-from memscal.friction.predicted import Members, Predicted, Sensor, predict
-from memscal.model.validation import FloatArray
+from memscal.friction.marginal_likelihood import Tables
+from memscal.friction.prediction import LoadPoints, Members, Predicted, Sensor, predict
+from memscal.model.arrays import FloatArray
 
 __all__ = ["Likelihood", "Standardised", "likelihood", "standardise"]
 

@@ -24,10 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import hyp0f1
 
-from memscal.estimation.forward import gaussian_transfer
+from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.validation import FloatArray
 
 __all__ = ["PressureShape", "film_transfer", "pressure_shapes"]
 

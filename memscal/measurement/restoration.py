@@ -2,30 +2,313 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from os import PathLike
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction
-from memscal.axisymmetry.hankel import RadialSpectrum
-from memscal.errors import InputError
+from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
+from memscal.errors import FitError, InputError
 from memscal.estimation.points import ScanPoints
-from memscal.measurement.comparison import (
-    Comparison,
-    Expected,
-    compare_stress,
-    read_expected,
-)
+from memscal.estimation.profile import CentreError, ProfileEstimate
 from memscal.measurement.posterior import Posterior, reach_of, sensor_transfer
-from memscal.model.checks import Message, QualityCheck
+from memscal.measurement.pressure import film_transfer
+from memscal.mechanics.contact import Contact
+from memscal.model.arrays import FloatArray
+from memscal.model.checks import Message, QualityCheck, chi_square_limit
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
 
-__all__ = ["Restoration"]
+__all__ = [
+    "SAME_LOAD",
+    "Comparison",
+    "Expected",
+    "Restoration",
+    "accept_mismatches",
+    "compare_stress",
+    "mismatches",
+    "read_expected",
+    "require_covariance",
+    "require_measurement",
+    "restored_or_explained",
+]
+
+#: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
+SAME_LOAD = 0.01
+#: Properties of one film agree within this share where no uncertainty is stated ...
+_SAME = {"young_modulus": 0.02, "poisson_ratio": 0.02, "thickness": 0.02}
+#: ... and within this many standard uncertainties of their difference where it is.
+_COVERAGE = 2.0
+_UNITS = {"young_modulus": ("MPa", 1e-6), "poisson_ratio": ("", 1.0), "thickness": ("mm", 1e3)}
+
+
+def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
+    """Refuse a scan and an apparatus function that do not belong together.
+
+    Raises
+    ------
+    InputError
+        If their sensors differ, the artifact's uncertainty is no number, or a
+        curved indenter was pressed at several loads.
+    """
+    _require_same_sensor(scan, apparatus)
+    require_covariance(apparatus)
+    load = scan.normal_load
+    if load is None or isinstance(scan.indenter, Rod):
+        return
+    low, high = float(np.nanmin(load)), float(np.nanmax(load))
+    if high - low > SAME_LOAD * scan.load:
+        raise InputError(
+            f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
+            why=f"The contact of a {scan.indenter.shape} grows with its load: each has a stress of "
+            "its own.",
+            cure="Give the scan of one load.",
+        )
+
+
+def restored_or_explained(estimate: Callable[[], ProfileEstimate]) -> ProfileEstimate:
+    """Return an estimate; where there is none, say so of a stress, not of a calibration.
+
+    Raises
+    ------
+    FitError
+        If the scan does not determine a stress.
+    """
+    try:
+        return estimate()
+    except CentreError:
+        raise
+    except FitError as failure:
+        raise FitError(
+            "The scan determines no stress at the base of the film.",
+            why="Its voltage does not rise clear of noise and baseline as the indenter passes one "
+            "centre, or the scan is too short to tell the profile's tail from the baseline.",
+            cure="Check channel and positions; scan farther; raise the load or average repeats.",
+        ) from failure
+
+
+def _require_same_sensor(scan: Scan, apparatus: ApparatusFunction) -> None:
+    ours, theirs = scan.sensor, apparatus.sensor
+    other_name = bool(ours.name and theirs.name and ours.name != theirs.name)
+    if other_name or ours.channel != theirs.channel:
+        raise InputError(
+            f"The scan is of sensor {ours.name or 'unnamed'} ({ours.channel}), the apparatus "
+            f"function of sensor {theirs.name or 'unnamed'} ({theirs.channel}).",
+            why="An apparatus function belongs to one sensor and channel.",
+            cure="Give the artifact of the scan's sensor; check /entry/instrument/stress_sensor.",
+        )
+
+
+def require_covariance(apparatus: ApparatusFunction) -> None:
+    """Refuse an apparatus function that does not say how well it is known.
+
+    Raises
+    ------
+    InputError
+        If the covariance of G or the uncertainty of A is missing or no number.
+    """
+    profile = apparatus.radial_profile
+    known = (
+        profile.g_covariance.shape == (profile.r.size, profile.r.size)
+        and np.isfinite(profile.g_covariance).all()
+        and np.isfinite(apparatus.parameters.uncertainty("conversion_constant"))
+    )
+    if not known:
+        raise InputError(
+            "The apparatus function does not state the covariance of G, or the uncertainty of A.",
+            why="The restored stress would have no uncertainty that means anything.",
+            cure="Calibrate again with memscal calibrate.",
+        )
+
+
+def mismatches(scan: Scan, apparatus: ApparatusFunction) -> tuple[str, ...]:
+    """Return in words what a scan and an artifact do not have in common."""
+    return (*_sensors(scan, apparatus), *_films(scan.film, apparatus.film))
+
+
+def accept_mismatches(
+    scan: Scan, apparatus: ApparatusFunction, place: str, *, override: bool
+) -> tuple[str, ...]:
+    """Refuse a scan of another sensor, channel or film; or accept it, and return what differs.
+
+    Raises
+    ------
+    InputError
+        If something differs and ``override`` is false, or the artifact is of a tangential channel.
+    """
+    if apparatus.order:
+        raise InputError(
+            f"The artifact is of the tangential channel {apparatus.sensor.channel}, but {place} is "
+            "to be read as normal stress.",
+            why="A shear is no normal stress: this cannot be overridden.",
+            cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
+        )
+    found = mismatches(scan, apparatus)
+    if found and not override:
+        raise InputError(
+            f"{place} does not belong to the artifact: {'; '.join(found)}.",
+            why="An apparatus function holds for one channel of one sensor, as it was calibrated "
+            "under its film.",
+            cure="Give the artifact of this sensor and film. If they are the same under other "
+            "names, override it (override=True; --override on the command line): that is recorded.",
+        )
+    return tuple(f"{place}: {text}" for text in found)
+
+
+def _sensors(scan: Scan, apparatus: ApparatusFunction) -> Iterator[str]:
+    ours, theirs = scan.sensor, apparatus.sensor
+    if ours.name and theirs.name and ours.name != theirs.name:
+        yield f'sensor "{ours.name}" in the scan, "{theirs.name}" in the artifact'
+    if ours.channel != theirs.channel:
+        yield f"channel {ours.channel} in the scan, {theirs.channel} in the artifact"
+
+
+def _films(ours: ElasticFilm, theirs: ElasticFilm) -> Iterator[str]:
+    if ours.name and theirs.name and ours.name != theirs.name:
+        yield f'film "{ours.name}" in the scan, "{theirs.name}" in the artifact'
+    for name, share in _SAME.items():
+        mine, its = getattr(ours, name), getattr(theirs, name)
+        spreads = [getattr(film, f"{name}_uncertainty") or 0.0 for film in (ours, theirs)]
+        allowed = max(share * its, _COVERAGE * math.hypot(*spreads))
+        if abs(mine - its) > allowed:
+            unit, factor = _UNITS[name]
+            values = [f"{value * factor:.4g} {unit}".rstrip() for value in (mine, its)]
+            words = name.replace("_", " ").replace("poisson ratio", "Poisson's ratio")
+            yield f"film {words} {values[0]} in the scan, {values[1]} in the artifact"
+
+
+Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
+"""A base stress to compare with, or the path of a file that holds one."""
+
+
+#: Coverage factor of 95 %.
+_EXPANDED = 1.96
+#: Below this share of the largest stress a difference matters to nobody.
+_NEGLIGIBLE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How a calculated stress agrees with what was measured.
+
+    Parameters
+    ----------
+    stress : StressProfile or Contact
+        What was calculated.
+    sigma_zz : ndarray, shape (n,)
+        It, at the restoration's radii, in Pa.
+    chi_square, degrees, limit, p_value : float
+        The direct way: reduced chi-square of the scan against the calculated stress convolved with
+        A G, its degrees of freedom, what it exceeds by chance once in a thousand, its p-value.
+    difference : float
+        Largest difference of the restored from the calculated stress, over the largest stress.
+    within : float
+        Share of the radii at which they agree within 1.96 standard uncertainties.
+    """
+
+    stress: StressProfile | Contact
+    sigma_zz: FloatArray
+    chi_square: float
+    degrees: int
+    limit: float
+    p_value: float
+    difference: float
+    within: float
+
+
+def compare_stress(
+    posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
+) -> Comparison:
+    """Compare a calculated stress, scaled to the scan's load, with scan and restoration.
+
+    Raises
+    ------
+    InputError
+        If the stress of a curved indenter was calculated for another load.
+    """
+    if not isinstance(scan.indenter, Rod) and abs(stress.load / scan.load - 1) > SAME_LOAD:
+        raise InputError(
+            f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",
+            why=f"The contact of a {scan.indenter.shape} grows with its load: stress is not "
+            "proportional to it.",
+            cure="Calculate the stress for the scan's load.",
+        )
+    estimate, nodes = posterior.estimate, posterior.nodes
+    model = estimate.model
+    spectrum = _per_newton(stress, model.k)
+    synthesis = model.reference.wavenumbers.synthesise(np.eye(nodes), r)
+    calculated = scan.load * (synthesis @ spectrum)
+    covariance = synthesis @ posterior.covariance[:nodes, :nodes] @ synthesis.T
+    peak = float(np.abs(calculated).max())
+    allowed = np.hypot(_EXPANDED * np.sqrt(np.maximum(np.diag(covariance), 0)), _NEGLIGIBLE * peak)
+    apart = np.abs(synthesis @ posterior.state[:nodes] - calculated)
+    chi_square, degrees = _direct(posterior, scan, spectrum)
+    return Comparison(
+        stress=stress,
+        sigma_zz=calculated,
+        chi_square=chi_square / degrees,
+        degrees=degrees,
+        limit=chi_square_limit(degrees) / degrees,
+        p_value=float(chdtrc(degrees, chi_square)),
+        difference=float(apart.max()) / peak,
+        within=float(np.mean(apart <= allowed)),
+    )
+
+
+def _per_newton(stress: StressProfile | Contact, k: FloatArray) -> FloatArray:
+    if isinstance(stress, Contact):
+        return stress.base_spectrum(k) / stress.load
+    return hankel_transform(stress.r, stress.sigma_zz, k) / stress.load
+
+
+def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[float, int]:
+    """Return chi-square of the scan against a calculated stress, and its degrees of freedom."""
+    estimate = posterior.estimate
+    model, points = estimate.model, estimate.points
+    free = points.free
+    centres = np.zeros(free.shape)
+    centres[free] = posterior.state[posterior.nodes : posterior.nodes + free.sum()]
+    geometry = model.geometry(centres)
+    pressure = spectrum / film_transfer(scan.film, model.k)
+    signal = model.signal(geometry, pressure)
+    columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
+    # The film is not part of the direct way: the calculated stress is at its base already.
+    added = np.hstack([posterior.shifts["apparatus"], posterior.shifts["position_scale"]])
+    if scan.load_uncertainty is not None:
+        share = scan.load_uncertainty / scan.load
+        added = np.column_stack([added, share * signal])
+    # A stated noise is taken at its word: raised by a misfit, it would hide it.
+    stated = points.u_errors is not None
+    root = estimate.noise_root * (1 / estimate.noise_scale if stated else posterior.noise_ratio)
+    covariance = root @ root.T + added @ added.T
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+    flat = np.linalg.qr(whiten @ np.hstack(columns))[0]
+    left = whiten @ (points.u - signal)
+    left = left - flat @ (flat.T @ left)
+    return float(left @ left), left.size - flat.shape[1]
+
+
+def read_expected(expected: Expected) -> StressProfile | Contact:
+    """Return a stress to compare with, read from its file where it is one."""
+    if isinstance(expected, str | PathLike):
+        from memscal.formats.reference import read_reference
+
+        return read_reference(expected)
+    if isinstance(expected, StressProfile | Contact):
+        return expected
+    raise InputError(
+        f"The expected stress is a {type(expected).__name__}.",
+        cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

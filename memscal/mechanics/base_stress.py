@@ -13,23 +13,60 @@ finite range of wavenumbers carries everything.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.quadrature import gauss_panels
+from memscal.axisymmetry.hankel import gauss_panels
 from memscal.mechanics import film_response as film
-from memscal.mechanics.traction import InterfaceTraction
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.validation import FloatArray
 
 __all__ = [
+    "HalfSpaceIntegrals",
+    "InterfaceTraction",
     "base_normal_spectrum",
     "base_normal_stress",
     "base_shear_spectrum",
     "base_shear_stress",
     "decay_radius",
 ]
+
+HalfSpaceIntegrals = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+r"""Four parts of a surface's displacements: depression by pressure and by shear, outward
+displacement by pressure and by shear."""
+
+
+class InterfaceTraction(Protocol):
+    r"""Axisymmetric pressure and radial shear on the film's surface, within ``radius``.
+
+    Whatever the indenter, the field in the film needs no more than these transforms.
+    """
+
+    @property
+    def radius(self) -> float:
+        """Radius outside which there is no traction, in m."""
+
+    def pressure(self, r: FloatArray) -> FloatArray:
+        """Return the pressure at the radii ``r`` (m), in Pa, positive in compression."""
+
+    def shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction on the film at ``r`` (m), in Pa, positive outward."""
+
+    def pressure_transform(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`\int p\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+
+    def shear_transform(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`\int q\,J_1(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+
+    def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
+        r"""Return what the displacements of a half-space's surface at ``r`` (m) are made of.
+
+        In Pa m: :math:`\int\hat p\,J_0(kr)\,dk`, :math:`\int\hat q\,J_0(kr)\,dk`,
+        :math:`\int\hat p\,J_1(kr)\,dk` and :math:`\int\hat q\,J_1(kr)\,dk`.
+        """
+
 
 # k h exp(-k h) is below 1e-15 here.
 _LARGEST_KH = 38.0

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import DomainError, InputError
+from memscal.mechanics.base_stress import InterfaceTraction
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.surface import FilmField, MeshedField
-from memscal.mechanics.traction import InterfaceTraction
+from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
 
 __all__ = ["Contact", "too_deep"]
 

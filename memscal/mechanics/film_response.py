@@ -34,7 +34,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = [
     "base_normal_from_pressure",

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ellipkm1, elliprd
 
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = ["coupling_integrals", "singular_integrals"]
 

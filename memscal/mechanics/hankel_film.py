@@ -13,9 +13,11 @@ from functools import cached_property
 import numpy as np
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.quadrature import gauss_panels
+from memscal.axisymmetry.hankel import gauss_panels
 from memscal.mechanics import film_response
 from memscal.mechanics.base_stress import (
+    HalfSpaceIntegrals,
+    InterfaceTraction,
     base_normal_spectrum,
     base_normal_stress,
     base_shear_spectrum,
@@ -24,9 +26,8 @@ from memscal.mechanics.base_stress import (
 from memscal.mechanics.half_space import coupling_integrals, singular_integrals
 from memscal.mechanics.rings import RingTraction, hat_transforms
 from memscal.mechanics.surface import SurfaceCompliance
-from memscal.mechanics.traction import HalfSpaceIntegrals, InterfaceTraction
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.validation import FloatArray
 
 __all__ = ["HankelField", "HankelFilm"]
 

@@ -10,16 +10,16 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact, too_deep
-from memscal.mechanics.finite_strain import press_at_finite_strain
+from memscal.mechanics.finite_strain.solve import press_at_finite_strain
 from memscal.mechanics.hankel_film import HankelField
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.rod import solve_rod
 from memscal.mechanics.solver.problem import Depth, Load, Target
-from memscal.mechanics.solver.request import RingRequest, solve_on_rings
+from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
+from memscal.model.arrays import FloatArray, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
-from memscal.model.validation import FloatArray, require_positive
-from memscal.threads import single_threaded
+from memscal.parallel import single_threaded
 
 __all__ = ["indent"]
 

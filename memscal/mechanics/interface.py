@@ -27,8 +27,8 @@ from typing import Protocol
 import numpy as np
 from scipy.special import gamma, pbdv
 
+from memscal.model.arrays import FloatArray, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
-from memscal.model.validation import FloatArray, require_non_negative, require_positive
 
 __all__ = ["ExponentialCompliance", "GreenwoodTripp", "Interface", "NormalLaw"]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.quadrature import gauss_between
+from memscal.axisymmetry.hankel import gauss_between
+from memscal.mechanics.base_stress import HalfSpaceIntegrals
 from memscal.mechanics.half_space import coupling_integrals, singular_integrals
-from memscal.mechanics.traction import HalfSpaceIntegrals
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = ["RingTraction", "hat_transforms"]
 

@@ -20,9 +20,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
-from memscal.model.validation import FloatArray
 
 __all__ = ["FilmField", "FilmModel", "MeshedField", "SurfaceCompliance"]
 

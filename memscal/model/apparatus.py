@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.model.arrays import FloatArray, freeze_arrays
 from memscal.model.checks import QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -15,7 +16,6 @@ from memscal.model.notation import format_measured
 from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray, freeze_arrays
 
 __all__ = [
     "ApparatusData",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import InputError
-from memscal.model.validation import FloatArray, freeze_arrays
+from memscal.model.arrays import FloatArray, freeze_arrays
 
 __all__ = ["FieldMesh"]
 

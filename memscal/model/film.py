@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from memscal.model.validation import require_non_negative, require_positive, require_range
+from memscal.model.arrays import require_non_negative, require_positive, require_range
 
 __all__ = ["ElasticFilm"]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.model.validation import (
+from memscal.model.arrays import (
     FloatArray,
     finite_vector,
     require_increasing,

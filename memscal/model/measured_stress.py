@@ -22,13 +22,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from memscal.model.arrays import FloatArray, frozen_array, same_content
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import StressSensor
-from memscal.model.validation import FloatArray, frozen_array, same_content
 
 __all__ = ["MeasuredPoints", "MeasuredProfile", "MeasuredScan", "MeasuredStress"]
 

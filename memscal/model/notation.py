@@ -7,7 +7,7 @@ from decimal import Decimal, localcontext
 
 from memscal.errors import InputError
 
-__all__ = ["format_bound", "format_measured"]
+__all__ = ["format_bound", "format_measured", "printable"]
 
 # Outside these powers of ten a factor reads better than a row of zeros.
 _PLAIN_EXPONENTS = range(-3, 5)
@@ -128,3 +128,17 @@ def format_bound(bound: float, *, upper: bool) -> str:
     outward = math.ceil(shifted) if upper else math.floor(shifted)
     digits = nearest if abs(shifted - nearest) < 1e-9 else outward
     return f"{digits * 10.0**-place:.{max(place, 0)}f}"
+
+
+def printable(value: object, limit: int) -> str:
+    r"""Return text without the characters that could steer a terminal.
+
+    Bytes are decoded as UTF-8 with replacement; line feeds and tabs stay.
+
+    Examples
+    --------
+    >>> printable(b"rod\x1b[2J\xff", 100)
+    'rod[2J\ufffd'
+    """
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return "".join(c for c in text[:limit] if c.isprintable() or c in "\n\t")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = ["EvenAxis", "Places", "even_lattice", "places_of"]
 

@@ -7,15 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.model.arrays import FloatArray, finite_vector, require_increasing, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
-from memscal.model.validation import (
-    FloatArray,
-    finite_vector,
-    require_increasing,
-    require_positive,
-)
 
 __all__ = ["StressProfile"]
 

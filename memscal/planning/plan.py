@@ -11,11 +11,11 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
 from memscal.estimation.reference import reference_contact
-from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD, simulate
+from memscal.model.arrays import require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
-from memscal.model.validation import require_non_negative, require_positive
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 
 __all__ = ["MOST_POSITIONS", "Plan"]
 

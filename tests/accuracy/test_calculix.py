@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from accuracy.calculix import Film, PressedSphere, press_rod, press_sphere
-from accuracy.contact_edge import contact_radius
+from helpers.calculix import Film, PressedSphere, press_rod, press_sphere
+from helpers.contact_edge import contact_radius
 
 import memscal
 

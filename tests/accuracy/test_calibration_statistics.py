@@ -10,9 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from accuracy.bounds import cramer_rao, root_mean_square_limit
-from peers import tuned_wiener
-from scans import CONVERSION, SIGMA, plane_error, simulated
+from helpers.bounds import cramer_rao, root_mean_square_limit
+from helpers.peers import tuned_wiener
+from helpers.scans import CONVERSION, SIGMA, plane_error, simulated
 from scipy.stats import chi2
 
 import memscal

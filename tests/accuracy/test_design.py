@@ -14,9 +14,9 @@ import pytest
 from scipy.stats import chi2
 
 import memscal
-from memscal.laboratory.rod_scan import PAPER_FILM
 from memscal.model.apparatus import ParameterSet
 from memscal.planning.plan import Plan
+from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 

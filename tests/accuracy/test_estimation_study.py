@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from accuracy.bounds import root_mean_square_limit
-from accuracy.estimation_study import (
+from helpers.bounds import root_mean_square_limit
+from helpers.estimation_study import (
     BANDS,
     CASES,
     EFFICIENCY,

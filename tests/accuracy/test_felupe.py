@@ -18,8 +18,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import j0
 
-from memscal.mechanics.elements.finite_strain import solve_finite_strain
-from memscal.mechanics.elements.finite_strain_state import FiniteStrainState
+from memscal.mechanics.finite_strain.solve import solve_finite_strain
+from memscal.mechanics.finite_strain.state import FiniteStrainState
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod

@@ -15,7 +15,7 @@ import pytest
 from scipy.stats import binom
 
 import memscal
-from memscal.measurement.stress_checks import pooled_force
+from memscal.measurement.measure_stress import pooled_force
 
 pytestmark = pytest.mark.accuracy
 

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 import pytest
-from accuracy.friction_study import CHANCE, FRICTIONS, FULL, SEEDS, outcome, outcomes, share
+from helpers.friction_study import CHANCE, FRICTIONS, FULL, SEEDS, outcome, outcomes, share
 from scipy.stats import binom, kstest
 
 pytestmark = pytest.mark.accuracy

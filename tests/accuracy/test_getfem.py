@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from accuracy.contact_edge import contact_radius, load_beyond
-from timing import once
+from helpers.contact_edge import contact_radius, load_beyond
+from helpers.timing import once
 
 import memscal
-from memscal.mechanics.solver.request import solve_on_rings
+from memscal.mechanics.solver.refinement import solve_on_rings
 
 FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 STEP, LAYERS = (0.05, 8) if FULL else (0.1, 5)

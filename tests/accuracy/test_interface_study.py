@@ -20,13 +20,13 @@ from scipy.stats import binom
 
 import memscal
 from memscal.friction.calculated import amontons_family, elasto_plastic_family
-from memscal.friction.compliance import compare_interface
-from memscal.friction.compliance_results import LawComparison
 from memscal.friction.family import ProfileFamily
-from memscal.laboratory.contact_scan import PAPER_LOADS, PAPER_SPHERE
-from memscal.laboratory.rod_scan import PAPER_FILM
+from memscal.friction.model_comparison import compare_interface
+from memscal.friction.results import LawComparison
 from memscal.mechanics.interface import Interface
 from memscal.model.film import ElasticFilm
+from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
+from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 

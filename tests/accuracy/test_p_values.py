@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scans import CONVERSION, RING, SIGMA, TAILS, estimated, simulated
+from helpers.scans import CONVERSION, RING, SIGMA, TAILS, estimated, simulated
 from scipy.special import j0, j1
 from scipy.stats import binom, kstest
 

@@ -12,9 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scans import EXACT_FILM, RING, TAILS, plane_error, simulated
+from helpers.scans import EXACT_FILM, RING, TAILS, plane_error, simulated
+from helpers.spheres import GAUSSIAN, known_apparatus, pressed, sphere_scan
 from scipy.stats import binom
-from spheres import GAUSSIAN, known_apparatus, pressed, sphere_scan
 
 import memscal
 

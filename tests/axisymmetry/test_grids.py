@@ -11,7 +11,7 @@ from scipy.signal import fftconvolve
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -11,14 +11,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import j0, j1, jv
 
-from memscal.axisymmetry.hankel import (
-    RadialSpectrum,
-    Wavenumbers,
-    hankel_transform,
-    radial_spline,
-)
+from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform, radial_spline
 from memscal.errors import InputError
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 K = np.linspace(0.05, 20.0, 60)
 

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.rounding import assert_same_to_rounding
 from hypothesis import given
 from hypothesis import strategies as st
-from rounding import assert_same_to_rounding
 
 from memscal import GaussianMixture, SmoothedDisc
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 
 @given(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import j0
 
-from memscal.axisymmetry.quadrature import gauss_panels
+from memscal.axisymmetry.hankel import gauss_panels
 
 
 @given(

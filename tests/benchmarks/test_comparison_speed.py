@@ -6,12 +6,12 @@ from statistics import median
 
 import numpy as np
 import pytest
-from friction.linear_contacts import Laboratory
-from timing import once, show
+from helpers.linear_contacts import Laboratory
+from helpers.timing import once, show
 
 from memscal.friction.effective import fine_values
 from memscal.friction.likelihood import likelihood
-from memscal.friction.predicted import members_of
+from memscal.friction.prediction import members_of
 
 
 @pytest.mark.benchmark

@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.timing import once, show, turns
 from scipy.integrate import quad
 from scipy.optimize import nnls
 from scipy.special import ellipk
-from timing import once, show, turns
 
 from memscal.mechanics.hankel_film import HankelFilm
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.path import follow
 from memscal.mechanics.solver.problem import ContactProblem, Depth, Load
-from memscal.mechanics.solver.request import RingRequest, solve_on_rings
+from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
-from memscal.model.validation import FloatArray
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = Sphere(radius=128.8e-3)

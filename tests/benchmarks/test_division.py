@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.timing import show, turns
 from scipy.optimize import curve_fit
-from timing import show, turns
 
 import memscal
 from memscal.axisymmetry.grids import EvenGrid
-from memscal.deconvolution.problem import DivisionProblem
-from memscal.deconvolution.white_noise import WhiteNoise
+from memscal.deconvolution.division import DivisionProblem
+from memscal.deconvolution.windows import WhiteNoise
+from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
 
 WIDTH = 16e-3
 STRESS_WIDTH, BLURRED_WIDTH = 0.9e-3, 1.06e-3

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 
 import pytest
-from timing import once, show
+from helpers.timing import once, show
 
 import memscal
 

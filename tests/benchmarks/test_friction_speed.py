@@ -6,11 +6,11 @@ from pathlib import Path
 from statistics import median
 
 import pytest
-from timing import once, show
+from helpers.timing import once, show
 
 from memscal.friction.calculated import amontons_family
 from memscal.friction.family import ProfileFamily
-from memscal.mechanics.solver.request import solve_on_rings
+from memscal.mechanics.solver.refinement import solve_on_rings
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
 

@@ -17,12 +17,12 @@ from time import perf_counter
 
 import numpy as np
 import pytest
-from peers import PEERS, RADII, Kernel
-from scans import RING, TAILS, plane_error, simulated
+from helpers.peers import PEERS, RADII, Kernel
+from helpers.scans import RING, TAILS, plane_error, simulated
 
 import memscal
+from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
-from memscal.model.validation import FloatArray
 
 pytestmark = pytest.mark.benchmark
 

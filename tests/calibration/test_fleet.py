@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scans import simulated
+from helpers.scans import simulated
 
 import memscal
-from memscal.calibration import fleet
-from memscal.calibration.fleet import FleetCalibration
-from memscal.calibration.workers import worker_pool
+from memscal.calibration import many as fleet
+from memscal.calibration.many import FleetCalibration
 from memscal.model.scan import Scan
+from memscal.parallel import worker_pool
 
 
 def scans(count: int) -> list[Scan]:

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import RING, SIGMA
+from helpers.scans import RING, SIGMA
 
 from memscal import fit_gaussian, lift
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.functionals import kernel_functionals
-from memscal.estimation.forward import unit_gaussian
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 R = np.linspace(0.0, 8e-3, 97)
 

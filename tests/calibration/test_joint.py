@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, simulated
+from helpers.scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, simulated
 from scipy.stats import chi2
 
 import memscal

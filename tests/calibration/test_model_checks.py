@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scans import RING, TAILS, simulated
+from helpers.scans import RING, TAILS, simulated
 
 import memscal
 from memscal.model.checks import QualityCheck

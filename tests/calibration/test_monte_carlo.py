@@ -5,19 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import EXACT_FILM, EXACT_ROD, TAILS, simulated
-from shears import shear_scan
+from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, simulated
+from helpers.shears import shear_scan
 
 import memscal
-from memscal.calibration.drawn_scans import DrawnScans
-from memscal.calibration.monte_carlo import shortest_interval
-from memscal.calibration.procedure import Calibration
+from memscal.calibration.calibrate import Calibration
+from memscal.calibration.monte_carlo import DrawnScans, shortest_interval
 from memscal.calibration.uncertainty import BUDGETED
-from memscal.deconvolution.problem import Division, DivisionProblem
-from memscal.deconvolution.registry import create_regulariser
+from memscal.deconvolution.division import Division, DivisionProblem, create_regulariser
 from memscal.errors import FitError
-from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.model.scan import Scan
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 
 def uncertain(**options: object) -> Calibration:

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rounding import assert_same_to_rounding
-from scans import CONVERSION, RING, SIGMA, TAILS, as_points, plane_error, simulated
+from helpers.rounding import assert_same_to_rounding
+from helpers.scans import CONVERSION, RING, SIGMA, TAILS, as_points, plane_error, simulated
 
 import memscal
 from memscal.calibration import fields as fields_room
 from memscal.calibration.fields import GridChoice
-from memscal.deconvolution.registry import regulariser_names
-from memscal.deconvolution.tikhonov import Tikhonov
+from memscal.deconvolution.division import regulariser_names
+from memscal.deconvolution.windows import Tikhonov
 from memscal.errors import InputError
 from memscal.model.checks import QualityCheck
 
@@ -63,7 +63,7 @@ def test_the_result_does_not_depend_on_the_grid(monkeypatch, spacing, extent) ->
         cells = np.ceil(choice.support / (choice.spacing * spacing))
         return replace(choice, spacing=choice.support / cells, extent=choice.extent * extent)
 
-    monkeypatch.setattr("memscal.calibration.solution.choose_grid", other)
+    monkeypatch.setattr("memscal.calibration.stages.choose_grid", other)
     changed = memscal.calibrate(scan).apparatus
     for name in ("conversion_constant", "gaussian_sigma_deconvolved"):
         assert changed.parameters[name] == pytest.approx(usual.parameters[name], rel=2e-4)

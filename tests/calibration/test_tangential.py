@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rounding import assert_same_to_rounding
+from helpers.rounding import assert_same_to_rounding
+from helpers.shears import CENTRE, CONVERSION, SIGMA, shear_scan
 from scipy.stats import binom, norm
-from shears import CENTRE, CONVERSION, SIGMA, shear_scan
 
 import memscal
 from memscal.axisymmetry.kernels import GaussianMixture
-from memscal.calibration.procedure import Calibration
+from memscal.calibration.calibrate import Calibration
 from memscal.errors import InputError
 from memscal.model.checks import QualityCheck
 from memscal.model.scan import Scan

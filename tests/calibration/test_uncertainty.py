@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import TAILS, simulated
+from helpers.scans import TAILS, simulated
 
 import memscal
-from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 PARAMETERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
 

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from console import Outcome, Run
+from helpers.console import Outcome, Run
 
 import memscal
 from memscal.cli import main

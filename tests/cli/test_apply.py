@@ -8,9 +8,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from console import Run, names
-from contacts import contact_scan
-from spheres import known_apparatus
+from helpers.console import Run, names
+from helpers.contacts import contact_scan
+from helpers.spheres import known_apparatus
 
 import memscal
 from memscal.cli.failures import CHECK_FAILED

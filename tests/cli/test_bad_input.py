@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from console import Run, names
+from helpers.console import Run, names
 
 import memscal
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from console import Run, names
+from helpers.console import Run, names
 
 OLD = b"an artifact from last week"
 
@@ -28,7 +28,7 @@ def no_computing(monkeypatch: pytest.MonkeyPatch) -> None:
     def reached(*_: object, **__: object) -> None:
         raise AssertionError("The calibration was reached.")
 
-    monkeypatch.setattr("memscal.calibration.procedure.calibrate", reached)
+    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", reached)
 
 
 def failing_after(count: int, code: int, original: Callable[..., object]) -> Callable[..., object]:
@@ -165,7 +165,7 @@ def test_an_internal_error_is_owned_up_to_without_a_traceback(
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("the flux capacitor\nis empty")
 
-    monkeypatch.setattr("memscal.calibration.procedure.calibrate", broken)
+    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", broken)
     failed = run("calibrate", scan)
     assert failed.code == 70
     assert "memscal itself failed" in failed.err
@@ -185,7 +185,7 @@ def test_running_out_of_memory_is_said_plainly(
     def greedy(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("memscal.calibration.procedure.calibrate", greedy)
+    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", greedy)
     failed = run("calibrate", scan)
     assert failed.code == 70
     assert "out of memory" in failed.err
@@ -196,7 +196,7 @@ def test_a_python_warning_becomes_one_line_of_words(
 ) -> None:
     import warnings
 
-    from memscal.calibration.procedure import calibrate
+    from memscal.calibration.calibrate import calibrate
 
     def warning(*given: object, **options: object) -> object:
         with warnings.catch_warnings():
@@ -204,7 +204,7 @@ def test_a_python_warning_becomes_one_line_of_words(
             warnings.warn("the film is old", UserWarning, stacklevel=1)
         return calibrate(*given, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("memscal.calibration.procedure.calibrate", warning)
+    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", warning)
     done = run("calibrate", scan)
     assert done.code == 0
     assert "Warning: UserWarning: the film is old" in done.err.splitlines()
@@ -214,13 +214,13 @@ def test_a_python_warning_becomes_one_line_of_words(
 def test_a_file_that_appears_during_the_computing_is_not_replaced(
     run: Run, scan: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    from memscal.calibration.procedure import calibrate
+    from memscal.calibration.calibrate import calibrate
 
     def slow(*given: object, **options: object) -> object:
         (folder / name).write_bytes(b"of another program")
         return calibrate(*given, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("memscal.calibration.procedure.calibrate", slow)
+    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", slow)
     refused = run("calibrate", scan, "-o", "out.h5", "--figure", "out.png")
     assert refused.code == 4
     assert (folder / name).read_bytes() == b"of another program"

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from console import Run, names
-from friction_results import comparison, interface_comparison
-from spheres import known_apparatus
+from helpers.console import Run, names
+from helpers.friction_results import comparison, interface_comparison
+from helpers.spheres import known_apparatus
 
 import memscal
+from memscal.cli.compare import cache_from, user_cache_folder
 from memscal.cli.failures import CHECK_FAILED
-from memscal.cli.user_cache import cache_from, user_cache_folder
-from memscal.laboratory.contact_scan import PAPER_SPHERE
-from memscal.laboratory.experiment import simulate_experiment
-from memscal.laboratory.rod_scan import PAPER_FILM
 from memscal.model.scan import Scan, StressSensor
+from memscal.simulation.contact_scan import PAPER_SPHERE
+from memscal.simulation.experiment import simulate_experiment
+from memscal.simulation.rod_scan import PAPER_FILM
 
 CHECKED, USAGE, REFUSED, NOT_WRITTEN = CHECK_FAILED, 2, 3, 4
 MU = 0.15
@@ -64,7 +64,7 @@ def made_by_hand(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
                 asked.update(options)
             return comparison(lubrications=("dry",), loads=(1.37,)) if found is None else found
 
-        monkeypatch.setattr("memscal.friction.procedure.compare", compare)
+        monkeypatch.setattr("memscal.friction.compare.compare", compare)
 
     return give
 
@@ -332,7 +332,7 @@ def test_a_folder_that_cannot_be_made_is_known_before_computing(
     def reached(*_: object, **__: object) -> None:
         raise AssertionError("The comparison was reached.")
 
-    monkeypatch.setattr("memscal.friction.procedure.compare", reached)
+    monkeypatch.setattr("memscal.friction.compare.compare", reached)
     assert compare("--figures", "no/such/folder").code == NOT_WRITTEN
 
 

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_results import FRICTION, LOADS, comparison, interface_comparison
+from helpers.friction_results import FRICTION, LOADS, comparison, interface_comparison
 
 import memscal
-from memscal.cli.compare_json import comparison_json
-from memscal.cli.compare_notes import comparison_notes
-from memscal.cli.compare_view import comparison_tables
-from memscal.cli.friction_text import bounded_text
 from memscal.friction.results import EffectiveFriction, FrictionComparison, Interval
 from memscal.model.checks import QualityCheck, failed_check_messages
 from memscal.model.provenance import SourceFile
+from memscal.summaries.comparison import comparison_json, comparison_notes, comparison_tables
+from memscal.summaries.interface_laws import bounded_text
 
 ARTIFACT = SourceFile("sensor.apparatus.h5", "cd" * 32)
 

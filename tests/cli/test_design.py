@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from console import Run, names
+from helpers.console import Run, names
 
 import memscal
 

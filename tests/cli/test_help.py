@@ -6,11 +6,11 @@ import re
 
 import click
 import pytest
-from console import Run
+from helpers.console import Run
 
 from memscal.cli import main
 from memscal.cli.commands import COMMANDS, memscal
-from memscal.cli.targets import FIGURE_SUFFIXES
+from memscal.cli.output import FIGURE_SUFFIXES
 from memscal.version import __version__
 
 
@@ -120,6 +120,6 @@ def test_words_are_completed(
 
 
 def test_figures_end_as_the_room_that_draws_them_allows() -> None:
-    from memscal.figures.render import FIGURE_SUFFIXES as DRAWN
+    from memscal.figures.style import FIGURE_SUFFIXES as DRAWN
 
     assert FIGURE_SUFFIXES == DRAWN

@@ -9,8 +9,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from console import Run, names
-from meshes import RADII, block, pressure, section
+from helpers.console import Run, names
+from helpers.meshes import RADII, block, pressure, section
 
 import memscal
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from console import Run
+from helpers.console import Run
 
 from memscal.formats.inspection import describe
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from console import Run
+from helpers.console import Run
 
 import memscal
 

@@ -8,9 +8,8 @@ import time
 
 import pytest
 
-from memscal.cli.output import readable
-from memscal.cli.progress import working
-from memscal.cli.tables import Table, emit_tables
+from memscal.cli.output import emit_tables, working
+from memscal.summaries.table import Table, readable
 
 
 class Terminal(io.StringIO):
@@ -81,7 +80,7 @@ def test_progress_appears_when_work_is_long_and_leaves_no_trace(
 ) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setattr("memscal.cli.progress._FIRST_AFTER", 0.0)
+    monkeypatch.setattr("memscal.cli.output._FIRST_AFTER", 0.0)
     with working("Sweeping"):
         while "Sweeping" not in terminal.getvalue():
             time.sleep(0.001)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from console import Run, names
+from helpers.console import Run, names
 
 import memscal
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from console import Run, names
-from spheres import known_apparatus, pressed, sphere_scan
+from helpers.console import Run, names
+from helpers.spheres import known_apparatus, pressed, sphere_scan
 
 import memscal
 from memscal.cli.failures import CHECK_FAILED

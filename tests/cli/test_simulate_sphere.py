@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from console import Run, names
+from helpers.console import Run, names
 
 import memscal
-from memscal.cli.simulate_sphere import FILES
+from memscal.cli.simulate import FILES
 from memscal.formats.inspection import check
 
 SPHERE = ("simulate", "--experiment", "sphere")

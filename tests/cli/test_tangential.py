@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from console import Run, names
-from shears import CONVERSION, shear_scan
+from helpers.console import Run, names
+from helpers.shears import CONVERSION, shear_scan
 
 import memscal
 

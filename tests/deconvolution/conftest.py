@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
-from memscal.deconvolution.problem import Division, DivisionProblem
-from memscal.model.validation import FloatArray
+from memscal.deconvolution.division import Division, DivisionProblem
+from memscal.model.arrays import FloatArray
 
 A = 3e-8
 STRESS_WIDTH, KERNEL_WIDTH = 0.9e-3, 0.561e-3

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from scipy.special import expm1
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
-from memscal.deconvolution.problem import DivisionProblem, filtered_division, image_division
-from memscal.deconvolution.tikhonov import Tikhonov
-from memscal.deconvolution.white_noise import WhiteNoise
-from memscal.model.validation import FloatArray
+from memscal.deconvolution.division import DivisionProblem, filtered_division, image_division
+from memscal.deconvolution.windows import Tikhonov, WhiteNoise
+from memscal.model.arrays import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)
 

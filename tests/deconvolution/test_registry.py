@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import memscal
-from memscal.deconvolution.registry import create_regulariser, regulariser_names
+from memscal.deconvolution.division import create_regulariser, regulariser_names
 from memscal.errors import InputError
 
 PLUG_IN = '''
@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from memscal.deconvolution.problem import filtered_division
+from memscal.deconvolution.division import filtered_division
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +107,7 @@ def test_a_plug_in_is_created_with_its_options_and_without_the_seed() -> None:
 @pytest.mark.usefixtures("plug_in")
 def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
     regulariser = create_regulariser("tikhonov")
-    assert type(regulariser).__module__ == "memscal.deconvolution.tikhonov"
+    assert type(regulariser).__module__ == "memscal.deconvolution.windows"
 
 
 @pytest.mark.usefixtures("plug_in")

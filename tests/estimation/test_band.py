@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scans import RING, TAILS, estimated, simulated
+from helpers.scans import RING, TAILS, estimated, simulated
 from scipy.special import j0
 
 import memscal
 from memscal.estimation.band import _ring_areas, find_band, transfer_uncertainty
-from memscal.estimation.departure import SHAPES
-from memscal.estimation.evidence import HYPOTHESES
-from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.estimation.bayesian import HYPOTHESES
+from memscal.estimation.departures import SHAPES
+from memscal.estimation.profile import ProfileEstimate
 
 
 @pytest.mark.parametrize("options", [{}, {"repeats": 3}, {"centre": (1.3e-3, 0.0)}])

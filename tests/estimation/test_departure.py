@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scans import CONVERSION, SIGMA, estimated, simulated
+from helpers.scans import CONVERSION, SIGMA, estimated, simulated
 
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.estimation.departure import SHAPES, Rings
+from memscal.estimation.departures import SHAPES, Rings
 
 NODES = Wavenumbers.covering(60e3, 12e-3)
 

@@ -7,13 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scans import CONVERSION, SIGMA, estimated, simulated
+from helpers.scans import CONVERSION, SIGMA, estimated, simulated
 from scipy.signal import fftconvolve
 from scipy.stats import chi2
 
 import memscal
-from memscal.estimation.ellipse import elliptic_columns, elliptic_departure
-from memscal.estimation.forward import unit_gaussian
+from memscal.axisymmetry.kernels import unit_gaussian
+from memscal.estimation.forward import elliptic_columns, elliptic_departure
 from memscal.model.scan import Scan
 
 SEEDS = 20

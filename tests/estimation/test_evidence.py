@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rounding import assert_same_to_rounding
-from scans import CONVERSION, RING, SIGMA, TAILS, estimated, plane_error, simulated
+from helpers.rounding import assert_same_to_rounding
+from helpers.scans import CONVERSION, RING, SIGMA, TAILS, estimated, plane_error, simulated
 from scipy.stats import multivariate_normal
 
 import memscal
 from memscal.errors import InputError
-from memscal.estimation.constrained import constrained_profile
-from memscal.estimation.evidence import HYPOTHESES
+from memscal.estimation.bayesian import HYPOTHESES
+from memscal.estimation.profile import constrained_profile
 
 R = np.linspace(0.0, 3e-3, 121)
 DISC = memscal.SmoothedDisc(0.8e-3, 0.3e-3)
@@ -35,7 +35,7 @@ def test_log_evidence_ratios_are_those_of_the_marginal_likelihood() -> None:
     null = q[:, basis.flat :]
     rest = null.T @ (root * (estimate.points.u - fit.predicted))
     voltages = model.signal(fit.geometry, basis.kernels(model.k)) * root[:, None]
-    from memscal.estimation.departure import SHAPES
+    from memscal.estimation.departures import SHAPES
 
     for i in (1, 5, len(HYPOTHESES) - 1):
         hypothesis = HYPOTHESES[i]
@@ -126,8 +126,7 @@ def test_without_constraints_the_profile_is_the_posterior_mean() -> None:
 
 def test_the_method_needs_a_scan_and_says_so() -> None:
     from memscal.axisymmetry.grids import EvenGrid
-    from memscal.deconvolution.problem import DivisionProblem
-    from memscal.deconvolution.registry import create_regulariser
+    from memscal.deconvolution.division import DivisionProblem, create_regulariser
 
     grid = EvenGrid(9, 1e-3)
     field = np.ones((9, 9))

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.scans import CONVERSION, simulated
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scans import CONVERSION, simulated
 
 import memscal
+from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
-from memscal.estimation.forward import ForwardModel, gaussian_transfer
-from memscal.estimation.gaussian_fit import fit_gaussian
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectrum
 from memscal.model.scan import Scan

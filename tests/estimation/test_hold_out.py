@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import estimated, simulated
+from helpers.scans import estimated, simulated
 from scipy.stats import binom, chi2
 
-from memscal.estimation.free_model import free_model
-from memscal.estimation.hold_out import hold_out, load_groups
+from memscal.estimation.assumptions import hold_out, load_groups
+from memscal.estimation.residuals import free_model
 
 
 def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covariance() -> None:

@@ -6,14 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import estimated, simulated
+from helpers.scans import estimated, simulated
 from scipy.stats import binom, chi2
 
-from memscal.estimation.hypotheses import (
-    axisymmetry_test,
-    linearity_test,
-    symmetry_test,
-)
+from memscal.estimation.assumptions import axisymmetry_test, linearity_test, symmetry_test
 from memscal.model.checks import chi_square_limit
 
 

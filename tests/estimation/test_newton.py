@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from memscal.estimation.newton import gauss_newton
-from memscal.model.validation import FloatArray
+from memscal.estimation.gaussian import gauss_newton
+from memscal.model.arrays import FloatArray
 
 X = np.linspace(0.0, 4.0, 60)
 TRUTH = np.array([1.3, 0.7, 0.1])

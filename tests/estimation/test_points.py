@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import simulated
+from helpers.scans import simulated
 
 import memscal
 from memscal.errors import FitError, InputError

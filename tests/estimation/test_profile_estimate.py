@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import CONVERSION, RING, estimated, simulated
+from helpers.scans import CONVERSION, RING, estimated, simulated
 from scipy.stats import chi2
 
 import memscal
@@ -86,7 +86,7 @@ def test_noise_alone_is_no_calibration(seed: int) -> None:
 def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     scan = simulated(kernel=RING, noise=0.002, state_noise=False)
     estimate = estimated(scan)
-    from memscal.estimation.evidence import weigh_departures
+    from memscal.estimation.bayesian import weigh_departures
 
     change = np.zeros_like(scan.u_zz)
     change[30] = 1e-3 * estimate.weighed.noise

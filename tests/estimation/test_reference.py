@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import simulated
+from helpers.scans import simulated
 
 import memscal
 from memscal.errors import InputError
@@ -18,8 +18,8 @@ from memscal.estimation.reference import (
     require_calibration_rod,
     rod_sensitivities,
 )
-from memscal.laboratory.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.mechanics.contact import Contact
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 SCAN = simulated(film=PAPER_FILM, rod=PAPER_ROD)
 POINTS = measured_points(SCAN)

@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scans import RING, TAILS, as_points, estimated, simulated
+from helpers.scans import RING, TAILS, as_points, estimated, simulated
 from scipy.stats import binom, chi2, f
 
 import memscal
-from memscal.estimation.free_model import free_model
-from memscal.estimation.profile_estimate import ProfileEstimate
+from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.residuals import (
     Residuals,
     _neighbours,
     _traces,
     chi_square_test,
+    free_model,
     neighbour_correlation_test,
     pure_error_test,
     residuals_of,

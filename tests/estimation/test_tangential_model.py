@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shears import CENTRE, shear_scan
+from helpers.shears import CENTRE, shear_scan
 
 import memscal
 from memscal.axisymmetry.kernels import GaussianMixture
@@ -14,8 +14,8 @@ from memscal.errors import InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.reference import carried_force, reference_spectra
+from memscal.model.arrays import FloatArray
 from memscal.model.stress import StressProfile
-from memscal.model.validation import FloatArray
 
 KERNEL = GaussianMixture((1.4, -0.4), (450e-6, 250e-6))
 

@@ -8,7 +8,7 @@ import pytest
 import memscal
 from memscal.errors import InputError
 from memscal.figures.design import design_figure
-from memscal.planning.outcome import Design
+from memscal.planning.expected import Design
 
 
 @pytest.fixture(scope="module")

@@ -6,18 +6,22 @@ import math
 
 import numpy as np
 import pytest
-from friction_results import FRICTION, LOADS, comparison, interface_comparison, stress
+from helpers.friction_results import FRICTION, LOADS, comparison, interface_comparison, stress
 from matplotlib.axes import Axes
 
-from memscal.cli.compare_outputs import figure_stems
+from memscal.cli.compare import figure_stems
 from memscal.errors import InputError
-from memscal.figures.friction import comparison_figure, comparison_figures
-from memscal.figures.friction_interface import interface_figure, length_position
-from memscal.figures.friction_maxima import maxima_figure
+from memscal.figures.friction import (
+    comparison_figure,
+    comparison_figures,
+    interface_figure,
+    length_position,
+    maxima_figure,
+)
 from memscal.figures.friction_profiles import friction_set_figure, profile_figure
 from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
 from memscal.figures.friction_scale import friction_position, load_looks, on_axis
-from memscal.figures.render import render_figure
+from memscal.figures.style import render_figure
 from memscal.friction.results import FrictionComparison
 
 

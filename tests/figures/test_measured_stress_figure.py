@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contacts import contact_scan
+from helpers.contacts import contact_scan
+from helpers.spheres import known_apparatus
 from matplotlib.axes import Axes
-from spheres import known_apparatus
 
 import memscal
-from memscal.figures.measured_stress import measured_stress_figure
-from memscal.figures.render import render_figure
+from memscal.figures.stress import measured_stress_figure
+from memscal.figures.style import render_figure
 from memscal.model.measured_stress import MeasuredStress
 
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spheres import known_apparatus, pressed, sphere_scan
+from helpers.spheres import known_apparatus, pressed, sphere_scan
 
 import memscal
-from memscal.figures.render import render_figure
-from memscal.figures.restoration import restoration_figure
+from memscal.figures.stress import restoration_figure
+from memscal.figures.style import render_figure
 from memscal.measurement.restoration import Restoration
 
 

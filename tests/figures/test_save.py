@@ -11,8 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from memscal.errors import InputError, OutputError
-from memscal.figures.render import render_figure
-from memscal.figures.save import save_figure
+from memscal.figures.style import render_figure, save_figure
 
 
 def test_a_png_has_its_signature_and_at_least_150_dots_per_inch(drawn, tmp_path):
@@ -72,7 +71,7 @@ def test_drawing_needs_no_pyplot_and_the_rest_no_matplotlib():
     code = (
         "import sys, memscal.figures, memscal.model.notation\n"
         "assert 'matplotlib' not in sys.modules\n"
-        "import memscal.figures.save, memscal.figures.report, memscal.figures.sweep\n"
+        "import memscal.figures.style, memscal.figures.report, memscal.figures.sweep\n"
         "assert 'matplotlib.figure' in sys.modules\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )

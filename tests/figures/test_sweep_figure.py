@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from memscal.figures.render import render_figure
+from memscal.figures.style import render_figure
 from memscal.figures.sweep import sweep_figure
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

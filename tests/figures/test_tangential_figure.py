@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.shears import shear_scan
 from matplotlib.figure import Figure
-from shears import shear_scan
 
 import memscal
 from memscal.figures.calibration import calibration_figure
-from memscal.figures.scan_panels import draw_scan, draw_scan_log
+from memscal.figures.scan import draw_scan, draw_scan_log
 from memscal.model.apparatus import ApparatusData
 
 

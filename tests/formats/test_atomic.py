@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import make_profile, make_scan
+from helpers.builders import make_profile, make_scan
 
 from memscal.errors import OutputError
-from memscal.formats.atomic import atomic_write_bytes, ensure_writable
+from memscal.formats.files import atomic_write_bytes, ensure_writable
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import read_scan, write_scan
 
@@ -122,7 +122,7 @@ def test_an_interrupt_leaves_no_temporary_file(target: Path, monkeypatch: pytest
 def test_a_process_killed_before_the_last_step_leaves_the_old_output(target: Path):
     script = (
         "import os, signal, sys\n"
-        "from memscal.formats.atomic import atomic_write_bytes\n"
+        "from memscal.formats.files import atomic_write_bytes\n"
         "os.replace = lambda *names: os.kill(os.getpid(), signal.SIGKILL)\n"
         "atomic_write_bytes(sys.argv[1], b'new' * 1000, overwrite=True)\n"
     )

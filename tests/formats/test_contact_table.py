@@ -12,16 +12,15 @@ import numpy as np
 import pytest
 
 from memscal.errors import FormatError
-from memscal.formats import contact_table
-from memscal.formats.contact_table import (
+from memscal.formats import cache as contact_table
+from memscal.formats.cache import (
     ContactTable,
     clear_contact_tables,
     find_contact_table,
     keep_contact_table,
     table_key,
 )
-from memscal.formats.hdf5_writer import file_tree, write_tree
-from memscal.formats.tree import Group
+from memscal.formats.hdf5.writer import Group, file_tree, write_tree
 
 KEY = table_key({"load": 0.34})
 

@@ -14,14 +14,14 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from builders import make_artifact, make_scan
+from helpers.builders import make_artifact, make_scan
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
-from memscal.formats import hdf5_reader
 from memscal.formats.artifact import read_artifact, write_artifact
-from memscal.formats.hdf5_lengths import attribute_text_lengths
+from memscal.formats.hdf5 import reader as hdf5_reader
+from memscal.formats.hdf5.limits import attribute_text_lengths
 from memscal.formats.scan import read_scan, write_scan
 
 SIGNAL = "/entry/data/u_zz"
@@ -475,7 +475,7 @@ def test_the_plugin_path_is_off_before_the_hdf5_library_starts(tmp_path: Path):
         "sys.meta_path.insert(0, Watch())\n"
         "import memscal.formats.scan\n"
         "assert 'h5py' not in sys.modules\n"
-        "import memscal.formats.hdf5_library\n"
+        "import memscal.formats.hdf5.limits\n"
     )
     environment = {k: v for k, v in os.environ.items() if k != "HDF5_PLUGIN_PRELOAD"}
     environment["HDF5_PLUGIN_PATH"] = str(plugins)

@@ -16,7 +16,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from meshes import section
+from helpers.meshes import section
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
 from memscal.formats.meshes import child

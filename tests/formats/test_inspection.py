@@ -7,14 +7,14 @@ from pathlib import Path
 
 import h5py
 import pytest
-from builders import make_artifact, make_profile, make_scan
+from helpers.builders import make_artifact, make_profile, make_scan
 
 from memscal.errors import FormatError, InputError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
-from memscal.formats.timestamp import timestamp
+from memscal.model.provenance import timestamp
 from memscal.model.scan import StressSensor
 
 

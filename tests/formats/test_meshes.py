@@ -10,14 +10,14 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from builders import make_film
-from meshes import HEIGHTS, RADII, block, pressure, section, tensor
+from helpers.builders import make_film
+from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor
 
 from memscal.errors import FormatError, InputError, MemscalError, UnitError
 from memscal.formats.meshes.mesh_files import read_mesh, write_mesh
 from memscal.formats.meshes.reference_mesh import read_reference_mesh
 from memscal.formats.reference import read_reference, write_reference
-from memscal.formats.reference_profile import ImportedProfile
+from memscal.formats.tables.reference import ImportedProfile
 from memscal.mechanics.base_stress import base_normal_stress, base_shear_stress
 from memscal.model.checks import marked_texts
 from memscal.model.field_mesh import FieldMesh

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import silx.io.nxdata
 import xarray
-from builders import make_artifact, make_profile, make_scan
+from helpers.builders import make_artifact, make_profile, make_scan
 from nexusformat.nexus.validate import validate_file
 
 from memscal.formats.artifact import write_artifact

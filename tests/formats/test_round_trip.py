@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from builders import make_artifact, make_film, make_profile, make_scan
+from helpers.builders import make_artifact, make_film, make_profile, make_scan
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp

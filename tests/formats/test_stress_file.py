@@ -10,10 +10,10 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from builders import make_artifact, make_film
+from helpers.builders import make_artifact, make_film
+from helpers.spheres import known_apparatus
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from spheres import known_apparatus
 
 import memscal
 from memscal.errors import FormatError, InputError, MemscalError, OutputError, UnitError

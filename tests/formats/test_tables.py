@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import make_film
+from helpers.builders import make_film
 from hypothesis import given
 from hypothesis import strategies as st
 
 from memscal.errors import FormatError, InputError, UnitError
-from memscal.formats.csv_table import read_table
 from memscal.formats.inspection import describe
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
-from memscal.formats.table import ImportedScan, read_reference_table, read_scan_table
+from memscal.formats.tables.reference import read_reference_table
+from memscal.formats.tables.scan import ImportedScan, read_scan_table
+from memscal.formats.tables.text_table import read_table
 from memscal.model.checks import marked_texts
 from memscal.model.indenter import Rod
 

@@ -11,11 +11,11 @@ import pytest
 
 import memscal
 from memscal.errors import InputError
-from memscal.friction.amontons import amontons_family
+from memscal.friction.calculated import amontons_family
+from memscal.friction.compare import compare_measured
 from memscal.friction.family import ProfileFamily
-from memscal.friction.procedure import compare_measured
-from memscal.laboratory.experiment import Experiment
 from memscal.model.scan import Scan, StressSensor
+from memscal.simulation.experiment import Experiment
 
 FRICTION = (0.0, 0.1, 0.2, 0.3, math.inf)
 LOADINGS = ("incremental", "total")

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from friction.interface_points import (
+from helpers.interface_points import (
     LOADS,
     MACROSCOPIC,
     PAPER,
@@ -22,12 +22,15 @@ from friction.interface_points import (
 )
 
 from memscal.errors import InputError
-from memscal.friction.compliance import compare_interface
-from memscal.friction.compliance_results import LawComparison
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import likelihood
-from memscal.friction.predicted import members_of
-from memscal.friction.weighed_laws import weigh_normal_compliance, weigh_slip_length
+from memscal.friction.model_comparison import (
+    compare_interface,
+    weigh_normal_compliance,
+    weigh_slip_length,
+)
+from memscal.friction.prediction import members_of
+from memscal.friction.results import LawComparison
 
 
 @lru_cache

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction.linear_contacts import CONVERSION, Laboratory, bare_points
+from helpers.linear_contacts import CONVERSION, Laboratory, bare_points
 from scipy.stats import kstest
 
-from memscal.friction.dry_against_lubricated import dry_against_lubricated, lubricated_pairs
-from memscal.friction.load_points import LoadPoints
-from memscal.friction.predicted import members_of
+from memscal.friction.lubrication import dry_against_lubricated, lubricated_pairs
+from memscal.friction.prediction import LoadPoints, members_of
 from memscal.friction.results import DryAgainstLubricated
 
 CHANCE = 1e-4

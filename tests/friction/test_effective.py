@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from friction.linear_contacts import FRICTIONS, Laboratory
+from helpers.linear_contacts import FRICTIONS, Laboratory
 from scipy.stats import binom, kstest
 
 from memscal.friction.effective import fine_values, with_loading

@@ -7,14 +7,17 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from memscal.errors import InputError
-from memscal.friction.compliance_results import BayesFactor
-from memscal.friction.evidence import (
+from memscal.friction.marginal_likelihood import (
+    Prior,
     Tables,
+    bounded_prior,
     evidence_of_each,
     evidence_of_one,
     log_likelihood,
+    log_uniform_prior,
+    uniform_prior,
 )
-from memscal.friction.priors import Prior, bounded_prior, log_uniform_prior, uniform_prior
+from memscal.friction.results import BayesFactor
 
 LOG_2PI = float(np.log(2 * np.pi))
 

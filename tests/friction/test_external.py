@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from friction.calculated_cases import FILM, LOADS, REACH, SPHERE, apart
-from rounding import assert_same_to_rounding
+from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart
+from helpers.rounding import assert_same_to_rounding
 
 from memscal.errors import InputError
-from memscal.friction.calculated import amontons_family, external_family
+from memscal.friction.calculated import amontons_family
+from memscal.friction.external import external_family
 from memscal.mechanics.indent import indent
 from memscal.model.stress import StressProfile
 

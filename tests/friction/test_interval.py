@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from memscal.friction.interval import Profiled, profiled, reason_of
+from memscal.friction.effective import Profiled, profiled, reason_of
 
 COORDINATES = np.linspace(0.0, 1.0, 101)
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from friction.calculated_cases import FILM, REACH, SPHERE
-from rounding import assert_same_to_rounding
+from helpers.calculated_cases import FILM, REACH, SPHERE
+from helpers.rounding import assert_same_to_rounding
 
-from memscal.friction import assembly
+from memscal.friction import paths as assembly
 from memscal.friction.calculated import amontons_family, normal_compliance_family
 from memscal.friction.family import ProfileFamily
 from memscal.model.film import ElasticFilm

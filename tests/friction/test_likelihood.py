@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from friction.linear_contacts import FRICTIONS, Laboratory, bare_points
+from helpers.linear_contacts import FRICTIONS, Laboratory, bare_points
 
 from memscal.friction.effective import Confrontation
-from memscal.friction.evidence import log_likelihood
 from memscal.friction.likelihood import likelihood
-from memscal.friction.predicted import Predicted, members_of, predict
+from memscal.friction.marginal_likelihood import log_likelihood
+from memscal.friction.prediction import Predicted, members_of, predict
 
 CORRELATED = {"white": 0.0, "correlated": 0.6}
 

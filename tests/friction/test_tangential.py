@@ -19,13 +19,12 @@ import memscal
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import GaussianMixture
 from memscal.errors import InputError
-from memscal.friction.amontons import FRICTIONS, amontons_family
-from memscal.friction.load_points import LoadPoints
-from memscal.friction.predicted import members_of, predict, sensor_of
-from memscal.friction.tangential import compare_shear
-from memscal.laboratory.experiment import Experiment
+from memscal.friction.calculated import FRICTIONS, amontons_family
+from memscal.friction.compare import compare_shear
+from memscal.friction.prediction import LoadPoints, members_of, predict, sensor_of
+from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredStress
-from memscal.model.validation import FloatArray
+from memscal.simulation.experiment import Experiment
 
 EXPERIMENTS = 80 if os.environ.get("MEMSCAL_FULL_STUDY") else 8
 TRUTHS = (0.0, 0.1, 0.2, 1.0)

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from memscal.friction.bracketing import bracketed_share
-from memscal.friction.checks import comparison_checks
-from memscal.friction.messages import comparison_messages, in_words
+from memscal.friction.checks import comparison_checks, comparison_messages, in_words
+from memscal.friction.effective import bracketed_share
 from memscal.friction.results import EffectiveFriction, FrictionComparison, Interval
 from memscal.model.checks import Message
 from memscal.model.film import ElasticFilm

@@ -7,18 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contacts import CENTRE, LOADS, contact_scan, measured
-from scans import CONVERSION, EXACT_FILM, SIGMA, as_points
-from spheres import GAUSSIAN, known_apparatus, pressed
+from helpers.contacts import CENTRE, LOADS, contact_scan, measured
+from helpers.scans import CONVERSION, EXACT_FILM, SIGMA, as_points
+from helpers.spheres import GAUSSIAN, known_apparatus, pressed
 
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
-from memscal.measurement.application import joined_stress
-from memscal.measurement.contact_signal import contact_signal
-from memscal.measurement.prepared_scan import prepared_scan
-from memscal.measurement.procedure import restore_known
-from memscal.measurement.single_loads import single_loads
+from memscal.measurement.measure_stress import joined_stress
+from memscal.measurement.measured_profile import prepared_scan
+from memscal.measurement.restore import restore_known
+from memscal.measurement.single_loads import contact_signal, single_loads
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan, StressSensor

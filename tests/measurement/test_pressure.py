@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from scans import EXACT_FILM
+from helpers.scans import EXACT_FILM
 from scipy.special import jv
 
-from memscal.axisymmetry.quadrature import gauss_between
+from memscal.axisymmetry.hankel import gauss_between
 from memscal.measurement.pressure import PressureShape, film_transfer, pressure_shapes
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 

@@ -7,12 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scans import CONVERSION, SIGMA, plane_error
-from spheres import known_apparatus, pressed, sphere_scan
+from helpers.scans import CONVERSION, SIGMA, plane_error
+from helpers.spheres import known_apparatus, pressed, sphere_scan
 
 import memscal
-from memscal.laboratory.rod_scan import PAPER_FILM
 from memscal.measurement.restoration import Restoration
+from memscal.simulation.rod_scan import PAPER_FILM
 
 EXACT = known_apparatus()
 FEW = 6

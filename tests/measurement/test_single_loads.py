@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import make_scan
-from contacts import LOADS, contact_scan
+from helpers.builders import make_scan
+from helpers.contacts import LOADS, contact_scan
 
 from memscal.errors import InputError
 from memscal.measurement.single_loads import single_loads

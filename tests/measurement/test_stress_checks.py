@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contacts import contact_scan, measured
-from scans import EXACT_FILM, SIGMA
-from spheres import known_apparatus
+from helpers.contacts import contact_scan, measured
+from helpers.scans import EXACT_FILM, SIGMA
+from helpers.spheres import known_apparatus
 
 import memscal
-from memscal.measurement.stress_checks import pooled_force
+from memscal.measurement.measure_stress import pooled_force
 from memscal.model.measured_stress import MeasuredStress
 
 SENSOR = known_apparatus()

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from rounding import assert_same_to_rounding
+from helpers.rounding import assert_same_to_rounding
 from scipy.integrate import simpson
 from scipy.special import j1
 

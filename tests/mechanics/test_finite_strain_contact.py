@@ -10,7 +10,7 @@ import pytest
 
 from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.elements import finite_strain
+from memscal.mechanics.finite_strain import solve as finite_strain
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
 from memscal.model.film import ElasticFilm

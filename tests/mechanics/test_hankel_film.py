@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from memscal.axisymmetry.quadrature import gauss_between, gauss_panels
+from memscal.axisymmetry.hankel import gauss_between, gauss_panels
 from memscal.mechanics.hankel_film import HankelField, HankelFilm
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm

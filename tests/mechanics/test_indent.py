@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rounding import assert_same_to_rounding
+from helpers.rounding import assert_same_to_rounding
 from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
-from memscal.axisymmetry.quadrature import gauss_panels
+from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import DomainError, InputError
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import j0, j1
 
-from memscal.axisymmetry.quadrature import gauss_panels
+from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response, rod
 from memscal.mechanics.rod import solve_rod

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import spherical_jn
 
-from memscal.mechanics.spherical_bessel import spherical_bessel
+from memscal.mechanics.rod import spherical_bessel
 
 
 @pytest.mark.parametrize("count", [1, 2, 33, 257])

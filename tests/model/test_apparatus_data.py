@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders import CONVERSION, SIGMA, make_artifact
+from helpers.builders import CONVERSION, SIGMA, make_artifact
 from hypothesis import given
 from hypothesis import strategies as st
 

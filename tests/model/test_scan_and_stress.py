@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import make_profile, make_scan
+from helpers.builders import make_profile, make_scan
 from hypothesis import given
 from hypothesis import strategies as st
 

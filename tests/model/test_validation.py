@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from memscal.errors import InputError
-from memscal.model.validation import (
+from memscal.model.arrays import (
     finite_vector,
     frozen_array,
     require_increasing,

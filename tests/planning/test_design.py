@@ -6,23 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rounding import assert_same_to_rounding
-from scans import EXACT_FILM, EXACT_ROD, estimated, simulated
+from helpers.rounding import assert_same_to_rounding
+from helpers.scans import EXACT_FILM, EXACT_ROD, estimated, simulated
 
 import memscal
-from memscal.deconvolution.registry import create_regulariser
+from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
 from memscal.estimation.band import find_band
-from memscal.estimation.departure import departure_basis
-from memscal.estimation.evidence import weigh_departures
+from memscal.estimation.bayesian import weigh_departures
+from memscal.estimation.departures import departure_basis
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian_fit import fit_gaussian
+from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectrum
-from memscal.planning.expectation import expected_calibration
-from memscal.planning.outcome import Design
+from memscal.planning.design import varied_designs
+from memscal.planning.expected import Design, expected_calibration
 from memscal.planning.plan import Plan
-from memscal.planning.procedure import varied_designs
 
 EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 

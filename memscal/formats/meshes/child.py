@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import FormatError, InputError, UnsafeFileError
-from memscal.formats.file_bytes import read_bytes
-from memscal.formats.hdf5_reader import SafeFile, open_hdf5
-from memscal.formats.text import printable
+from memscal.formats.files import read_bytes
+from memscal.formats.hdf5.reader import SafeFile, open_hdf5
+from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 
 __all__ = ["heavy_arrays", "run_meshio"]

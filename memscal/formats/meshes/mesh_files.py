@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FormatError, InputError
-from memscal.formats.atomic import atomic_write_bytes
-from memscal.formats.damage import damage_named
-from memscal.formats.file_bytes import read_bytes
+from memscal.formats.files import atomic_write_bytes, read_bytes
+from memscal.formats.hdf5.reader import damage_named
 from memscal.formats.meshes.child import heavy_arrays, run_meshio
-from memscal.formats.text import printable
 from memscal.formats.units import from_si
+from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
+from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
-from memscal.model.validation import FloatArray
 from memscal.version import __version__
 
 __all__ = ["Cells", "Mesh", "is_mesh", "read_mesh", "write_mesh"]

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.meshes.base import (
+from memscal.formats.meshes.film_base import (
     Base,
     Frame,
     average_over_circles,
     find_base,
     find_frame,
 )
-from memscal.formats.meshes.components import Component, find_normal, find_shear
 from memscal.formats.meshes.mesh_files import Mesh, read_mesh
-from memscal.formats.reference_profile import (
+from memscal.formats.meshes.stress_components import Component, find_normal, find_shear
+from memscal.formats.tables.reference import (
     ImportedProfile,
     Samples,
     profile_of,
@@ -25,10 +25,10 @@ from memscal.formats.reference_profile import (
     require_sign,
 )
 from memscal.formats.units import to_si
+from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
-from memscal.model.validation import FloatArray
 
 __all__ = ["read_reference_mesh"]
 

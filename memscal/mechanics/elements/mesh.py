@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
 __all__ = ["TriangleMesh", "film_triangles"]
 

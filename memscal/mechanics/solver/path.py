@@ -20,13 +20,124 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import ConvergenceError
-from memscal.mechanics.solver.at_once import step_at_once
-from memscal.mechanics.solver.edge import meet_at, mixture, reached
-from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target
+from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target, Touch
 from memscal.mechanics.solver.step import take_step
-from memscal.model.validation import FloatArray
+from memscal.model.arrays import FloatArray
 
-__all__ = ["PathPoint", "follow"]
+__all__ = ["PathPoint", "follow", "is_contact", "meet_at", "mixture", "reached", "step_at_once"]
+
+# At the very edge, a share of the largest pressure may pull, and a share of the depth overlap:
+# that is what the rings next to it resolve.  It is gone with the next ring.
+_PULL = 1e-2
+_OVERLAP = 1e-3
+
+
+def meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
+    """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``.
+
+    The rings in contact stay in contact, though one may pull a little at the edge.  Only where
+    that would be more than a little are they free to go.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is no such state.
+    """
+    state = take_step(problem, start, Touch(ring), same_contact=True)
+    return state if is_contact(problem, state) else take_step(problem, start, Touch(ring))
+
+
+def is_contact(problem: ContactProblem, state: ContactState) -> bool:
+    """Whether a state fulfils Signorini's conditions, but for what an edge does not resolve."""
+    outside = problem.separations(state)[~state.touching]
+    overlaps = np.any(outside < -_OVERLAP * abs(state.depth))
+    return bool(state.pressure.min() >= -_PULL * state.pressure.max() and not overlaps)
+
+
+def mixture(lower: ContactState, upper: ContactState, target: Target) -> ContactState:
+    """Return the mixture of two states that is at ``target``; statuses are the second's.
+
+    Raises
+    ------
+    ConvergenceError
+        If the target does not lie between them.
+    """
+    begin, end = reached(lower, target), reached(upper, target)
+    share = (target.value - begin) / (end - begin)
+    if not 0 <= share <= 1:
+        raise ConvergenceError(
+            f"No contact was found at {target}.",
+            why=f"It should lie between {begin:.6g} and {end:.6g}, where the surfaces meet at one "
+            "ring and at the next.",
+            cure="Try another number of rings, or a friction coefficient nearby.",
+        )
+    mixed = {
+        name: (1 - share) * getattr(lower, name) + share * getattr(upper, name)
+        for name in ("pressure", "shear", "depth", "load", "anchor", "outward")
+    }
+    return replace(upper, **mixed, iterations=lower.iterations + upper.iterations)
+
+
+def reached(state: ContactState, target: Target) -> float:
+    """Return the load or the depth of a state, as the target counts."""
+    return state.load if isinstance(target, Load) else state.depth
+
+
+def step_at_once(problem: ContactProblem, smooth: ContactState, target: Target) -> ContactState:
+    """Return the state at ``target``, one step from the untouched film.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        Film, indenter and interface.
+    smooth : ContactState
+        The frictionless state at the same target, where the search begins.
+    target : Load or Depth
+        Where the step ends.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is no such state.
+    """
+    untouched = np.zeros(problem.size)
+    start = replace(smooth, anchor=untouched, outward=untouched)
+    try:
+        return take_step(problem, start, target)
+    except ConvergenceError:
+        rings = int(np.count_nonzero(start.touching))
+        if problem.normal_law is not None or not np.all(start.touching[:rings]):
+            raise
+    return _between_rings(problem, start, target, rings)
+
+
+def _between_rings(
+    problem: ContactProblem, start: ContactState, target: Target, rings: int
+) -> ContactState:
+    """Find the neighbouring rings between which the edge lies; mix the states that meet there."""
+
+    def meeting_at(ring: int) -> ContactState:
+        inside = np.arange(problem.size) < ring
+        return take_step(problem, replace(start, touching=inside), Touch(ring), same_contact=True)
+
+    rings = min(rings, problem.size - 1)
+    upper = meeting_at(rings)
+    while reached(upper, target) < target.value and rings < problem.size - 1:
+        rings += 1
+        upper = meeting_at(rings)
+    lower = meeting_at(rings - 1)
+    while reached(lower, target) > target.value and rings > 2:
+        rings, upper = rings - 1, lower
+        lower = meeting_at(rings - 1)
+    state = mixture(lower, upper, target)
+    if not is_contact(problem, state):
+        raise ConvergenceError(
+            f"No contact that is loaded in one step was found at {target}.",
+            why="At its edge the film would have to pull at the indenter, or pass through it.",
+            cure="Load incrementally, use a lower friction coefficient, or other rings.",
+        )
+    return state
+
 
 # Steps of a contact that neither grows nor shrinks, such as a rod's, when it is not the first.
 _STEPS_OF_A_FIXED_CONTACT = 24

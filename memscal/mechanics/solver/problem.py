@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from memscal.mechanics.interface import Interface, NormalLaw
 from memscal.mechanics.surface import SurfaceCompliance
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-from memscal.model.validation import FloatArray
 
 __all__ = ["ContactProblem", "ContactState", "Depth", "Goal", "Load", "Target", "Touch"]
 

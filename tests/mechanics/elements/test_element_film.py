@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from rounding import assert_same_to_rounding
+from helpers.rounding import assert_same_to_rounding
 
 from memscal.errors import DomainError, InputError
-from memscal.mechanics.elements.film import ElementFilm
+from memscal.mechanics.elements.element_film import ElementFilm
 from memscal.mechanics.hankel_film import HankelFilm
 from memscal.model.film import ElasticFilm
 

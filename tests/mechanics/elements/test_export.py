@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from memscal.mechanics.elements.film import ElementField, ElementFilm
+from memscal.mechanics.elements.element_film import ElementField, ElementFilm
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 

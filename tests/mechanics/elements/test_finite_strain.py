@@ -7,11 +7,10 @@ import pytest
 import skfem
 
 from memscal.errors import ConvergenceError, DomainError, InputError
-from memscal.mechanics.elements.finite_strain import solve_finite_strain
-from memscal.mechanics.elements.finite_strain_faces import RodFace, SphereFace
-from memscal.mechanics.elements.finite_strain_material import NeoHookean
-from memscal.mechanics.elements.finite_strain_state import FiniteStrainState
-from memscal.mechanics.elements.finite_strain_system import FilmElements
+from memscal.mechanics.finite_strain.film_elements import FilmElements, NeoHookean
+from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
+from memscal.mechanics.finite_strain.solve import solve_finite_strain
+from memscal.mechanics.finite_strain.state import FiniteStrainState
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Rod, Sphere

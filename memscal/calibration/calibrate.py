@@ -1,0 +1,527 @@
+"""The main job: from a scan to an apparatus function, by the paper's method."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from os import PathLike
+from typing import Any, TypeAlias
+
+import numpy as np
+import scipy
+
+from memscal.apparatus import ApparatusFunction
+from memscal.axisymmetry.kernels import unit_gaussian
+from memscal.calibration.checks import quality_checks
+from memscal.calibration.inputs import InputEffect, input_effects
+from memscal.calibration.stages import Solution, field_noise, solve
+from memscal.calibration.sweep import Sweep, sweep_noise
+from memscal.calibration.uncertainty import Results, propagate
+from memscal.deconvolution.division import Regulariser, create_regulariser
+from memscal.errors import InputError
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reference import (
+    reference_profile,
+    reference_spectra,
+    require_calibration_rod,
+    require_one_sensor,
+)
+from memscal.formats.opened import Scans, opened_scans
+from memscal.mechanics.contact import Contact
+from memscal.model.apparatus import ApparatusField, ApparatusRadial, Reconvolution, TransferFunction
+from memscal.model.arrays import FloatArray
+from memscal.model.checks import (
+    NOISE_UNSTATED,
+    OUTLIER_WEIGHT,
+    Message,
+    QualityCheck,
+    failed_check_messages,
+)
+from memscal.model.indenter import RoundIndenter
+from memscal.model.provenance import Process, timestamp
+from memscal.model.scan import Scan, StressSensor
+from memscal.model.stress import StressProfile
+from memscal.parallel import single_threaded
+from memscal.version import __version__
+
+__all__ = [
+    "Calibration",
+    "Reference",
+    "assemble",
+    "calibrate",
+    "calibration_messages",
+    "uncertainties",
+]
+
+
+def assemble(
+    solution: Solution,
+    results: Results,
+    checks: tuple[QualityCheck, ...],
+    messages: tuple[Message, ...],
+    configuration: Mapping[str, Any],
+) -> ApparatusFunction:
+    """Return the apparatus function with everything that its artifact stores."""
+    scan, stress = solution.scan, solution.stress
+    reference = stress.profile() if isinstance(stress, Contact) else stress
+    return ApparatusFunction(
+        field=_field(solution, results),
+        radial_profile=_radial(solution, results),
+        transfer=_transfer(solution, results),
+        reconvolution=_reconvolution(solution),
+        parameters=results.parameters,
+        checks=checks,
+        film=scan.film,
+        indenter=scan.indenter,
+        sensor=_sensor(solution),
+        load=scan.load,
+        reference=reference,
+        process=Process(
+            program="memscal",
+            version=__version__,
+            date=timestamp(),
+            configuration={
+                **configuration,
+                "grid": dict(solution.choice.reasons),
+                "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
+                **_further_scans(solution),
+            },
+            environment={
+                "python": platform.python_version(),
+                "numpy": np.__version__,
+                "scipy": scipy.__version__,
+            },
+            messages=messages,
+            input_scan=scan.source,
+            input_reference=reference.source,
+        ),
+        budget=results.budget,
+    )
+
+
+def _sensor(solution: Solution) -> StressSensor:
+    """The sensor, by the channel that was calibrated: a scan's own is the normal one."""
+    channel, sensor = solution.estimate.points.channel, solution.scan.sensor
+    return sensor if channel == "zz" else replace(sensor, channel=channel)
+
+
+def _further_scans(solution: Solution) -> dict[str, Any]:
+    """Where the scans beside the first came from."""
+    sources = [scan.source for scan in solution.scans[1:]]
+    if not sources:
+        return {}
+    listed = [
+        None if s is None else {"file_name": s.file_name, "sha256": s.sha256} for s in sources
+    ]
+    return {"further_scans": listed}
+
+
+def _field(solution: Solution, results: Results) -> ApparatusField:
+    g = solution.deconvolution.g
+    errors = np.sqrt(np.diag(results.radial_covariance))
+    radius = np.hypot.outer(g.y, g.x)
+    return ApparatusField(g.x, g.y, g.image, np.interp(radius, g.r, errors))
+
+
+def _radial(solution: Solution, results: Results) -> ApparatusRadial:
+    g = solution.deconvolution.g
+    covariance = results.radial_covariance
+    gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
+    errors = np.sqrt(np.diag(covariance))
+    with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
+    scale = errors * results.parameters.uncertainty("conversion_constant")
+    correlation = np.divide(with_a, scale, out=np.zeros_like(with_a), where=scale > 0)
+    return ApparatusRadial(g.r, g.radial, errors, gaussian, covariance, correlation)
+
+
+def _transfer(solution: Solution, results: Results) -> TransferFunction:
+    fields, deconvolution = solution.fields, solution.deconvolution
+    a, quotient = deconvolution.conversion_constant, deconvolution.quotient
+    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(quotient.values)) / a)
+    window = fields.along_axis(quotient.window)[1]
+    return TransferFunction(k, modulus, results.transfer_errors, window, solution.band.resolved)
+
+
+def _reconvolution(solution: Solution) -> Reconvolution:
+    estimate = solution.estimate
+    points = estimate.points
+    # A raster is shown against the distance from the centre: a line has a side, a plane has not.
+    along = points.x if points.free[0, 0] else points.y
+    place = estimate.distance if points.planar or points.scans > 1 else along
+    if points.scans > 1 and estimate.model.order:
+        # A shear has a side, too.
+        place = estimate.offset[estimate.model.axis]
+    order = np.argsort(place, kind="stable")
+
+    def sorted_(values: FloatArray) -> FloatArray:
+        return np.asarray(values[order])
+
+    return Reconvolution(
+        x=sorted_(place),
+        u_zz=sorted_(points.u),
+        u_zz_errors=sorted_(estimate.noise),
+        u_zz_predicted=sorted_(solution.deconvolution.predicted),
+        u_zz_gaussian=sorted_(estimate.gaussian.predicted),
+        residual=sorted_(points.u - solution.deconvolution.predicted),
+    )
+
+
+#: Methods that are a fixed window or none: their uncertainties are complete to first order.
+_WINDOWS = ("white-noise", "tikhonov", "evidence")
+#: Relative difference below which two lengths or ratios are the same.
+_SAME = 1e-6
+
+
+def calibration_messages(
+    solution: Solution, checks: tuple[QualityCheck, ...]
+) -> tuple[Message, ...]:
+    """Return the messages that accompany a result, the gravest first."""
+    estimate, scan = solution.estimate, solution.scan
+    messages = failed_check_messages(checks)
+    messages += _channel(estimate)
+    messages += _points(estimate)
+    messages += _method(solution)
+    messages += _reference(solution)
+    messages += _unstated(scan)
+    if scan.synthetic is not None:
+        messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
+    return tuple(messages)
+
+
+def _channel(estimate: ProfileEstimate) -> list[Message]:
+    channel = estimate.points.channel
+    if estimate.model.order == 0:
+        return []
+    text = (
+        f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
+        "those of the shear at the base; the voltage is positive where the film pulls the sensor "
+        f"towards larger {channel[0]}."
+    )
+    return [Message("experimental", text)]
+
+
+def _points(estimate: ProfileEstimate) -> list[Message]:
+    points = estimate.points
+    messages: list[Message] = []
+    if points.missing:
+        text = f"{points.missing} points of the scan are missing and were left out."
+        messages.append(Message("missing_points", text))
+    for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]:
+        place = f"x = {points.x[i] * 1e3:.4g} mm"
+        if points.planar:
+            place += f", y = {points.y[i] * 1e3:.4g} mm"
+        if points.repeat.any():
+            place += f" of repeat {points.repeat[i]}"
+        text = (
+            f"Outlier at {place}: {points.u[i] * 1e3:.4g} mV instead of "
+            f"{estimate.predicted[i] * 1e3:.4g} mV; its weight is "
+            f"{estimate.outlier_weight[i]:.2g}."
+        )
+        messages.append(Message("outlier", text))
+    if points.u_errors is None:
+        text = (
+            f"u_{points.channel}_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV "
+            "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
+            "misfit of the same size, and has no p-value."
+        )
+        messages.append(Message(NOISE_UNSTATED, text))
+    return messages
+
+
+def _method(solution: Solution) -> list[Message]:
+    """Say of a method that is no fixed window on the spectrum what its uncertainty leaves out."""
+    regulariser = solution.regulariser
+    if regulariser.name in _WINDOWS:
+        return []
+    text = (
+        f"Method {regulariser.name}: uncertainties are first-order through its effective window, "
+        f"without its own scatter. {regulariser.fails}"
+    )
+    return [Message("method", text)]
+
+
+def _reference(solution: Solution) -> list[Message]:
+    stress, scan = solution.stress, solution.scan
+    if isinstance(stress, Contact):
+        return [Message("model_form", _model_form(stress))]
+    messages = _other_set_up(scan, stress)
+    if stress.convergence is None:
+        text = "The reference states no convergence: its own error is not counted."
+        messages.append(Message("convergence_unstated", text))
+    return messages
+
+
+def _model_form(contact: Contact) -> str:
+    """Say what the reference takes for granted."""
+    way = "frictionless" if contact.friction == 0 else "sticking"
+    depth = f"{contact.depth / contact.film.thickness:.0%} of its thickness at {contact.load:.3g} N"
+    if contact.strain == "finite":
+        return (
+            f"The reference is the {way} rod on a neo-Hookean film at finite strain, indented by "
+            f"{depth}; it is used in proportion to the load, and how far the film's own law "
+            "departs from it is not part of the uncertainties."
+        )
+    return (
+        f"The reference is the {way} rod on the linear elastic film, indented by {depth}; the "
+        "error of linear elasticity there is not part of the uncertainties. A reference at finite "
+        "strain (memscal reference rod --strain finite --friction inf) shows what it changes."
+    )
+
+
+def _other_set_up(scan: Scan, stress: StressProfile) -> list[Message]:
+    """Say where a reference was made for another film or indenter than the scan's."""
+    pairs = []
+    if stress.film is not None:
+        for name, unit in (("thickness", 1e3), ("poisson_ratio", 1.0)):
+            ours, theirs = getattr(scan.film, name), getattr(stress.film, name)
+            pairs.append((f"film {name.replace('_', ' ')}", ours * unit, theirs * unit))
+    if isinstance(stress.indenter, RoundIndenter):
+        pairs.append(("rod radius", scan.indenter.radius * 1e3, stress.indenter.radius * 1e3))
+    return [
+        Message(
+            "other_set_up",
+            f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "
+            f"{ours:.4g}{'' if 'ratio' in name else ' mm'}.",
+        )
+        for name, ours, theirs in pairs
+        if abs(theirs - ours) > _SAME * abs(ours)
+    ]
+
+
+def _unstated(scan: Scan) -> list[Message]:
+    film = scan.film
+    missing = {
+        "film thickness": film.thickness_uncertainty,
+        "Poisson's ratio": film.poisson_ratio_uncertainty,
+        "rod radius": scan.indenter.radius_uncertainty,
+        "load": scan.load_uncertainty,
+    }
+    names = [name for name, value in missing.items() if value is None]
+    if not names:
+        return []
+    pronoun = "them" if len(names) > 1 else "it"
+    listed = ", ".join(names)
+    text = f"No uncertainty is stated for {listed}: nothing is counted for {pronoun}."
+    return [Message("uncertainty_unstated", text)]
+
+
+Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
+"""A base stress, the path of a file that holds one, or nothing: the rod is solved."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration:
+    """A finished calibration: its result, and every step that led to it.
+
+    Parameters
+    ----------
+    apparatus : ApparatusFunction
+        The result, ready to be saved and applied.
+    solution : Solution
+        The steps: estimate, band, fields, deconvolution.
+    effects : mapping of str to InputEffect
+        What one standard uncertainty of each stated input does.
+    correlations : mapping of (str, str) to float
+        Correlation coefficients of the inputs' errors.
+    """
+
+    apparatus: ApparatusFunction
+    solution: Solution
+    effects: Mapping[str, InputEffect] = field(default_factory=dict)
+    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Return the result in place of every step's arrays."""
+        return f"<Calibration by {self.solution.regulariser.name}: {self.apparatus!r}>"
+
+    @property
+    def passed(self) -> bool:
+        """Whether every quality check passed."""
+        return self.apparatus.passed
+
+    @single_threaded()
+    def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> Sweep:
+        """Vary the white noise over two decades of amplitude, and over seeds.
+
+        Parameters
+        ----------
+        amplitudes : int
+            How many amplitudes, from a tenth to ten times the rule's; three or more.
+        draws : int
+            How many seeded draws at each; one or more.
+        seed : int
+            The first seed.
+
+        Returns
+        -------
+        Sweep
+            A, both widths and the reconvolution for each.
+        """
+        return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
+
+
+@single_threaded()
+def calibrate(
+    scan: Scans,
+    *,
+    reference: Reference | Sequence[Reference] = None,
+    alternative: Reference | Sequence[Reference] = None,
+    channel: str = "zz",
+    method: str | Regulariser = "white-noise",
+    correlations: Mapping[tuple[str, str], float] | None = None,
+    seed: int = 0,
+    **options: Any,
+) -> Calibration:
+    r"""Find the apparatus function of a sensor from a rod scan, or from several.
+
+    Solves :math:`U_{zz} = A\,G \otimes \sigma_{zz}` (the paper's Eq. 1) for the conversion
+    constant A and the apparatus function G of unit integral.  A tangential channel, experimental,
+    is solved with the shear at the base: :math:`U_{xz} = A\,G \otimes \tau\cos\theta`.
+
+    Parameters
+    ----------
+    scan : Scan or path, or a sequence of them
+        Voltage against the rod's position.  Several scans of one sensor, at other loads, with
+        other rods or films, along x or y, are fitted together: A and G are shared, and each has
+        its own centre and baseline.
+    reference : StressProfile, Contact or path, optional
+        Stress at the base of the film, one for each scan.  Without it, the one that travels with
+        the scan; without that, the rod is solved on the film.
+    alternative : StressProfile, Contact or path, optional
+        The same by another model of the film, such as finite strain.  Its difference from the
+        reference is counted as an uncertainty of the model's form, ``model_form``, rectangular.
+    channel : str, default "zz"
+        ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
+        by method ``"evidence"``; see docs/tangential.md.
+    method : str or Regulariser, default "white-noise"
+        How the fields are divided; see :func:`memscal.deconvolution.division.regulariser_names`.
+        ``"evidence"`` divides none: it takes G from the scan's points, and is the most accurate.
+    correlations : mapping of (str, str) to float, optional
+        Correlation coefficients of the inputs' errors, such as
+        ``{("thickness", "poisson_ratio"): 0.5}``.
+    seed : int, default 0
+        Seed of methods that draw random numbers.
+    **options
+        Parameters of the method, such as ``amplitude``.
+
+    Returns
+    -------
+    Calibration
+        With ``.apparatus``; its quality checks may have failed: see ``.passed``.
+
+    Raises
+    ------
+    InputError
+        If the scan or the reference cannot be used.
+    FitError
+        If the scan does not determine the parameters.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> calibration = memscal.calibrate(memscal.simulate(noise=0.005, seed=1))
+    >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
+    True
+    """
+    scans = require_one_sensor(opened_scans(scan))
+    for each in scans:
+        require_calibration_rod(each)
+    given = _each(reference, scans)
+    stresses = [reference_profile(s, r) for s, r in zip(scans, given, strict=True)]
+    regulariser = chosen_method(method, seed, options)
+    solution = solve(scans, stresses, regulariser, channel)
+    others = None if alternative is None else _each(alternative, scans)
+    effects = _effects(solution, others)
+    results = uncertainties(solution, effects, correlations or {})
+    checks = quality_checks(solution, results.parameters)
+    messages = calibration_messages(solution, checks)
+    configuration = {"method": regulariser.name, "seed": seed, **_settings(regulariser)}
+    if channel != "zz":
+        configuration["channel"] = channel
+    if correlations:
+        configuration["correlations"] = {" ".join(pair): c for pair, c in correlations.items()}
+    apparatus = assemble(solution, results, checks, messages, configuration)
+    return Calibration(apparatus, solution, effects, dict(correlations or {}))
+
+
+def _each(
+    reference: Reference | Sequence[Reference], scans: Sequence[Scan]
+) -> list[StressProfile | Contact | None]:
+    """Read a reference for each scan; one alone serves all."""
+    if isinstance(reference, Sequence) and not isinstance(reference, str):
+        if len(reference) != len(scans):
+            raise InputError(
+                f"{len(reference)} references were given, but there "
+                f"{'is one scan' if len(scans) == 1 else f'are {len(scans)} scans'}.",
+                cure="Give one for each scan, in their order, or one for all.",
+            )
+        return [_read(each) for each in reference]
+    return [_read(reference)] * len(scans)
+
+
+def _read(reference: Reference) -> StressProfile | Contact | None:
+    if isinstance(reference, str | PathLike):
+        from memscal.formats.reference import read_reference
+
+        return read_reference(reference)
+    if reference is None or isinstance(reference, StressProfile | Contact):
+        return reference
+    raise InputError(
+        f"The reference is a {type(reference).__name__}.",
+        cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
+    )
+
+
+def chosen_method(method: str | Regulariser, seed: int, options: Mapping[str, Any]) -> Regulariser:
+    """Set up the method of division, by its name or as it was given."""
+    if isinstance(method, str):
+        return create_regulariser(method, seed=seed, **options)
+    if isinstance(method, type) or not callable(getattr(method, "divide", None)):
+        raise InputError(
+            f"The method is {method!r}, which cannot divide fields.",
+            cure="Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov.",
+        )
+    if options:
+        raise InputError(
+            f"Options {', '.join(options)} were given beside a regulariser that is set up already.",
+            cure="Set them on the regulariser, or give the method by name.",
+        )
+    return method
+
+
+def _settings(regulariser: Regulariser) -> Mapping[str, Any]:
+    """Parameters of a regulariser, for the record."""
+    own: Any = regulariser
+    known = is_dataclass(own) and not isinstance(own, type)
+    return {"options": asdict(own) if known else {}}
+
+
+def _effects(
+    solution: Solution, alternatives: Sequence[StressProfile | Contact | None] | None
+) -> Mapping[str, InputEffect]:
+    scans, estimate = solution.scans, solution.estimate
+    spectra = None
+    if alternatives is not None:
+        known = [other for other in alternatives if other is not None]
+        parts = [estimate.points.only(i) for i in range(len(scans))]
+        spectra = reference_spectra(known, parts, [scan.film.thickness for scan in scans])
+    return input_effects(scans, solution.stresses, estimate, spectra)
+
+
+def uncertainties(
+    solution: Solution,
+    effects: Mapping[str, InputEffect],
+    correlations: Mapping[tuple[str, str], float],
+) -> Results:
+    """Propagate noise and inputs through a calibration's steps."""
+    wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
+    return propagate(
+        solution.estimate,
+        solution.deconvolution,
+        solution.window_at_nodes,
+        wavenumbers,
+        effects,
+        correlations,
+        field_noise(solution, wavenumbers),
+    )

@@ -1,0 +1,407 @@
+"""The quality checks of a calibration: value, limit, and what a failure means."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.calibration.stages import Misfit, Solution
+from memscal.deconvolution.division import Evidence
+from memscal.estimation.assumptions import (
+    ExtraColumns,
+    axisymmetry_test,
+    departure_evidence,
+    hold_out,
+    linearity_test,
+    load_groups,
+    symmetry_test,
+)
+from memscal.estimation.band import RESOLVED
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reference import carried_force
+from memscal.estimation.residuals import (
+    FEWEST_RESIDUALS,
+    Residuals,
+    chi_square_test,
+    free_model,
+    neighbour_correlation_test,
+    pure_error_test,
+    residuals_of,
+    runs_test,
+)
+from memscal.model.apparatus import ParameterSet
+from memscal.model.checks import (
+    FALSE_ALARM,
+    NOISE_LIMIT,
+    OUTLIER_LIMIT,
+    OUTLIER_WEIGHT,
+    QualityCheck,
+    check,
+    chi_square_limit,
+)
+
+__all__ = ["model_checks", "quality_checks"]
+
+#: Evidence exceeds this in less than one Gaussian sensor of a thousand: odds of mean one
+#: exceed a thousand at most once in a thousand (Markov's inequality).
+_EVIDENCE_LIMIT = -float(np.log(FALSE_ALARM))
+_KINDS = {
+    "edge": "an edge: a flat top with steep flanks, as of a disc",
+    "rough edge": "an edge: a flat top with steep flanks, as of a disc",
+    "core": "a core of its own: a ring or a spike in the middle",
+    "tail": "tails that fall more slowly than a Gaussian's",
+}
+
+
+def model_checks(estimate: ProfileEstimate) -> list[QualityCheck]:
+    """Run every check of the model that applies to the scan."""
+    residuals = residuals_of(estimate)
+    checks = _noise(estimate)
+    if residuals.degrees >= FEWEST_RESIDUALS:
+        checks += _size(estimate, residuals)
+        checks += _order(residuals)
+    checks.append(_evidence(estimate))
+    checks += _symmetry(estimate)
+    checks += _linearity(estimate)
+    return checks + _held_out(estimate)
+
+
+def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
+    if estimate.points.u_errors is None:
+        return []
+    return [
+        check(
+            "noise_as_stated",
+            estimate.weighed.noise,
+            NOISE_LIMIT,
+            f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. "
+            "A failure means that "
+            "something besides electronic noise scatters the scan, such as position or load; the "
+            "uncertainties have been raised accordingly.",
+        )
+    ]
+
+
+def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
+    """Compare what no G explains with the noise, if there is a noise to compare with."""
+    degrees = residuals.degrees
+    if residuals.stated:
+        found = chi_square_test(residuals)
+        compared = f"with the stated noise: reduced chi-square of {degrees} degrees"
+        noise = "the noise is larger than stated, or "
+    else:
+        pure = pure_error_test(estimate)
+        if pure is None:
+            return []
+        found, noise = pure, ""
+        compared = "with the scatter of repeats, as no noise is stated: an F ratio"
+    meaning = (
+        f"What no radial G can explain of the scan, compared {compared}. A failure means that "
+        f"{noise}the scan is no convolution of this reference with a radial G: check the rod's "
+        "radius, the film's thickness and Poisson's ratio, a baseline that is no straight line, "
+        "and the positions; every uncertainty is doubtful until then."
+    )
+    return [check("chi_square", found.value, found.limit, meaning, found.p_value)]
+
+
+def _order(residuals: Residuals) -> list[QualityCheck]:
+    cause = (
+        "a baseline that steps or bends, a wrong reference, or noise that is correlated from point "
+        "to point (a slow amplifier, creep, temperature). Look at the residual; state a known "
+        "correlation as u_zz_correlation; uncertainties are too small until then."
+    )
+    runs, alike = runs_test(residuals), neighbour_correlation_test(residuals)
+    return [
+        check(
+            "residual_runs",
+            runs.value,
+            runs.limit,
+            "Share of neighbours along the scan whose residuals have the same sign: a half by "
+            f"chance. A failure means that residuals come in runs: {cause}",
+            runs.p_value,
+        ),
+        check(
+            "residual_correlation",
+            alike.value,
+            alike.limit,
+            "Correlation of each residual with its neighbours along the scan, halved for each step "
+            f"farther, over what chance gives on average. A failure means that residuals are "
+            f"alike: {cause}",
+            alike.p_value,
+        ),
+    ]
+
+
+def _evidence(estimate: ProfileEstimate) -> QualityCheck:
+    found = departure_evidence(estimate)
+    return check(
+        "gaussian_evidence",
+        found.log_bayes_factor,
+        _EVIDENCE_LIMIT,
+        "Natural logarithm of the odds by which the scan speaks for a departure of G from a "
+        "Gaussian (Bayes factor; within ±8.5); below zero it speaks for the Gaussian, and "
+        "gaussian_sigma may be used. A failure means that G is not Gaussian: use the found G. The "
+        f"likeliest departure is {_KINDS[found.kind]} ({found.share:.0%} of them).",
+    )
+
+
+def _symmetry(estimate: ProfileEstimate) -> list[QualityCheck]:
+    if estimate.points.planar:
+        uneven = axisymmetry_test(estimate)
+        meaning = (
+            f"Fall of chi-square by {uneven.count} columns of an elliptic sensor, which then make "
+            f"up {uneven.size:.2%} of the largest signal. A failure means that the radial profile "
+            "is only a mean over directions: use the field."
+        )
+        return [_added("axisymmetry", uneven, meaning)]
+    odd = symmetry_test(estimate)
+    if estimate.model.order:
+        meaning = (
+            f"Fall of chi-square by {odd.count} even columns, which then make up {odd.size:.2%} of "
+            "the largest signal. A failure means that the left and right halves differ by more "
+            "than their sign: cross-talk of the normal stress, a tilted rod, or an uneven film."
+        )
+        return [_added("symmetry", odd, meaning)]
+    meaning = (
+        f"Fall of chi-square by {odd.count} odd columns, which then make up {odd.size:.2%} of the "
+        "largest signal. A failure means that the left and right halves differ: a tilted rod, an "
+        "uneven film, or a drifting load."
+    )
+    return [_added("symmetry", odd, meaning)]
+
+
+def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
+    linear = linearity_test(estimate)
+    if linear is None:
+        return []
+    meaning = (
+        "Fall of chi-square by a conversion constant that changes with the load, here by "
+        f"{float(linear.coefficients[0]):.2%} per mean load. A failure means that the output is "
+        "not linear in the load, and that one A does not serve all loads."
+    )
+    return [_added("load_linearity", linear, meaning)]
+
+
+def _added(name: str, found: ExtraColumns, meaning: str) -> QualityCheck:
+    p_value = float(chdtrc(found.count, found.fall))
+    return check(name, found.fall, chi_square_limit(found.count), meaning, p_value)
+
+
+def _held_out(estimate: ProfileEstimate) -> list[QualityCheck]:
+    """Predict each repeat, load and scan from the others, whichever there are several of."""
+    points = estimate.points
+    load = load_groups(points.load)
+    several_scans = points.scans > 1
+    # Where every repeat has a load, or a scan, of its own, it is held out under that name.
+    repeat = not _same(points.repeat, load) and not _same(points.repeat, points.scan)
+    checks = [
+        _prediction(estimate, "repeat", points.repeat) if repeat else None,
+        _prediction(estimate, "load", load) if not _same(load, points.scan) else None,
+        _prediction(estimate, "scan", points.scan) if several_scans else None,
+    ]
+    return [found for found in checks if found is not None]
+
+
+def _same(one: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
+    """Whether two groupings of the points are the same but for the groups' names."""
+    pairs = np.unique(np.stack([one, other]), axis=1).shape[1]
+    return bool(pairs == np.unique(one).size == np.unique(other).size)
+
+
+def _prediction(
+    estimate: ProfileEstimate, what: str, group: NDArray[np.intp]
+) -> QualityCheck | None:
+    found = hold_out(estimate, group)
+    if found is None:
+        return None
+    causes = {
+        "repeat": "something changed between repeats: the load, the contact, the sensor; look at "
+        "this repeat, and leave it out if its reason is known",
+        "load": "the signal is not proportional to the load: the film is strained too far for a "
+        "linear reference, or the load cell's scale is wrong; calibrate at the load of use",
+        "scan": "the scans are not of the same sensor, film and reference; calibrate each by "
+        "itself and compare",
+    }
+    stated = estimate.points.u_errors is not None
+    scale = "" if stated else ", over the others' own scatter as no noise is stated"
+    joined = "" if found.alone else f", {what}s taken several at a time"
+    meaning = (
+        f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "
+        f"with the uncertainty of both{scale}; the worst of {found.folds}, number {found.worst + 1}"
+        f"{joined}. Its own baseline, drift and centre are fitted to it. A failure means that "
+        f"{causes[what]}."
+    )
+    return check(f"held_out_{what}", found.value, found.limit, meaning, found.p_value)
+
+
+_BASELINE_DRIFT_LIMIT = 0.05
+_TAIL_LIMIT = 0.05
+#: A shear falls off more slowly: of the paper's rod 6.5 % lie beyond four film thicknesses.
+_SHEAR_TAIL_LIMIT = 0.10
+_BAND_LIMIT = 0.5
+_FORCE_LIMIT = 0.01
+_WIDTH_LIMIT = 3.0
+_NEGLIGIBLE_DIFFERENCE = 0.002
+
+
+def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
+    """Run every check that applies to the scan."""
+    return (
+        *_reconvolutions(solution),
+        *_constraint(solution),
+        *_agreements(solution, parameters),
+        *_set_up(solution),
+        *model_checks(solution.estimate),
+    )
+
+
+def _reconvolutions(solution: Solution) -> list[QualityCheck]:
+    evidence = solution.regulariser.name == "evidence"
+    removed = (
+        "the posterior mean of G misses something that the scan shows"
+        if evidence
+        else "the regularisation has removed something that the scan shows (see method evidence)"
+    )
+    stated = solution.estimate.points.u_errors is not None
+    return [
+        _chi_square(
+            "reconvolution",
+            solution.deconvolution.misfit,
+            "Reduced chi-square of the scan against the found G convolved with the reference. A "
+            f"failure means that {removed}, or that the scan is no convolution of the reference: "
+            "look at chi_square, which does not depend on G.",
+        ),
+        _chi_square(
+            "gaussian_misfit",
+            solution.gaussian_misfit,
+            "Reduced chi-square of the scan against the fitted Gaussian convolved with the "
+            "reference. A failure means that G is not Gaussian at this noise: use the found G, "
+            "not gaussian_sigma.",
+            exact=stated,
+        ),
+    ]
+
+
+def _constraint(solution: Solution) -> list[QualityCheck]:
+    """Compare a G that was kept from falling below zero, or from rising, with the free one."""
+    regulariser, estimate = solution.regulariser, solution.estimate
+    if not (isinstance(regulariser, Evidence) and regulariser.constrained):
+        return []
+    weights = estimate.weights / estimate.noise_scale**2
+    misfits = [
+        float(np.sum(estimate.points.standardised(estimate.points.u - u, weights) ** 2))
+        for u in (solution.deconvolution.predicted, estimate.predicted)
+    ]
+    # As many directions of G as the scan tells apart, and which the constraint may cost.
+    told = free_model(estimate).design.shape[1] - estimate.basis.flat
+    return [
+        check(
+            "constraint",
+            max(misfits[0] - misfits[1], 0.0),
+            chi_square_limit(max(told, 1)),
+            "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
+            "estimate. A failure means that the scan contradicts it: leave it out.",
+        )
+    ]
+
+
+def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
+    """Compare the found G with the Gaussian; the two are fitted to the same noise."""
+    if solution.regulariser.name == "evidence":
+        found = "of the free G in data space"
+        else_ = ""
+    else:
+        found = "of the G by division of the fields"
+        else_ = ", or that the method of division failed: compare method evidence"
+    return [
+        _agreement(
+            parameters,
+            ("conversion_constant", "conversion_constant_gaussian"),
+            "method_agreement",
+            f"Difference of the conversion constant {found} from the Gaussian fit's, in its "
+            "standard uncertainty. A failure means that the Gaussian's is biased, as when G has "
+            f"tails that a Gaussian lacks{else_}.",
+        ),
+        _agreement(
+            parameters,
+            ("gaussian_sigma_deconvolved", "gaussian_sigma"),
+            "width_agreement",
+            f"Difference of the width {found} from the one fitted to the scan, in its standard "
+            "uncertainty. A failure means that G is not Gaussian, so that its width depends on how "
+            f"it is read off{else_}. Look at both reconvolutions.",
+        ),
+    ]
+
+
+def _set_up(solution: Solution) -> list[QualityCheck]:
+    """Film, band, reach, baseline and reference."""
+    estimate = solution.estimate
+    resolved = solution.band.resolved
+    return [
+        check(
+            "width_over_thickness",
+            estimate.gaussian.sigma / solution.scan.film.thickness,
+            _WIDTH_LIMIT,
+            "Width of G over the film's thickness. A failure means that the unit of the positions "
+            "or of the film's thickness should be looked at.",
+        ),
+        check(
+            "resolved_band",
+            float(gaussian_transfer(np.array(resolved), estimate.gaussian.sigma)),
+            _BAND_LIMIT,
+            "Transfer function of the fitted Gaussian at the resolved wavenumber, here "
+            f"{resolved * 1e-3:.3g} rad/mm: up to there, the posterior standard uncertainty of G's "
+            f"transfer function is less than 1/{RESOLVED:g} of it, whatever the method of "
+            "division; beyond, the prior speaks and not the scan. A failure means that noise hides "
+            "more than half of G's spectrum: average repeats or raise the load.",
+        ),
+        check(
+            "tail_share",
+            solution.tail_share,
+            _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT,
+            "Share of the voltage's integral that lies beyond the scan and is extrapolated. A "
+            "failure means that A rests on the extrapolation: scan farther.",
+        ),
+        check(
+            "baseline_drift",
+            2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal,
+            _BASELINE_DRIFT_LIMIT,
+            "Change of the baseline across the scan over the largest signal. It is fitted and "
+            "removed as a straight line; a failure means that what is left of it may bias A.",
+        ),
+        check(
+            "reference_force",
+            abs(carried_force(solution.stress, estimate.model.reference) - 1.0),
+            _FORCE_LIMIT,
+            "Relative difference of the reference's total force from the load. A failure means "
+            "that the reference was made for another load, or that its table ends too early; A is "
+            "wrong by as much.",
+        ),
+        check(
+            "outliers",
+            float(np.mean(estimate.outlier_weight < OUTLIER_WEIGHT)),
+            OUTLIER_LIMIT,
+            "Share of points whose weight was more than halved. A failure means that the noise is "
+            "not what the uncertainties take it for: look at the points that the messages name.",
+        ),
+    ]
+
+
+def _chi_square(name: str, misfit: Misfit, meaning: str, *, exact: bool = False) -> QualityCheck:
+    """Check a misfit; its p-value is known where the noise is, for a plain fit."""
+    limit = chi_square_limit(misfit.degrees) / misfit.degrees
+    p_value = float(chdtrc(misfit.degrees, misfit.chi2_reduced * misfit.degrees))
+    return check(name, misfit.chi2_reduced, limit, meaning, p_value if exact else None)
+
+
+def _agreement(
+    parameters: ParameterSet, names: tuple[str, str], name: str, meaning: str
+) -> QualityCheck:
+    i, j = (parameters.names.index(name) for name in names)
+    c, values = parameters.covariance, parameters.values
+    variance = max(c[i, i] + c[j, j] - 2 * c[i, j], 0.0)
+    # Differences below a fifth of a percent matter to nobody, however small their noise.
+    allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * values[j])
+    return check(name, abs(values[i] - values[j]) / allowed, 3.0, meaning)

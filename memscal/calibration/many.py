@@ -1,0 +1,147 @@
+"""Calibration of many scans, in processes: what each says, or why it says nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from typing import Any
+
+from memscal.calibration.calibrate import calibrate, chosen_method
+from memscal.errors import InputError, MemscalError
+from memscal.model.apparatus import ApparatusRadial, ParameterSet
+from memscal.model.checks import Message, QualityCheck
+from memscal.model.scan import Scan
+from memscal.parallel import require_workers, worker_pool
+
+__all__ = ["FleetCalibration", "calibrate_many"]
+
+#: One item: a scan, its file, or several scans that are fitted together.
+FleetScan = Scan | str | PathLike[str] | Sequence[Scan]
+#: Scans that a process takes at a time: their results wait for each other.
+_LARGEST_CHUNK = 16
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class FleetCalibration:
+    """What one scan of many says, without its fields; or the error that it met.
+
+    Parameters
+    ----------
+    index : int
+        Its place among the scans.
+    parameters : ParameterSet or None
+        A and all other parameters with their covariance, in SI units.
+    radial_profile : ApparatusRadial or None
+        G with its standard uncertainty.
+    resolved_wavenumber : float or None
+        Up to which wavenumber the scan determines G, in rad/m.
+    budget : mapping
+        Standard uncertainties by source.
+    checks : tuple of QualityCheck
+        Quality checks.
+    messages : tuple of Message
+        What the calibration tells.
+    error : MemscalError or None
+        Why there is no result.
+    """
+
+    index: int
+    parameters: ParameterSet | None = None
+    radial_profile: ApparatusRadial | None = None
+    resolved_wavenumber: float | None = None
+    budget: Mapping[str, Mapping[str, float]]
+    checks: tuple[QualityCheck, ...] = ()
+    messages: tuple[Message, ...] = ()
+    error: MemscalError | None = None
+
+    def __repr__(self) -> str:
+        """Return A, or the error."""
+        if self.parameters is None:
+            problem = self.error.problem if self.error is not None else "no result"
+            return f"<FleetCalibration {self.index}: {problem}>"
+        a = self.parameters["conversion_constant"] * 1e3
+        return f"<FleetCalibration {self.index}: A = {a:.4g} mV/Pa>"
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is a result, and every quality check passed."""
+        return self.error is None and all(check.passed for check in self.checks)
+
+
+def calibrate_many(
+    scans: Iterable[FleetScan], *, workers: int = 1, **options: Any
+) -> list[FleetCalibration]:
+    """Calibrate with many scans, each by itself.
+
+    Parameters
+    ----------
+    scans : iterable of Scan, path, or sequence of Scan
+        Scans or their files; a sequence within counts as one, and is fitted together.
+    workers : int, default 1
+        Processes that share the work.  Where these are more than one, a script needs the usual
+        ``if __name__ == "__main__":``, because each process imports it.
+    **options
+        Options of :func:`memscal.calibrate`, the same for all.
+
+    Returns
+    -------
+    list of FleetCalibration
+        One for each scan, in their order.  A scan that cannot be used has its error in place;
+        the others are not affected.
+
+    Raises
+    ------
+    InputError
+        If the method, one of its options, or the number of processes is wrong.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> scans = [memscal.simulate(noise=0.005, seed=seed) for seed in range(3)]
+    >>> found = memscal.calibrate_many([*scans, "missing.h5"], method="evidence")
+    >>> [one.passed for one in found]
+    [True, True, True, False]
+    """
+    require_workers(workers)
+    if isinstance(scans, Scan | str | PathLike):
+        raise InputError(
+            "calibrate_many() was given one scan.",
+            cure="Give a list of scans; calibrate one with memscal.calibrate(scan).",
+        )
+    method, seed = options.get("method", "white-noise"), options.get("seed", 0)
+    known = ("reference", "alternative", "channel", "method", "correlations", "seed")
+    chosen_method(method, seed, {name: v for name, v in options.items() if name not in known})
+    task = partial(_calibrated, options=options)
+    items = list(enumerate(scans))
+    if workers == 1 or len(items) < 2:
+        return [task(item) for item in items]
+    chunk = max(1, min(_LARGEST_CHUNK, len(items) // (4 * workers)))
+    with worker_pool(min(workers, len(items))) as pool:
+        return list(pool.map(task, items, chunksize=chunk))
+
+
+def _calibrated(item: tuple[int, FleetScan], options: Mapping[str, Any]) -> FleetCalibration:
+    """Calibrate one scan; whatever goes wrong is its own matter."""
+    index, scan = item
+    try:
+        apparatus = calibrate(scan, **options).apparatus
+    except MemscalError as failure:
+        return FleetCalibration(index=index, budget={}, error=failure)
+    except Exception as failure:  # noqa: BLE001 - the rest must go on
+        unforeseen = MemscalError(
+            f"Scan {index} met {type(failure).__name__}: {failure}",
+            why="This should have been refused with a reason.",
+            cure="Please report it, with the scan.",
+        )
+        return FleetCalibration(index=index, budget={}, error=unforeseen)
+    return FleetCalibration(
+        index=index,
+        parameters=apparatus.parameters,
+        radial_profile=apparatus.radial_profile,
+        resolved_wavenumber=apparatus.resolved_wavenumber,
+        budget=apparatus.budget,
+        checks=apparatus.checks,
+        messages=apparatus.process.messages,
+    )

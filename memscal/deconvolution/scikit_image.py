@@ -1,0 +1,145 @@
+"""The classical restorations of scikit-image, behind the same protocol."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from memscal.deconvolution.division import (
+    NOISE_RATIO,
+    Division,
+    DivisionProblem,
+    image_division,
+    require_amplitude,
+    require_count,
+)
+from memscal.model.arrays import FloatArray
+
+__all__ = ["RichardsonLucy", "UnsupervisedWiener", "Wiener"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Images:
+    """Both fields as scikit-image wants them: of order one, the point spread of sum one."""
+
+    image: FloatArray
+    point_spread: FloatArray
+    scale: float
+
+    @classmethod
+    def of(cls, problem: DivisionProblem) -> _Images:
+        grid = problem.grid
+        image = grid.to_image(problem.voltage)
+        spread = grid.to_image(problem.reference)
+        peak = float(np.abs(image).max())
+        total = float(spread.sum())
+        # u = sum(g * spread) * cell area, with image / peak and spread / total.
+        return cls(image / peak, spread / total, peak / (total * grid.cell_area))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wiener:
+    """Wiener-Hunt restoration: the quotient with a Laplacian penalty.
+
+    Parameters
+    ----------
+    amplitude : float
+        The penalty equals the square of a tenth of the weakest relevant component there;
+        this factor scales that amplitude.
+    """
+
+    amplitude: float = 1.0
+    name: ClassVar[str] = "wiener"
+    assumes: ClassVar[str] = "G is smooth; the noise of the lifted field is white."
+    fails: ClassVar[str] = (
+        "A lifted line scan has ring-shaped noise, not white: the penalty is a guess."
+    )
+
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide by scikit-image's Wiener-Hunt filter."""
+        from skimage.restoration import wiener
+        from skimage.restoration.uft import laplacian
+
+        images = _Images.of(problem)
+        penalty = np.abs(laplacian(2, images.image.shape)[0])
+        spectrum = np.abs(np.fft.rfft2(np.fft.ifftshift(images.point_spread)))
+        weakest = problem.weakest_reference / (
+            problem.grid.cell_area * problem.grid.to_image(problem.reference).sum()
+        )
+        # Along one axis: the first component weaker than the weakest relevant one, or the last.
+        index = int(np.argmax(spectrum[0] < weakest)) or spectrum.shape[1] - 1
+        balance = (self.amplitude * NOISE_RATIO * weakest / penalty[0, index]) ** 2
+        restored = wiener(images.image, images.point_spread, balance, clip=False)
+        return image_division(problem, restored * images.scale)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnsupervisedWiener:
+    """Wiener-Hunt restoration whose two precisions are sampled with the image.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the Gibbs sampler.
+    """
+
+    seed: int = 0
+    name: ClassVar[str] = "unsupervised-wiener"
+    assumes: ClassVar[str] = "The noise of the field is white, and G is smooth."
+    fails: ClassVar[str] = (
+        "The noise of a lifted line scan is not white: almost no regularisation may be chosen."
+    )
+
+    def __post_init__(self) -> None:
+        require_count(self.name, "seed", self.seed, 0)
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide by scikit-image's unsupervised Wiener-Hunt restoration."""
+        from skimage.restoration import unsupervised_wiener
+
+        images = _Images.of(problem)
+        restored, _ = unsupervised_wiener(
+            images.image, images.point_spread, clip=False, rng=self.seed
+        )
+        return image_division(problem, restored * images.scale)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RichardsonLucy:
+    """Richardson-Lucy restoration: multiplicative steps that keep G positive.
+
+    Parameters
+    ----------
+    iterations : int
+        Number of steps; more of them resolve finer detail, then noise.
+    """
+
+    iterations: int = 50
+    name: ClassVar[str] = "richardson-lucy"
+    assumes: ClassVar[str] = "G is nowhere negative; the noise is a counting noise."
+    fails: ClassVar[str] = (
+        "Stopping is the regularisation: too early is too wide, too late is ripples."
+    )
+
+    def __post_init__(self) -> None:
+        require_count(self.name, "iterations", self.iterations, 1)
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide by scikit-image's Richardson-Lucy restoration."""
+        from skimage.restoration import richardson_lucy
+
+        images = _Images.of(problem)
+        positive = np.maximum(images.image, 0.0)
+        restored = richardson_lucy(
+            positive,
+            images.point_spread,
+            num_iter=self.iterations,
+            clip=False,
+            filter_epsilon=1e-12,
+        )
+        return image_division(problem, restored * images.scale)

@@ -1,0 +1,476 @@
+r"""The Gaussian apparatus function that fits the scan best, in data space.
+
+The paper's approximation, fitted where the noise is known: its convolution with the
+reference stress against the scan, together with conversion constant, centre, baseline and
+linear drift, by weighted least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from memscal.axisymmetry.kernels import gaussian_transfer
+from memscal.errors import FitError, InputError
+from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
+from memscal.estimation.points import ScanPoints
+from memscal.model.arrays import FloatArray
+
+__all__ = [
+    "GaussianFit",
+    "fit_gaussian",
+    "gauss_newton",
+    "linearise",
+    "require_parity",
+    "robust_start",
+    "smoothing_length",
+    "undetermined",
+]
+
+_MOST_STEPS = 20
+_MOST_HALVINGS = 5
+#: Steps end here, in units of the parameters' typical sizes: the model is no longer linear.
+_LONGEST_STEP = 1.0
+#: Rounding may raise a cost that has settled by this share.
+_ROUNDING = 1e-10
+
+Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+def gauss_newton(
+    linearise: Linearised, start: FloatArray, *, tolerance: float, knee: float = np.inf
+) -> FloatArray | None:
+    """Minimise the loss of the residuals of a model that is nearly linear about the start.
+
+    Parameters
+    ----------
+    linearise : callable
+        Residuals, shape (n,), and their derivatives, shape (n, p), at parameters of shape (p,).
+    start : ndarray, shape (p,)
+        Where to begin; the parameters are scaled to numbers near one.
+    tolerance : float
+        The last step is shorter than this in every parameter.
+    knee : float
+        Residual from which on the loss grows linearly; infinite for least squares.
+
+    Returns
+    -------
+    ndarray, shape (p,), or None
+        ``None`` if the steps do not settle downhill: use a solver with a trust region.
+
+    Examples
+    --------
+    >>> x = np.arange(4.0)
+    >>> def decay(p):
+    ...     curve = np.exp(-p[0] * x)
+    ...     return curve - np.exp(-0.5 * x), -(x * curve)[:, None]
+    >>> round(float(gauss_newton(decay, np.array([0.4]), tolerance=1e-9)[0]), 6)
+    0.5
+    """
+    place: FloatArray = start
+    step: FloatArray = np.zeros_like(start)
+    cost, halvings = np.inf, 0
+    for _ in range(_MOST_STEPS):
+        residual, slope = linearise(place)
+        stretch = np.sqrt(1 + (residual / knee) ** 2)
+        # The loss, in a form without cancellation where the knee is far away.
+        found = float(np.sum(2 * residual**2 / (1 + stretch)))
+        if not found <= cost * (1 + _ROUNDING):
+            halvings += 1
+            if halvings > _MOST_HALVINGS:
+                return None
+            step = step / 2
+            place = place - step
+            continue
+        root = stretch**-0.5
+        whole = np.linalg.lstsq(slope * root[:, None], -residual * root, rcond=None)[0]
+        longest = float(np.abs(whole).max())
+        step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
+        place, cost = place + step, found
+        if longest < tolerance:
+            return np.asarray(place)
+    return None
+
+
+#: A shape of the wrong parity or sign must leave less than this share of what the right one does.
+_CLEARLY = 0.7
+
+
+def require_parity(
+    points: ScanPoints,
+    odd: tuple[FloatArray, FloatArray],
+    even: tuple[FloatArray, FloatArray],
+) -> None:
+    """Refuse a voltage that a shear of the other sign, or an even signal, meets far better.
+
+    Parameters
+    ----------
+    points : ScanPoints
+        The points of one scan, by a tangential channel.
+    odd, even : tuple of two ndarray, shape (m,)
+        Amplitudes of odd and of even signals of trial centres and widths, fitted to the voltages,
+        and the sums of absolute residuals that each leaves.
+
+    Raises
+    ------
+    InputError
+        If the voltage has the wrong sign, or is even.
+    """
+    amplitudes, costs = odd
+    right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
+    turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
+    same = float(even[1].min())
+    name, along = f"u_{points.channel}", points.channel[0]
+    if same < _CLEARLY * min(right, turned):
+        raise InputError(
+            f"{name} is the same on both sides of the sensor.",
+            why="A shear changes its sign where the indenter passes the sensor; a normal stress "
+            "does not.",
+            cure="Check the channels: this looks like u_zz.",
+        )
+    if turned < _CLEARLY * right:
+        raise InputError(
+            f"{name} has the wrong sign: it rises where the indenter stands at larger {along} "
+            "than the sensor.",
+            why="A squeezed film pulls the base away from the indenter: the traction on the "
+            f"sensor along {along} is then negative.",
+            cure=f"Change the sign of {name}, or of {along} if it is the sensor that was moved: "
+            f"{along} is the indenter's position from the sensor.",
+        )
+
+
+#: Widths from which the search starts, in units of the film's smoothing length.
+_STARTING_WIDTHS = (0.1, 0.3, 0.8)
+
+
+def robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
+    """Start each scan by itself, and A and the width at the medians of all.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Points and reference.
+    weights : ndarray, shape (n,)
+        Relative weights of the points.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        A, sigma, centres, drift and ellipticity, as in
+        :func:`memscal.estimation.gaussian.linearise`.
+
+    Raises
+    ------
+    FitError
+        If no Gaussian with a positive A comes near the scan.
+    InputError
+        If a tangential channel's voltage has the wrong parity or sign.
+    """
+    points = model.points
+    parts = [
+        _robust_start_of_one(model.only(i), weights[points.scan == i]) for i in range(points.scans)
+    ]
+    shape = np.median([part[:2] for part in parts], axis=0)
+    free = points.free.sum(axis=1)
+    centres = [part[2 : 2 + n] for part, n in zip(parts, free, strict=True)]
+    drifts = [part[2 + n : 3 + 2 * n] for part, n in zip(parts, free, strict=True)]
+    return np.concatenate([shape, *centres, *drifts, np.zeros(points.ellipse)])
+
+
+def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray:
+    """Best of a grid of centres and widths, by the sum of absolute residuals.
+
+    A single outlier can be the largest voltage of a scan: positions are tried, not read off.
+    """
+    points = model.points
+    centres = _trial_centres(model)
+    distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
+    radii = np.linspace(0.0, 2 * np.ptp(points.x) + 2 * np.ptp(points.y), 400)
+    widths = smoothing_length(model) * np.array(_STARTING_WIDTHS)
+    kernels = np.stack([gaussian_transfer(model.k, float(width)) for width in widths])
+    # Profiles per newton of every width, on a table for quick trials.
+    spectra = (model.reference.values * kernels).T
+    wavenumbers = model.reference.wavenumbers
+    tables = wavenumbers.synthesise(spectra, radii, order=model.order).T
+    root = np.sqrt(weights)
+    data, drift = root * points.u, root[:, None] * model.drift_columns
+    best, best_cost = np.zeros(0), np.inf
+    odd: list[FloatArray] = []
+    for sigma, table in zip(widths, tables, strict=True):
+        shapes = np.interp(distances, radii, table) * (points.load * root)
+        if model.order:
+            shapes *= model.cosines(centres)
+            odd.append(shapes)
+        amplitudes, costs = _amplitudes(shapes, data, drift)
+        i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
+        if amplitudes[i] > 0 and costs[i] < best_cost:
+            left = data - amplitudes[i] * shapes[i]
+            baseline = np.linalg.lstsq(drift, left, rcond=None)[0]
+            best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
+            best_cost = float(costs[i])
+    if model.order:
+        # The potential of a shear looks much as the normal stress does.
+        potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
+        even = [np.interp(distances, radii, each) * (points.load * root) for each in potentials]
+        require_parity(
+            points,
+            _amplitudes(np.concatenate(odd), data, drift),
+            _amplitudes(np.concatenate(even), data, drift),
+        )
+    if not best.size:
+        raise undetermined(model)
+    return best
+
+
+def _amplitudes(
+    shapes: FloatArray, data: FloatArray, drift: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Fit each row of shapes beside the drift: its amplitude, the sum of absolute residuals."""
+    base = np.linalg.qr(drift)[0]
+    free = shapes - (shapes @ base) @ base.T
+    rest = data - base @ (base.T @ data)
+    square = np.sum(free**2, axis=1)
+    amplitudes = np.divide(free @ rest, square, out=np.zeros_like(square), where=square > 0)
+    return amplitudes, np.abs(rest - amplitudes[:, None] * free).sum(axis=1)
+
+
+def _trial_centres(model: ForwardModel) -> FloatArray:
+    """At most 40 candidates per axis: the positions themselves, less the outer tenth."""
+    points = model.points
+
+    def inner(positions: FloatArray) -> FloatArray:
+        unique = np.unique(positions)
+        margin = unique.size // 10
+        kept = unique[margin : unique.size - margin]
+        return kept[:: int(np.ceil(kept.size / (12 if points.planar else 40)))]
+
+    along = [
+        inner(positions) if free else np.zeros(1)
+        for free, positions in zip(points.free[0], (points.x, points.y), strict=True)
+    ]
+    mesh = np.meshgrid(*along)
+    return np.stack([axis.ravel() for axis in mesh], axis=1)
+
+
+def smoothing_length(model: ForwardModel) -> float:
+    r"""Length over which the film blurs: :math:`1/k` where the reference has fallen to half."""
+    values = model.reference.scalar.values
+    return float(1 / model.k[int(np.argmax(values / values[0] < 0.5))])
+
+
+def undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
+    """Return the error for a scan that no Gaussian fits."""
+    stopped = conversion_constant is not None
+    found = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
+    return FitError(
+        f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{found}.",
+        why="The voltage does not rise and fall with the distance from one centre.",
+        cure="Look at the scan; check its channel, its positions and that it crosses the sensor.",
+    )
+
+
+_Loss = Literal["linear", "soft_l1"]
+
+#: A step in the ellipticity that the solver takes for one.
+_TYPICAL_ELLIPTICITY = 0.2
+#: Standardised residual from which on the robust fit's loss grows linearly.
+_KNEE = 3.0
+#: A width below this share of its typical size is left to a search with a trust region.
+_NARROWEST = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianFit:
+    """Best Gaussian in data space, and the model linearised about it.
+
+    Parameters
+    ----------
+    conversion_constant : float
+        A, in V/Pa.
+    sigma : float
+        Standard deviation of the Gaussian, in m.
+    centre : ndarray, shape (scans, 2)
+        Centre (x0, y0) of the sensor in each scan, in m; zero where a line does not tell.
+    drift : ndarray, shape (2 or 3 a scan,)
+        Baseline of each scan, and its change over half the range along x (and y), in V.
+    ellipticity : ndarray, shape (2,)
+        e1 (along x against y) and e2 (along the diagonals), where the points spread over a plane.
+    points : ScanPoints
+        What was fitted.
+    geometry : Geometry
+        Distances from the centre.
+    jacobian : ndarray, shape (n, p)
+        Derivatives of the voltages by A, sigma, centre and drift, in this order.
+    predicted : ndarray, shape (n,)
+        Voltages of the fit, in V.
+    """
+
+    conversion_constant: float
+    sigma: float
+    centre: FloatArray
+    drift: FloatArray
+    ellipticity: FloatArray
+    points: ScanPoints
+    geometry: Geometry
+    jacobian: FloatArray
+    predicted: FloatArray
+
+    def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
+        """Covariance of the parameters for a noise (V) and relative weights."""
+        standardised = self.points.standardised(self.jacobian, weights)
+        information = standardised.T @ standardised
+        scale = np.sqrt(np.diag(information))
+        inverse = np.linalg.inv(information / np.outer(scale, scale))
+        return np.asarray(noise**2 * inverse / np.outer(scale, scale))
+
+    def gain(self, weights: FloatArray) -> FloatArray:
+        """Derivative of the parameters by the voltages, shape (p, n)."""
+        twice = self.points.standardised(self.jacobian, weights)
+        back = self.points.standardised(np.eye(weights.size), weights)
+        return np.asarray(self.covariance(weights, 1.0) @ twice.T @ back)
+
+
+def fit_gaussian(
+    model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
+) -> GaussianFit:
+    """Fit a Gaussian apparatus function to the scan.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Points and reference.
+    weights : ndarray, shape (n,)
+        Relative weights: the inverse noise variance up to a common factor.
+    start : GaussianFit, optional
+        An earlier fit to start from; without one the search is global and robust.
+
+    Raises
+    ------
+    FitError
+        If the scan does not determine the parameters.
+    """
+    if start is None:
+        return _solve(model, weights, robust_start(model, weights), loss="soft_l1")
+    centres = start.centre[model.points.free]
+    shape = [start.conversion_constant, start.sigma]
+    ellipse = start.ellipticity[: model.points.ellipse]
+    theta = np.concatenate([shape, centres, start.drift, ellipse])
+    return _solve(model, weights, theta, loss="linear")
+
+
+def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _Loss) -> GaussianFit:
+    from scipy.optimize import least_squares
+
+    standardised = model.points.standardised
+    last: dict[bytes, GaussianFit] = {}
+
+    def evaluate(scaled: FloatArray) -> GaussianFit:
+        # Residuals and Jacobian are asked for at the same point, one after the other.
+        key = scaled.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = linearise(model, scaled * scale)
+        return last[key]
+
+    scale = _typical(model, start)
+    unexplained = model.points.u - evaluate(start / scale).predicted
+    noise = _robust_scale(standardised(unexplained, weights))
+
+    def residual(scaled: FloatArray) -> FloatArray:
+        return standardised(evaluate(scaled).predicted - model.points.u, weights) / noise
+
+    def slope(scaled: FloatArray) -> FloatArray:
+        return standardised(evaluate(scaled).jacobian, weights) * scale / noise
+
+    # A robust fit is only where the next one starts.
+    knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
+    found = gauss_newton(
+        lambda scaled: (residual(scaled), slope(scaled)),
+        start / scale,
+        tolerance=tolerance,
+        knee=knee,
+    )
+    # At a width of zero every slope by the width is zero: steps do not leave it.
+    if found is None or found[1] < _NARROWEST:
+        result = least_squares(
+            residual,
+            start / scale,
+            jac=slope,
+            loss=loss,
+            f_scale=_KNEE,
+            xtol=1e-10,
+            ftol=1e-12,
+            gtol=1e-10,
+            max_nfev=100,
+        )
+        if not result.success:
+            raise undetermined(model, linearise(model, result.x * scale).conversion_constant)
+        found = np.asarray(result.x)
+    fit = linearise(model, found * scale)
+    if not 0 < fit.conversion_constant < np.inf:
+        raise undetermined(model, fit.conversion_constant)
+    return _positive_width(fit)
+
+
+def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
+    """Typical size of each parameter, so that the solver sees numbers near one."""
+    width = max(abs(theta[1]), 0.05 * smoothing_length(model))
+    amplitude = np.ptp(model.points.u)
+    centres = int(model.points.free.sum())
+    ellipse = np.full(model.points.ellipse, _TYPICAL_ELLIPTICITY)
+    drift = np.full(theta.size - 2 - centres - ellipse.size, amplitude)
+    return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift, ellipse])
+
+
+def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
+    """Return the model and its derivatives at given parameters.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Points and reference.
+    theta : ndarray, shape (p,)
+        A, sigma, free coordinates of the centres, drift, and in a plane the ellipticity, as in
+        :class:`GaussianFit`.
+    """
+    free, elliptic = model.points.free, model.points.ellipse
+    amplitude, sigma = float(theta[0]), float(theta[1])
+    centre = np.zeros(free.shape)
+    centre[free] = theta[2 : 2 + free.sum()]
+    drift = theta[2 + free.sum() : theta.size - elliptic]
+    ellipticity = np.zeros(2)
+    ellipticity[:elliptic] = theta[theta.size - elliptic :]
+    geometry = model.geometry(centre)
+    kernel = gaussian_transfer(model.k, sigma)
+    columns = np.stack([kernel, -sigma * model.k**2 * kernel], axis=1)
+    shape, widening, *ovals = (
+        elliptic_columns(model, geometry, sigma, ellipticity).T
+        if elliptic
+        else model.signal(geometry, columns).T
+    )
+    shift = model.centre_derivative(geometry, amplitude * kernel)
+    baseline = model.drift_columns
+    oval = [amplitude * column for column in ovals[:elliptic]]
+    jacobian = np.column_stack([shape, amplitude * widening, shift, baseline, *oval])
+    predicted = amplitude * shape + baseline @ drift
+    return GaussianFit(
+        amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
+    )
+
+
+def _positive_width(fit: GaussianFit) -> GaussianFit:
+    """The model is even in the width: choose its positive branch."""
+    if fit.sigma >= 0:
+        return fit
+    jacobian = fit.jacobian.copy()
+    jacobian[:, 1] *= -1
+    return replace(fit, sigma=-fit.sigma, jacobian=jacobian)
+
+
+def _robust_scale(residual: FloatArray) -> float:
+    """Median absolute deviation as a standard deviation, never zero."""
+    scale = 1.4826 * float(np.median(np.abs(residual)))
+    return max(scale, 1e-12 * float(np.abs(residual).max()), np.finfo(float).tiny)

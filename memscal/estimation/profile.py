@@ -1,0 +1,376 @@
+"""From the points of a scan to its radial profile: centre, baseline, noise and outliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
+from memscal.errors import FitError
+from memscal.estimation.bayesian import WeighedFit, weigh_departures
+from memscal.estimation.departures import DepartureBasis, departure_basis
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian
+from memscal.estimation.points import ScanPoints
+from memscal.model.arrays import FloatArray
+
+__all__ = [
+    "CentreError",
+    "PosteriorProfile",
+    "ProfileEstimate",
+    "constrained_profile",
+    "estimate_profile",
+]
+
+#: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
+OUTLIER_THRESHOLD = 3.5
+#: Error of the reference and of its transforms, relative to the largest signal.
+NUMERICAL_FLOOR = 1e-6
+#: A conversion constant must exceed this many of its standard uncertainties.
+LEAST_SIGNIFICANCE = 5.0
+_WEIGHING_ROUNDS = 4
+
+
+class CentreError(FitError):
+    """A scan that does not cross the centre of its sensor."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileEstimate:
+    """What the scan says, with its uncertainty, before any division.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Points and reference.
+    gaussian : GaussianFit
+        The best Gaussian in data space.
+    basis, weighed : DepartureBasis, WeighedFit
+        Kernels about it and their posterior.
+    weights : ndarray, shape (n,)
+        Relative weight of each point, the outliers' below one included.
+    outlier_weight : ndarray, shape (n,)
+        One for ordinary points; less for outliers.
+    """
+
+    model: ForwardModel
+    gaussian: GaussianFit
+    basis: DepartureBasis
+    weighed: WeighedFit
+    weights: FloatArray
+    outlier_weight: FloatArray
+
+    @property
+    def points(self) -> ScanPoints:
+        """The measured points."""
+        return self.model.points
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard uncertainty of each voltage, shape (n,), in V; outliers' noise is not raised.
+
+        Uncertain positions count as noise of the voltage.
+        """
+        stated = self.weights / self.outlier_weight
+        return np.asarray(self.noise_scale / np.sqrt(stated))
+
+    @property
+    def noise_root(self) -> FloatArray:
+        """Square root of the voltages' covariance, shape (n, n), in V."""
+        factor = self.points.decorrelation
+        root = np.diag(self.noise / np.sqrt(self.outlier_weight))
+        return root if factor is None else root @ np.linalg.inv(factor)
+
+    @property
+    def noise_scale(self) -> float:
+        """Noise of a point (V); or, with stated uncertainties, the factor they must grow by.
+
+        Stated uncertainties are believed until the residuals exceed them (Birge's ratio).  A
+        scatter is never taken for less than the model's own numerical error.
+        """
+        found = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
+        return found if self.points.u_errors is None else max(found, 1.0)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of all corrections, at the noise that is believed."""
+        return self.weighed.covariance
+
+    @property
+    def gaussian_covariance(self) -> FloatArray:
+        """Covariance of the Gaussian fit's own parameters, by the Jacobian's order."""
+        return self.gaussian.covariance(self.weights, self.noise_scale)
+
+    @property
+    def gaussian_gain(self) -> FloatArray:
+        """Derivative of the Gaussian fit's parameters by the voltages."""
+        return self.gaussian.gain(self.weights)
+
+    @cached_property
+    def kernel(self) -> FloatArray:
+        """Transform of A G at the quadrature nodes, in V/Pa."""
+        gaussian = gaussian_transfer(self.model.k, self.gaussian.sigma)
+        correction = self.basis.kernels(self.model.k) @ self.weighed.mean
+        return np.asarray(self.gaussian.conversion_constant * gaussian + correction)
+
+    def radial(self, r: FloatArray, shift: FloatArray | float = 0.0) -> FloatArray:
+        """A G at radii ``r`` (m), in V/Pa/m^2; its coefficients may be shifted, shape (p,)."""
+        gaussian = self.gaussian.conversion_constant * unit_gaussian(r, self.gaussian.sigma)
+        return np.asarray(gaussian + self.basis.radial(r) @ (self.weighed.mean + shift))
+
+    @property
+    def spectrum(self) -> RadialSpectrum:
+        """Transform of the voltage's radial profile per newton, in V m^2 / N."""
+        reference = self.model.reference
+        return replace(reference, values=self.kernel * reference.values)
+
+    @property
+    def conversion_constant(self) -> float:
+        """Integral of A G over the plane: A without any division, in V/Pa."""
+        return float(self.gaussian.conversion_constant + self.basis.integrals @ self.weighed.mean)
+
+    @property
+    def centres(self) -> FloatArray:
+        """Centre of the sensor in each scan, shape (scans, 2), in m, departures allowed for."""
+        corrected = self.gaussian.centre.copy()
+        free = self.points.free
+        corrected[free] += self.weighed.mean[2 : 2 + free.sum()]
+        return corrected
+
+    @property
+    def centre(self) -> FloatArray:
+        """Centre of the sensor (x0, y0) in the first scan, in m."""
+        return np.asarray(self.centres[0])
+
+    @property
+    def drifts(self) -> FloatArray:
+        """Each scan's baseline and its change over half the range along x (and y), in V."""
+        first = 2 + int(self.points.free.sum())
+        last = self.basis.flat - self.points.ellipse
+        return np.asarray(self.gaussian.drift + self.weighed.mean[first:last])
+
+    @property
+    def drift(self) -> FloatArray:
+        """The first scan's baseline and its change over half the range along x (and y), in V."""
+        return self.drifts[: 1 + int(self.points.free[0].sum())]
+
+    @property
+    def oval(self) -> FloatArray:
+        """What an elliptic sensor adds to the radial profile's voltages, shape (n,), in V."""
+        if not self.points.ellipse:
+            return np.zeros_like(self.points.u)
+        radial = self.model.signal(self.model.geometry(self.centres), self.kernel)
+        return np.asarray(self.predicted - self.background - radial)
+
+    @property
+    def offset(self) -> FloatArray:
+        """Position of each point from its scan's centre, shape (2, n), in m."""
+        positions = np.stack([self.points.x, self.points.y])
+        return np.asarray(positions - self.centres[self.points.scan].T)
+
+    @property
+    def distance(self) -> FloatArray:
+        """Distance of each point from its scan's centre, shape (n,), in m."""
+        return np.asarray(np.hypot(*self.offset))
+
+    @property
+    def background(self) -> FloatArray:
+        """Baseline and drift at each point, shape (n,), in V."""
+        return np.asarray(self.model.drift_columns @ self.drifts)
+
+    @property
+    def predicted(self) -> FloatArray:
+        """Voltage at each point, shape (n,), in V."""
+        return self.points.u - self.weighed.residual
+
+    @property
+    def largest_signal(self) -> float:
+        """Largest voltage above the background, in V."""
+        return float(np.abs(self.predicted - self.background).max())
+
+
+def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> ProfileEstimate:
+    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers.
+
+    Parameters
+    ----------
+    points : ScanPoints
+        The measured points, of one scan or several.
+    *references : RadialSpectrum
+        Transform of the base stress per newton, for each scan; all on the same nodes.
+
+    Returns
+    -------
+    ProfileEstimate
+        The best Gaussian and the weighed departures from it.
+
+    Raises
+    ------
+    FitError
+        If the scan does not determine the parameters: no centre within it, or no signal that
+        stands clear of zero.
+    """
+    model = ForwardModel(points, references)
+    fit = fit_gaussian(model, _stated_weights(points))
+    stated = _stated_weights(points, _position_noise(model, fit))
+    residual = points.u - fit.predicted
+    outlier = _outlier_weight(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
+    least = NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
+    least = least if points.u_errors is None else 1.0
+    for _ in range(_WEIGHING_ROUNDS):
+        weights = stated * outlier
+        fit = fit_gaussian(model, weights, start=fit)
+        basis = departure_basis(model, fit)
+        weighed = weigh_departures(
+            model, fit, basis, weights, float(outlier.sum()), least_noise=least
+        )
+        found = _outlier_weight(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
+        if np.allclose(found, outlier, atol=0.02):
+            break
+        outlier = found
+    estimate = ProfileEstimate(model, fit, basis, weighed, weights, outlier)
+    _require_determined(estimate)
+    return estimate
+
+
+def _stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0) -> FloatArray:
+    """Inverse variance of each voltage as stated; ones where nothing is."""
+    if points.u_errors is None:
+        return np.ones_like(points.u)
+    return np.asarray(1 / (points.u_errors**2 + position_noise**2))
+
+
+def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
+    """Voltage noise that uncertain positions make, shape (n,): most of it where U is steep."""
+    kernel = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
+    slope = model.shift_derivative(fit.geometry, kernel)
+    # A raster's positions are uncertain along x; how much of that is radial depends on the place.
+    along = np.argmax(model.points.free[model.points.scan], axis=1), range(model.points.u.size)
+    return np.asarray(slope[along] * model.points.x_errors)
+
+
+def _require_determined(estimate: ProfileEstimate) -> None:
+    """Refuse scans that do not cross their sensor, or whose signal is lost in noise."""
+    points, integrals = estimate.points, estimate.basis.integrals
+    for scan, axis in np.argwhere(points.free):
+        name, centre = "xy"[axis], estimate.centres[scan, axis]
+        positions = (points.x, points.y)[axis][points.scan == scan]
+        if not positions.min() - points.step <= centre <= positions.max() + points.step:
+            raise CentreError(
+                f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "
+                f"scan from {positions.min() * 1e3:.4g} mm to {positions.max() * 1e3:.4g} mm.",
+                why="A centre that was not crossed is not determined, nor is anything else.",
+                cure="Scan across the sensor.",
+            )
+    # Rounding makes the variance of a scan without noise negative.
+    variance = float(integrals @ estimate.covariance @ integrals)
+    uncertainty = float(np.sqrt(max(variance, 0.0)))
+    if not estimate.conversion_constant > LEAST_SIGNIFICANCE * uncertainty:
+        raise FitError(
+            f"The conversion constant would be ({estimate.conversion_constant * 1e3:.2g} ± "
+            f"{uncertainty * 1e3:.2g}) mV/Pa: it is not told apart from zero.",
+            why="The voltage does not rise above its noise as the rod passes, or the scan is too "
+            "short to tell the profile's tail from the baseline.",
+            cure="Check channel and positions; scan farther; raise the load or average repeats.",
+        )
+
+
+def _outlier_weight(standardised: FloatArray, threshold: float) -> FloatArray:
+    """Weights that leave ordinary points at one and fall fast beyond the threshold.
+
+    The influence w z of a point falls as 1/z^3 beyond the threshold, so a gross outlier
+    moves nothing, yet no point is ever dropped.
+    """
+    scale = 1.4826 * np.median(np.abs(standardised))
+    z = np.abs(standardised) / max(scale, np.finfo(float).tiny)
+    return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))
+
+
+_RADII = 60
+_REACH_IN_WIDTHS = 6.0
+#: Beyond the reach a profile has ended; there the inequalities hold to this share of the peak.
+_SLACK = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorProfile:
+    """A G as the scan's points have it: the posterior mean, its coefficients shifted."""
+
+    estimate: ProfileEstimate
+    shift: FloatArray
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """A G at radii ``r`` (m), in V/Pa/m^2."""
+        return self.estimate.radial(r, self.shift)
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Hankel transform of A G at ``k`` (rad/m), in V/Pa."""
+        fit, basis = self.estimate.gaussian, self.estimate.basis
+        corrections = self.estimate.weighed.mean + self.shift
+        gaussian = fit.conversion_constant * gaussian_transfer(k, fit.sigma)
+        return np.asarray(gaussian + basis.kernels(k) @ corrections)
+
+
+def constrained_profile(
+    estimate: ProfileEstimate, *, nonnegative: bool, monotone: bool
+) -> PosteriorProfile:
+    """Return the most credible A G under constraints; without any, the posterior mean.
+
+    Parameters
+    ----------
+    estimate : ProfileEstimate
+        The posterior.
+    nonnegative : bool
+        Whether A G must not be negative.
+    monotone : bool
+        Whether A G must not rise with the radius, nor be negative.
+
+    Raises
+    ------
+    FitError
+        If no profile meets the constraints.
+    """
+    if not (nonnegative or monotone):
+        return PosteriorProfile(estimate, np.zeros_like(estimate.weighed.mean))
+    width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)
+    r = np.linspace(0.0, _REACH_IN_WIDTHS * width, _RADII)
+    profile, columns = estimate.radial(r), estimate.basis.radial(r)
+    if monotone:
+        # What falls all the way to nothing is nowhere negative, either.
+        profile = np.append(profile[:-1] - profile[1:], profile[-1])
+        columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
+    scale = float(np.abs(profile).max())
+    values, vectors = np.linalg.eigh(_scaled(estimate))
+    kept = values > 1e-12 * values[-1]
+    root = _deviation(estimate)[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
+    return PosteriorProfile(estimate, root @ z)
+
+
+def _deviation(estimate: ProfileEstimate) -> FloatArray:
+    deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
+    return np.where(deviation > 0, deviation, 1.0)
+
+
+def _scaled(estimate: ProfileEstimate) -> FloatArray:
+    deviation = _deviation(estimate)
+    return np.asarray(estimate.covariance / np.outer(deviation, deviation))
+
+
+def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
+    """Shortest z with ``matrix @ z >= bound``."""
+    from scipy.optimize import nnls
+
+    target = np.append(np.zeros(matrix.shape[1]), 1.0)
+    dual, _ = nnls(np.vstack([matrix.T, bound]), target, maxiter=50 * bound.size)
+    residual = np.vstack([matrix.T, bound]) @ dual - target
+    if not residual[-1] < -1e-12:
+        raise FitError(
+            "No apparatus function of the kind that was asked for comes near the scan.",
+            why="It would have to be negative, or to rise, somewhere.",
+            cure="Leave out the constraint: nonnegative=false, monotone=false.",
+        )
+    return np.asarray(-residual[:-1] / residual[-1])

@@ -1,0 +1,269 @@
+"""The one way a file is written: whole or not at all, and never over an input."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+
+from memscal.errors import InputError, OutputError, UnsafeFileError
+from memscal.formats.schema import MAX_FILE_BYTES
+
+__all__ = ["atomic_write_bytes", "ensure_writable", "read_bytes"]
+
+_UNTOUCHED = "Nothing was written; what was there before is untouched."
+_CURES = {
+    errno.ENOSPC: "Free some space on this disk, or choose another folder.",
+    errno.EDQUOT: "Free some of your disk quota, or choose another folder.",
+    errno.EROFS: "Choose a folder on a disk that is not read-only.",
+    errno.EACCES: "Choose a folder in which you may write.",
+    errno.EPERM: "Choose a folder in which you may write.",
+    errno.ENOENT: "Create the folder first, or correct its name.",
+    errno.ENOTDIR: "Correct the path: a part of it is a file, not a folder.",
+    errno.ENAMETOOLONG: "Choose a shorter name.",
+}
+_NO_HARD_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK}
+
+
+def ensure_writable(
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    inputs: Iterable[str | os.PathLike[str]] = (),
+) -> None:
+    """Prove that an output can be written, before the work that produces it begins.
+
+    A small file is written beside the target and removed again: permissions alone do not
+    say whether a disk is full or read-only.
+
+    Parameters
+    ----------
+    path : path
+        The output.
+    overwrite : bool
+        Whether an existing regular file may be replaced.
+    inputs : iterable of path
+        Files that are read in the same run: the output may be none of them.
+
+    Raises
+    ------
+    OutputError
+        If the output cannot be written, exists, or is an input.
+
+    Examples
+    --------
+    >>> ensure_writable("/no/such/folder/a.h5")
+    Traceback (most recent call last):
+    ...
+    memscal.errors.OutputError: The output /no/such/folder/a.h5 cannot be written: ...
+    """
+    target = _checked_target(path, overwrite=overwrite, inputs=inputs)
+    temporary = _temporary_name(target)
+    try:
+        _write_durably(temporary, b"\0")
+    except OSError as error:
+        raise _output_error(target, error) from error
+    finally:
+        _remove(temporary)
+
+
+def atomic_write_bytes(
+    path: str | os.PathLike[str],
+    data: bytes | memoryview,
+    *,
+    overwrite: bool = False,
+    inputs: Iterable[str | os.PathLike[str]] = (),
+) -> None:
+    """Write a file whole or not at all.
+
+    The bytes go to a temporary file beside the target, are flushed to the disk, and take
+    the target's name in one step; the temporary file is removed on any failure.  A process
+    that is killed half-way leaves the old target as it was.
+
+    Parameters
+    ----------
+    path : path
+        The target; a symbolic link is followed, and its target replaced.
+    data : bytes
+        The content.
+    overwrite : bool
+        Whether an existing regular file may be replaced.
+    inputs : iterable of path
+        Files that the target may not be.
+
+    Raises
+    ------
+    OutputError
+        If the target exists, is an input, or the system refuses to write it.
+    """
+    target = _checked_target(path, overwrite=overwrite, inputs=inputs)
+    temporary = _temporary_name(target)
+    try:
+        _write_durably(temporary, data)
+        if overwrite:
+            os.replace(temporary, target)
+        else:
+            _place_new(temporary, target)
+        _sync_folder(target.parent)
+    except OSError as error:
+        raise _output_error(target, error) from error
+    finally:
+        _remove(temporary)
+
+
+def _checked_target(
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool,
+    inputs: Iterable[str | os.PathLike[str]],
+) -> Path:
+    """Follow symbolic links to the real target and refuse what must not be replaced."""
+    shown = os.fspath(path)
+    if not shown or "\0" in shown:
+        raise OutputError(f"{shown!r} is not the name of a file.", cure="Give the output a name.")
+    target = Path(os.path.realpath(shown))
+    try:
+        status = os.stat(target)
+    except FileNotFoundError:
+        return target
+    except OSError as error:
+        raise _output_error(Path(shown), error) from error
+    for given in inputs:
+        with contextlib.suppress(OSError):
+            if os.path.samestat(status, os.stat(given)):
+                raise OutputError(
+                    f"The output {shown} is also an input.",
+                    why=f"Writing it would destroy what is being read. {_UNTOUCHED}",
+                    cure="Give the output another name.",
+                )
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "not a regular file"
+        raise OutputError(
+            f"The output {shown} is {kind}.",
+            why="A result is written as one regular file that takes its name when it is whole.",
+            cure="Give the name of a file.",
+        )
+    if not overwrite:
+        raise OutputError(
+            f"The output {shown} exists already.",
+            why=_UNTOUCHED,
+            cure="Choose another name, or allow overwriting (--force; overwrite=True in Python).",
+        )
+    return target
+
+
+def _temporary_name(target: Path) -> Path:
+    return target.parent / f".memscal-{secrets.token_hex(8)}.tmp"
+
+
+def _write_durably(temporary: Path, data: bytes | memoryview) -> None:
+    """Write and flush to the disk; the mode 0o666 leaves the permissions to the umask."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+    for name in ("O_CLOEXEC", "O_NOFOLLOW", "O_BINARY"):
+        flags |= getattr(os, name, 0)
+    descriptor = os.open(temporary, flags, 0o666)
+    try:
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[os.write(descriptor, remaining) :]
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _place_new(temporary: Path, target: Path) -> None:
+    """Give the temporary file its name only if nobody else took it in the meantime."""
+    try:
+        os.link(temporary, target)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        if error.errno not in _NO_HARD_LINKS:
+            raise
+        os.replace(temporary, target)  # a file system without hard links
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the new name durable; some systems cannot, and the content is safe without it."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | getattr(os, "O_DIRECTORY", 0))
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _remove(temporary: Path) -> None:
+    with contextlib.suppress(OSError):
+        os.unlink(temporary)
+
+
+def _output_error(target: Path, error: OSError) -> OutputError:
+    reason = os.strerror(error.errno) if error.errno else str(error)
+    return OutputError(
+        f"The output {target} cannot be written: {reason}.",
+        why=_UNTOUCHED,
+        cure=_CURES.get(error.errno or 0, "Choose another folder, or another name."),
+    )
+
+
+def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> bytes:
+    """Read a regular file of bounded size, once, without ever waiting for another program.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it cannot be read.
+    UnsafeFileError
+        If it is not a regular file, or too large.
+    """
+    shown = os.fspath(path)
+    flags = os.O_RDONLY
+    for name in ("O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY", "O_BINARY"):
+        flags |= getattr(os, name, 0)
+    try:
+        descriptor = os.open(shown, flags)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"{shown} cannot be read: {reason}.", cure="Check the name and the permissions."
+        ) from error
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise UnsafeFileError(
+                f"{shown} is not a regular file.",
+                why="A folder, pipe or device could keep a program waiting for ever.",
+                cure="Give the name of a file.",
+            )
+        if status.st_size > limit:
+            raise _too_large(shown, status.st_size, limit)
+        return _read_whole(descriptor, shown, limit)
+    finally:
+        os.close(descriptor)
+
+
+def _read_whole(descriptor: int, shown: str, limit: int) -> bytes:
+    """Read to the end; a file that grows meanwhile still meets the limit."""
+    parts, size = [], 0
+    try:
+        while part := os.read(descriptor, min(2**20, limit + 1 - size)):
+            parts.append(part)
+            size += len(part)
+            if size > limit:
+                raise _too_large(shown, size, limit)
+    except OSError as error:
+        raise InputError(f"{shown} cannot be read: {error.strerror}.") from error
+    return b"".join(parts)
+
+
+def _too_large(shown: str, size: int, limit: int) -> UnsafeFileError:
+    return UnsafeFileError(
+        f"{shown} has {size:,} bytes, but at most {limit:,} are read.",
+        why="A scan or an apparatus function is far smaller.",
+        cure="Check that it is the right file; leave out data that memscal does not need.",
+    )

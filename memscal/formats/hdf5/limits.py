@@ -1,0 +1,287 @@
+"""What a dataset may claim before any of it is read."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+import h5py
+
+from memscal.errors import UnsafeFileError
+
+__all__ = [
+    "MAX_DATASET_BYTES",
+    "MAX_TEXT_BYTES",
+    "attribute_text_lengths",
+    "check_layout",
+    "check_type",
+    "claimed_bytes",
+    "text_length",
+]
+
+_DESCRIPTOR = 16
+_OBJECT = 16  # header of an object in a global heap
+_CONTINUATION, _ATTRIBUTE = 0x10, 0x0C
+_SHARED = 0x02
+_VARIABLE_LENGTH = 9  # class of the datatype
+_MAX_BLOCKS = 1000
+
+
+def text_length(data: bytes, address: int) -> int:
+    """Return the length that the descriptor at an address claims, in bytes.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    if not 0 <= address <= len(data) - _DESCRIPTOR:
+        raise ValueError("the text lies outside the file")
+    return _claim(data, data, address)
+
+
+def _claim(file: bytes, data: bytes, position: int) -> int:
+    """Return the length in a descriptor, after a look at the heap that it leads to."""
+    length, heap = struct.unpack_from("<IQ", data, position)
+    if length:
+        _check_heap(file, heap)
+    return int(length)
+
+
+def _check_heap(file: bytes, address: int) -> None:
+    """Refuse a global heap through which HDF5 would walk for ever, or out of the file.
+
+    Every object says how far it is to the next; free space (index 0) counts its own header.
+    """
+    if address > len(file) - 16 or file[address : address + 4] != b"GCOL":
+        raise ValueError("the text lies in no heap")
+    end = address + int.from_bytes(file[address + 8 : address + 16], "little")
+    position = address + 16
+    if not position <= end <= len(file):
+        raise ValueError("the heap of the text has a wrong size")
+    while position + _OBJECT <= end:
+        index, _, size = struct.unpack_from("<HHxxxxQ", file, position)
+        step = size if index == 0 else _OBJECT + -(-size // 8) * 8
+        if step < _OBJECT or position + step > end:
+            raise ValueError("the heap of the text is damaged")
+        position += step
+
+
+def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -> list[int]:
+    """Return the lengths that an attribute's descriptors claim, in bytes.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    header : int
+        Address of the object's header.
+    name : bytes
+        The attribute.
+    number : int
+        How many texts it holds.
+
+    Raises
+    ------
+    ValueError
+        If the attribute is not found, or the header is damaged.
+    """
+    try:
+        for kind, flags, message in _messages(data, header):
+            if kind != _ATTRIBUTE or flags & _SHARED:
+                continue
+            found, start = _attribute(message)
+            if found == name:
+                starts = [start + i * _DESCRIPTOR for i in range(number)]
+                return [_claim(data, message, at) for at in starts]
+    except (struct.error, IndexError) as error:
+        raise ValueError("the header of its object is damaged") from error
+    lengths = list(_dense_lengths(data, name, number))
+    if not lengths:
+        raise ValueError("an attribute is stored in a way that cannot be checked")
+    return lengths
+
+
+def _dense_lengths(data: bytes, name: bytes, number: int) -> Iterator[int]:
+    """Yield the claims of every attribute of this name and of variable length, in any object.
+
+    Where an object has many attributes they lie in a heap of their own; its structure need
+    not be followed, because a message stands there as it would in the header.
+    """
+    wanted = name + b"\0"
+    position = data.find(wanted)
+    while position >= 0:
+        for size, versions in ((8, (1, 2)), (9, (3,))):
+            start = position - size
+            if start < 0 or data[start] not in versions:
+                continue
+            message = data[start : start + 2**16]
+            named, values = _attribute(message)
+            dtype = size + (-(-len(wanted) // 8) * 8 if data[start] == 1 else len(wanted))
+            variable = dtype < len(message) and message[dtype] & 0x0F == _VARIABLE_LENGTH
+            if named == name and variable and len(message) >= values + number * _DESCRIPTOR:
+                for i in range(number):
+                    yield _claim(data, message, values + i * _DESCRIPTOR)
+        position = data.find(wanted, position + 1)
+
+
+def _attribute(message: bytes) -> tuple[bytes, int]:
+    """Return the name of an attribute message and where its data begin."""
+    version, _, name, dtype, space = struct.unpack_from("<BBHHH", message)
+    start = 9 if version == 3 else 8
+    # Version 1 pads each part to a multiple of eight bytes.
+    sizes = [-(-size // 8) * 8 if version == 1 else size for size in (name, dtype, space)]
+    return message[start : start + name].rstrip(b"\0"), start + sum(sizes)
+
+
+def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
+    """Yield type, flags and body of every message in an object header and its continuations."""
+    if data[header : header + 4] == b"OHDR":
+        settings = data[header + 5]
+        start = header + 6 + (16 if settings & 0x20 else 0) + (4 if settings & 0x10 else 0)
+        width = 1 << (settings & 0x03)
+        size = int.from_bytes(data[start : start + width], "little")
+        blocks, prefix = [(start + width, size)], 6 if settings & 0x04 else 4
+    else:
+        (size,) = struct.unpack_from("<I", data, header + 8)
+        blocks, prefix = [(header + 16, size)], 8
+    for _ in range(_MAX_BLOCKS):
+        if not blocks:
+            return
+        position, size = blocks.pop()
+        end = min(position + size, len(data))
+        while position + prefix <= end:
+            if prefix == 8:
+                kind, length, flags = struct.unpack_from("<HHB", data, position)
+            else:
+                kind, length, flags = struct.unpack_from("<BHB", data, position)
+            body = data[position + prefix : position + prefix + length]
+            if kind == _CONTINUATION:
+                address, extent = struct.unpack_from("<QQ", body)
+                # A block of a version 2 header has a signature before and a checksum behind.
+                blocks.append((address, extent) if prefix == 8 else (address + 4, extent - 8))
+            yield kind, flags, body
+            position += prefix + length
+
+
+MAX_DATASET_BYTES = 128 * 2**20
+MAX_TEXT_BYTES = 4 * 2**20
+_MAX_RANK = 4
+_MAX_CHUNKS = 2**16
+_MIN_CHUNK_LIMIT = 2**20
+_MAX_NUMBER_BYTES = 16
+
+
+def refuse(where: str, problem: str, why: str) -> UnsafeFileError:
+    """Return the error for a dataset that is not read."""
+    return UnsafeFileError(
+        f"{where} {problem}.",
+        why=why,
+        cure="Copy the data into a plain file: contiguous, or with gzip, shuffle and fletcher32.",
+    )
+
+
+def claimed_bytes(dataset: Any) -> int:
+    """Return the size that a dataset's shape and type claim, in bytes."""
+    return int(math.prod(dataset.shape)) * int(dataset.get_type().get_size())
+
+
+def check_type(where: str, kind: Any, *, text: bool) -> None:
+    """Refuse a type that is not a plain number, or not a string where text is wanted."""
+    type_class = kind.get_class()
+    if text:
+        if type_class != h5py.h5t.STRING:
+            raise refuse(where, "does not hold text", "Text is expected here.")
+        return
+    if type_class not in (h5py.h5t.INTEGER, h5py.h5t.FLOAT):
+        raise refuse(
+            where,
+            "holds neither integers nor floating-point numbers",
+            "Objects, references, compounds and strings are not read where numbers belong.",
+        )
+    if kind.get_size() > _MAX_NUMBER_BYTES:
+        raise refuse(where, f"has numbers of {kind.get_size()} bytes", "No number is that long.")
+
+
+def check_layout(where: str, dataset: Any, *, text: bool) -> None:
+    """Refuse a dataset whose storage could read other files, run code or exhaust memory.
+
+    ``dataset`` is a low-level ``h5py.h5d.DatasetID``; only its header is looked at.
+    """
+    if dataset.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+        raise refuse(where, "has a null dataspace", "It holds no value.")
+    check_type(where, dataset.get_type(), text=text)
+    shape = dataset.shape
+    if len(shape) > (0 if text else _MAX_RANK):
+        wanted = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
+        raise refuse(where, f"has {len(shape)} dimensions", f"It should have {wanted}.")
+    limit = MAX_TEXT_BYTES if text else MAX_DATASET_BYTES
+    if claimed_bytes(dataset) > limit:
+        raise refuse(
+            where,
+            f"claims {claimed_bytes(dataset):,} bytes",
+            f"More than {limit:,} bytes are not read, however small the file is.",
+        )
+    _check_storage(where, dataset)
+
+
+def _check_storage(where: str, dataset: Any) -> None:
+    plist = dataset.get_create_plist()
+    layout = plist.get_layout()
+    if layout == h5py.h5d.VIRTUAL:
+        raise refuse(where, "is a virtual dataset", "Its values would come from other files.")
+    if plist.get_external_count() > 0:
+        raise refuse(where, "is stored in external files", "Any file could be read through it.")
+    _check_filters(where, plist)
+    if layout == h5py.h5d.CHUNKED:
+        _check_chunks(where, dataset, plist)
+    elif claimed_bytes(dataset) and dataset.get_storage_size() < claimed_bytes(dataset):
+        raise refuse(
+            where, "was never written in full", "Values that are not there would read as zeros."
+        )
+
+
+def _check_filters(where: str, plist: Any) -> None:
+    known = {
+        h5py.h5z.FILTER_DEFLATE: "gzip",
+        h5py.h5z.FILTER_SHUFFLE: "shuffle",
+        h5py.h5z.FILTER_FLETCHER32: "fletcher32",
+    }
+    seen: set[int] = set()
+    for i in range(plist.get_nfilters()):
+        code = plist.get_filter(i)[0]
+        if code not in known:
+            raise refuse(
+                where,
+                f"uses the HDF5 filter {code}",
+                "Only gzip, shuffle and fletcher32 are read: others may load foreign code.",
+            )
+        if code in seen:
+            raise refuse(
+                where,
+                f"uses the filter {known[code]} more than once",
+                "Filters on filters can blow a small file up without limit.",
+            )
+        seen.add(code)
+
+
+def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
+    chunk = plist.get_chunk()
+    shape = dataset.shape
+    size = int(math.prod(chunk)) * int(dataset.get_type().get_size())
+    limit = max(_MIN_CHUNK_LIMIT, 2 * claimed_bytes(dataset))
+    if size > limit or size > MAX_DATASET_BYTES:
+        raise refuse(
+            where,
+            f"has chunks of {size:,} bytes for {claimed_bytes(dataset):,} bytes of data",
+            "A whole chunk is held in memory to read one number.",
+        )
+    number = math.prod(-(-n // c) for n, c in zip(shape, chunk, strict=True))
+    if number > _MAX_CHUNKS:
+        raise refuse(where, f"is cut into {number:,} chunks", f"At most {_MAX_CHUNKS:,} are read.")
+    if number and dataset.get_num_chunks() < number:
+        raise refuse(
+            where, "was never written in full", "Values that are not there would read as zeros."
+        )

@@ -1,0 +1,287 @@
+"""The one safe HDF5 reader: for files that come from anywhere, in any state.
+
+The file is read once into memory and hashed; HDF5 sees those bytes and never the disk.
+Only known paths are opened, along hard links; nothing is listed or visited.  Every dataset
+is checked (:mod:`memscal.formats.hdf5.limits`) before it is read, and whatever the library
+raises on damaged bytes becomes a :class:`~memscal.errors.FormatError`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Iterable, Iterator
+from io import BytesIO
+from typing import Any
+
+import h5py
+import numpy as np
+
+from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.formats.files import read_bytes
+from memscal.formats.hdf5.limits import (
+    MAX_TEXT_BYTES,
+    attribute_text_lengths,
+    check_layout,
+    check_type,
+    claimed_bytes,
+    refuse,
+    text_length,
+)
+from memscal.model.notation import printable
+from memscal.model.provenance import SourceFile
+
+__all__ = ["SafeFile", "damage_named", "open_hdf5"]
+
+
+@contextlib.contextmanager
+def damage_named(
+    problem: str,
+    *,
+    why: str = "The file is damaged or incomplete",
+    cure: str = "Get the file again from where it came from.",
+) -> Iterator[None]:
+    """Turn whatever a library raises on damaged bytes into one kind of error.
+
+    Parameters
+    ----------
+    problem : str
+        The file, the path inside it, and what cannot be done, without a full stop.
+    why : str
+        What it means, without a full stop: the library's own words follow.
+    cure : str
+        What the user can do.
+
+    Raises
+    ------
+    FormatError
+        In place of any other exception; errors of memscal itself pass.
+    UnsafeFileError
+        If memory ran out.
+    """
+    try:
+        yield
+    except MemscalError:
+        raise
+    except MemoryError as error:
+        raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
+    except Exception as error:
+        said = printable(" ".join(str(error).split()), 200) or type(error).__name__
+        raise FormatError(
+            f"{problem}.",
+            why=f"{why} ({said}).",
+            cure=cure,
+        ) from error
+
+
+_MAX_TOTAL_BYTES = 512 * 2**20
+_MAX_ATTRIBUTE_BYTES = 2**16
+_MAX_ATTRIBUTE_ITEMS = 64
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+@contextlib.contextmanager
+def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
+    """Open an HDF5 file safely, for the time of a ``with`` block.
+
+    Raises
+    ------
+    FormatError
+        If it is not an HDF5 file, is damaged, or holds something that is not read.
+    """
+    data = read_bytes(path)
+    name = os.path.basename(os.fspath(path))
+    if not data.startswith(_SIGNATURE):
+        raise FormatError(
+            f"{name} is not an HDF5 file.",
+            why="It does not begin with HDF5's signature.",
+            cure="Convert a table with `memscal import`.",
+        )
+    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    with damage_named(f"{name} cannot be opened as HDF5"):
+        file = h5py.File(BytesIO(data), "r")
+    try:
+        yield SafeFile(file, name, source, data)
+    except InputError as error:
+        if name in error.problem:
+            raise
+        # The dataclasses check values without knowing where they come from.
+        raise type(error)(f"{name}: {error.problem}", why=error.why, cure=error.cure) from error
+    finally:
+        with contextlib.suppress(Exception):
+            file.close()
+
+
+class SafeFile:
+    """An open file whose content is reached by known paths only.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The file, opened from memory.
+    name : str
+        Its base name, for messages.
+    source : SourceFile
+        Name and SHA-256 of its bytes.
+    data : bytes
+        The bytes.
+    """
+
+    def __init__(self, file: Any, name: str, source: SourceFile, data: bytes) -> None:
+        self.name = name
+        self.source = source
+        self._data = data
+        self._opened: dict[str, Any] = {"/": file["/"].id}
+        self._budget = _MAX_TOTAL_BYTES
+        self._arrays: dict[str, np.ndarray[Any, Any]] = {}
+        self._texts: dict[str, str] = {}
+        self._listed: frozenset[str] | None = None
+
+    def where(self, path: str) -> str:
+        """Return file and path as messages name them."""
+        return f"{self.name}: {path}"
+
+    def limit_to(self, paths: Iterable[str]) -> None:
+        """From now on refuse what stands at any other path: no digest covers it."""
+        self._listed = frozenset(paths)
+
+    def has(self, path: str) -> bool:
+        """Return whether a path exists; a link that is not a hard link is refused."""
+        with damage_named(f"{self.where(path)} cannot be opened"):
+            return self._open(path) is not None
+
+    def is_group(self, path: str) -> bool:
+        """Return whether a path exists and is a group."""
+        with damage_named(f"{self.where(path)} cannot be opened"):
+            return isinstance(self._open(path), h5py.h5g.GroupID)
+
+    def array(self, path: str) -> np.ndarray[Any, Any]:
+        """Return the numbers at a path: 64-bit floats, or 64-bit integers where stored so."""
+        if path not in self._arrays:
+            with damage_named(f"{self.where(path)} cannot be read"):
+                self._arrays[path] = self._read_array(path)
+        return self._arrays[path]
+
+    def text(self, path: str) -> str:
+        """Return the text at a path, without characters that do not print."""
+        if path not in self._texts:
+            with damage_named(f"{self.where(path)} cannot be read"):
+                self._texts[path] = self._read_text(path)
+        return self._texts[path]
+
+    def is_text(self, path: str) -> bool:
+        """Return whether a path holds a string and not a number."""
+        with damage_named(f"{self.where(path)} cannot be read"):
+            return bool(self._dataset(path).get_type().get_class() == h5py.h5t.STRING)
+
+    def attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
+        """Return an attribute: text, a number, a few texts, or ``None`` where there is none."""
+        with damage_named(f"{self.where(path)}@{name} cannot be read"):
+            return self._read_attribute(path, name)
+
+    def _open(self, path: str) -> Any:
+        """Return the object at a path, each part of which is a hard link; ``None`` if absent."""
+        if path not in self._opened:
+            folder, _, name = path.rpartition("/")
+            self._opened[path] = self._follow(self._open(folder or "/"), path, name)
+        found = self._opened[path]
+        if found is not None and self._listed is not None and path not in self._listed:
+            raise FormatError(
+                f"{self.where(path)} was added after the file was written.",
+                why="The list of its contents lacks it, so that no digest covers it.",
+                cure="Remove it, or make the file again.",
+            )
+        return found
+
+    def _follow(self, folder: Any, path: str, name: str) -> Any:
+        key = name.encode("ascii")
+        if not isinstance(folder, h5py.h5g.GroupID) or not folder.links.exists(key):
+            return None
+        if folder.links.get_info(key).type != h5py.h5l.TYPE_HARD:
+            raise UnsafeFileError(
+                f"{self.where(path)} is reached through a soft, external or other link.",
+                why="A link can lead to another file, to a pipe, or round in a circle.",
+                cure="Copy the linked data into the file.",
+            )
+        return h5py.h5o.open(folder, key)
+
+    def _dataset(self, path: str) -> Any:
+        found = self._open(path)
+        if found is None:
+            raise FormatError(f"{self.where(path)} is missing.")
+        if not isinstance(found, h5py.h5d.DatasetID):
+            raise FormatError(f"{self.where(path)} is not a dataset.")
+        return found
+
+    def _spend(self, path: str, size: int) -> None:
+        self._budget -= size
+        if self._budget < 0:
+            raise refuse(
+                self.where(path),
+                "brings the data of this file over the limit",
+                f"At most {_MAX_TOTAL_BYTES:,} bytes are read from one file.",
+            )
+
+    def _check_length(self, path: str, length: int) -> None:
+        if length > MAX_TEXT_BYTES:
+            raise refuse(
+                self.where(path),
+                f"claims a text of {length:,} bytes",
+                f"More than {MAX_TEXT_BYTES:,} bytes are not read, however small the file is.",
+            )
+        self._spend(path, length)
+
+    def _read_array(self, path: str) -> np.ndarray[Any, Any]:
+        dataset = self._dataset(path)
+        check_layout(self.where(path), dataset, text=False)
+        self._spend(path, claimed_bytes(dataset))
+        whole = dataset.get_type().get_class() == h5py.h5t.INTEGER
+        values = np.empty(dataset.shape, dtype=np.int64 if whole else np.float64)
+        dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
+        values.setflags(write=False)
+        return values
+
+    def _read_text(self, path: str) -> str:
+        dataset = self._dataset(path)
+        check_layout(self.where(path), dataset, text=True)
+        self._spend(path, claimed_bytes(dataset))
+        if dataset.get_type().is_variable_str():
+            self._check_length(path, text_length(self._data, dataset.get_offset() or -1))
+        return printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
+
+    def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
+        item = self._open(path)
+        if item is None:
+            raise FormatError(f"{self.where(path)} is missing.")
+        key = name.encode("ascii")
+        if not h5py.h5a.exists(item, key):
+            return None
+        attribute = h5py.h5a.open(item, key)
+        where = f"{self.where(path)}@{name}"
+        if attribute.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+            raise refuse(where, "has a null dataspace", "It holds no value.")
+        number = int(np.prod(attribute.shape, dtype=object))
+        size = number * attribute.get_type().get_size()
+        if len(attribute.shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
+            raise refuse(where, f"has {number} values", "An attribute is one value or a few names.")
+        text = attribute.get_type().get_class() == h5py.h5t.STRING
+        check_type(where, attribute.get_type(), text=text)
+        self._spend(path, size)
+        if text and attribute.get_type().is_variable_str():
+            address = h5py.h5o.get_info(item).addr
+            for length in attribute_text_lengths(self._data, address, key, number):
+                self._check_length(f"{path}@{name}", length)
+        value = h5py.AttributeManager(_Owner(item))[name]
+        if not text:
+            return np.asarray(value).reshape(-1)[0].item() if number else None
+        if len(attribute.shape) == 0:
+            return printable(value, _MAX_ATTRIBUTE_BYTES)
+        return tuple(printable(part, _MAX_ATTRIBUTE_BYTES) for part in value)
+
+
+class _Owner:
+    """What h5py's attribute access needs of an object: its identifier."""
+
+    def __init__(self, identifier: Any) -> None:
+        self.id = identifier

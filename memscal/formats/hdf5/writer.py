@@ -1,0 +1,291 @@
+"""The one HDF5 writer: a tree becomes bytes in memory, and the bytes a file in one step."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from memscal.errors import InputError
+from memscal.formats.files import atomic_write_bytes, ensure_writable
+from memscal.formats.json_text import to_json
+from memscal.formats.schema import (
+    DIGEST_ATTRIBUTE,
+    SCHEMA_ATTRIBUTE,
+    SCHEMA_VERSION,
+    VERSION_ATTRIBUTE,
+)
+from memscal.formats.units import from_si
+from memscal.model.notation import printable
+
+__all__ = [
+    "DigestItem",
+    "Group",
+    "Node",
+    "Number",
+    "content_digest",
+    "contents_of",
+    "count",
+    "ensure_writable",
+    "file_tree",
+    "index_axis",
+    "note",
+    "si",
+    "tree_items",
+    "tree_to_bytes",
+    "walk",
+    "write_tree",
+]
+
+Attribute = str | int | tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Number:
+    """A scalar or array in the unit of the file; ``axes`` names its axes, found in its group."""
+
+    values: NDArray[np.float64] | NDArray[np.int64]
+    units: str
+    axes: tuple[str, ...] = ()
+    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """A NeXus group; an attribute whose value is empty text is left out when it is written."""
+
+    nx_class: str
+    children: Mapping[str, Node]
+    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+
+    @property
+    def all_attributes(self) -> dict[str, Attribute]:
+        """The attributes, the class first, and for NXdata the index of each axis."""
+        found: dict[str, Attribute] = {"NX_class": self.nx_class, **self.attributes}
+        axes = self.attributes.get("axes", ())
+        if isinstance(axes, tuple):
+            found |= {f"{axis}_indices": i for i, axis in enumerate(axes)}
+        return found
+
+
+Node = Group | Number | str
+
+
+def si(values: ArrayLike, dimension: str, axes: tuple[str, ...] = ()) -> Number:
+    """Return SI values as a number in the unit that our files use for their dimension."""
+    converted, units = from_si(values, dimension)
+    return Number(converted, units, axes)
+
+
+def count(value: int) -> Number:
+    """Return a whole number, or a truth value as 0 or 1."""
+    return Number(np.asarray(value, dtype=np.int64), "1")
+
+
+def index_axis(name: str, size: int) -> Number:
+    """Return an axis that only counts: repeats, or the parameters of a covariance."""
+    return Number(np.arange(size, dtype=np.int64), "1", (name,))
+
+
+def note(text: str, *, media_type: str = "text/plain", description: str = "") -> Group:
+    """Return text as an NXnote."""
+    children: dict[str, Node] = {"type": media_type, "data": text}
+    if description:
+        children["description"] = description
+    return Group("NXnote", children)
+
+
+def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
+    """Yield every node with its path, parents first, the root as ``"/"``."""
+    yield path or "/", root
+    for name, child in root.children.items():
+        if isinstance(child, Group):
+            yield from walk(child, f"{path}/{name}")
+        else:
+            yield f"{path}/{name}", child
+
+
+# Path, value (None for a group) and attributes.
+DigestItem = tuple[str, "np.ndarray[Any, Any] | str | None", Mapping[str, Any]]
+
+
+def content_digest(items: Iterable[DigestItem]) -> str:
+    """Return the SHA-256 over paths, values and attributes, as hexadecimal text."""
+    total = hashlib.sha256()
+    for path, value, attributes in items:
+        kind, shape, data = _canonical(value)
+        plain = {name: _plain(attribute) for name, attribute in attributes.items()}
+        line = json.dumps(
+            [path, kind, shape, plain, hashlib.sha256(data).hexdigest()],
+            sort_keys=True,
+            separators=(",", ":"),
+        )
+        total.update(line.encode("ascii") + b"\n")
+    return total.hexdigest()
+
+
+def contents_of(root: Group) -> dict[str, list[str]]:
+    """Return each path of a tree with the names of its attributes."""
+    return {path: sorted(_attributes(node)) for path, node in walk(root)}
+
+
+def tree_items(root: Group) -> Iterable[DigestItem]:
+    """Yield what :func:`content_digest` needs from a tree that is about to be written."""
+    for path, node in sorted(walk(root), key=lambda item: item[0]):
+        if isinstance(node, Group):
+            yield path, None, _attributes(node)
+        elif isinstance(node, Number):
+            yield path, node.values, _attributes(node)
+        else:
+            yield path, node, {}
+
+
+def _attributes(node: Node) -> dict[str, Any]:
+    if isinstance(node, Group):
+        return node.all_attributes
+    if isinstance(node, Number):
+        return {"units": node.units, **node.attributes}
+    return {}
+
+
+def _canonical(value: Any) -> tuple[str, list[int], bytes]:
+    if value is None:
+        return "group", [], b""
+    if isinstance(value, str):
+        return "text", [], printable(value, len(value)).encode("utf-8", "replace")
+    kind = "integer" if value.dtype.kind in "iu" else "float"
+    stored = np.ascontiguousarray(value, dtype="<i8" if kind == "integer" else "<f8")
+    return kind, list(value.shape), stored.tobytes()
+
+
+def _plain(attribute: Any) -> Any:
+    if isinstance(attribute, str):
+        return printable(attribute, len(attribute))
+    return list(attribute) if isinstance(attribute, tuple) else attribute
+
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_CONTENTS = "Every path that was written, with its attributes; memscal_content_sha256 covers them."
+# Below this a chunked and compressed dataset is larger than a plain one.
+_COMPRESS_ABOVE = 4096
+
+
+def file_tree(schema: str, entry: Group) -> Group:
+    """Return the root of a file around its entry: schema, contents list and digest."""
+    root = Group(
+        "NXroot",
+        {"entry": entry},
+        {"default": "entry", SCHEMA_ATTRIBUTE: schema, VERSION_ATTRIBUTE: SCHEMA_VERSION},
+    )
+    listed = _with_contents(root, "")
+    # The list names itself, so it is made once with a place for itself and once in full.
+    listed = _with_contents(root, to_json("contents", contents_of(listed)))
+    digest = content_digest(tree_items(listed))
+    return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
+
+
+def write_tree(
+    root: Group,
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    inputs: Iterable[str | os.PathLike[str]] = (),
+) -> None:
+    """Write a tree as one HDF5 file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the file exists (and ``overwrite`` is false), is an input, or cannot be written.
+    """
+    atomic_write_bytes(path, tree_to_bytes(root), overwrite=overwrite, inputs=inputs)
+
+
+def tree_to_bytes(root: Group) -> bytes:
+    """Return the HDF5 file of a tree; the same tree always gives the same bytes."""
+    memory = BytesIO()
+    with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
+        for path, node in walk(root):
+            if isinstance(node, Group):
+                _check_names(path, node)
+                group = file if path == "/" else file.create_group(path)
+                for name, value in node.all_attributes.items():
+                    _write_attribute(group, name, value)
+            elif isinstance(node, Number):
+                _write_number(file, path, node)
+            else:
+                _write_text(file, path, node)
+        _attach_scales(file, root)
+    return memory.getvalue()
+
+
+def _check_names(path: str, group: Group) -> None:
+    for name in group.children:
+        if not _NAME.fullmatch(name):
+            raise InputError(
+                f"{name!r} cannot be written into {path}: a name is lower-case ASCII.",
+                cure="Use the letters a to z, digits and underscores.",
+            )
+
+
+def _with_contents(root: Group, text: str) -> Group:
+    entry = root.children["entry"]
+    assert isinstance(entry, Group)
+    listing = note(text, media_type="application/json", description=_CONTENTS)
+    entry = replace(entry, children={**entry.children, "contents": listing})
+    return replace(root, children={**root.children, "entry": entry})
+
+
+def _write_number(file: Any, path: str, node: Number) -> None:
+    storage: dict[str, Any] = {}
+    if node.values.nbytes > _COMPRESS_ABOVE:
+        storage = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True}
+    dataset = file.create_dataset(path, data=node.values, track_times=False, **storage)
+    for name, value in {"units": node.units, **node.attributes}.items():
+        _write_attribute(dataset, name, value)
+
+
+def _write_text(file: Any, path: str, text: str) -> None:
+    file.create_dataset(path, data=_plain_text(text), dtype=_text_type(), track_times=False)
+
+
+def _write_attribute(item: Any, name: str, value: Attribute) -> None:
+    if isinstance(value, int):
+        item.attrs.create(name, value, dtype=np.int64)
+    elif isinstance(value, tuple):
+        texts = [_plain_text(text) for text in value]
+        item.attrs.create(name, np.array(texts, dtype=object), dtype=_text_type())
+    else:
+        item.attrs.create(name, _plain_text(value), dtype=_text_type())
+
+
+def _text_type() -> Any:
+    """Text of variable length in UTF-8, as most programs write it."""
+    return h5py.string_dtype("utf-8")
+
+
+def _plain_text(text: str) -> bytes:
+    return printable(text, len(text)).encode("utf-8", "replace")
+
+
+def _attach_scales(file: Any, root: Group) -> None:
+    """Make every axis an HDF5 dimension scale and attach it to the arrays that run along it."""
+    arrays = [(p, n) for p, n in walk(root) if isinstance(n, Number) and n.axes]
+    for path, node in arrays:
+        folder, _, name = path.rpartition("/")
+        if node.axes == (name,):
+            file[path].make_scale(name)
+    for path, node in arrays:
+        folder, _, name = path.rpartition("/")
+        if node.axes != (name,):
+            for i, axis in enumerate(node.axes):
+                file[path].dims[i].attach_scale(file[f"{folder}/{axis}"])

@@ -1,0 +1,310 @@
+"""From samples of a calculated stress to a reference: what every import of one checks and does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.formats.tables.text_table import read_table
+from memscal.formats.units import to_si
+from memscal.model.arrays import FloatArray
+from memscal.model.checks import Message, import_notes, marked_texts
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+from memscal.model.provenance import SourceFile
+from memscal.model.stress import StressProfile
+
+__all__ = [
+    "ImportedProfile",
+    "Samples",
+    "profile_of",
+    "read_reference_table",
+    "require_numbers",
+    "require_sign",
+]
+
+# A larger difference between force and load is warned of, one beyond a factor is refused.
+_WARNED = 0.03
+_REFUSED = 2.0
+# Samples whose stress has not decayed to this share of its maximum end early.
+_DECAYED = 0.01
+# In SI; a force calculated from larger numbers would overflow.
+_ABSURD = 1e30
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedProfile:
+    """A stress profile that was imported, and what was done on the way."""
+
+    profile: StressProfile
+    notes: tuple[Message, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Samples:
+    """Stress at the base as it was found, in SI, and how to speak of it.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray, shape (n,)
+        ``r``, ``sigma_zz`` (positive in compression) and, where it is known, ``sigma_rz``.
+    source : SourceFile
+        The file.
+    notes : sequence of Message
+        What was done so far.
+    kind, item : str
+        What the file is and what a sample is in it: ``table`` and ``data row``.
+    units : tuple of str
+        The units of length and stress that were taken.
+    sign : {1, -1}
+        The sign by which the normal stress was turned.
+    spacing : float
+        Radii that differ by no more, in m, are the same.
+    discretisation : str
+        The mesh.
+    """
+
+    columns: dict[str, FloatArray]
+    source: SourceFile
+    notes: Sequence[Message]
+    kind: str
+    item: str
+    units: tuple[str, str]
+    sign: int
+    spacing: float
+    discretisation: str = ""
+
+    @property
+    def plural(self) -> str:
+        """What several samples are called."""
+        return self.item.split()[-1] + "s"
+
+
+def require_sign(name: str, value: int) -> None:
+    """Refuse a sign other than 1 and -1."""
+    if value not in (1, -1):
+        raise InputError(f"The {name} is {value}.", cure="Give 1 or -1.")
+
+
+def require_numbers(samples: Samples) -> None:
+    """Refuse samples of which one is not a number that can be worked with.
+
+    Raises
+    ------
+    InputError
+        If a value is missing, infinite or absurd.
+    """
+    for quantity, values in samples.columns.items():
+        bad = np.flatnonzero(~(np.abs(values) < _ABSURD))
+        if bad.size:
+            wrong = "is too large" if np.isfinite(values[bad[0]]) else "is not a number"
+            raise InputError(
+                f"{samples.source.file_name}: {quantity} {wrong} in {samples.item} "
+                f"{bad[0] + 1}" + (f" and {bad.size - 1} more." if bad.size > 1 else "."),
+                cure=f"Remove these {samples.plural}, or calculate them.",
+            )
+
+
+def profile_of(
+    samples: Samples,
+    *,
+    load: float,
+    film: ElasticFilm | None,
+    indenter: Indenter | None,
+    solver: str,
+) -> ImportedProfile:
+    """Check samples of a stress, sort them by radius, and hold their force against the load.
+
+    Raises
+    ------
+    InputError
+        If a value is missing, a radius is negative, the stress is mostly tensile, or it carries
+        less than half or more than twice the load (less, only if it decays within the samples).
+    """
+    name = samples.source.file_name
+    require_numbers(samples)
+    lowest = float(samples.columns["r"].min())
+    if lowest < 0:
+        raise InputError(
+            f"{name} has a negative radius ({lowest * 1e3:g} mm).",
+            why="A reference is a profile against the distance from the axis.",
+            cure="Give one half of a section through the axis, with r from 0.",
+        )
+    notes = list(samples.notes)
+    columns = _sorted_by_radius(samples, notes)
+    profile = StressProfile(
+        r=columns["r"],
+        sigma_zz=columns["sigma_zz"],
+        sigma_rz=columns.get("sigma_rz"),
+        load=load,
+        film=film,
+        indenter=indenter,
+        solver=solver,
+        discretisation=samples.discretisation,
+        source=samples.source,
+    )
+    notes += _compare_with_load(profile, samples)
+    return ImportedProfile(replace(profile, notes="\n".join(marked_texts(notes))), tuple(notes))
+
+
+def _sorted_by_radius(samples: Samples, notes: list[Message]) -> dict[str, FloatArray]:
+    """Sort, and average the values that element-wise output gives twice at a shared node."""
+    columns = samples.columns
+    order = np.argsort(columns["r"], kind="stable")
+    columns = {name: values[order] for name, values in columns.items()}
+    if samples.kind == "table" and np.any(np.diff(order) < 0):  # nodes of a mesh have no order
+        notes += import_notes([f"The {samples.plural} were sorted by radius."])
+    r = columns["r"]
+    index = np.concatenate([[0], np.cumsum(np.diff(r) > samples.spacing)])
+    if index[-1] == r.size - 1:
+        return columns
+    number = np.bincount(index)
+    means = {name: np.bincount(index, weights=v) / number for name, v in columns.items()}
+    means["r"] = r[np.searchsorted(index, np.arange(number.size))]
+    peak = float(np.abs(means["sigma_zz"]).max())
+    apart = float(np.abs(columns["sigma_zz"] - means["sigma_zz"][index]).max())
+    text = (
+        f"{r.size - number.size} {samples.plural} repeat a radius; they were averaged "
+        f"(normal stresses differ from the mean by up to {apart / peak if peak else 0:.2g} "
+        "of the maximum)."
+    )
+    notes += import_notes([text])
+    return means
+
+
+def _compare_with_load(profile: StressProfile, samples: Samples) -> list[Message]:
+    """Hold the force that the samples carry against their load, which finds a wrong unit."""
+    force, load = profile.force, profile.load
+    file_name, kind, turned = samples.source.file_name, samples.kind, -samples.sign
+    if force <= 0:
+        counted = "negative" if turned == -1 else "positive"
+        raise InputError(
+            f"The normal stress in {file_name} is mostly negative: it carries {force:.4g} N.",
+            why=f"Here compression is positive, and the {kind}'s sign was taken as {samples.sign}.",
+            cure=f"If the program counts compression as {counted}, say so (sign={turned}; "
+            f"--sign {turned}).",
+        )
+    ratio, reach = force / load, profile.r[-1] * 1e3
+    tail = abs(float(profile.sigma_zz[-1])) / float(np.abs(profile.sigma_zz).max())
+    early = tail > _DECAYED
+    within = f"within r = {reach:.4g} mm"
+    if ratio > _REFUSED or (ratio < 1 / _REFUSED and not early):
+        raise InputError(
+            f"The stress in {file_name} carries {force:.4g} N {within}, {ratio:.4g} times the load "
+            f"of {load:g} N.",
+            why="The force that the base carries must be the load.",
+            cure=f'Check the unit of the stresses ("{samples.units[1]}"), the unit of the '
+            f'lengths ("{samples.units[0]}"), the sign, that it is the normal stress at the base, '
+            "and the load in N.",
+        )
+    carried = import_notes(
+        [f"The {kind} carries {force:.4g} N of the load of {load:g} N ({ratio:.2%}) {within}."]
+    )
+    if abs(ratio - 1) <= _WARNED:
+        return carried
+    cure = (
+        f"The {kind} ends with {tail:.1%} of its maximum left: extend it to where the stress has "
+        "decayed."
+        if early and ratio < 1
+        else "Check the load, the units, and that the radii are fine enough under the indenter."
+    )
+    warning = (
+        f"the {kind}'s force differs from the load by {abs(ratio - 1):.1%} of it. A "
+        f"calibration takes stress per load from the {kind}, so its conversion constant would be "
+        f"wrong by as much. {cure}"
+    )
+    return [*carried, Message("force_differs", warning, "warning")]
+
+
+Column = str | int
+
+# Radii that differ by less than this share of the largest are the same, but for rounding.
+_SAME = 1e-9
+
+
+def read_reference_table(
+    path: str | os.PathLike[str],
+    *,
+    r: Column,
+    sigma: Column,
+    r_unit: str,
+    sigma_unit: str,
+    load: float,
+    sign: int = 1,
+    shear: Column | None = None,
+    shear_sign: int = 1,
+    film: ElasticFilm | None = None,
+    indenter: Indenter | None = None,
+    solver: str = "",
+    delimiter: str | None = None,
+    decimal: str | None = None,
+) -> ImportedProfile:
+    """Read the stress at the base of the film from a table with one row per radius.
+
+    Parameters
+    ----------
+    path : path
+        A delimited text file.
+    r, sigma : str or int
+        Columns of radius and normal stress: a name, or a number counted from 1.
+    r_unit, sigma_unit : str
+        Their units; ``sigma_unit`` holds for ``shear`` too.
+    load : float
+        Normal load of the calculation, in N.
+    sign : {1, -1}
+        -1 where the program counts compression as negative, as most FEM programs do; it
+        turns the normal stress only.
+    shear : str or int, optional
+        Column of the radial shear stress.
+    shear_sign : {1, -1}
+        1 where the column is the radial traction of the base on the film, positive outward; -1
+        where it is the stress component S13 (S_rz) with the third axis from the base to the
+        surface, because the film's lower face looks the other way.
+    film, indenter : optional
+        What was pressed on what.
+    solver : str
+        The program.
+    delimiter, decimal : str, optional
+        Column separator and decimal mark; found from the file by default.
+
+    Returns
+    -------
+    ImportedProfile
+        The profile, sorted by radius, and what was done: also recorded in ``profile.notes``.
+
+    Raises
+    ------
+    InputError
+        If a value is missing, a radius is negative, the stress is mostly tensile, or it carries
+        less than half or more than twice the load (less, only if it decays within the table).
+    """
+    require_sign("sign", sign)
+    require_sign("shear sign", shear_sign)
+    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    columns = {
+        "r": to_si(table.column(r), r_unit, "length", table.where(r)),
+        "sigma_zz": sign * to_si(table.column(sigma), sigma_unit, "stress", table.where(sigma)),
+    }
+    if shear is not None:
+        values = to_si(table.column(shear), sigma_unit, "stress", table.where(shear))
+        columns["sigma_rz"] = shear_sign * values
+    samples = Samples(
+        columns=columns,
+        source=table.source,
+        notes=import_notes(
+            [
+                f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
+                *table.notes,
+            ]
+        ),
+        kind="table",
+        item="data row",
+        units=(r_unit, sigma_unit),
+        sign=sign,
+        spacing=_SAME * float(np.nanmax(np.abs(columns["r"]), initial=0.0)),
+    )
+    return profile_of(samples, load=load, film=film, indenter=indenter, solver=solver)

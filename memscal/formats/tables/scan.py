@@ -1,0 +1,306 @@
+"""Import of tables: scans as they leave an experiment, profiles as they leave a FEM program."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import InputError, UnitError
+from memscal.formats.tables.reference import ImportedProfile, read_reference_table
+from memscal.formats.tables.text_table import Table, read_table
+from memscal.formats.units import to_si
+from memscal.model.arrays import FloatArray
+from memscal.model.checks import Message, import_notes, marked_texts
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.places import places_of
+from memscal.model.scan import Scan, StressSensor
+
+__all__ = ["ImportedProfile", "ImportedScan", "read_reference_table", "read_scan_table"]
+
+Column = str | int
+
+#: Positions closer than this share of the typical spacing are probably one place, and a table with
+#: so large a share of them was probably repeated.
+_CLOSE, _MANY = 0.1, 0.25
+#: Loads of one line that differ by more than this share were hardly meant to be one.
+_MIXED = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedScan:
+    """A scan that was read from a table, and what was done on the way."""
+
+    scan: Scan
+    notes: tuple[Message, ...]
+
+
+def read_scan_table(
+    path: str | os.PathLike[str],
+    *,
+    x: Column,
+    u: Column,
+    x_unit: str,
+    u_unit: str,
+    film: ElasticFilm,
+    indenter: RoundIndenter,
+    load: float | None = None,
+    y: Column | None = None,
+    repeat: Column | Sequence[Column] | None = None,
+    u_xz: Column | None = None,
+    u_yz: Column | None = None,
+    load_column: Column | None = None,
+    load_unit: str = "N",
+    load_uncertainty: float | None = None,
+    load_scatter: float | None = None,
+    x_error: float | None = None,
+    lubrication: str = "",
+    lubricant: str = "",
+    u_scale: float | None = None,
+    u_sign: int = 1,
+    sensor: StressSensor | None = None,
+    title: str = "",
+    delimiter: str | None = None,
+    decimal: str | None = None,
+) -> ImportedScan:
+    """Read a scan from a table with one row per reading.
+
+    Positions and readings are kept as they are, in the order of the file.  Without ``y`` and
+    ``repeat`` they are a line; repeats over exactly the same positions become rows of one array
+    (repeat, x); all else is a scan of single points.
+
+    Parameters
+    ----------
+    path : path
+        A delimited text file.
+    x, u : str or int
+        Columns of position and voltage: a name, or a number counted from 1.
+    x_unit, u_unit : str
+        Their units; ``x_unit`` holds for ``y`` too.
+    film, indenter
+        What was pressed on what: a table does not say it.
+    load : float, optional
+        Nominal load in N; by default the median of ``load_column``.
+    y : str or int, optional
+        Column of the second position, of points in a plane.
+    repeat : str or int, or several, optional
+        Column that numbers the repeats.
+        Of several columns each combination is a line: of the load that was set and of the pass,
+        where a table holds several of both.
+    u_xz, u_yz, load_column : str or int, optional
+        Columns of further channels (in ``u_unit``) and of the load at each point.
+    load_unit : str
+        Unit of ``load_column``.
+    load_uncertainty : float, optional
+        Standard uncertainty of the load common to all points, in N.
+    load_scatter : float, optional
+        Relative standard uncertainty of each point's own load, independent from point to point,
+        as of a weight that is set down by hand.
+    x_error : float, optional
+        Standard uncertainty of each position, independent from point to point, in m.
+    lubrication, lubricant : str
+        ``"dry"`` or ``"lubricated"``, and with what; empty if not stated.
+    u_scale : float, optional
+        Volts per unit of the ``u`` columns, for a sensor whose output is not a voltage;
+        ``u_unit`` is then only its name, and the notes of the scan record the choice.
+    u_sign : {1, -1}
+        -1 where the voltage falls under compression, as with swapped leads: ``u`` is turned, and
+        the notes of the scan record it.  The other channels stay as they are.
+    sensor, title
+        Carried into the scan.
+    delimiter, decimal : str, optional
+        Column separator and decimal mark; found from the file by default.
+
+    Returns
+    -------
+    ImportedScan
+        The scan, and what was done: also recorded in ``scan.notes``.
+
+    Raises
+    ------
+    InputError
+        If a column is missing, or no row has a position.
+    UnitError
+        If ``u_unit`` is not a voltage and no ``u_scale`` is given.
+    """
+    if u_sign not in (1, -1):
+        raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
+    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    notes = [
+        f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
+        *table.notes,
+    ]
+    columns = {"u_zz": u_sign * _voltage(table, u, u_unit, u_scale)}
+    if u_sign < 0:
+        notes.append("The sign of u_zz was changed.")
+    for name, column in (("u_xz", u_xz), ("u_yz", u_yz)):
+        if column is not None:
+            columns[name] = _voltage(table, column, u_unit, u_scale)
+    if u_scale is not None:
+        notes.append(
+            f"The readings are in {u_unit}, not in volts: {u_scale:g} V was taken for one "
+            f"{u_unit}, and every voltage and conversion constant carries this choice."
+        )
+    if load_column is not None:
+        where = table.where(load_column)
+        columns["normal_load"] = to_si(table.column(load_column), load_unit, "force", where)
+        if load is None:
+            load = float(np.nanmedian(columns["normal_load"]))
+            notes.append(f"The nominal load is the median of the column: {load:g} N.")
+    if load is None:
+        raise InputError(
+            "The load of the scan is not given.", cure="Give the load in N, or its column."
+        )
+    if load_scatter is not None and "normal_load" not in columns:
+        columns["normal_load"] = np.full(columns["u_zz"].shape, load)
+    columns["x"] = to_si(table.column(x), x_unit, "length", table.where(x))
+    if y is not None:
+        columns["y"] = to_si(table.column(y), x_unit, "length", table.where(y))
+    if repeat is not None:
+        columns["repeat"] = _lines(table, repeat, notes)
+    columns = _placed(columns, notes)
+    notes += _counted(columns)
+    messages = import_notes(notes)
+    if "y" not in columns and "normal_load" in columns:
+        messages += _mixed_loads(columns["normal_load"], columns.get("repeat"), indenter)
+    arrays = _as_rows(columns)
+    loads = arrays.get("normal_load")
+    scan = Scan(
+        x=arrays["x"],
+        y=arrays.get("y"),
+        repeat=None if "repeat" not in arrays else arrays["repeat"].astype(np.int64),
+        x_errors=None if x_error is None else np.full(arrays["x"].size, x_error),
+        u_zz=arrays["u_zz"],
+        normal_load=loads,
+        normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
+        channels={name: arrays[name] for name in ("u_xz", "u_yz") if name in arrays},
+        load=load,
+        load_uncertainty=load_uncertainty,
+        lubrication=lubrication,
+        lubricant=lubricant,
+        film=film,
+        indenter=indenter,
+        sensor=sensor or StressSensor(),
+        title=title,
+        notes="\n".join(marked_texts(messages)),
+        source=table.source,
+    )
+    return ImportedScan(scan, tuple(messages))
+
+
+def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) -> FloatArray:
+    """Number the line of each row: by one column, or by the combinations of several."""
+    columns = [repeat] if isinstance(repeat, str | int) else list(repeat)
+    values = np.stack([table.column(column) for column in columns])
+    if len(columns) == 1:
+        return np.asarray(values[0])
+    known = np.isfinite(values).all(axis=0)
+    found, number = np.unique(values[:, known], axis=1, return_inverse=True)
+    lines = np.full(known.size, np.nan)
+    lines[known] = 1 + number.reshape(-1)  # NumPy 2.0 kept an axis here
+    named = " and ".join(repr(column) for column in columns)
+    notes.append(f"{found.shape[1]} lines: one for each combination of the columns {named}.")
+    return lines
+
+
+def _placed(columns: Mapping[str, FloatArray], notes: list[str]) -> dict[str, FloatArray]:
+    """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
+    stated = [columns[name] for name in ("x", "y", "repeat") if name in columns]
+    known = np.isfinite(stated).all(axis=0)
+    if not known.any():
+        raise InputError("No row of the table has a position.", cure="Check the columns.")
+    if not known.all():
+        notes.append(f"{int((~known).sum())} rows without a position were left out.")
+    kept = {name: values[known] for name, values in columns.items()}
+    if "repeat" in kept:
+        kept["repeat"] = np.unique(kept["repeat"], return_inverse=True)[1].astype(np.float64)
+    return kept
+
+
+def _counted(columns: Mapping[str, FloatArray]) -> list[str]:
+    """Say how many readings, repeats and places there are, and what is missing."""
+    x, y = columns["x"], columns.get("y", np.zeros(columns["x"].size))
+    repeat = columns.get("repeat", np.zeros(x.size)).astype(np.intp)
+    places = places_of(x, y, repeat)
+    number = int(repeat.max()) + 1
+    in_repeats = f" in {number} repeats" if number > 1 else ""
+    step = " x ".join(f"{step * 1e3:.4g}" for step in places.steps if step)
+    apart = f", typically {step} mm apart" if step else ""
+    reach = ", ".join(
+        f"{name} from {values.min() * 1e3:.4g} to {values.max() * 1e3:.4g} mm"
+        for name, values in (("x", x), ("y", y))
+        if name in columns
+    )
+    notes = [f"{x.size} readings{in_repeats} at {places.count} places{apart}; {reach}."]
+    missing = {name: int(np.isnan(values).sum()) for name, values in columns.items()}
+    notes += [
+        f"{count} values of {name} are missing (NaN)." for name, count in missing.items() if count
+    ]
+    full = number * places.count - x.size
+    if number > 1 and full > 0:
+        notes.append(f"{full} more would make every repeat complete.")
+    if "repeat" not in columns and "y" not in columns:
+        gaps = np.sort(np.diff(np.sort(x)))
+        # The gap in which half of the length lies: repeated positions do not change it.
+        typical = gaps[np.searchsorted(np.cumsum(gaps), 0.5 * np.ptp(x))] if np.ptp(x) else 0.0
+        close = int(np.sum(gaps < _CLOSE * typical))
+        if close > _MANY * x.size:
+            notes.append(
+                f"{close} of {x.size} positions lie closer to another than {_CLOSE:.0%} of the "
+                "typical spacing. If they are repeats, name the column that numbers them "
+                '(repeat="..."; --repeat COLUMN): then each is predicted from the others.'
+            )
+    return notes
+
+
+def _as_rows(columns: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
+    """Make rows of repeats over exactly the same positions; leave all other columns as they are."""
+    if "repeat" not in columns or "y" in columns:
+        return columns
+    number = int(columns["repeat"].max()) + 1
+    order = np.lexsort((columns["x"], columns["repeat"]))
+    if number > 1 and order.size % number:
+        return columns
+    rows = {name: values[order].reshape(number, -1) for name, values in columns.items()}
+    x = rows.pop("x")
+    if np.any(np.diff(x[0]) == 0) or np.any(x != x[0]) or np.any(np.diff(rows.pop("repeat"))):
+        return columns
+    return {"x": x[0], **rows}
+
+
+def _mixed_loads(
+    loads: FloatArray, repeat: FloatArray | None, indenter: RoundIndenter
+) -> list[Message]:
+    """Warn of lines at several loads: only a rod's voltage is proportional to its load."""
+    line = np.zeros(loads.size) if repeat is None else repeat
+    of_lines = [loads[(line == i) & np.isfinite(loads)] for i in np.unique(line)]
+    mixed = [v for v in of_lines if v.size and np.ptp(v) > _MIXED * np.median(v)]
+    if isinstance(indenter, Rod) or not mixed:
+        return []
+    text = (
+        f"The loads of a line go from {mixed[0].min():.4g} to {mixed[0].max():.4g} N, "
+        "but each load has a profile of its own. Name the column of the loads that were set among "
+        'those that number the repeats (repeat=("set load", "pass"); --repeat "set load" --repeat '
+        "pass)."
+    )
+    return [Message("mixed_loads", text, "warning")]
+
+
+def _voltage(table: Table, column: Column, unit: str, scale: float | None) -> FloatArray:
+    values = table.column(column)
+    if scale is not None:
+        if not (np.isfinite(scale) and scale != 0):
+            raise InputError(f"The scale of the readings is {scale:g} V per {unit}.")
+        return values * scale
+    try:
+        return to_si(values, unit, "voltage", table.where(column))
+    except UnitError as error:
+        raise UnitError(
+            error.problem,
+            why="Conversion constants are in volts per pascal.",
+            cure="Give a unit of voltage; for another kind of sensor give the volts that one unit "
+            "stands for (u_scale; --u-scale).",
+        ) from error

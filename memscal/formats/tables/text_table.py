@@ -1,0 +1,264 @@
+"""Tables of numbers as text: delimiter, decimal mark and header are found, and reported."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import itertools
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import FormatError, InputError
+from memscal.formats.files import read_bytes
+from memscal.formats.units import to_si
+from memscal.model.arrays import FloatArray
+from memscal.model.indenter import Profile
+from memscal.model.notation import printable
+from memscal.model.provenance import SourceFile
+
+__all__ = ["Table", "read_indenter_table", "read_table"]
+
+_MAX_COLUMNS = 1000
+_DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+_MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
+_MAX_NAME = 80
+_MAX_COMMENTS = 20
+_MAX_COMMENT = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table as it stands in a file: the cells of its columns, by name and by number."""
+
+    source: SourceFile
+    names: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    first_line: int
+    decimal: str
+    notes: tuple[str, ...]
+
+    def column(self, wanted: str | int) -> FloatArray:
+        """Return a column as numbers, NaN where a cell is empty.
+
+        Parameters
+        ----------
+        wanted : str or int
+            The name in the header, or the number counted from 1.
+
+        Raises
+        ------
+        InputError
+            If there is no such column.
+        FormatError
+            If a cell is not a number.
+        """
+        i = self._index(wanted)
+        values = np.empty(len(self.rows))
+        for k, row in enumerate(self.rows):
+            values[k] = self._number(row[i] if i < len(row) else "", k, wanted)
+        return values
+
+    def where(self, wanted: str | int) -> str:
+        """Return file and column as messages name them."""
+        return f"{self.source.file_name}: column {wanted!r}"
+
+    def _index(self, wanted: str | int) -> int:
+        if isinstance(wanted, str) and wanted in self.names:
+            if self.names.count(wanted) > 1:
+                raise InputError(
+                    f"{self.source.file_name} has several columns named {wanted!r}.",
+                    cure="Give the number of the column, counted from 1.",
+                )
+            return self.names.index(wanted)
+        number = int(wanted) if isinstance(wanted, int) or wanted.isdecimal() else 0
+        if not 1 <= number <= len(self.names):
+            raise InputError(
+                f"{self.source.file_name} has no column {wanted!r}.",
+                why="Its columns are: " + ", ".join(self.names) + ".",
+                cure="Give one of these names, or a number counted from 1.",
+            )
+        return number - 1
+
+    def _number(self, cell: str, k: int, wanted: str | int) -> float:
+        if cell.lower() in _MISSING:
+            return float("nan")
+        text = cell.replace(self.decimal, ".") if self.decimal != "." else cell
+        try:
+            return float(text.replace("D", "E").replace("d", "e"))
+        except ValueError as error:
+            raise FormatError(
+                f"{self.where(wanted)}, data row {k + 1}: "
+                f"{printable(cell, _MAX_NAME)!r} is not a number.",
+                cure="Correct or remove this row, or state the decimal mark.",
+            ) from error
+
+
+def read_table(
+    path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None
+) -> Table:
+    """Read a delimited text file.
+
+    Lines that begin with ``#`` or ``%`` are comments, and those above the table are kept in
+    its notes; the first line with a cell that is no number is the header, and without one the
+    columns have numbers only.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    delimiter, decimal : str, optional
+        What separates the columns, and the decimal mark; found from the file by default.
+
+    Raises
+    ------
+    FormatError
+        If there is no table in it.
+    """
+    data = read_bytes(path)
+    name = os.path.basename(os.fspath(path))
+    notes = []
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+        notes.append("The table is not UTF-8; it was read as Latin-1.")
+    if "\0" in text:
+        raise FormatError(f"{name} is not a text file.", cure="Give a table as CSV.")
+    written = [line for line in text.splitlines() if line.strip()]
+    lines = [line for line in written if not _is_comment(line)]
+    if not lines:
+        raise FormatError(f"{name} holds no table.", cure="Give a table with one row per reading.")
+    notes += _head_comments(written)
+    delimiter = delimiter or _find_delimiter(lines)
+    rows = _split(name, lines, delimiter)
+    headed = not all(_NUMBER.fullmatch(c) or c.lower() in _MISSING for c in rows[0])
+    width = max(len(row) for row in rows)
+    header = rows[0] if headed else tuple(str(i + 1) for i in range(width))
+    body = tuple(rows[1:] if headed else rows)
+    if not body:
+        raise FormatError(f"{name} has a header, but no rows.", cure="Give a table with rows.")
+    decimal = decimal or _find_decimal(body, delimiter)
+    mark = "comma" if decimal == "," else "point"
+    notes.append(
+        f"Read {len(body)} rows of {width} columns separated by a "
+        f"{_DELIMITERS.get(delimiter, repr(delimiter))}, with a decimal {mark}."
+    )
+    return Table(
+        source=SourceFile(name, hashlib.sha256(data).hexdigest()),
+        names=tuple(printable(cell, _MAX_NAME) for cell in header),
+        rows=body,
+        first_line=int(headed) + 1,
+        decimal=decimal,
+        notes=tuple(notes),
+    )
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip()[0] in "#%"
+
+
+def _head_comments(lines: list[str]) -> list[str]:
+    """Return what is written above the table: it may say that the data are synthetic."""
+    head = list(itertools.takewhile(_is_comment, lines))
+    shown = [printable(line.lstrip(" \t#%"), _MAX_COMMENT).strip() for line in head]
+    notes = [f"The table says: {line}" for line in shown[:_MAX_COMMENTS] if line]
+    if len(shown) > _MAX_COMMENTS:
+        notes.append(f"{len(shown) - _MAX_COMMENTS} more lines of comment were left out.")
+    return notes
+
+
+def _find_delimiter(lines: list[str]) -> str:
+    """Take the delimiter that cuts the most lines into equally many pieces."""
+    sample = lines[:50]
+    best, score = " ", 0.0
+    for delimiter in _DELIMITERS:
+        widths = [len(_cells(line, delimiter)) for line in sample]
+        common = max(set(widths), key=widths.count)
+        if common > 1 and widths.count(common) > score:
+            best, score = delimiter, widths.count(common)
+    return best
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    return line.split() if delimiter == " " else line.split(delimiter)
+
+
+def _split(name: str, lines: list[str], delimiter: str) -> list[tuple[str, ...]]:
+    rows: Iterable[list[str]]
+    try:
+        if delimiter == " ":
+            rows = [line.split() for line in lines]
+        else:
+            rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True))
+    except (csv.Error, TypeError) as error:
+        raise FormatError(f"{name} cannot be cut into columns: {error}.") from error
+    cut = [tuple(cell.strip() for cell in row) for row in rows]
+    if max(len(row) for row in cut) > _MAX_COLUMNS:
+        raise FormatError(f"{name} has more than {_MAX_COLUMNS} columns.")
+    return cut
+
+
+def _find_decimal(rows: tuple[tuple[str, ...], ...], delimiter: str) -> str:
+    """A comma is the decimal mark only where cells hold one comma each and no point."""
+    if delimiter == ",":
+        return "."
+    cells = [c for row in rows[:200] for c in row if _NUMBER.fullmatch(c)]
+    return "," if any("," in c for c in cells) and not any("." in c for c in cells) else "."
+
+
+def read_indenter_table(
+    path: str | os.PathLike[str],
+    *,
+    r: str | int = 1,
+    z: str | int = 2,
+    r_unit: str = "mm",
+    z_unit: str = "um",
+) -> Profile:
+    r"""Read an indenter's profile from a table with one row per radius.
+
+    Parameters
+    ----------
+    path : path
+        A delimited text file.
+    r, z : str or int
+        Columns of radius and height: a name, or a number counted from 1.
+    r_unit, z_unit : str
+        Their units.
+
+    Returns
+    -------
+    Profile
+        With heights above the lowest point of the table.
+
+    Raises
+    ------
+    FormatError, UnitError, InputError
+        If the table cannot be read or is no profile: radii that do not increase from 0, fewer
+        than four of them, a height that is missing, or a flat face.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "tip.csv")
+    ...     rows = "r,z\n0,0\n0.5,1\n1,4\n1.5,9\n"
+    ...     _ = path.write_text(rows)
+    ...     read_indenter_table(path)
+    <Profile: 4 radii to 1.5 mm, heights to 9 um>
+    """
+    table = read_table(path)
+    radii = to_si(table.column(r), r_unit, "length", table.where(r))
+    heights = to_si(table.column(z), z_unit, "length", table.where(z))
+    try:
+        # What a microscope calls zero is anywhere.
+        return Profile(r=radii, z=heights - heights.min())
+    except InputError as error:
+        raise InputError(
+            f"{table.source.file_name}: {error.problem}", why=error.why, cure=error.cure
+        ) from error

@@ -1,0 +1,185 @@
+"""Single values of a safe file by kind, and whether the file is as it was written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from memscal.errors import FormatError, SchemaVersionError
+from memscal.formats.hdf5.reader import SafeFile
+from memscal.formats.hdf5.writer import DigestItem, content_digest
+from memscal.formats.json_text import from_json
+from memscal.formats.schema import (
+    CONTENTS_PATH,
+    DIGEST_ATTRIBUTE,
+    SCHEMA_ATTRIBUTE,
+    SCHEMA_VERSION,
+    VERSION_ATTRIBUTE,
+)
+from memscal.formats.units import SI_UNITS, dimension_of, to_si
+from memscal.model.arrays import FloatArray
+
+__all__ = [
+    "altered",
+    "any_scalar",
+    "json_value",
+    "optional_array",
+    "optional_scalar",
+    "optional_text",
+    "require_array",
+    "require_scalar",
+    "require_schema",
+    "require_text",
+    "stored_items",
+    "units_of",
+]
+
+_MAX_ITEMS = 10_000
+
+
+def require_schema(file: SafeFile, schema: str) -> str:
+    """Return the schema version; refuse another schema or a newer major version."""
+    found = file.attribute("/", SCHEMA_ATTRIBUTE)
+    if found != schema:
+        what = "no memscal schema" if found is None else f'the schema "{found}"'
+        raise FormatError(
+            f'{file.name} has {what}, but "{schema}" is needed here.',
+            why=f"The root attribute {SCHEMA_ATTRIBUTE} says what a file holds.",
+            cure="Give the right file, or make one with `memscal import` or `memscal calibrate`.",
+        )
+    version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")
+    major = version.partition(".")[0]
+    if not (major.isascii() and major.isdigit()):
+        raise FormatError(
+            f'{file.name} has the schema version "{version}", which is not a version.',
+            cure=f'Set the root attribute {VERSION_ATTRIBUTE}, such as "{SCHEMA_VERSION}".',
+        )
+    known = SCHEMA_VERSION.partition(".")[0]
+    if int(major) > int(known):
+        raise SchemaVersionError(
+            f"{file.name} was written by a newer memscal: {schema} version {version}.",
+            why=f"This memscal reads versions up to {known}.x and would misread it.",
+            cure="Upgrade memscal.",
+        )
+    if int(major) < int(known):
+        raise SchemaVersionError(
+            f"{file.name} has {schema} version {version}, which is not read any more.",
+            cure="Write it again with the current memscal.",
+        )
+    return version
+
+
+def units_of(file: SafeFile, path: str) -> str | None:
+    """Return the unit that stands at a path, or ``None``."""
+    units = file.attribute(path, "units")
+    return None if units is None else str(units)
+
+
+def require_array(
+    file: SafeFile, path: str, dimension: str, *, ndim: int | None = None
+) -> FloatArray:
+    """Return the array at a path in SI units."""
+    if not file.has(path):
+        raise FormatError(
+            f"{file.where(path)} is missing.",
+            why=f"It should hold a {dimension}.",
+            cure=f'Write it, with an attribute units such as "{SI_UNITS[dimension]}".',
+        )
+    values = file.array(path)
+    if ndim is not None and values.ndim != ndim:
+        raise FormatError(
+            f"{file.where(path)} has {values.ndim} dimensions, but {ndim} are expected.",
+            cure="Check the shape of the array.",
+        )
+    return to_si(values, units_of(file, path), dimension, file.where(path))
+
+
+def optional_array(
+    file: SafeFile, path: str, dimension: str, *, ndim: int | None = None
+) -> FloatArray | None:
+    """Return the array at a path in SI units, or ``None`` where there is none."""
+    return require_array(file, path, dimension, ndim=ndim) if file.has(path) else None
+
+
+def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
+    """Return the one number at a path in SI units; an array of one is accepted."""
+    values = require_array(file, path, dimension)
+    if values.size != 1:
+        raise FormatError(
+            f"{file.where(path)} has {values.size} values, but one number is expected.",
+        )
+    return float(values.reshape(()))
+
+
+def optional_scalar(file: SafeFile, path: str, dimension: str) -> float | None:
+    """Return the one number at a path in SI units, or ``None`` where there is none."""
+    return require_scalar(file, path, dimension) if file.has(path) else None
+
+
+def any_scalar(file: SafeFile, path: str) -> tuple[float, str]:
+    """Return a number of any dimension in SI units, with its SI unit."""
+    dimension = dimension_of(units_of(file, path) or "1", file.where(path))
+    return require_scalar(file, path, dimension), SI_UNITS[dimension]
+
+
+def require_text(file: SafeFile, path: str) -> str:
+    """Return the text at a path."""
+    if not file.has(path):
+        raise FormatError(f"{file.where(path)} is missing.", why="It should hold text.")
+    return file.text(path)
+
+
+def optional_text(file: SafeFile, path: str, default: str = "") -> str:
+    """Return the text at a path, or the default where there is none."""
+    return file.text(path) if file.has(path) else default
+
+
+def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
+    """Return JSON of a given type (``list`` or ``dict``), or the default where there is none."""
+    if not file.has(path):
+        return default
+    value = from_json(file.where(path), file.text(path))
+    if not isinstance(value, kind):
+        raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
+    if isinstance(value, (list, dict)) and len(value) > _MAX_ITEMS:
+        raise FormatError(f"{file.where(path)} lists {len(value):,} items.")
+    return value
+
+
+_PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
+
+
+def altered(file: SafeFile) -> str:
+    """Return how a file differs from what was written, or ``""`` where it does not.
+
+    A file without a digest counts as altered: every file of ours has one.  Of one that is not
+    altered only what it lists can be read from here on; what was added is refused by its path.
+    """
+    stated = file.attribute("/", DIGEST_ATTRIBUTE)
+    if stated is None:
+        return f"its root attribute {DIGEST_ATTRIBUTE} is missing."
+    contents = json_value(file, CONTENTS_PATH, dict, None)
+    if contents is None:
+        return f"the list of its contents ({CONTENTS_PATH}) is missing."
+    missing = [path for path in contents if not (_PATH.fullmatch(path) and file.has(path))]
+    if missing:
+        return f"{missing[0]} is missing."
+    if content_digest(stored_items(file, contents)) != stated:
+        return "its content does not fit its digest."
+    file.limit_to(contents)
+    return ""
+
+
+def stored_items(file: SafeFile, contents: dict[str, Any]) -> Iterator[DigestItem]:
+    """Yield what the list of contents names, as it stands in the file."""
+    for path, names in sorted(contents.items()):
+        if not isinstance(names, list):
+            raise FormatError(f"{file.where(CONTENTS_PATH)} does not list attributes for {path}.")
+        attributes = {str(name): file.attribute(path, str(name)) for name in names}
+        if file.is_group(path):
+            yield path, None, attributes
+        elif file.is_text(path):
+            yield path, file.text(path), attributes
+        else:
+            yield path, file.array(path), attributes

@@ -1,0 +1,291 @@
+r"""Evidence of laws of the interface: the likelihood averaged over what a law leaves free.
+
+The voltages of a group of points (one load of one scan) are :math:`u = f(\theta) + F\beta +
+D(\theta)\,\xi + n`: flat nuisances :math:`\beta` of the group's own (baseline, drift, centre),
+systematic ones :math:`\xi` of unit variance that all groups share, and noise :math:`n` of the
+covariance :math:`N(\theta)`.  All of them enter linearly, so that they are integrated in closed
+form.  With the residual :math:`\rho = u - f` and :math:`Q = N^{-1} - N^{-1}F(F^TN^{-1}F)^{-1}
+F^TN^{-1}`,
+
+.. math::
+
+    -2\ln p(u | \theta) = \chi^2 + \ln\det C, \qquad
+    \chi^2 = \rho^T Q\rho - g^T M^{-1} g, \qquad
+    \ln\det C = \ln\det N + \ln\det F^TN^{-1}F + \ln\det M,
+
+with :math:`g = D^TQ\rho` and :math:`M = 1 + D^TQD`, up to constants that no law changes.  The
+determinant must not be left out: D is in proportion to the calculated stress, and a law that
+makes the stress less certain would be rewarded for its small :math:`\chi^2` but not charged for
+the data that it makes less probable.
+
+Groups only share :math:`\xi`: what they tell adds up in :math:`\rho^TQ\rho`, g, M and the
+determinants.  A law with one parameter of each load is therefore integrated load by load.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.errors import InputError
+from memscal.model.arrays import FloatArray
+
+__all__ = [
+    "Evidence",
+    "Prior",
+    "Tables",
+    "bounded_prior",
+    "evidence_of_each",
+    "evidence_of_one",
+    "log_likelihood",
+    "log_uniform_prior",
+    "uniform_prior",
+]
+
+#: Paths through the loads along which a parameter of each load is drawn: a power of two.
+_PATHS = 256
+#: A systematic direction that moves the data by less than this, in standard deviations, is none.
+_UNFELT = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    r"""What J groups tell at M values of a parameter, nuisances of their own integrated.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (M, J)
+        :math:`\rho^T Q \rho`.
+    pulls : ndarray, shape (M, J, q)
+        :math:`D^T Q \rho`.
+    grips : ndarray, shape (M, J, q, q)
+        :math:`D^T Q D`.
+    volumes : ndarray, shape (M, J)
+        :math:`\ln\det N + \ln\det F^T N^{-1} F`.
+    """
+
+    squares: FloatArray
+    pulls: FloatArray
+    grips: FloatArray
+    volumes: FloatArray
+
+    def together(self) -> Tables:
+        """Return the groups as one, of shape (M, 1): one parameter for all of them."""
+        return Tables(*(np.sum(part, axis=1, keepdims=True) for part in self.parts))
+
+    def group(self, index: int | Sequence[int]) -> Tables:
+        """Return some of the groups, as one."""
+        chosen = np.atleast_1d(np.asarray(index, dtype=np.intp))
+        return Tables(*(part[:, chosen] for part in self.parts)).together()
+
+    @property
+    def parts(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Squares, pulls, grips and volumes."""
+        return self.squares, self.pulls, self.grips, self.volumes
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """An integral of the likelihood over a prior, by its logarithm, and its numerical error."""
+
+    log: float
+    error: float = 0.0
+
+
+def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
+    """Return the logarithm of the likelihood, and chi-square, of each entry of tables.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of any leading shape.
+
+    Returns
+    -------
+    log_likelihood, chi_square : ndarray
+        Of the leading shape.
+
+    Examples
+    --------
+    One datum of unit noise at a distance of 2, with a systematic of three times the noise:
+
+    >>> tables = Tables(np.array([[4.0]]), np.array([[[6.0]]]), np.array([[[[9.0]]]]),
+    ...                 np.array([[0.0]]))
+    >>> [round(part.item(), 6) for part in log_likelihood(tables)]
+    [-1.351293, 0.4]
+    """
+    squares, q = tables.squares, tables.pulls.shape[-1]
+    # One factorisation gives both: the last pivot of M bordered by g is chi-square (plus one, so
+    # that data without any misfit do not make it singular).
+    bordered = np.empty((*squares.shape, q + 1, q + 1))
+    bordered[..., :q, :q] = tables.grips + np.eye(q)
+    bordered[..., q, :q] = bordered[..., :q, q] = tables.pulls
+    bordered[..., q, q] = squares + 1
+    pivots = np.einsum("...ii->...i", np.linalg.cholesky(bordered))
+    chi_square = np.maximum(pivots[..., q] ** 2 - 1, 0.0)
+    volume = 2 * np.log(pivots[..., :q]).sum(axis=-1) + tables.volumes
+    return -(chi_square + volume) / 2, chi_square
+
+
+def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> Evidence:
+    """Return the evidence of a law with one parameter.
+
+    Parameters
+    ----------
+    log_likelihoods : ndarray, shape (M,)
+        At the nodes of the prior.
+    weights : ndarray, shape (M,)
+        The prior's share of each node, of which the sum is at most 1.
+
+    Examples
+    --------
+    >>> nodes = np.linspace(-8, 8, 161)
+    >>> found = evidence_of_one(-(nodes**2) / 2, np.full(161, 0.1 / 16))
+    >>> bool(np.isclose(found.log, np.log(np.sqrt(2 * np.pi) / 16)))
+    True
+    """
+    with np.errstate(divide="ignore"):
+        return Evidence(float(_log_sum(log_likelihoods + np.log(weights))))
+
+
+def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) -> Evidence:
+    """Return the evidence of a law with one parameter of each load.
+
+    The loads are taken one after the other.  Given the parameters of those before, the next one
+    is known at all nodes of its prior; it is drawn from that, and the mean over the draws of the
+    product of what each load had been expected to be is the evidence.  The draws are the points
+    of a Sobol sequence, so that the result is the same each time.
+
+    Parameters
+    ----------
+    tables : sequence of Tables, each of one group
+        Of each load, at its own nodes.
+    weights : sequence of ndarray
+        The prior's share of each of its nodes.
+
+    Raises
+    ------
+    InputError
+        If there is no load, or not one prior for each.
+    """
+    from scipy.stats.qmc import Sobol
+
+    if not tables or len(tables) != len(weights):
+        raise InputError(f"There are {len(tables)} loads and {len(weights)} priors.")
+    tables = _compressed(tables)
+    size = tables[0].pulls.shape[-1]
+    steps = len(tables) - 1
+    # Without scrambling the first point is 0: it is moved into the middle of its cell.
+    draws = Sobol(steps, scramble=False).random(_PATHS) + 0.5 / _PATHS if steps else None
+    paths = _PATHS if steps else 1
+    known = Tables(
+        np.zeros(paths), np.zeros((paths, size)), np.zeros((paths, size, size)), np.zeros(paths)
+    )
+    logs, before = np.zeros(paths), np.zeros(paths)
+    for step, (table, weight) in enumerate(zip(tables, weights, strict=True)):
+        one = Tables(*(part[None, :, 0] for part in table.parts))
+        both = Tables(
+            *(old[:, None] + new for old, new in zip(known.parts, one.parts, strict=True))
+        )
+        with np.errstate(divide="ignore"):
+            joint = log_likelihood(both)[0] + np.log(weight)
+        expected = _log_sum(joint)
+        logs += expected - before
+        if draws is None or step == steps:
+            continue
+        cumulated = np.cumsum(np.exp(joint - expected[:, None]), axis=1)
+        drawn = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
+        drawn = np.minimum(drawn, weight.size - 1)
+        known = Tables(*(part[np.arange(paths), drawn] for part in both.parts))
+        before = log_likelihood(known)[0]
+    mean = float(_log_sum(logs) - np.log(paths))
+    spread = np.std(np.exp(logs - mean)) / np.sqrt(paths)
+    return Evidence(mean, float(spread))
+
+
+def _log_sum(logs: FloatArray) -> FloatArray:
+    """Logarithm of the sum of exponentials along the last axis."""
+    top = np.max(logs, axis=-1, keepdims=True)
+    return np.asarray((np.log(np.exp(logs - top).sum(axis=-1, keepdims=True)) + top)[..., 0])
+
+
+def _compressed(tables: Sequence[Tables]) -> list[Tables]:
+    """Keep the systematic directions that move any datum: the work goes with their cube."""
+    largest = np.sum([np.mean(table.grips[:, 0], axis=0) for table in tables], axis=0)
+    values, vectors = np.linalg.eigh(largest)
+    basis = vectors[:, values > _UNFELT**2]
+    return [
+        Tables(
+            table.squares,
+            table.pulls @ basis,
+            np.einsum("qa,mjqp,pb->mjab", basis, table.grips, basis, optimize=True),
+            table.volumes,
+        )
+        for table in tables
+    ]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A prior of one parameter that is not negative.
+
+    Parameters
+    ----------
+    words : str
+        The prior in words, with its range.
+    below : callable
+        Share of the prior below each of several values, infinity included.
+    """
+
+    words: str
+    below: Callable[[FloatArray], FloatArray]
+
+    def weights(self, edges: FloatArray) -> FloatArray:
+        """Return the prior's share of the cells between edges, shape (m + 1,) to (m,)."""
+        return np.asarray(np.diff(self.below(edges)))
+
+
+def bounded_prior(scale: float, words: str) -> Prior:
+    """Return the prior that is uniform in the bounded coordinate about a ``scale``.
+
+    Examples
+    --------
+    >>> bounded_prior(0.3, "mu").below(np.array([0.0, 0.3, np.inf]))
+    array([0. , 0.5, 1. ])
+    """
+
+    def below(values: FloatArray) -> FloatArray:
+        known = np.isfinite(values)
+        finite = np.where(known, values, 0.0)
+        return np.where(known, finite / (finite + scale), 1.0)
+
+    return Prior(words, below)
+
+
+def log_uniform_prior(low: float, high: float, words: str) -> Prior:
+    """Return the prior that gives each decade from ``low`` to ``high`` the same share.
+
+    Examples
+    --------
+    >>> log_uniform_prior(0.1, 10.0, "mu").below(np.array([0.0, 1.0, np.inf]))
+    array([0. , 0.5, 1. ])
+    """
+
+    def below(values: FloatArray) -> FloatArray:
+        return np.asarray(np.log(np.clip(values, low, high) / low) / math.log(high / low))
+
+    return Prior(words, below)
+
+
+def uniform_prior(high: float, words: str) -> Prior:
+    """Return the prior that is uniform from 0 to ``high``.
+
+    Examples
+    --------
+    >>> uniform_prior(2.0, "mu").below(np.array([0.0, 1.0, np.inf]))
+    array([0. , 0.5, 1. ])
+    """
+    return Prior(words, lambda values: np.asarray(np.clip(values, 0.0, high) / high))

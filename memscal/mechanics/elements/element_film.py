@@ -1,0 +1,358 @@
+r"""The bonded film by finite elements: compliance of its surface, and the field below it.
+
+Static condensation: the equations of the film (:mod:`memscal.mechanics.elements.mixed`) are
+factorised once and solved for a unit traction on every ring.  Of each solution, the displacement
+of the surface and the traction of the base are kept, which is all that a contact asks for.
+
+The traction of the base is found from the forces that hold its nodes: it does the same work as
+they on the displacements of these nodes, and its integral is the load to rounding.  The film
+passes nothing to the base that varies fast; a smooth spline takes what the elements add.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+
+from memscal.axisymmetry.hankel import hankel_transform
+from memscal.errors import DomainError, InputError
+from memscal.mechanics.elements.mesh import film_triangles
+from memscal.mechanics.elements.mixed import MixedSystem, smooth_even, smooth_odd
+from memscal.mechanics.surface import SurfaceCompliance
+from memscal.model.arrays import FloatArray, finite_vector, require_increasing, require_positive
+from memscal.model.field_mesh import FieldMesh
+from memscal.model.film import ElasticFilm
+
+__all__ = ["ElementField", "ElementFilm", "field_mesh"]
+
+# A quartic triangle has 15 nodes, at quarters of its sides and of the lines between them: they
+# are the nodes of four quadratic triangles.
+_QUARTERS = 4
+_CORNERS = (((0, 0), (2, 0), (0, 2)), ((2, 0), (4, 0), (2, 2)), ((0, 2), (2, 2), (0, 4)),
+            ((2, 2), (0, 2), (2, 0)))  # fmt: skip
+
+
+def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> FieldMesh:
+    """Return displacement and stress at all nodes of the quartic triangles.
+
+    Parameters
+    ----------
+    system : MixedSystem
+        The finite elements.
+    solution : ndarray, shape (n,)
+        Displacements in film thicknesses, then mean pressures in shear moduli.
+    film : ElasticFilm
+        Gives both their units.
+
+    Notes
+    -----
+    The mean pressure is continuous; the strain is not, and is averaged over the triangles that
+    meet at a node.
+    """
+    import skfem
+
+    # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
+    dofs = np.asarray(system.displacement.element_dofs)
+    local = np.asarray(skfem.ElementTriP4.doflocs)
+    outward, inward = dofs[0::2], dofs[1::2]
+    nodes, index = np.unique(inward, return_inverse=True)
+    index = index.reshape(inward.shape)
+    gradient, squeeze = _at_local_points(system, solution, local)
+    r, depth = system.displacement.doflocs[:, nodes]
+    displacement = np.empty((nodes.size, 2))
+    displacement[index, 0] = solution[outward]
+    displacement[index, 1] = -solution[inward]
+
+    def averaged(values: FloatArray) -> FloatArray:
+        count = np.bincount(index.ravel())
+        return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / count)
+
+    radial, vertical = averaged(gradient[0][0]), averaged(gradient[1][1])
+    hoop = np.where(r > 0, displacement[:, 0] / np.where(r > 0, r, 1.0), radial)
+    slip = averaged(gradient[0][1] + gradient[1][0])
+    mean, volume = averaged(squeeze), (radial + vertical + hoop) / 3
+    stress = [2 * (strain - volume) - mean for strain in (radial, vertical, hoop)]
+    return FieldMesh(
+        points=film.thickness * np.stack([r, 1 - depth], axis=1),
+        triangles=_quadratic_triangles(index, local, system),
+        displacement=film.thickness * displacement,
+        stress=film.shear_modulus * np.stack([*stress, -slip], axis=1),
+        notes=(
+            f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
+            f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. "
+            "Stress positive in tension."
+        ),
+    )
+
+
+def _at_local_points(system: MixedSystem, solution: FloatArray, local: FloatArray) -> Any:
+    """Return the displacement's gradient and the mean pressure at points of every triangle."""
+    import skfem
+
+    at_nodes = skfem.Basis(
+        system.displacement.mesh,
+        system.displacement.elem,
+        quadrature=(local.T, np.ones(local.shape[0])),
+    )
+    moved, pressed = np.split(solution, [system.displacement.N])
+    cubic = at_nodes.with_element(system.pressure.elem)
+    return at_nodes.interpolate(moved).grad, np.asarray(cubic.interpolate(pressed))
+
+
+def _quadratic_triangles(
+    index: NDArray[np.int64], local: FloatArray, system: MixedSystem
+) -> NDArray[np.int64]:
+    """Return four quadratic triangles for each quartic one, anticlockwise with z upward."""
+    place = {tuple(np.rint(_QUARTERS * each).astype(int)): i for i, each in enumerate(local)}
+    found = []
+    for corners in _CORNERS:
+        around = [*corners, corners[0]]
+        middles = [((a[0] + b[0]) // 2, (a[1] + b[1]) // 2) for a, b in pairwise(around)]
+        found.append(index[[place[each] for each in (*corners, *middles)]].T)
+    triangles = np.concatenate(found)
+    # With the depth as second coordinate, what turns anticlockwise there is clockwise here.
+    r, depth = system.displacement.mesh.p[:, system.displacement.mesh.t]
+    turn = (r[1] - r[0]) * (depth[2] - depth[0]) - (r[2] - r[0]) * (depth[1] - depth[0])
+    turned = np.tile(turn > 0, len(_CORNERS))
+    triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
+    return triangles
+
+
+# Tractions solved together: bounds the memory.
+_BATCH = 128
+# Radii between two nodes of the base at which its stress is tabulated for its spectrum.
+_PER_NODE = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ElementFilm:
+    """A bonded film of finite radius, whose surface carries tractions on rings.
+
+    The base holds the film in every direction; its outer edge is free.  The mesh is fitted to the
+    rings: on the surface, two intervals between even rings are one side of a triangle.
+
+    Parameters
+    ----------
+    film : ElasticFilm
+        The film.
+    r : ndarray, shape (n,)
+        Radii of the rings in m, increasing from 0.
+    radius : float
+        Radius of the film's free edge, in m.
+    refinement : int
+        How many times shorter than by default the sides of the triangles are.
+
+    Raises
+    ------
+    InputError
+        If the rings do not increase from 0, or the refinement is not a whole number from 1.
+    DomainError
+        If a ring lies beyond the film's edge.
+
+    Examples
+    --------
+    Under a uniform pressure much wider than thick, a compressible film is an oedometer: it is
+    thinned by p h / M, with the modulus M = 2G (1 - nu)/(1 - 2 nu):
+
+    >>> film = ElasticFilm(young_modulus=1.0, poisson_ratio=0.25, thickness=1.0)
+    >>> wide = ElementFilm(film, np.linspace(0.0, 12.0, 41), radius=20.0)
+    >>> oedometer = film.shear_modulus * 2 * 0.75 / 0.5
+    >>> round(float((wide.compliance.normal @ np.ones(41))[0]) * oedometer, 5)
+    1.0
+    """
+
+    film: ElasticFilm
+    r: FloatArray
+    radius: float = 25e-3
+    refinement: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "r", finite_vector("r of the rings", self.r))
+        require_increasing("r of the rings", self.r)
+        require_positive("radius of the film", self.radius, "m")
+        if self.r.size < 2 or self.r[0] != 0:
+            raise InputError(
+                f"The rings begin at {self.r[0]:g} m and number {self.r.size}.",
+                why="The traction is linear between rings, from the axis outward.",
+                cure="Give two radii or more, the first of them 0.",
+            )
+        if self.r[-1] > self.radius:
+            raise DomainError(
+                f"The outermost ring, at {self.r[-1] * 1e3:.4g} mm, lies beyond the film's edge at "
+                f"{self.radius * 1e3:.4g} mm.",
+                cure="Give a wider film, or a smaller contact.",
+            )
+        if self.refinement < 1 or self.refinement != int(self.refinement):
+            raise InputError(
+                f"The refinement of the mesh is {self.refinement}.",
+                cure="Give a whole number from 1: 2 makes all sides half as long.",
+            )
+
+    @cached_property
+    def system(self) -> MixedSystem:
+        """The finite-element equations, in film thicknesses and shear moduli."""
+        h = self.film.thickness
+        mesh = film_triangles(
+            self.r / h, radius=self.radius / h, thickness=1.0, refinement=int(self.refinement)
+        )
+        return MixedSystem(mesh, self.film.poisson_ratio)
+
+    @cached_property
+    def compliance(self) -> SurfaceCompliance:
+        """Displacements of the rings under tractions on the rings."""
+        system, rings = self.system, self.r / self.film.thickness
+        line, outward, inward = system.side(0.0)
+        hats, seen = line.loads_of_hats(rings).tocsc(), line.at(rings)
+        scale = self.film.thickness / self.film.shear_modulus
+        parts = np.empty((2, 2, rings.size, rings.size))
+        for source, unknowns in enumerate((inward, outward)):
+            for start in range(0, rings.size, _BATCH):
+                batch = slice(start, start + _BATCH)
+                loads = hats[:, batch].toarray()
+                solution = system.solve(unknowns, loads)
+                parts[source, 0, :, batch] = scale * (seen @ solution[inward])
+                parts[source, 1, :, batch] = scale * (seen @ solution[outward])
+        return SurfaceCompliance(
+            r=self.r,
+            normal=parts[0, 0],
+            normal_by_shear=parts[1, 0],
+            radial_by_pressure=parts[0, 1],
+            radial=parts[1, 1],
+        )
+
+    @property
+    def discretisation(self) -> str:
+        """What was discretised and how finely, in words."""
+        triangles = self.system.mesh.triangles.shape[0]
+        return (
+            f"finite elements, quartic displacement and cubic pressure (Taylor-Hood): {triangles} "
+            f"triangles, {self.system.free.size} unknowns, free edge at {self.radius * 1e3:g} mm"
+        )
+
+    def field(self, pressure: FloatArray, shear: FloatArray) -> ElementField:
+        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""
+        for name, values in (("pressure", pressure), ("shear", shear)):
+            if np.shape(values) != self.r.shape:
+                raise InputError(
+                    f"The {name} has shape {np.shape(values)}, but there are {self.r.size} rings.",
+                    cure="Give one value for each ring.",
+                )
+        line, outward, inward = self.system.side(0.0)
+        hats = line.loads_of_hats(self.r / self.film.thickness)
+        modulus = self.film.shear_modulus
+        loads = np.concatenate([hats @ (pressure / modulus), hats @ (shear / modulus)])
+        solution = self.system.solve(np.concatenate([inward, outward]), loads[:, None])
+        return ElementField(self.film, self.radius, self.system, solution[:, 0])
+
+
+@dataclass(frozen=True, eq=False)
+class ElementField:
+    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`.
+
+    Parameters
+    ----------
+    film : ElasticFilm
+        The film.
+    radius : float
+        Radius of its free edge, in m.
+    system : MixedSystem
+        The finite elements.
+    solution : ndarray, shape (n,)
+        Displacements in film thicknesses, then mean pressures in shear moduli.
+    """
+
+    film: ElasticFilm
+    radius: float
+    system: MixedSystem
+    solution: FloatArray
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa; zero beyond the film's edge."""
+        return self._at_base(0, r)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa; zero beyond its edge."""
+        return self._at_base(1, r)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N.
+
+        It has the elements' relative accuracy at small ``k``, but does not fall off like
+        :math:`e^{-kh}` below some 1e-5 of the load.
+        """
+        r = self._fine_radii
+        spectrum = hankel_transform(r, self.base_normal(r), np.ravel(k))
+        return spectrum.reshape(np.shape(k))
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N.
+
+        As accurate as :meth:`base_spectrum`.
+        """
+        r = self._fine_radii
+        spectrum = hankel_transform(r, self.base_shear(r), np.ravel(k), order=1)
+        return spectrum.reshape(np.shape(k))
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return the normal displacement of the surface in m, positive into the film.
+
+        Raises
+        ------
+        DomainError
+            If a radius lies beyond the film's edge.
+        """
+        _, _, inward = self.system.side(0.0)
+        return self._at_surface(inward, r)
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return the radial displacement of the surface in m; see :meth:`depression`."""
+        _, outward, _ = self.system.side(0.0)
+        return self._at_surface(outward, r)
+
+    def mesh(self) -> FieldMesh:
+        """Return displacement and stress inside the film, on quadratic triangles."""
+        return field_mesh(self.system, self.solution, self.film)
+
+    @property
+    def _fine_radii(self) -> FloatArray:
+        """Radii at which the base's tractions are tabulated for their spectra, in m."""
+        nodes = self.system.side(1.0)[0].r * self.film.thickness
+        index = np.arange(_PER_NODE * (nodes.size - 1) + 1) / _PER_NODE
+        return np.interp(index, np.arange(nodes.size), nodes)
+
+    @cached_property
+    def _base(self) -> tuple[Callable[[FloatArray], FloatArray], ...]:
+        """Normal and radial traction at the base, in Pa, at radii in film thicknesses."""
+        from scipy.sparse.linalg import spsolve
+
+        line, outward, inward = self.system.side(1.0)
+        forces = self.system.matrix[np.concatenate([inward, outward])] @ self.solution
+        pushed, held = forces.reshape(2, -1) * self.film.shear_modulus
+        mass = csc_array(line.mass)
+        # On the axis there is no shear.
+        shear = np.append(0.0, spsolve(mass[1:, 1:], held[1:]))
+        return smooth_even(line, -spsolve(mass, pushed)), smooth_odd(line, shear)
+
+    def _at_base(self, component: int, r: FloatArray) -> FloatArray:
+        flat = np.ravel(np.asarray(r, dtype=np.float64))
+        inside = np.minimum(flat, self.radius) / self.film.thickness
+        values = self._base[component](inside)
+        return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
+
+    def _at_surface(self, unknowns: NDArray[np.int64], r: FloatArray) -> FloatArray:
+        flat = np.ravel(np.asarray(r, dtype=np.float64))
+        if np.any(flat > self.radius):
+            raise DomainError(
+                f"There is no surface at {flat.max():g} m: the film ends at {self.radius:g} m.",
+                cure="Ask for smaller radii, or give a wider film.",
+            )
+        line, _, _ = self.system.side(0.0)
+        values = line.at(flat / self.film.thickness) @ self.solution[unknowns]
+        return np.asarray(self.film.thickness * values).reshape(np.shape(r))

@@ -1,0 +1,1 @@
+"""The neo-Hookean film at finite strain."""

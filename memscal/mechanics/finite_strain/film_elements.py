@@ -1,0 +1,396 @@
+r"""Finite elements for the film at finite strain: energy, forces and their exact tangent.
+
+Displacement is quadratic and pressure linear on triangles of the undeformed cross-section
+(Taylor and Hood), a pair that neither locks nor oscillates at :math:`\nu = 1/2`.  The nodal forces
+are the derivatives of the energy by the nodal displacements, and the tangent is theirs: Newton's
+method converges quadratically.
+
+Lengths are in mm, stresses in MPa, forces in N; in SI units the direct solver loses digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from memscal.model.arrays import FloatArray
+from memscal.model.film import ElasticFilm
+
+__all__ = [
+    "FilmElements",
+    "IntArray",
+    "NeoHookean",
+    "cofactor",
+    "determinant",
+    "mesh_below_a_rod",
+    "mesh_below_a_sphere",
+]
+
+_PASCAL_TO_MPA = 1e-6
+# Share of the bulk modulus that does not go through the pressure, in shear moduli: enough to keep
+# elements from buckling, and too little to make them lock.
+_HELD = 1.0
+
+
+def determinant(F: FloatArray) -> FloatArray:
+    """Return the volume ratio J of gradients of shape (..., 5)."""
+    return np.asarray((F[..., 0] * F[..., 3] - F[..., 1] * F[..., 2]) * F[..., 4])
+
+
+def cofactor(F: FloatArray) -> FloatArray:
+    """Return the derivative of J by the gradient, shape (..., 5)."""
+    rr, rz, zr, zz, hoop = np.moveaxis(F, -1, 0)
+    parts = [zz * hoop, -zr * hoop, -rz * hoop, rr * hoop, rr * zz - rz * zr]
+    return np.stack(parts, axis=-1)
+
+
+@dataclass(frozen=True)
+class NeoHookean:
+    r"""The film's material.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        :math:`G`, in MPa: with lengths in mm, the unknowns are then of like size.
+    held : float
+        :math:`\kappa`, in MPa.
+    softness : float
+        :math:`1/(K - \kappa)`, in 1/MPa; 0 where the film is incompressible.
+    """
+
+    shear_modulus: float
+    held: float
+    softness: float
+
+    @classmethod
+    def of(cls, film: ElasticFilm) -> NeoHookean:
+        r"""Return the material with the film's moduli at small strain: K = G / (1 - 2 nu)."""
+        G = film.shear_modulus * _PASCAL_TO_MPA
+        compliance = (1 - 2 * film.poisson_ratio) / G  # 1/K
+        held = _HELD * G / (1 + 2 * _HELD * G * compliance)
+        return cls(G, held, compliance / (1 - held * compliance))
+
+    def energy(self, F: FloatArray, p: FloatArray) -> FloatArray:
+        """Return the stored energy per undeformed volume, shape (...), where p has settled."""
+        G = self.shear_modulus
+        strain = (np.sum(F**2, axis=-1) - 3) / 2 - (determinant(F) - 1)
+        swelling = self.held / 2 * (determinant(F) - 1) ** 2
+        return np.asarray(G * strain + swelling + self.softness / 2 * p**2)
+
+    def _pressing(self, F: FloatArray, p: FloatArray) -> FloatArray:
+        """Return G + p - held (J - 1): minus the factor of the cofactor in the stress."""
+        return np.asarray(self.shear_modulus + p - self.held * (determinant(F) - 1))
+
+    def stress(self, F: FloatArray, p: FloatArray) -> FloatArray:
+        """Return the nominal (first Piola-Kirchhoff) stress, shape (..., 5)."""
+        return np.asarray(self.shear_modulus * F - self._pressing(F, p)[..., None] * cofactor(F))
+
+    def tangent(self, F: FloatArray, p: FloatArray) -> FloatArray:
+        """Return the derivative of the nominal stress by the gradient, shape (..., 5, 5)."""
+        rr, rz, zr, zz, hoop = np.moveaxis(F, -1, 0)
+        cof, pressing = cofactor(F), self._pressing(F, p)
+        stiffness = self.held * cof[..., :, None] * cof[..., None, :]
+        pairs = ((0, 3, hoop), (1, 2, -hoop), (0, 4, zz), (3, 4, rr), (1, 4, -zr), (2, 4, -rz))
+        for i, j, second in pairs:  # second derivatives of J
+            stiffness[..., i, j] -= pressing * second
+            stiffness[..., j, i] -= pressing * second
+        stiffness[..., range(5), range(5)] += self.shear_modulus
+        return np.asarray(stiffness)
+
+    def cauchy(self, F: FloatArray, p: FloatArray) -> FloatArray:
+        """Return the Cauchy stress rr, zz, hoop and rz, tension positive, shape (..., 4)."""
+        rr, rz, zr, zz, hoop = np.moveaxis(F, -1, 0)
+        b = np.stack([rr**2 + rz**2, zr**2 + zz**2, hoop**2, rr * zr + rz * zz], axis=-1)
+        stress = (self.shear_modulus / determinant(F))[..., None] * b
+        stress[..., :3] -= self._pressing(F, p)[..., None]
+        return np.asarray(stress)
+
+
+# Sides below the contact, as a share of the rod's radius or of the contact's ...
+_SHARE_OF_ROD = 0.25
+_SHARE_OF_CONTACT = 0.025
+# ... growing from one to the next away from it by this share, up to this many thicknesses near
+# the contact and far from it.
+_GROWTH = 0.3
+_WIDEST_BELOW_A_ROD = 0.06
+_WIDEST_BELOW_A_SPHERE = 0.08
+_WIDEST_FAR = 0.6
+_NEAR = 4.0
+# Growth of the sides with the distance from where the surface is folded around the rod's edge.
+_SLOPE = 0.7
+
+
+def mesh_below_a_rod(
+    *,
+    rod: float,
+    thickness: float,
+    radius: float,
+    refinement: float,
+    fold: tuple[float, float],
+    finest: float,
+) -> Any:
+    """Return a mesh of the cross-section that is finest where the rod's edge folds the surface.
+
+    Parameters
+    ----------
+    rod, thickness, radius : float
+        Radius of the rod, and thickness and radius of the film, in mm.
+    refinement : float
+        How many times shorter than by default the sides are.
+    fold : tuple of float
+        Undeformed radii between which the surface comes to lie around the edge, in mm.
+    finest : float
+        Sides there, in mm, at the refinement 1.
+    """
+    near = _WIDEST_BELOW_A_ROD * thickness / refinement
+    side = min(_SHARE_OF_ROD * rod / refinement, near)
+    even = np.linspace(0.0, rod, max(2, round(rod / side)) + 1)
+    mesh = _tensor(even, (side, near), rod, thickness, radius, refinement)
+    while True:
+        r, z = mesh.p[:, mesh.t]
+        longest = np.hypot(r - np.roll(r, 1, axis=0), z - np.roll(z, 1, axis=0)).max(axis=0)
+        away = np.maximum(np.maximum(fold[0] - r, r - fold[1]), 0.0)
+        distance = np.hypot(away, thickness - z).min(axis=0)
+        # A triangle that is cut has sides up to sqrt(2) of the size that is asked for.
+        long = longest > np.sqrt(2) * (finest / refinement + _SLOPE * distance)
+        if not np.any(long & (longest < 3 * side)):
+            return mesh
+        mesh = mesh.refined(np.flatnonzero(long & (longest < 3 * side)))
+
+
+def mesh_below_a_sphere(
+    *, contact: float, thickness: float, radius: float, refinement: float
+) -> Any:
+    """Return a mesh of the cross-section, fine up to a radius somewhat beyond the contact's.
+
+    Parameters
+    ----------
+    contact, thickness, radius : float
+        Largest contact radius to expect, thickness and radius of the film, in mm.
+    refinement : float
+        How many times shorter than by default the sides are.
+    """
+    near = _WIDEST_BELOW_A_SPHERE * thickness / refinement
+    side = min(_SHARE_OF_CONTACT * contact / refinement, near)
+    count = int(np.ceil(contact / side))
+    even = np.linspace(0.0, contact, count + 1)
+    return _tensor(even, (side, near), contact, thickness, radius, refinement)
+
+
+def _tensor(
+    even: FloatArray,
+    sides: tuple[float, float],
+    contact: float,
+    thickness: float,
+    radius: float,
+    refinement: float,
+) -> Any:
+    """Return triangles on a grid that grows away from the contact, outward and downward."""
+    import skfem
+
+    grow = 1 + _GROWTH / refinement
+    (side, near), far = sides, _WIDEST_FAR * thickness / refinement
+    r, step = [contact], side
+    while r[-1] < radius:
+        step = min(step * grow, near if r[-1] < contact + _NEAR * thickness else far)
+        left = radius - r[-1]
+        r.append(radius if left < 1.5 * step else r[-1] + step)
+    depth, step = [0.0], side
+    while depth[-1] < thickness:
+        left = thickness - depth[-1]
+        depth.append(thickness if left < 1.5 * step else depth[-1] + step)
+        step = min(step * grow, near)
+    heights = thickness - np.array(depth[::-1])
+    heights[0] = 0.0
+    return skfem.MeshTri.init_tensor(np.concatenate([even, r[1:]]), heights)
+
+
+IntArray = NDArray[np.int64]
+
+# Exact for the square of a quadratic, times its radius and its Jacobian.
+_QUADRATURE = 6
+
+
+@dataclass(frozen=True, eq=False)
+class FilmElements:
+    """Forces in a film for given displacements of its nodes and given pressures.
+
+    Unknowns stand as one vector: n radial displacements, n upward displacements, m pressures.
+
+    Parameters
+    ----------
+    mesh : skfem.MeshTri
+        Triangles of the cross-section, radius and height above the base in mm.
+    material : NeoHookean
+        The material.
+    """
+
+    mesh: Any
+    material: NeoHookean
+
+    @cached_property
+    def bases(self) -> tuple[Any, Any]:
+        """Quadratic functions for one component of displacement, and linear ones for pressure."""
+        import skfem
+
+        displacement = skfem.Basis(self.mesh, skfem.ElementTriP2(), intorder=_QUADRATURE)
+        return displacement, displacement.with_element(skfem.ElementTriP1())
+
+    @property
+    def n(self) -> int:
+        """Nodes of displacement."""
+        return int(self.bases[0].N)
+
+    @property
+    def size(self) -> int:
+        """Unknowns."""
+        return 2 * self.n + int(self.bases[1].N)
+
+    @cached_property
+    def nodes(self) -> FloatArray:
+        """Radius and height of the undeformed nodes of displacement, in mm, shape (2, n)."""
+        return np.asarray(self.bases[0].doflocs)
+
+    @cached_property
+    def thickness(self) -> float:
+        """Thickness of the film, in mm."""
+        return float(self.nodes[1].max())
+
+    @cached_property
+    def surface(self) -> IntArray:
+        """Nodes of the surface, from the axis outward."""
+        return self._line(self.nodes[1] > self.thickness * (1 - 1e-9))
+
+    @cached_property
+    def base(self) -> IntArray:
+        """Nodes of the base, from the axis outward."""
+        return self._line(self.nodes[1] < self.thickness * 1e-9)
+
+    @cached_property
+    def held(self) -> IntArray:
+        """Unknowns that stay zero: the base is bonded, and the axis stays where it is."""
+        axis = np.flatnonzero(self.nodes[0] < 1e-9 * self.thickness)
+        return np.unique(np.concatenate([self.base, self.base + self.n, axis]))
+
+    def _line(self, chosen: NDArray[np.bool_]) -> IntArray:
+        found = np.flatnonzero(chosen)
+        return found[np.argsort(self.nodes[0][found], kind="stable")]
+
+    @cached_property
+    def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
+        """Return gradients (cells, points, 5, 12), pressures, volumes and numbers of unknowns."""
+        displacement, pressure = self.bases
+        radius = np.asarray(displacement.global_coordinates())[0]
+        gradients, pressures = _shapes(displacement, pressure, radius)
+        volumes = 2 * np.pi * radius * displacement.dx
+        dofs = displacement.element_dofs.T
+        moving = np.concatenate([dofs, dofs + self.n], axis=1)
+        return gradients, pressures, volumes, moving, pressure.element_dofs.T + 2 * self.n
+
+    def _state(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the deformation gradient (cells, points, 5) and the pressure (cells, points)."""
+        gradients, pressures, _, moving, pressing = self._shape
+        cells, points = pressures.shape[:2]
+        F = (gradients.reshape(cells, -1, 12) @ x[moving][:, :, None]).reshape(cells, points, 5)
+        F[..., [0, 3, 4]] += 1.0
+        return F, (pressures @ x[pressing][:, :, None])[..., 0]
+
+    def energy(self, x: FloatArray) -> float:
+        """Return the stored energy, in mJ."""
+        return float(np.sum(self.material.energy(*self._state(x)) * self._shape[2]))
+
+    def forces(self, x: FloatArray) -> FloatArray:
+        """Return the derivative of the energy by every unknown: nodal forces in N.
+
+        They are what must be applied to the nodes from outside.
+        """
+        F, p = self._state(x)
+        gradients, pressures, volumes, moving, pressing = self._shape
+        cells = p.shape[0]
+        stress = (self.material.stress(F, p) * volumes[..., None]).reshape(cells, -1)
+        swelling = (determinant(F) - 1 + self.material.softness * p) * volumes
+        pushed = (stress[:, None, :] @ gradients.reshape(cells, -1, 12))[:, 0]
+        swollen = -(swelling[:, None, :] @ pressures)[:, 0]
+        dofs = np.concatenate([moving, pressing], axis=1).ravel()
+        values = np.concatenate([pushed, swollen], axis=1).ravel()
+        return np.bincount(dofs, values, self.size).astype(np.float64)
+
+    def tangent(self, x: FloatArray) -> sparse.csr_array:
+        """Return the derivative of the forces by the unknowns: symmetric, of shape (size, size)."""
+        F, p = self._state(x)
+        gradients, pressures, volumes, moving, pressing = self._shape
+        cells = p.shape[0]
+        stiffness = self.material.tangent(F, p) * volumes[..., None, None]
+        flat = gradients.reshape(cells, -1, 12)
+        stiff = flat.transpose(0, 2, 1) @ (stiffness @ gradients).reshape(cells, -1, 12)
+        squeeze = cofactor(F)[..., None, :] * volumes[..., None, None] @ gradients
+        couple = -pressures.transpose(0, 2, 1) @ squeeze[:, :, 0]
+        weighted = pressures * (self.material.softness * volumes)[..., None]
+        soft = -pressures.transpose(0, 2, 1) @ weighted
+        whole = np.concatenate(
+            [
+                np.concatenate([stiff, couple.transpose(0, 2, 1)], axis=2),
+                np.concatenate([couple, soft], axis=2),
+            ],
+            axis=1,
+        )
+        dofs = np.concatenate([moving, pressing], axis=1)
+        rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
+        columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
+        shape = (self.size, self.size)
+        return sparse.coo_array((whole.ravel(), (rows, columns)), shape=shape).tocsr()
+
+    def is_inside_out(self, x: FloatArray) -> bool:
+        """Whether a triangle, as a whole, is turned inside out: no state of a film.
+
+        Where the rod's edge folds the film, J strays from 1 between the few pressures that hold
+        it there; that triangles keep their volume is what the elements promise.
+        """
+        F, _ = self._state(x)
+        volumes = self._shape[2]
+        kept = np.sum(determinant(F) * volumes, axis=1) / np.sum(volumes, axis=1)
+        # Also where it is not a number.
+        return not (np.all(kept > 0) and np.all(F[..., 4] > 0))
+
+    def nodal_stress(self, x: FloatArray) -> FloatArray:
+        """Return the Cauchy stress rr, zz, hoop and rz at the nodes in MPa, shape (n, 4).
+
+        It is the mean over the triangles that meet there, tension positive.
+        """
+        import skfem
+
+        corners = np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
+        at_nodes = (corners, np.full(6, 1 / 12))
+        displacement = skfem.Basis(self.mesh, skfem.ElementTriP2(), quadrature=at_nodes)
+        pressure = displacement.with_element(skfem.ElementTriP1())
+        radius = np.asarray(displacement.global_coordinates())[0]
+        gradients, pressures = _shapes(displacement, pressure, radius)
+        _, _, _, moving, pressing = self._shape
+        F = np.einsum("cqij,cj->cqi", gradients, x[moving])
+        F[..., [0, 3, 4]] += 1.0
+        stress = self.material.cauchy(F, np.einsum("cqj,cj->cq", pressures, x[pressing]))
+        dofs = displacement.element_dofs.T.ravel()
+        sums = [np.bincount(dofs, stress[..., i].ravel()) for i in range(4)]
+        return np.stack(sums, axis=-1) / np.bincount(dofs)[:, None]
+
+
+def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the gradients (cells, points, 5, 12) and pressures of the shape functions."""
+    gradients = np.zeros((*radius.shape, 5, 12))
+    on_axis = radius < 1e-12
+    for i, (field,) in enumerate(displacement.basis):
+        value, slope = np.broadcast_to(np.asarray(field), radius.shape), field.grad
+        # u/r on the axis is the slope of u.
+        hoop = np.where(on_axis, slope[0], value / np.where(on_axis, 1.0, radius))
+        for row, column, part in (
+            (0, i, slope[0]), (1, i, slope[1]), (4, i, hoop),
+            (2, 6 + i, slope[0]), (3, 6 + i, slope[1]),
+        ):  # fmt: skip
+            gradients[:, :, row, column] = part
+    pressures = [np.broadcast_to(np.asarray(field), radius.shape) for (field,) in pressure.basis]
+    return gradients, np.stack(pressures, axis=-1)

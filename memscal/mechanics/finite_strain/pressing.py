@@ -1,0 +1,431 @@
+r"""Contact of the film at finite strain with a rigid face: exact constraints, Newton's method.
+
+A node of the surface that touches lies on the indenter's contour *where it has moved to*,
+
+.. math::
+
+    R + u_r = r(s), \qquad u_z = z(s) - \delta.
+
+Its displacements are no unknowns then, but the arc length s is one, along which it slides without
+friction; where the contact sticks, s stays what it was at first touch.  They are eliminated with
+first and second derivatives, so that the constraint holds exactly (no penalty) and the forces are
+normal to the face where it slides.  The depth :math:`\delta` is one more unknown, whose force is
+the load: load and depth can be prescribed alike.  Which nodes touch is found by an active set: a
+node that is pulled leaves, and one that lies inside the indenter is taken in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from memscal.errors import ConvergenceError
+from memscal.mechanics.finite_strain.film_elements import FilmElements, IntArray
+from memscal.model.arrays import FloatArray
+
+__all__ = [
+    "Face",
+    "Goal",
+    "NewtonError",
+    "Pressed",
+    "Pressing",
+    "RodFace",
+    "SphereFace",
+    "Step",
+    "follow",
+]
+
+
+class Face(Protocol):
+    """The contour of an indenter."""
+
+    def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the points at ``s`` and their first and second derivatives, shapes (2, n)."""
+
+    def nearest(self, r: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where on the contour is nearest, and how far outside a point is (or inside)."""
+
+
+@dataclass(frozen=True)
+class RodFace:
+    """A rod: its end, its rounded edge, and its side wall, which the film drapes itself against.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the rod.
+    edge : float
+        Radius of the rounding of its edge.
+    """
+
+    radius: float
+    edge: float
+
+    @property
+    def flat(self) -> float:
+        """Radius of the flat part of the end: the contour is straight up to there."""
+        return self.radius - self.edge
+
+    def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return points, tangents and curvature vectors."""
+        angle = np.clip((s - self.flat) / self.edge, 0.0, np.pi / 2)
+        sine, cosine = np.sin(angle), np.cos(angle)
+        wall = np.maximum(s - self.flat - np.pi / 2 * self.edge, 0.0)
+        rise = 2 * self.edge * np.sin(angle / 2) ** 2
+        points = np.stack([np.minimum(s, self.flat) + self.edge * sine, rise + wall])
+        bend = np.where((angle > 0) & (angle < np.pi / 2), 1 / self.edge, 0.0)
+        return points, np.stack([cosine, sine]), np.stack([-sine * bend, cosine * bend])
+
+    def nearest(self, r: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the arc length of the nearest point, and the distance outside it."""
+        x, y = r - self.flat, self.edge - z  # outward and downward from the rounding's centre
+        wall = np.where((x <= 0) & (y <= 0), x > y, x > 0)
+        s = np.where(wall, self.flat + np.pi / 2 * self.edge - y, r)
+        turning = (x > 0) & (y > 0)
+        s = np.where(turning, self.flat + self.edge * np.arctan2(x, y), s)
+        straight = np.where(wall, x, y)
+        return s, np.where(turning, np.hypot(x, y), straight) - self.edge
+
+
+@dataclass(frozen=True)
+class SphereFace:
+    """A sphere of this radius of curvature."""
+
+    radius: float
+
+    def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return points, tangents and curvature vectors."""
+        sine, cosine = np.sin(s / self.radius), np.cos(s / self.radius)
+        height = 2 * self.radius * np.sin(s / (2 * self.radius)) ** 2
+        points = np.stack([self.radius * sine, height])
+        return points, np.stack([cosine, sine]), np.stack([-sine, cosine]) / self.radius
+
+    def nearest(self, r: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the arc length of the nearest point, and the distance outside it."""
+        away = np.hypot(r, self.radius - z)
+        # The difference to the radius, without cancellation.
+        gap = (r**2 + z**2 - 2 * self.radius * z) / (away + self.radius)
+        return self.radius * np.arctan2(r, self.radius - z), gap
+
+
+# Newton's method has converged when the last step moved nothing by more than this share of the
+# film's thickness; its convergence is quadratic, so that what is left is the square of it.
+_SETTLED = 1e-7
+# The contact's edge is looked at again when the last step was shorter than this; a node that
+# sticks stays for good where it is then, and that must be where it touched.
+_LOOSE_SLIDING = 1e-3
+_LOOSE_STICKING = 1e-6
+_MOST_ITERATIONS = 40
+# A Newton step that moves something farther than so many thicknesses leads nowhere.
+_FARTHEST = 3.0
+# A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
+_INSIDE = 1e-10
+
+
+class NewtonError(ConvergenceError):
+    """Newton's method found no equilibrium from where it started: load in smaller steps."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is prescribed: a load in N, or a depth in mm."""
+
+    value: float
+    is_load: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A film under an indenter.
+
+    Parameters
+    ----------
+    x : ndarray, shape (size,)
+        The unknowns of :class:`FilmElements`.
+    depth : float
+        Indentation depth, in mm.
+    touching : ndarray of int, shape (m,)
+        Nodes that touch, from the axis outward.
+    place : ndarray, shape (m,)
+        Where on the contour they are, in mm of arc length.
+    load : float
+        Load, in N.
+    iterations : int
+        Newton steps that it took.
+    """
+
+    x: FloatArray
+    depth: float
+    touching: IntArray
+    place: FloatArray
+    load: float = 0.0
+    iterations: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Pressing:
+    """A film, an indenter, and whether the surface sticks to it.
+
+    Parameters
+    ----------
+    elements : FilmElements
+        The film.
+    face : Face
+        The indenter.
+    sticking : bool
+        Whether a node stays where it touched; otherwise it slides freely.
+    upright : bool
+        Whether a node that sticks does so at its own undeformed radius (no radial displacement
+        in the contact), and not at the place of the face where it came to touch.
+    """
+
+    elements: FilmElements
+    face: Face
+    sticking: bool
+    upright: bool = False
+
+    def press(self, start: Pressed, goal: Goal) -> Pressed:
+        """Return the equilibrium at a goal, from a state near it.
+
+        Raises
+        ------
+        NewtonError
+            If Newton's method or the active set does not settle.
+        """
+        state = start if goal.is_load else replace(start, depth=goal.value)
+        state = self.placed(state)
+        seen: set[bytes] = set()
+        loose = _LOOSE_STICKING if self.sticking and not self.upright else _LOOSE_SLIDING
+        for iteration in range(1, _MOST_ITERATIONS + 1):
+            state, moved = self._step(state, goal)
+            if not moved < _FARTHEST * self.elements.thickness:
+                break
+            if moved > loose * self.elements.thickness:
+                continue
+            changed = self._touching(state, seen)
+            if changed is not None:
+                state = self.placed(changed)
+            elif moved < _SETTLED * self.elements.thickness:
+                if self.elements.is_inside_out(state.x):
+                    break
+                forces = self.elements.forces(state.x)
+                load = -float(np.sum(forces[state.touching + self.elements.n]))
+                return replace(state, load=load, iterations=iteration)
+        raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")
+
+    def placed(self, state: Pressed) -> Pressed:
+        """Return the state with its touching nodes on the face."""
+        x, n = state.x.copy(), self.elements.n
+        points, _, _ = self.face.contour(state.place)
+        x[state.touching] = points[0] - self.elements.nodes[0][state.touching]
+        x[state.touching + n] = points[1] - state.depth
+        x[self.elements.held] = 0.0
+        return replace(state, x=x)
+
+    def _touching(self, state: Pressed, seen: set[bytes]) -> Pressed | None:
+        """Return the state with the nodes that should touch, or None if they do already."""
+        n, nodes = self.elements.n, self.elements.surface
+        u, w = state.x[nodes], state.x[nodes + n]
+        place, gap = self.face.nearest(self.elements.nodes[0][nodes] + u, w + state.depth)
+        if self.upright:
+            place = self.place_at(self.elements.nodes[0][nodes])
+        touches = np.isin(nodes, state.touching)
+        place[touches] = state.place
+        _, (along, up), _ = self.face.contour(place)
+        forces = self.elements.forces(state.x)
+        pushed = up * forces[nodes] - along * forces[nodes + n] > 0
+        chosen = np.where(touches, pushed, gap < -_INSIDE * self.elements.thickness)
+        chosen[0] = True
+        if np.array_equal(chosen, touches):
+            return None
+        if (key := chosen.tobytes()) in seen:  # a node that comes and goes stays
+            chosen |= touches
+            if np.array_equal(chosen, touches):
+                return None
+        seen.add(key)
+        return replace(state, touching=nodes[chosen], place=place[chosen])
+
+    def place_at(self, r: FloatArray) -> FloatArray:
+        """Return the arc length at which the face has the radius ``r``."""
+        s = r.copy()
+        for _ in range(3):  # Newton; faces are nearly flat where this is asked
+            points, tangents, _ = self.face.contour(s)
+            s -= (points[0] - r) / np.maximum(tangents[0], 0.1)
+        return s
+
+    def _step(self, state: Pressed, goal: Goal) -> tuple[Pressed, float]:
+        """Take Newton's step; return the state after it and how far it moved something, in mm."""
+        elements, touching = self.elements, state.touching
+        n, size = elements.n, elements.size
+        _, tangents, bends = self.face.contour(state.place)
+        forces, tangent = elements.forces(state.x), elements.tangent(state.x)
+        # Columns: unknowns that are free; the places of sliding nodes, in the columns of their
+        # radial displacement; and the depth, which moves all touching nodes down.
+        free = np.ones(size, dtype=bool)
+        free[np.concatenate([elements.held, touching + n])] = False
+        own = np.ones(size)
+        own[touching] = tangents[0]
+        climbing = sparse.coo_array((tangents[1], (touching + n, touching)), shape=(size, size))
+        if self.sticking:
+            free[touching] = False
+        else:
+            curvature = np.zeros(size)
+            curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
+        columns = [(sparse.diags_array(own) + climbing).tocsc()[:, np.flatnonzero(free)]]
+        if goal.is_load:
+            sinking = np.zeros((size, 1))
+            sinking[touching + n] = -1.0
+            columns.append(sparse.csc_array(sinking))
+        change = sparse.hstack(columns, format="csc")
+        reduced = change.T @ tangent @ change
+        residual = np.asarray(change.T @ forces)
+        if not self.sticking:
+            last = [0.0] if goal.is_load else []
+            reduced = reduced + sparse.diags_array(np.concatenate([curvature[free], last]))
+        if goal.is_load:
+            residual[-1] -= goal.value
+        # The matrix is symmetric, and needs pivots off the diagonal only for the pressures.
+        solution = splu(reduced.tocsc(), diag_pivot_thresh=1e-4).solve(-residual)
+        sunk = float(solution[-1]) if goal.is_load else 0.0
+        steps = np.zeros(size)
+        steps[free] = solution[: np.count_nonzero(free)]
+        place = state.place if self.sticking else state.place + steps[touching]
+        moved = max(float(np.max(np.abs(steps[: 2 * n]))), abs(sunk))
+        ahead = replace(state, x=state.x + steps, depth=state.depth + sunk, place=place)
+        return self.placed(ahead), moved
+
+
+# The first step of a rod, as a share of its radius in depth; those of a sphere to the first goal,
+# for the sake of the work; and what the next may grow by.
+_FIRST = 0.05
+_FIRST_STEPS = 5
+_GROWTH = 1.4
+# A step that takes more iterations than this is not followed by a longer one.
+_EASY = 9
+# A step is halved at most so many times.
+_HALVINGS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A state on the way, how many steps led there, and the work on the way in mJ."""
+
+    pressed: Pressed
+    count: int
+    work: float
+
+
+def follow(pressing: Pressing, start: Pressed, goals: list[Goal]) -> Iterator[Step]:
+    """Yield the states at the goals, in their order.
+
+    Raises
+    ------
+    NewtonError
+        If a goal is out of reach, however short the steps; ``last`` is the last step.
+    """
+    path = _Path(pressing, start)
+    for goal in goals:
+        try:
+            path.reach(goal)
+        except NewtonError as problem:
+            problem.last = path.step if path.states else None
+            raise
+        yield path.step
+
+
+class _Path:
+    """The state reached, the one before it, and the length of the next step."""
+
+    def __init__(self, pressing: Pressing, start: Pressed) -> None:
+        self.pressing, self.start = pressing, start
+        self.states: list[Pressed] = []
+        # Stepping is by load or by depth, whatever the goals are given in.
+        self.length = np.inf
+
+    @property
+    def step(self) -> Step:
+        return Step(self.states[-1], len(self.states), self._work())
+
+    def _work(self) -> float:
+        """Return the integral of load over depth, by splines through four points or more."""
+        from scipy.interpolate import CubicSpline
+
+        depths = np.array([0.0] + [state.depth for state in self.states])
+        loads = np.array([0.0] + [state.load for state in self.states])
+        # Over the number of the step, so that a path may turn back.
+        number = np.arange(depths.size)
+        if number.size < 4:
+            return float(np.sum(np.diff(depths) * (loads[1:] + loads[:-1]) / 2))
+        depth, load = CubicSpline(number, depths), CubicSpline(number, loads)
+        t, weights = np.polynomial.legendre.leggauss(4)
+        places = (number[:-1, None] + (t + 1) / 2).ravel()
+        return float(np.tile(weights / 2, number.size - 1) @ (load(places) * depth(places, 1)))
+
+    def reach(self, goal: Goal) -> None:
+        """Go to a goal."""
+        begin = self._value(goal)
+        if not self.states:
+            self.length = self._first(goal)
+        halvings = 0
+        while begin != goal.value:
+            left = goal.value - begin
+            pieces = max(1.0, np.ceil(abs(left) / self.length - 1e-9))
+            ahead = goal.value if pieces == 1 else begin + left / pieces
+            try:
+                state = self.pressing.press(
+                    self._guess(Goal(ahead, goal.is_load)), Goal(ahead, goal.is_load)
+                )
+            except NewtonError:
+                self.length = abs(ahead - begin) / 2
+                halvings += 1
+                if halvings > _HALVINGS:
+                    raise
+                continue
+            halvings = max(0, halvings - 1)
+            if state.iterations <= _EASY:
+                self.length = max(abs(ahead - begin), self.length) * _GROWTH
+            self.states.append(state)
+            begin = ahead
+
+    def _first(self, goal: Goal) -> float:
+        """Return the length of the first step."""
+        face = self.pressing.face
+        if not isinstance(face, RodFace):
+            return goal.value / _FIRST_STEPS
+        stiffness = 8 * self.pressing.elements.material.shear_modulus * face.radius
+        return _FIRST * face.radius * (stiffness if goal.is_load else 1.0)
+
+    def _value(self, goal: Goal) -> float:
+        if not self.states:
+            return 0.0
+        return self.states[-1].load if goal.is_load else self.states[-1].depth
+
+    def _guess(self, goal: Goal) -> Pressed:
+        """Return the last state, carried on as it came."""
+        if not self.states:
+            return self.start
+        if len(self.states) == 1:
+            return self.states[-1]
+        before, last = self.states[-2:]
+        old, new = (s.load if goal.is_load else s.depth for s in (before, last))
+        if new == old:
+            return last
+        ahead = (goal.value - new) / (new - old)
+        place = last.place.copy()
+        if not self.pressing.sticking:
+            was, now = (
+                np.isin(before.touching, last.touching),
+                np.isin(last.touching, before.touching),
+            )
+            place[now] += ahead * (place[now] - before.place[was])
+        return replace(
+            last,
+            x=last.x + ahead * (last.x - before.x),
+            depth=last.depth + ahead * (last.depth - before.depth),
+            place=place,
+        )

@@ -1,0 +1,253 @@
+"""A film pressed at finite strain: what was found, in SI units, and its field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.axisymmetry.hankel import gauss_between, hankel_transform
+from memscal.mechanics.finite_strain.film_elements import IntArray
+from memscal.mechanics.finite_strain.pressing import Pressed, Pressing
+from memscal.model.arrays import FloatArray
+from memscal.model.field_mesh import FieldMesh
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter
+
+__all__ = ["FiniteStrainField", "FiniteStrainState", "interface_tractions", "outermost"]
+
+_MM = 1e-3
+_MPA = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class FiniteStrainField:
+    """The field in a film at finite strain; see :class:`memscal.mechanics.surface.FilmField`.
+
+    At the base, what a sensor measures is the Cauchy traction where it is: the base is rigid and
+    the film bonded to it, so that there an element of area neither moves, grows nor turns.  The
+    Cauchy traction is then the nominal one, and radii before and after deformation are the same.
+
+    At the surface, ``depression`` and ``outward`` are functions of the radius of a point *before*
+    the deformation; the point is then at ``r + outward(r)``.
+
+    Parameters
+    ----------
+    pressing : Pressing
+        Film and indenter.
+    pressed : Pressed
+        Their state.
+    """
+
+    pressing: Pressing
+    pressed: Pressed
+
+    @cached_property
+    def base(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Radii at the base (m), pressure and outward shear on the film there (Pa).
+
+        They are those of the splines that do the same work as the nodal forces on every
+        displacement that is linear between the triangles' corners: more accurate than stresses
+        taken inside the elements, and in balance with the load to rounding.
+        """
+        elements = self.pressing.elements
+        forces, nodes = elements.forces(self.pressed.x), elements.base
+        r = elements.nodes[0][nodes][::2]
+        # The hat on the axis has hardly any area: its force is added to that of the next one.
+        normal, shear = (
+            np.linalg.solve(_spline_masses(r, parity), _without_axis(_on_corners(forces[which])))
+            for parity, which in ((1, nodes + elements.n), (-1, nodes))
+        )
+        return np.asarray(r[1:]) * _MM, np.asarray(normal * _MPA), np.asarray(shear * _MPA)
+
+    @cached_property
+    def surface(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Radii of the surface's nodes before deformation, their depression and outward shift."""
+        elements, x = self.pressing.elements, self.pressed.x
+        nodes = elements.surface
+        r, w, u = elements.nodes[0][nodes], -x[nodes + elements.n], x[nodes]
+        return r * _MM, w * _MM, u * _MM
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa, compression positive; 0 beyond the film."""
+        return _interpolated(self.base[0], self.base[1], r, parity=1)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa, positive outward."""
+        return _interpolated(self.base[0], self.base[2], r, parity=-1)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+        flat = np.ravel(np.asarray(k, dtype=np.float64))
+        return hankel_transform(self.base[0], self.base[1], flat).reshape(np.shape(k))
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
+        flat = np.ravel(np.asarray(k, dtype=np.float64))
+        return hankel_transform(self.base[0], self.base[2], flat, order=1).reshape(np.shape(k))
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return how far the points at ``r`` before deformation (m) moved into the film, in m."""
+        radii, w, _ = self.surface
+        return _interpolated(radii, w, r, parity=0)
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return how far the points at ``r`` before deformation (m) moved outward, in m."""
+        radii, _, u = self.surface
+        return _interpolated(radii, u, r, parity=0)
+
+    def mesh(self) -> FieldMesh:
+        """Return displacement and Cauchy stress on the undeformed mesh."""
+        elements, x = self.pressing.elements, self.pressed.x
+        basis = elements.bases[0]
+        corners = basis.doflocs[:, basis.element_dofs[:3]]
+        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        turned = one[0] * other[1] < one[1] * other[0]
+        triangles = basis.element_dofs.T.copy()
+        triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
+        return FieldMesh(
+            points=elements.nodes.T * _MM,
+            triangles=triangles,
+            displacement=x[: 2 * elements.n].reshape(2, -1).T * _MM,
+            stress=elements.nodal_stress(x) * _MPA,
+            notes=f"neo-Hookean film at finite strain under {self.pressed.load:.6g} N",
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FiniteStrainState:
+    """A rigid indenter pressed on a neo-Hookean film at finite strain.
+
+    Parameters
+    ----------
+    film, indenter
+        What was pressed on what.
+    sticking : bool
+        Whether the contact sticks; otherwise it is frictionless.
+    load, depth, contact_radius : float
+        Load in N, indentation depth and (deformed) contact radius in m.
+    inside : FiniteStrainField
+        The field in the film.
+    interface_r, interface_pressure, interface_shear : ndarray, shape (n,)
+        Radii of points in contact after deformation (m, on the end and the rounded edge of a
+        rod, but not on its wall), pressure and outward shear on the film there (Pa, Cauchy).
+    elastic_energy : float
+        Energy stored in the film, in J.
+    work : float or None
+        Work done by the indenter, in J, from the steps of the loading; ``None`` for a sphere that
+        sticks, whose contact has no way (no radial displacement wherever it touches).
+    convergence : float
+        Largest change of base stress, load and depth from a coarser mesh, relative to the largest
+        stress, the load and the depth.
+    steps : int
+        Load steps from the untouched film.
+    discretisation : str
+        What was discretised and how finely, in words.
+    """
+
+    film: ElasticFilm
+    indenter: Indenter
+    sticking: bool
+    load: float
+    depth: float
+    contact_radius: float
+    inside: FiniteStrainField = field(repr=False)
+    interface_r: FloatArray = field(repr=False)
+    interface_pressure: FloatArray = field(repr=False)
+    interface_shear: FloatArray = field(repr=False)
+    elastic_energy: float
+    work: float | None
+    convergence: float
+    steps: int
+    discretisation: str
+
+    def mesh(self) -> FieldMesh:
+        """Return displacement and Cauchy stress on the undeformed mesh."""
+        return self.inside.mesh()
+
+
+def interface_tractions(
+    pressing: Pressing, pressed: Pressed
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return radii (m), pressure and shear (Pa) at the corners of the triangles in contact.
+
+    They are means over the hats of the corners, in the deformed surface: nodal forces of
+    quadratic elements are no tractions of their own (that on the axis has no area).
+    """
+    elements, x = pressing.elements, pressed.x
+    nodes = elements.surface
+    forces = elements.forces(x)
+    touching = np.isin(nodes, pressed.touching)
+    place = np.zeros(nodes.size)
+    place[touching] = pressed.place
+    _, (along, up), _ = pressing.face.contour(place)
+    radial, upward = forces[nodes] * touching, forces[nodes + elements.n] * touching
+    pushed, dragged = up * radial - along * upward, along * radial + up * upward
+    r, z = elements.nodes[0][nodes] + x[nodes], x[nodes + elements.n]
+    # The axis keeps its radial force to itself: it is none of the indenter's.
+    if r[0] < 1e-12:
+        dragged[0] = 0.0
+    side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))
+    left, right = r[:-2:2], r[2::2]
+    area = np.zeros(r[::2].size)
+    area[:-1] += np.pi / 3 * side * (2 * left + right)
+    area[1:] += np.pi / 3 * side * (left + 2 * right)
+
+    chosen = touching[::2] & (along[::2] > 1e-6)
+    pressure, shear = _on_corners(pushed) / area, _on_corners(dragged) / area
+    return r[::2][chosen] * _MM, pressure[chosen] * _MPA, shear[chosen] * _MPA
+
+
+def _on_corners(forces: FloatArray) -> FloatArray:
+    """Return the forces on hats between corners; nodes are corners and middles by turns."""
+    sums = forces[::2].copy()
+    sums[:-1] += forces[1::2] / 2
+    sums[1:] += forces[1::2] / 2
+    return sums
+
+
+def _without_axis(rows: FloatArray) -> FloatArray:
+    """Add the first row to the second, and leave it out."""
+    return np.concatenate([rows[:1] + rows[1:2], rows[2:]])
+
+
+def _spline(r: FloatArray, values: FloatArray, parity: int) -> Callable[[FloatArray], FloatArray]:
+    """Return an even (1) or odd (-1) cubic spline through a table that begins off the axis."""
+    from scipy.interpolate import CubicSpline
+
+    mirror = slice(3, None, -1)
+    spline = CubicSpline(
+        np.concatenate([-r[mirror], r]), np.concatenate([parity * values[mirror], values])
+    )
+    return lambda radii: np.asarray(spline(radii))
+
+
+def _spline_masses(r: FloatArray, parity: int) -> FloatArray:
+    """Return integrals around the axis of hats times splines that are 1 at one corner off it."""
+    nodes, weights = gauss_between(r, order=6)
+    splines = _spline(r[1:], np.eye(r.size - 1), parity)(nodes)
+    corner = np.arange(r.size)
+    hats = np.maximum(0.0, 1 - np.abs(np.interp(nodes, r, corner) - corner[:, None]))
+    return _without_axis(hats @ (splines * (2 * np.pi * nodes * weights)[:, None]))
+
+
+def _interpolated(
+    nodes: FloatArray, values: FloatArray, r: ArrayLike, *, parity: int
+) -> FloatArray:
+    """Return a table's values at ``r``: by an even or odd spline, or without overshoot (0)."""
+    from scipy.interpolate import PchipInterpolator
+
+    radii = np.asarray(r, dtype=np.float64)
+    spline = _spline(nodes, values, parity) if parity else PchipInterpolator(nodes, values)
+    return np.where(radii <= nodes[-1], spline(np.minimum(radii, nodes[-1])), 0.0)
+
+
+def outermost(pressing: Pressing, pressed: Pressed) -> float:
+    """Return the radius after deformation at which the contact ends, in mm, between two nodes."""
+    nodes: IntArray = pressing.elements.surface
+    r = pressing.elements.nodes[0][nodes] + pressed.x[nodes]
+    last = int(np.flatnonzero(np.isin(nodes, pressed.touching))[-1])
+    return float((r[last] + r[min(last + 1, r.size - 1)]) / 2)

@@ -1,0 +1,323 @@
+r"""Contacts on rings: placed, solved, and solved again on half as many to see what changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from memscal.errors import ConvergenceError, DomainError
+from memscal.mechanics.contact import Contact, too_deep
+from memscal.mechanics.hankel_film import HankelFilm
+from memscal.mechanics.interface import Interface
+from memscal.mechanics.rings import RingTraction
+from memscal.mechanics.solver.path import PathPoint, follow
+from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target
+from memscal.mechanics.surface import FilmModel
+from memscal.model.arrays import FloatArray
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Indenter, Rod
+
+__all__ = ["RingRequest", "even_rings", "rings_around", "rings_under_a_rod", "solve_on_rings"]
+
+# Rings beyond the largest contact, so that it can end where it will.
+_MARGIN = 4
+# At a contact's edge the spacing has shrunk by this factor, and grows away from it by this share
+# of the distance.
+_FINEST = 1 / 16
+_GROWTH = 0.4
+# A rod's rings crowd as the fourth power of their number counted from the edge.
+_CROWDING = 4.0
+# Radii at which the spacing is tabulated.
+_PLACING_SAMPLES = 100_001
+
+
+def even_rings(reach: float, count: int) -> FloatArray:
+    """Return ``count`` even rings from the axis to ``reach`` (m)."""
+    return np.linspace(0.0, reach, count)
+
+
+def rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArray:
+    """Return rings that resolve contacts of given radii.
+
+    Parameters
+    ----------
+    edges : sequence of float
+        Expected contact radii, in m.
+    reach : float
+        Radius that pressure reaches, in m: the largest edge, or more where there is no edge.
+    count : int
+        Even rings up to ``reach``; those at the edges come on top.
+    """
+    spacing = reach / count
+    r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
+    local = np.full(r.size, spacing)
+    for edge in edges:
+        graded = np.hypot(_FINEST * spacing, _GROWTH * (r - edge))
+        local = np.minimum(local, graded)
+    # Where the number of rings passed so far is whole, there is one.
+    passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (1 / local[1:] + 1 / local[:-1]))])
+    return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
+
+
+def rings_under_a_rod(radius: float, count: int) -> FloatArray:
+    """Return rings from the axis to a rod's edge that crowd towards it, and one on the edge."""
+    inward = np.linspace(1.0, 0.0, count) ** _CROWDING
+    return radius * (1.0 - inward)
+
+
+_FEWEST_RINGS = 48
+_MOST_RINGS = 384
+# Rings are doubled until base stress, load and depth change by less than this ...
+_SETTLED = 1e-4
+# ... and a solution that changes by more than this is not given away.
+_TOLERABLE = 5e-3
+# Rings of the coarse contact that tells where to place the others.
+_COARSE = 40
+# A contact wider than this many film thicknesses is no probe of the film.
+_WIDEST = 100.0
+# Where the pressure is below this share of its largest, there is no contact.
+_EDGE = 1e-3
+# Radii at which the base stress of two solutions is compared.
+_REQUEST_SAMPLES = 24
+# Distance of the film's free edge from the contact, in thicknesses, where none is given.
+_FREE_EDGE = 12.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RingRequest:
+    """What is asked for; its content is the key under which a solution is remembered.
+
+    Parameters
+    ----------
+    film, indenter, interface
+        What is pressed on what, and what is between them.
+    targets : tuple of Load or Depth
+        Loads (N) or depths (m), in the order in which they are visited.
+    friction : float
+        Amontons' coefficient.
+    loading : str
+        ``"incremental"`` or ``"total"``.
+    backend : str
+        ``"hankel"`` or ``"fem"``.
+    film_radius : float, optional
+        Radius of the film's free edge in m, for finite elements.
+    rings : int, optional
+        Rings from the axis to the largest contact; as many as are needed by default.
+    """
+
+    film: ElasticFilm
+    indenter: Indenter
+    interface: Interface
+    targets: tuple[Target, ...]
+    friction: float
+    loading: str
+    backend: str
+    film_radius: float | None
+    rings: int | None
+
+
+@lru_cache(maxsize=64)
+def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
+    """Return the contacts of a request, in its order.
+
+    Raises
+    ------
+    DomainError
+        If a contact outgrows the film, the model or the indenter.
+    ConvergenceError
+        If the contact problem does not settle, or has not converged with the most rings; the
+        error's ``last`` is then the last contact that was solved.
+    """
+    edges, reach = _expected(request)
+    count = request.rings or _FEWEST_RINGS
+    coarse = _solve(request, _rings(request, edges, reach, max(count // 2, 8)))
+    while True:
+        edges = [contact.contact_radius for contact in coarse]
+        fine = _solve(request, _rings(request, edges, reach, count))
+        changes = [_change(request, *pair) for pair in zip(fine, coarse, strict=True)]
+        if max(changes) < _SETTLED or request.rings or 2 * count > _MOST_RINGS:
+            break
+        count, coarse = 2 * count, fine
+    contacts = [replace(c, convergence=change) for c, change in zip(fine, changes, strict=True)]
+    if max(changes) > _TOLERABLE:
+        error = ConvergenceError(
+            f"On {count} rings the contact still changes by {max(changes):.1g} of its largest base "
+            "stress, its load or its depth when they are doubled.",
+            why=f"The model promises {_TOLERABLE:g}.",
+            cure="Give more rings, or ask for a state nearer to one that was solved.",
+        )
+        error.last = contacts[-1]
+        raise error
+    return tuple(contacts)
+
+
+def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: int) -> FloatArray:
+    if isinstance(request.indenter, Rod):
+        return rings_under_a_rod(request.indenter.radius, count)
+    return rings_around(edges, reach, count)
+
+
+def _expected(request: RingRequest) -> tuple[list[float], float]:
+    """Return the contact radii to expect and how far pressure reaches (m), from a coarse contact.
+
+    The reach of the coarse rings is doubled until the contact ends within them, and shortened
+    until it fills a good part of them.
+    """
+    if isinstance(request.indenter, Rod):
+        return [], request.indenter.radius
+    film = request.film
+    reach = film.thickness
+    while True:
+        rings = even_rings(reach, _COARSE)
+        try:
+            states = [point.state for point in _follow(request, HankelFilm(film, rings))[1]]
+        except ConvergenceError:
+            # A contact that has run off the rings may not settle.
+            if reach > _WIDEST * film.thickness:
+                raise
+            reach *= 2
+            continue
+        filled = max(int(np.flatnonzero(state.pressure > 0)[-1]) for state in states)
+        if filled >= _COARSE - 4:
+            reach *= 2
+        elif filled < _COARSE // 3 and reach > 1e-6 * film.thickness:
+            reach *= max(1.5 * filled / _COARSE, 0.05)
+        else:
+            break
+        if reach > _WIDEST * film.thickness:
+            raise DomainError(
+                f"The contact would be more than {_WIDEST:g} times as wide as the film is thick.",
+                why="Such a film is no longer a layer under an indenter: its response is that of "
+                "a column at every point.",
+                cure="Lower the load or the depth, or check the units of film and indenter.",
+            )
+    edges = [_contact_radius(request, rings, state) for state in states]
+    within = float(rings[filled + 1])
+    if within > request.indenter.extent:
+        raise DomainError(
+            f"The contact would reach the end of the {request.indenter.shape}, "
+            f"{request.indenter.extent * 1e3:.4g} mm from its axis.",
+            why="Its face is not known beyond.",
+            cure="Lower the load or the depth, or extend the profile.",
+        )
+    return edges, within
+
+
+def _follow(request: RingRequest, model: FilmModel) -> tuple[ContactProblem, list[PathPoint]]:
+    rings = model.compliance.r
+    problem = ContactProblem(
+        film=request.film,
+        compliance=model.compliance,
+        heights=request.indenter.height(rings),
+        friction=request.friction,
+        interface=request.interface,
+    )
+    # Between rigid surfaces a step is a ring; where nothing touches all at once, as many steps.
+    return problem, follow(problem, request.targets, request.loading, increments=rings.size)
+
+
+def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
+    """Return the contacts on given rings."""
+    model: FilmModel
+    if request.backend == "fem":
+        from memscal.mechanics.elements.element_film import ElementFilm
+
+        radius = request.film_radius or rings[-1] + _FREE_EDGE * request.film.thickness
+        model = ElementFilm(request.film, rings, radius=radius)
+    else:
+        model = HankelFilm(request.film, rings)
+    try:
+        _, points = _follow(request, model)
+    except ConvergenceError as error:
+        if isinstance(error.last, PathPoint):
+            error.last = _contact(request, model, error.last)
+        raise
+    contacts = [_contact(request, model, point) for point in points]
+    # What was asked for is met to rounding; it is given back as it was asked for.
+    return [
+        replace(contact, load=target.value)
+        if isinstance(target, Load)
+        else replace(contact, depth=target.value)
+        for contact, target in zip(contacts, request.targets, strict=True)
+    ]
+
+
+def _contact(request: RingRequest, model: FilmModel, point: PathPoint) -> Contact:
+    state, rings = point.state, model.compliance.r
+    if state.depth >= request.film.thickness:
+        raise too_deep(request.film, request.indenter, state.load, state.depth)
+    radius = _contact_radius(request, rings, state)
+    count = int(np.count_nonzero(state.pressure > 0))
+    return Contact(
+        film=request.film,
+        indenter=request.indenter,
+        interface=request.interface,
+        load=state.load,
+        depth=state.depth,
+        contact_radius=radius,
+        stick_radius=_stick_radius(request, rings, state, radius),
+        friction=request.friction,
+        loading="" if isinstance(request.indenter, Rod) else request.loading,
+        backend=request.backend,
+        convergence=math.nan,
+        steps=point.steps,
+        discretisation=f"{count} rings in contact, {model.discretisation}",
+        traction=RingTraction(rings, state.pressure, state.shear),
+        inside=model.field(state.pressure, state.shear),
+        elastic_energy=point.elastic_energy,
+        work=point.work,
+        dissipated_energy=point.dissipated_energy,
+    )
+
+
+def _contact_radius(request: RingRequest, rings: FloatArray, state: ContactState) -> float:
+    """Return the radius in m at which the pressure ends."""
+    if isinstance(request.indenter, Rod):
+        return request.indenter.radius
+    p = state.pressure
+    if request.interface.normal_law is not None:
+        # Without an edge: where the pressure has fallen to a small share of its largest.
+        last = int(np.flatnonzero(p > _EDGE * p.max())[-1])
+        share = (p[last] - _EDGE * p.max()) / (p[last] - p[last + 1])
+        return float(rings[last] + share * (rings[last + 1] - rings[last]))
+    last = int(np.flatnonzero(p > 0)[-1])
+    if last == 0:
+        return float(rings[1]) / 2
+    # The pressure ends like a square root: its square falls in proportion to r^2.
+    inner, outer = p[last - 1] ** 2, p[last] ** 2
+    squares = rings[last - 1] ** 2, rings[last] ** 2
+    if inner <= outer:
+        return float(rings[last])
+    edge = math.sqrt(squares[1] + outer / (inner - outer) * (squares[1] - squares[0]))
+    return float(min(edge, rings[last + 1]))
+
+
+def _stick_radius(
+    request: RingRequest, rings: FloatArray, state: ContactState, contact_radius: float
+) -> float:
+    """Return the radius in m within which the film sticks."""
+    sticking = np.flatnonzero(state.sticking(request.friction) & (state.pressure > 0))
+    if sticking.size == 0 or (sticking.size == 1 and sticking[0] == 0):
+        return 0.0
+    last = int(sticking[-1])
+    if last + 1 >= rings.size or not state.touching[last + 1]:
+        return contact_radius
+    return min(contact_radius, float(rings[last] + rings[last + 1]) / 2)
+
+
+def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
+    """Return the largest relative change of base stress, load and depth."""
+    reach = fine.contact_radius + 3 * fine.film.thickness
+    if request.film_radius is not None:
+        # In the corner between the base and a free edge the stress is singular.
+        off_the_corner = request.film_radius - fine.film.thickness
+        reach = min(reach, max(off_the_corner, request.film_radius / 2))
+    r = np.linspace(0.0, reach, _REQUEST_SAMPLES)
+    ours, theirs = fine.base_stress(r), coarse.base_stress(r)
+    by_stress = float(np.max(np.abs(ours - theirs)) / np.max(np.abs(ours)))
+    by_load, by_depth = abs(coarse.load / fine.load - 1), abs(coarse.depth / fine.depth - 1)
+    return float(max(by_stress, by_load, by_depth))

@@ -1,0 +1,107 @@
+"""Processes that share work, and threads of the linear algebra library: one for each."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from numbers import Integral
+from typing import TYPE_CHECKING, Any
+
+from memscal.errors import InputError
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+
+    from threadpoolctl import ThreadpoolController
+
+__all__ = [
+    "THREAD_VARIABLES",
+    "one_thread_per_process",
+    "require_workers",
+    "single_threaded",
+    "worker_pool",
+]
+
+#: What OpenBLAS, OpenMP, MKL and Accelerate read when they are loaded.
+THREAD_VARIABLES = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+
+
+def _set_by_user() -> bool:
+    return any(name in os.environ for name in THREAD_VARIABLES)
+
+
+def one_thread_per_process() -> None:
+    """Have BLAS start one thread, unless the user set a number or numpy is loaded already."""
+    if "numpy" not in sys.modules and not _set_by_user():
+        os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    """Return the handle on the loaded libraries, which takes milliseconds to find."""
+    import scipy.linalg  # noqa: F401 - scipy brings a BLAS of its own, which has to be loaded
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """Run BLAS on one thread, also as a decorator; a number that the user set stays.
+
+    Threads spin while they wait for each other.  On the matrices here, of a few hundred rows, that
+    costs ten times the processor time of the work itself.
+    """
+    if _set_by_user():
+        yield
+    else:
+        with _controller().limit(limits=1, user_api="blas"):  # some 25 us
+            yield
+
+
+#: Systems refuse more, and no machine gains by them.
+_MOST_WORKERS = 61
+
+
+def require_workers(workers: Any) -> None:
+    """Refuse a number of processes that makes no sense.
+
+    Raises
+    ------
+    InputError
+        If it is no whole number from 1 to 61.
+    """
+    if not isinstance(workers, Integral) or not 1 <= int(workers) <= _MOST_WORKERS:
+        raise InputError(
+            f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}.",
+            cure="Give one process per core, at the most.",
+        )
+
+
+@contextmanager
+def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of processes.
+
+    A process forked from one with threads may hang, so each is started afresh.  Matrices here are
+    small: threads of BLAS in every process would only wait for each other.  Their number is read
+    when a process starts, from the environment, which is put back afterwards.
+    """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    unset = [name for name in THREAD_VARIABLES if name not in os.environ]
+    os.environ.update(dict.fromkeys(unset, "1"))
+    try:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            yield pool
+    finally:
+        for name in unset:
+            os.environ.pop(name, None)

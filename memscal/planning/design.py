@@ -1,0 +1,382 @@
+"""Design of a calibration: what a scan would tell, and what scan tells what is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
+from memscal.deconvolution.division import Regulariser
+from memscal.errors import FitError, InputError
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Rod
+from memscal.parallel import single_threaded
+from memscal.planning.expected import Design, evaluate
+from memscal.planning.plan import Plan
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+
+__all__ = ["VARIED", "WISHES", "design", "least_design", "require_wishes", "varied_designs"]
+
+WISHES = {
+    "A": "conversion_constant",
+    "sigma": "gaussian_sigma",
+    "fwhm": "fwhm",
+    "resolved": "resolved_wavenumber",
+}
+"""What can be wanted, by its short name: three relative uncertainties and a wavenumber."""
+
+VARIED = ("step", "half_range", "repeats")
+"""What can be varied to reach it."""
+
+_MOST_REPEATS = 10_000
+#: More positions cost more to evaluate than they are worth: repeats lower the noise as well.
+_MOST_POSITIONS = 513
+#: Farther away, in thicknesses of the film, there is nothing but the baseline.
+_FARTHEST = 20
+#: A step of more Gaussian widths does not sample G: what is stated of it is the prior's alone.
+_WIDEST_STEP = 2.0
+_FEWEST_POSITIONS = 6
+_GROWTH = 1.6
+
+#: What a source is, and what would make it smaller, for those that more scanning does not.
+_CURES = {
+    "thickness": "Measure the film's thickness better.",
+    "poisson_ratio": "Determine the film's Poisson's ratio better.",
+    "rod_radius": "Measure the rod's radius better.",
+    "load": "Determine the load better.",
+    "noise": "Lower the noise, or raise the load.",
+    "regularisation": "It is what the film hides of G: a thinner film shows more of it, and so do "
+    "less noise and a finer step.",
+}
+
+
+@dataclass(frozen=True)
+class _Search:
+    """One thing to vary: its least and most, in units of its own, and the plan for each.
+
+    ``name`` and ``unit`` say what a number means to people.
+    """
+
+    name: str
+    least: int
+    most: int
+    plan: Callable[[int], Plan]
+    told: Callable[[Plan], str]
+
+
+def require_wishes(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
+    """Return the wishes by their full names.
+
+    Raises
+    ------
+    InputError
+        If one is unknown, is no positive number, or nothing is to be varied for them.
+    """
+    named = {}
+    for name, value in want.items():
+        full = WISHES.get(name, name)
+        if full not in WISHES.values():
+            raise InputError(
+                f"The design is wanted to reach {name!r}, which is no wish that is known.",
+                cure=f"Choose from {', '.join(WISHES)}.",
+            )
+        if not 0 < value < np.inf:
+            raise InputError(f"The {name} that is wanted is {value:g}, but it must be above zero.")
+        named[full] = float(value)
+    if vary is not None and vary not in VARIED:
+        raise InputError(
+            f"The design is to vary {vary!r}, which cannot be varied.",
+            cure=f"Choose from {', '.join(VARIED)}.",
+        )
+    if bool(named) != (vary is not None):
+        raise InputError(
+            "A wish needs something to vary for it, and the other way round.",
+            cure=f"Give both want and vary (one of {', '.join(VARIED)}), or neither.",
+        )
+    return named
+
+
+def least_design(
+    plan: Plan, wishes: Mapping[str, float], vary: str, evaluate: Callable[[Plan], Design]
+) -> Design:
+    """Find the coarsest step, the shortest range or the fewest repeats that reach the wishes.
+
+    Parameters
+    ----------
+    plan : Plan
+        All that is not varied.
+    wishes : mapping of str to float
+        By full name: largest relative uncertainty, or smallest resolved wavenumber in rad/m.
+    vary : str
+        One of :data:`VARIED`.
+    evaluate : callable
+        Returns the design of a plan.
+
+    Raises
+    ------
+    FitError
+        If they cannot be reached, with the best that can, and what stands in the way.
+    """
+    search = _search(plan, vary)
+    tried: dict[int, Design | None] = {}
+
+    def meets(count: int) -> bool:
+        if count not in tried:
+            tried[count] = _attempt(search.plan(count), evaluate)
+        design = tried[count]
+        return design is not None and all(_met(design, *wish) for wish in wishes.items())
+
+    fails, works = search.least - 1, search.least
+    while not meets(works):
+        if works == search.most:
+            raise _out_of_reach(search, wishes, [d for d in tried.values() if d is not None])
+        fails, works = works, min(max(works + 1, round(_GROWTH * works)), search.most)
+    while works - fails > 1:
+        middle = (works + fails) // 2
+        fails, works = (fails, middle) if meets(middle) else (middle, works)
+    found = tried[works]
+    assert found is not None
+    return found
+
+
+def _search(plan: Plan, vary: str) -> _Search:
+    if vary == "repeats":
+        return _Search(
+            "repeats",
+            1,
+            _MOST_REPEATS,
+            lambda count: replace(plan, repeats=count),
+            lambda tried: f"{tried.repeats} repeats",
+        )
+    if vary == "step":
+        return _Search(
+            "step",
+            _FEWEST_POSITIONS,
+            _MOST_POSITIONS,
+            lambda count: replace(plan, step=2 * plan.half_range / (count - 1)),
+            lambda tried: f"a step of {tried.step * 1e3:.4g} mm",
+        )
+    # The sensor has to lie within.
+    reach = int(np.ceil(2 * abs(plan.centre) / plan.step)) + 1
+    farthest = int(2 * (abs(plan.centre) + _FARTHEST * plan.film.thickness) / plan.step) + 1
+    return _Search(
+        "half range",
+        max(_FEWEST_POSITIONS, reach),
+        max(min(_MOST_POSITIONS, farthest), reach, _FEWEST_POSITIONS),
+        lambda count: replace(plan, half_range=plan.step * (count - 1) / 2),
+        lambda tried: f"a half range of {tried.half_range * 1e3:.4g} mm",
+    )
+
+
+def _attempt(plan: Plan, evaluate: Callable[[Plan], Design]) -> Design | None:
+    """Return the design, or nothing where the plan determines nothing, or does not sample G."""
+    try:
+        design = evaluate(plan)
+    except FitError:
+        return None
+    return design if plan.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"] else None
+
+
+def _reached(design: Design, name: str) -> float:
+    if name == "resolved_wavenumber":
+        return design.resolved_wavenumber
+    return design.relative_uncertainty(name)
+
+
+def _met(design: Design, name: str, value: float) -> bool:
+    reached = _reached(design, name)
+    return reached >= value if name == "resolved_wavenumber" else reached <= value
+
+
+def _told(name: str, value: float) -> str:
+    if name == "resolved_wavenumber":
+        return f"a resolved wavenumber of {value * 1e-3:.4g} rad/mm"
+    short = next(key for key, full in WISHES.items() if full == name)
+    return f"a standard uncertainty of {short} of {value * 100:.3g} %"
+
+
+def _out_of_reach(search: _Search, wishes: Mapping[str, float], tried: list[Design]) -> FitError:
+    """Say the best that can be reached, and what stands in the way."""
+    if not tried:
+        return FitError(
+            f"No {search.name} makes a scan that can be calibrated with.",
+            cure="Plan more repeats, less noise, a larger load or a larger half range.",
+        )
+    name = next(n for n, v in wishes.items() if not _met(tried[-1], n, v))
+    sign = -1 if name == "resolved_wavenumber" else 1
+    best = min(tried, key=lambda design: sign * _reached(design, name))
+    told = f"{_told(name, wishes[name])} is out of reach by the {search.name} alone"
+    problem = (
+        f"{told[0].upper()}{told[1:]}: the best is {_told(name, _reached(best, name))}, with "
+        f"{search.told(best.plan)}."
+    )
+    if name == "resolved_wavenumber":
+        return _band_ends(best, problem)
+    source = best.largest_source(name)
+    share = best.budget[name][source] / abs(best.parameters[name])
+    return FitError(
+        problem,
+        why=f"{source} alone contributes {share * 100:.3g} %.",
+        cure=_CURES.get(source, "Reduce that contribution, or want less."),
+    )
+
+
+def _band_ends(best: Design, problem: str) -> FitError:
+    sampled = np.pi / best.plan.step
+    if best.resolved_wavenumber >= 0.99 * sampled:
+        return FitError(
+            problem,
+            why=f"A step of {best.plan.step * 1e3:.4g} mm samples no more than "
+            f"{sampled * 1e-3:.4g} rad/mm.",
+            cure="Plan a finer step.",
+        )
+    return FitError(
+        problem,
+        why=f"A film of {best.plan.film.thickness * 1e3:.4g} mm passes little of larger "
+        "wavenumbers, and noise hides it.",
+        cure="Plan less noise, a larger load, or a thinner film.",
+    )
+
+
+@single_threaded()
+def design(
+    *,
+    film: ElasticFilm = PAPER_FILM,
+    rod: Rod = PAPER_ROD,
+    kernel: RadialKernel | None = None,
+    conversion_constant: float = 1e-7,
+    load: float = 1.0,
+    load_uncertainty: float | None = 0.01,
+    step: float = 0.25e-3,
+    half_range: float = 8e-3,
+    repeats: int = 1,
+    noise: float = 0.005,
+    noise_voltage: float | None = None,
+    centre: float = 0.0,
+    method: str | Regulariser = "evidence",
+    seed: int = 0,
+    want: Mapping[str, float] | None = None,
+    vary: str | None = None,
+) -> Design:
+    r"""Predict the uncertainties of a calibration from a line scan that is not made yet.
+
+    The covariance is that of the linear model about the expected apparatus function,
+
+    .. math::
+
+        \mathrm{cov} = (J^T J/\sigma^2)^{-1}
+
+    for the Gaussian's parameters (the bound of Cramer and Rao); beside it, departures from a
+    Gaussian are weighed as a calibration does, with the expected squares of its data.  No scan is
+    simulated, and nothing is drawn.
+
+    Parameters
+    ----------
+    film, rod : ElasticFilm, Rod
+        What is pressed on what, with the uncertainties that are known of it; the paper's.
+    kernel : RadialKernel, optional
+        The apparatus function to expect; the paper's Gaussian of 561 um where absent.
+    conversion_constant : float
+        A to expect, in V/Pa.
+    load, load_uncertainty : float
+        Load in N and its relative standard uncertainty.
+    step, half_range : float
+        Distance of neighbouring positions, and how far they reach to either side, in m.
+    repeats : int
+        How often the line is scanned.
+    noise : float
+        Standard deviation of one voltage, as a share of the signal with the rod right above the
+        sensor.
+    noise_voltage : float, optional
+        The same in V, in place of the share.
+    centre : float
+        Expected position of the sensor along the scan, in m.
+    method : str or Regulariser
+        How the scan would be evaluated.
+    seed : int
+        Seed of methods that draw random numbers.
+    want : mapping of str to float, optional
+        Relative standard uncertainties wanted of ``A``, ``sigma`` and ``fwhm``, at most, and
+        ``resolved`` wavenumber, in rad/m, at least.
+    vary : str, optional
+        What to vary for them: ``step``, ``half_range`` or ``repeats``.  Found is the coarsest
+        step, the shortest range or the fewest repeats.
+
+    Returns
+    -------
+    Design
+        The plan with its expected uncertainties, their sources, and the resolved band.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, the scan would not pass over the sensor, or a wish is
+        unknown.
+    FitError
+        If the scan would not determine the parameters, or a wish is out of reach: with the best
+        that can be reached, and what stands in the way.
+
+    Examples
+    --------
+    >>> import memscal
+    >>> planned = memscal.design(noise=0.01)
+    >>> round(planned.relative_uncertainty("gaussian_sigma"), 3)
+    0.031
+    >>> planned.largest_source("gaussian_sigma")
+    'thickness'
+    >>> finer = memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")
+    >>> finer.plan.repeats
+    3
+    """
+    wishes = require_wishes(want or {}, vary)
+    plan = Plan(
+        film=film,
+        rod=rod,
+        kernel=GaussianMixture() if kernel is None else kernel,
+        conversion_constant=conversion_constant,
+        load=load,
+        load_uncertainty=load_uncertainty,
+        step=step,
+        half_range=half_range,
+        repeats=repeats,
+        noise=noise,
+        noise_voltage=noise_voltage,
+        centre=centre,
+    )
+    evaluated = partial(evaluate, method=method, seed=seed)
+    return evaluated(plan) if vary is None else least_design(plan, wishes, vary, evaluated)
+
+
+def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[Design]:
+    """Return the designs with one number of the plan replaced, those that determine anything.
+
+    Parameters
+    ----------
+    planned : Design
+        The design about which to vary.
+    vary : str
+        ``step``, ``half_range`` (m) or ``repeats``.
+    values : sequence of float
+        In place of the plan's own.
+
+    Raises
+    ------
+    InputError
+        If a value is out of range.
+    """
+    found = []
+    for value in values:
+        given = int(value) if vary == "repeats" else float(value)
+        try:
+            found.append(evaluate(_with(planned.plan, vary, given), planned.method))
+        except FitError:
+            continue
+    return found
+
+
+def _with(plan: Plan, name: str, value: float) -> Plan:
+    changed: dict[str, float] = {name: value}
+    return replace(plan, **changed)  # type: ignore[arg-type]

@@ -1,0 +1,223 @@
+r"""The calibration of a scan that is not made yet: its estimate and covariance, in expectation.
+
+The Gaussian's parameters have the covariance of the inverse Fisher information at the true ones
+(the bound of Cramer and Rao).  Departures are weighed as in :mod:`memscal.estimation.bayesian`,
+with the expected squares of the data, those of the signal plus those of the noise, in place of
+the data's own.  Everything after that is the calibration's own code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.calibration.fields import choose_grid
+from memscal.calibration.inputs import InputEffect, input_effects
+from memscal.calibration.stages import Solution, deconvolve, prepare_fields
+from memscal.calibration.uncertainty import Results, propagate
+from memscal.deconvolution.division import Regulariser, create_regulariser
+from memscal.errors import FitError
+from memscal.estimation.band import find_band
+from memscal.estimation.bayesian import weigh_departures
+from memscal.estimation.departures import departure_basis
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import fit_gaussian
+from memscal.estimation.points import measured_points
+from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
+from memscal.estimation.reference import (
+    reference_contact,
+    reference_spectra,
+    require_calibration_rod,
+)
+from memscal.model.apparatus import ParameterSet
+from memscal.model.arrays import FloatArray, freeze_arrays
+from memscal.planning.plan import Plan
+
+__all__ = ["Design", "Expected", "evaluate", "expected_calibration"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Expected:
+    """What a planned scan would give.
+
+    ``solution``: every step of its calibration; ``results``: parameters, budget and covariances.
+    """
+
+    solution: Solution
+    results: Results
+
+
+def expected_calibration(plan: Plan, regulariser: Regulariser) -> Expected:
+    """Calibrate the scan that is planned, with expected squares in place of data.
+
+    Raises
+    ------
+    InputError
+        If the rod is wider than the film is thick, or the kernel is no apparatus function.
+    FitError
+        If the scan would have fewer positions than parameters, or would not tell the conversion
+        constant from zero.
+    """
+    scan = plan.scan()
+    require_calibration_rod(scan)
+    stress = reference_contact(plan.film, plan.rod, plan.load)
+    points = measured_points(scan)
+    references = reference_spectra([stress], [points], [plan.film.thickness])
+    estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)
+    band = find_band(estimate)
+    choice = choose_grid(estimate, band)
+    fields = prepare_fields(estimate, choice)
+    deconvolution = deconvolve(estimate, band, fields, regulariser)
+    solution = Solution(
+        scans=(scan,),
+        stresses=(stress,),
+        estimate=estimate,
+        band=band,
+        choice=choice,
+        fields=fields,
+        regulariser=regulariser,
+        deconvolution=deconvolution,
+        gaussian_misfit=deconvolution.misfit,
+    )
+    effects = input_effects(solution.scans, solution.stresses, estimate)
+    return Expected(solution, _propagated(solution, effects))
+
+
+def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
+    """Return the estimate from voltages without noise, at the noise that they state."""
+    errors = model.points.u_errors
+    assert errors is not None
+    weights = np.asarray(1 / errors**2)
+    fit = fit_gaussian(model, weights, start=fit_gaussian(model, weights))
+    basis = departure_basis(model, fit)
+    count = float(repeats * weights.size)
+    weighed = weigh_departures(model, fit, basis, weights, count, expected_noise=1.0)
+    estimate = ProfileEstimate(model, fit, basis, weighed, weights, np.ones_like(weights))
+    variance = float(basis.integrals @ estimate.covariance @ basis.integrals)
+    if not estimate.conversion_constant > LEAST_SIGNIFICANCE * np.sqrt(variance):
+        raise FitError(
+            f"The scan as planned would find a conversion constant of "
+            f"({estimate.conversion_constant * 1e3:.2g} ± {np.sqrt(variance) * 1e3:.2g}) mV/Pa: "
+            "not told apart from zero.",
+            why="It is too short to tell the profile's tail from the baseline, or too noisy.",
+            cure="Plan a larger half range, more repeats, or a larger load.",
+        )
+    return estimate
+
+
+def _propagated(solution: Solution, effects: Mapping[str, InputEffect]) -> Results:
+    return propagate(
+        solution.estimate,
+        solution.deconvolution,
+        solution.window_at_nodes,
+        solution.fields.along_axis(solution.deconvolution.quotient.window)[0],
+        effects,
+        {},
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design:
+    """A planned scan and what it would find, with standard uncertainties (k = 1).
+
+    Parameters
+    ----------
+    plan : Plan
+        The scan.
+    method : str
+        How it would be evaluated.
+    parameters : ParameterSet
+        What a calibration states, in expectation: ``conversion_constant`` (V/Pa),
+        ``gaussian_sigma``, ``fwhm`` (m) and more, with their joint covariance.
+    budget : mapping
+        Standard uncertainty of A and of the widths by source, in SI units.  ``noise`` scatters
+        from scan to scan; ``regularisation`` is what no repeated scan would show: the shapes of G
+        that the film hides.
+    r, g, g_errors : ndarray, shape (n,)
+        G to expect, in 1/m^2, at radii in m.
+    k, transfer, transfer_errors : ndarray, shape (m,)
+        Its transfer function at wavenumbers in rad/m.
+    resolved_wavenumber : float
+        Up to which the scan would determine G, in rad/m.
+    """
+
+    plan: Plan
+    method: str
+    parameters: ParameterSet
+    budget: Mapping[str, Mapping[str, float]]
+    r: FloatArray
+    g: FloatArray
+    g_errors: FloatArray
+    k: FloatArray
+    transfer: FloatArray
+    transfer_errors: FloatArray
+    resolved_wavenumber: float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self, "r", "g", "g_errors", "k", "transfer", "transfer_errors")
+
+    def __repr__(self) -> str:
+        """Return the plan and its main numbers in place of arrays."""
+        shares = ", ".join(
+            f"u({symbol})/{symbol} = {self.relative_uncertainty(name):.2%}"
+            for symbol, name in (("A", "conversion_constant"), ("sigma", "gaussian_sigma"))
+        )
+        return (
+            f"<Design of {self.plan.positions} positions every {self.plan.step * 1e3:.4g} mm, "
+            f"{self.plan.repeats} repeat{'s' if self.plan.repeats > 1 else ''}: {shares}>"
+        )
+
+    def relative_uncertainty(self, name: str) -> float:
+        """Return the standard uncertainty of a parameter over its value.
+
+        Raises
+        ------
+        InputError
+            If there is no such parameter.
+        """
+        return abs(self.parameters.uncertainty(name) / self.parameters[name])
+
+    def largest_source(self, name: str) -> str:
+        """Return the source that contributes most to a budgeted parameter."""
+        parts = self.budget[name]
+        return max(parts, key=lambda source: parts[source])
+
+
+def evaluate(plan: Plan, method: str | Regulariser = "evidence", seed: int = 0) -> Design:
+    """Return what to expect of a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+        The scan.
+    method : str or Regulariser
+        How it is evaluated.
+    seed : int
+        Seed of methods that draw random numbers.
+
+    Raises
+    ------
+    InputError, FitError
+        If the plan cannot be calibrated with.
+    """
+    regulariser = create_regulariser(method, seed=seed) if isinstance(method, str) else method
+    expected = expected_calibration(plan, regulariser)
+    solution, results = expected.solution, expected.results
+    deconvolution, fields = solution.deconvolution, solution.fields
+    transfer = fields.grid.transfer(deconvolution.quotient.values)
+    k, modulus = fields.along_axis(np.abs(transfer))
+    return Design(
+        plan=plan,
+        method=regulariser.name,
+        parameters=results.parameters,
+        budget=results.budget,
+        r=deconvolution.g.r,
+        g=deconvolution.g.radial,
+        g_errors=np.sqrt(np.diag(results.radial_covariance)),
+        k=k,
+        transfer=modulus / deconvolution.conversion_constant,
+        transfer_errors=results.transfer_errors,
+        resolved_wavenumber=solution.band.resolved,
+    )

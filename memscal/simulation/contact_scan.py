@@ -1,0 +1,377 @@
+"""Synthetic scans of a sphere's contacts through a known apparatus function."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.kernels import RadialKernel
+from memscal.errors import InputError
+from memscal.mechanics.contact import Contact
+from memscal.mechanics.indent import indent
+from memscal.mechanics.interface import Interface
+from memscal.model.arrays import FloatArray, require_non_negative, require_positive, require_range
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Sphere
+from memscal.model.scan import Scan, StressSensor
+from memscal.simulation.rod_scan import PAPER_FILM
+from memscal.simulation.sensor import (
+    Disturbances,
+    apparatus_function,
+    blurred_stress,
+    disturbance,
+    shear_channel,
+)
+
+__all__ = [
+    "PAPER_LOADS",
+    "PAPER_SPHERE",
+    "LoadPath",
+    "described_film",
+    "pressed_path",
+    "simulate_contacts",
+]
+
+# Distance in ln P of the outer states from the middle one, in standard deviations of the load,
+# and its smallest value: closer ones would show the solver's own error.
+_SPREAD = 2.0
+_LEAST_SPREAD = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPath:
+    """Contacts at several nominal loads, with neighbours where their loads scatter.
+
+    Parameters
+    ----------
+    states : sequence of sequences of Contact
+        At each nominal load one contact, or three, ``spread`` apart in ln P.
+    spread : float
+        Their distance.
+    """
+
+    states: Sequence[Sequence[Contact]]
+    spread: float
+
+    def at_nominal(self, kernel: RadialKernel, radius: FloatArray) -> FloatArray:
+        """Return the blurred stress at every nominal load, shape (loads, *radius.shape), in Pa."""
+        return blurred_stress([state[len(state) // 2] for state in self.states], kernel, radius)
+
+    def near(
+        self,
+        index: int,
+        kernel: RadialKernel,
+        radius: FloatArray,
+        ratio: FloatArray,
+        *,
+        order: int = 0,
+    ) -> FloatArray:
+        """Return the blurred stress at radii (m), each at its own load, in Pa.
+
+        Parameters
+        ----------
+        index : int
+            Number of the nominal load.
+        kernel : RadialKernel
+            The apparatus function.
+        radius, ratio : ndarray, shape (n,)
+            Distance from the axis in m, and load relative to the nominal one, of each contact.
+        order : int
+            Zero for the normal stress, one for the shear's radial component.
+        """
+        values = blurred_stress(self.states[index], kernel, radius, order=order)
+        if len(values) == 1:
+            return np.asarray(values[0])
+        below, middle, above = values
+        t = np.log(ratio)
+        slope = (above - below) / (2 * self.spread)
+        bend = (above - 2 * middle + below) / self.spread**2
+        return np.asarray(middle + slope * t + 0.5 * bend * t**2)
+
+
+def pressed_path(
+    film: ElasticFilm,
+    sphere: Sphere,
+    loads: FloatArray,
+    *,
+    friction: float,
+    loading: str,
+    interface: Interface,
+    scatter: float,
+) -> LoadPath:
+    """Solve the contacts at the loads (N) that scatter by a relative standard deviation."""
+    spread = max(_SPREAD * scatter, _LEAST_SPREAD) if scatter > 0 else 0.0
+    around = np.exp(spread * np.arange(-1, 2)) if scatter > 0 else np.ones(1)
+    path, place = np.unique(np.multiply.outer(loads, around), return_inverse=True)
+    solved = indent(
+        film, sphere, load=path, friction=friction, loading=loading, interface=interface
+    )
+    rows = np.reshape(place, (loads.size, around.size))
+    return LoadPath([[solved[i] for i in row] for row in rows], spread)
+
+
+#: The paper's sphere and its loads in N; the uncertainty of the radius is a plausible one.
+PAPER_SPHERE = Sphere(radius=128.8e-3, radius_uncertainty=0.5e-3)
+PAPER_LOADS = (0.34, 0.69, 1.37, 2.75)
+
+# Beyond this scatter of the loads a parabola in ln P is no longer good to 1e-3.
+_MOST_SCATTER = 0.1
+
+
+def simulate_contacts(
+    *,
+    film: ElasticFilm = PAPER_FILM,
+    sphere: Sphere = PAPER_SPHERE,
+    kernel: RadialKernel | None = None,
+    conversion_constant: float = 1e-7,
+    channels: Sequence[str] = ("zz",),
+    shear_kernel: RadialKernel | None = None,
+    shear_conversion_constant: float = 5e-8,
+    load: float | Sequence[float] = PAPER_LOADS,
+    friction: float = 0.0,
+    loading: str = "incremental",
+    interface: Interface | None = None,
+    points: int = 33,
+    spacing: float = 0.5e-3,
+    repeats: int = 1,
+    noise: float = 0.005,
+    load_scatter: float = 0.02,
+    record_loads: bool = False,
+    load_reading: float = 0.002,
+    load_scale: float = 1.0,
+    load_uncertainty: float | None = 0.01,
+    position_error: float = 10e-6,
+    centre: tuple[float, float] = (0.14e-3, 0.0),
+    baseline: float = 0.01,
+    drift: float = 0.005,
+    state_noise: bool = True,
+    lubrication: str = "dry",
+    lubricant: str = "",
+    seed: int = 0,
+) -> Scan:
+    r"""Simulate a line scan of contacts of a sphere, each pressed anew at its place.
+
+    The base stress of contact i of nominal load P, with its own load :math:`P_i` and at its own
+    distance :math:`R_i` from the sensor, is convolved with G exactly:
+
+    .. math:: U_i = A\,(G \otimes \sigma_{zz}^{P_i})(R_i) + b + d\,\xi_i + n_i
+
+    with an offset b, a linear drift d and Gaussian noise :math:`n_i`; see
+    :mod:`memscal.simulation.contact_scan` for the stress at each load.
+
+    Parameters
+    ----------
+    film, sphere
+        What is pressed on what; the paper's where absent.
+    kernel : RadialKernel, optional
+        The apparatus function G; the paper's Gaussian of 561 um where absent.
+    conversion_constant : float
+        A, in V/Pa.
+    channels, shear_kernel, shear_conversion_constant
+        Whether ``u_xz`` is recorded, too, and its G and A, as of :func:`memscal.simulate`.
+    load : float or sequence of float
+        Nominal loads, in N, each once; each gives ``repeats`` rows of the scan.
+    friction, loading, interface
+        The contact's law, as of :func:`memscal.indent`.
+    points, spacing : int, float
+        Number of contacts in a row, and their distance in m.
+    repeats : int
+        Rows at each load.
+    noise, baseline, drift : float
+        Standard deviation of the noise, offset, and change of the offset across the scan, each
+        as a share of the scan's largest signal: the same voltage at every load.
+    load_scatter : float
+        Relative standard deviation of each contact's own load; stated as ``normal_load_errors``.
+    record_loads : bool
+        Record the load that each contact had, in place of the nominal one; the error that is
+        stated is then that of the reading.
+    load_reading : float
+        Relative standard deviation of the reading of a load that is recorded.
+    load_scale : float
+        Common factor of all true loads against what is stated.
+    load_uncertainty : float, optional
+        Relative standard uncertainty to state for the loads' common error.
+    position_error : float
+        Standard deviation of each contact's own position in m; stated as ``x_errors``.
+    centre : tuple of float
+        Position of the sensor, in m.
+    state_noise : bool
+        Whether the scan states its noise (``u_zz_errors``).
+    lubrication, lubricant : str
+        Stated in the scan; what they do to the contact is to be said by ``friction``.
+    seed : int
+        Seed.  Noise, loads and positions are drawn from streams of their own.
+
+    Returns
+    -------
+    Scan
+        One row for each repeat at each load, with its truth in ``synthetic``: the film, the
+        sphere and the contact's law, ``load_1`` and so on (the true loads without their scatter),
+        the sensor, and the disturbances.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, or the kernel is no apparatus function.
+    DomainError
+        If a load is beyond what the contact's model holds for.
+
+    Examples
+    --------
+    >>> scan = simulate_contacts(load=[0.34, 1.37], repeats=2, seed=1)
+    >>> scan.u_zz.shape, scan.lubrication, float(scan.normal_load[2, 0])
+    ((4, 33), 'dry', 1.37)
+    """
+    loads = _checked_loads(load)
+    _require_plausible(points, spacing, repeats, noise, load_scatter, load_reading, seed)
+    require_positive("conversion_constant", conversion_constant, "V/Pa")
+    require_positive("load_scale", load_scale)
+    require_non_negative("position_error", position_error)
+    _require_finite(centre, baseline, drift)
+    interface, truth = interface or Interface(), apparatus_function(kernel)
+    shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
+    path = pressed_path(
+        film,
+        sphere,
+        load_scale * loads,
+        friction=friction,
+        loading=loading,
+        interface=interface,
+        scatter=load_scatter,
+    )
+    x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
+    row = np.repeat(np.arange(loads.size), repeats)
+    draws = _draw(row.size, points, seed)
+    ratio = 1 + load_scatter * draws["load"]
+    along = x + position_error * draws["position"] - centre[0]
+    away = np.hypot(along, centre[1])
+    largest = conversion_constant * float(
+        path.at_nominal(truth, np.hypot(x - centre[0], centre[1])).max()
+    )
+    signal = np.stack([path.near(int(j), truth, away[i], ratio[i]) for i, j in enumerate(row)])
+    u = conversion_constant * signal + largest * (
+        disturbance(x, baseline, drift) + noise * draws["noise"]
+    )
+    stated = np.broadcast_to(loads[row, None], u.shape)
+    unsure = load_scatter
+    if record_loads:
+        stated, unsure = stated * ratio * (1 + load_reading * draws["reading"]), load_reading
+    shape = u.shape[1:] if len(u) == 1 else u.shape
+    further: dict[str, FloatArray] = {}
+    known: dict[str, float | str] = {}
+    if shear is not None:
+        blurred = [
+            path.near(int(j), shear.kernel, away[i], ratio[i], order=1) for i, j in enumerate(row)
+        ]
+        sheared = np.stack(blurred) * shear.side(along, away)
+        disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
+        further, known = shear.recorded(sheared.reshape(shape), x, disturbed)
+    return Scan(
+        x=x,
+        u_zz=u.reshape(shape),
+        u_zz_errors=np.full(shape, noise * largest) if state_noise and noise > 0 else None,
+        x_errors=np.full(points, position_error) if position_error > 0 else None,
+        normal_load=stated.reshape(shape),
+        normal_load_errors=(unsure * stated).reshape(shape) if unsure > 0 else None,
+        channels=further,
+        load=float(loads.mean()),
+        load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
+        indenter=sphere,
+        film=film,
+        lubrication=lubrication,
+        lubricant=lubricant,
+        sensor=StressSensor(name="a simulated sensor", channel="zz"),
+        title=f"Synthetic sphere scan{', ' if lubrication else ''}{lubrication}",
+        notes="Synthetic data made by memscal simulate; nothing here was measured.",
+        synthetic={
+            **truth.describe(),
+            "conversion_constant": conversion_constant,
+            **described_film(film),
+            "indenter_radius": sphere.radius,
+            "friction": float(friction),
+            "loading": loading,
+            **_described(interface),
+            "load_scale": float(load_scale),
+            **{f"load_{j}": float(value) for j, value in enumerate(load_scale * loads, 1)},
+            "load_scatter": load_scatter,
+            "position_error": position_error,
+            "centre": centre[0],
+            "centre_y": centre[1],
+            "baseline": baseline * largest,
+            "drift": drift * largest,
+            "noise": noise * largest,
+            "seed": float(seed),
+            **known,
+        },
+    )
+
+
+def described_film(film: ElasticFilm) -> dict[str, float]:
+    """Return what of a film decides over its base stress, by the names of a truth."""
+    names = ("young_modulus", "poisson_ratio", "thickness")
+    return {name: float(getattr(film, name)) for name in names}
+
+
+def _require_finite(centre: tuple[float, float], baseline: float, drift: float) -> None:
+    if not np.isfinite((*centre, baseline, drift)).all():
+        raise InputError(
+            f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
+            "largest signal; they must be finite."
+        )
+
+
+def _draw(rows: int, points: int, seed: int) -> dict[str, FloatArray]:
+    """Return standard normal numbers for each source of error, from streams of their own."""
+    sources = ("noise", "load", "position", "reading")
+    streams = np.random.SeedSequence(seed).spawn(len(sources))
+    return {
+        name: np.random.default_rng(stream).standard_normal((rows, points))
+        for name, stream in zip(sources, streams, strict=True)
+    }
+
+
+def _described(interface: Interface) -> dict[str, float | str]:
+    """Return the compliance of the interface, by the names of a truth; nothing if it is rigid."""
+    found: dict[str, float | str] = {}
+    if interface.slip_length > 0:
+        found["slip_length"] = interface.slip_length
+    if interface.normal_law is not None and interface.normal is not None:
+        found |= {name: float(value) for name, value in asdict(interface.normal).items()}
+    return found | ({"interface": interface.description} if found else {})
+
+
+def _checked_loads(load: float | Sequence[float]) -> FloatArray:
+    loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
+    if loads.ndim != 1 or loads.size == 0:
+        raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
+    for each in loads:
+        require_positive("load", float(each), "N")
+    if np.unique(loads).size != loads.size:
+        raise InputError(
+            f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N.",
+            cure="Give each load once, and the number of its repeats.",
+        )
+    return loads
+
+
+def _require_plausible(
+    points: int,
+    spacing: float,
+    repeats: int,
+    noise: float,
+    load_scatter: float,
+    load_reading: float,
+    seed: int,
+) -> None:
+    require_range("spacing", spacing, 1e-9, 0.1, "m")
+    require_non_negative("noise", noise)
+    require_range("load_scatter", load_scatter, 0.0, _MOST_SCATTER)
+    require_range("load_reading", load_reading, 0.0, _MOST_SCATTER)
+    if points < 2 or repeats < 1 or seed < 0:
+        raise InputError(
+            f"There are {points} contacts in a row and {repeats} rows at each load, from the seed "
+            f"{seed}.",
+            cure="Give two contacts and one row at least, and a seed that is not negative.",
+        )

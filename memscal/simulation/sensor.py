@@ -1,0 +1,177 @@
+"""What a simulated sensor reports: base stresses through its apparatus function, disturbed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
+from memscal.errors import InputError
+from memscal.mechanics.contact import Contact
+from memscal.model.arrays import FloatArray, require_positive
+
+__all__ = [
+    "Disturbances",
+    "ShearChannel",
+    "apparatus_function",
+    "blurred_stress",
+    "disturbance",
+    "shear_channel",
+]
+
+# The film passes exp(-kh): beyond this in kh nothing is left in double precision.
+_REACH = 40.0
+
+
+def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
+    """Return the kernel, or the paper's Gaussian where there is none.
+
+    Raises
+    ------
+    InputError
+        If it is no kernel, or has another integral than 1, which would pass for an error of A.
+    """
+    if kernel is None:
+        return GaussianMixture()
+    if not isinstance(kernel, RadialKernel):
+        raise InputError(
+            f"The kernel is a {type(kernel).__name__}, which has no transform(), radial() and "
+            "describe().",
+            cure="Give a GaussianMixture, a SmoothedDisc, or an object with these three methods.",
+        )
+    # Not at k = 0 itself, where a closed form such as J1(ka)/ka may divide by zero.
+    integral = float(kernel.transform(np.array([1e-2]))[0])
+    if not abs(integral - 1) <= 1e-6:
+        raise InputError(
+            f"The kernel's transform is {integral:g} at k = 0, not 1.",
+            why="An apparatus function has unit integral.",
+            cure="Divide the kernel by its integral; the conversion constant carries the size.",
+        )
+    return kernel
+
+
+def blurred_stress(
+    contacts: Sequence[Contact], kernel: RadialKernel, radius: FloatArray, *, order: int = 0
+) -> FloatArray:
+    r"""Return :math:`G \otimes \sigma_{zz}` of several contacts on one film.
+
+    Of order one it is the radial component of the blurred base shear, a vector field.
+
+    Parameters
+    ----------
+    contacts : sequence of Contact
+        Contacts on one film.
+    kernel : RadialKernel
+        The apparatus function G.
+    radius : ndarray, any shape
+        Distances from the contact's axis, in m.
+    order : int
+        Zero for the normal stress, one for the shear.
+
+    Returns
+    -------
+    ndarray, shape (contacts, *radius.shape)
+        The convolution, exact by Hankel transforms, in Pa.
+    """
+    nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, float(radius.max()))
+    transform = kernel.transform(nodes.k)
+    transforms = [
+        contact.base_shear_spectrum(nodes.k) if order else contact.base_spectrum(nodes.k)
+        for contact in contacts
+    ]
+    spectra = np.stack([found * transform for found in transforms], axis=1)
+    return np.moveaxis(nodes.synthesise(spectra, radius, order=order), -1, 0)
+
+
+def disturbance(x: FloatArray, baseline: float, drift: float) -> FloatArray:
+    """Return an offset and a linear drift over the positions, as shares of the largest signal."""
+    half_range = 0.5 * float(np.ptp(x))
+    return np.asarray(baseline + 0.5 * drift * (x - 0.5 * (x.min() + x.max())) / half_range)
+
+
+_CHANNELS = (("zz",), ("zz", "xz"))
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Noise, offset and drift as shares of the largest signal, and whether noise is stated."""
+
+    noise: float
+    baseline: float
+    drift: float
+    state_noise: bool
+    seed: int
+
+
+@dataclass(frozen=True)
+class ShearChannel:
+    """Apparatus function and conversion constant (V/Pa) of the tangential channel along x."""
+
+    kernel: RadialKernel
+    conversion_constant: float
+
+    def side(self, x: FloatArray, away: FloatArray) -> FloatArray:
+        """Cosine of the way from the sensor to the indenter with x; zero on the sensor.
+
+        Parameters
+        ----------
+        x, away : ndarray
+            Coordinate along x, and distance, of the indenter from the sensor, in m.
+        """
+        return np.asarray(np.divide(x, away, out=np.zeros_like(away + x), where=away > 0))
+
+    def recorded(
+        self, stress: FloatArray, x: FloatArray, disturbed: Disturbances
+    ) -> tuple[dict[str, FloatArray], dict[str, float | str]]:
+        """Return the channel's voltages, and its truth by names that end in ``_xz``.
+
+        Parameters
+        ----------
+        stress : ndarray, shape (..., n)
+            Component of the blurred shear along x, in Pa.
+        x : ndarray, shape (n,)
+            Positions, in m.
+        disturbed : Disturbances
+            As shares of this channel's own largest signal; its noise is drawn from a stream that
+            no other channel uses.
+        """
+        clean = self.conversion_constant * stress
+        largest = float(np.abs(clean).max())
+        draws = np.random.default_rng([disturbed.seed, 1]).standard_normal(clean.shape)
+        level = disturbance(x, disturbed.baseline, disturbed.drift)
+        channels = {"u_xz": clean + largest * (level + disturbed.noise * draws)}
+        if disturbed.state_noise and disturbed.noise > 0:
+            channels["u_xz_errors"] = np.full(clean.shape, disturbed.noise * largest)
+        truth: Mapping[str, float | str] = {
+            **self.kernel.describe(),
+            "conversion_constant": self.conversion_constant,
+            "baseline": disturbed.baseline * largest,
+            "drift": disturbed.drift * largest,
+            "noise": disturbed.noise * largest,
+        }
+        return channels, {f"{name}_xz": value for name, value in truth.items()}
+
+
+def shear_channel(
+    channels: Sequence[str], kernel: RadialKernel | None, conversion_constant: float
+) -> ShearChannel | None:
+    """Return the tangential channel if it is among the channels of a scan.
+
+    Raises
+    ------
+    InputError
+        If there is another channel, or the kernel is no apparatus function.
+    """
+    if tuple(channels) not in _CHANNELS:
+        raise InputError(
+            f"The channels are {tuple(channels)}.",
+            why="A line scan along x has the normal channel, and may have the shear's along x.",
+            cure='Give ("zz",) or ("zz", "xz").',
+        )
+    if len(channels) == 1:
+        return None
+    require_positive("conversion_constant of the channel xz", conversion_constant, "V/Pa")
+    return ShearChannel(apparatus_function(kernel), conversion_constant)

@@ -1,0 +1,55 @@
+"""What no estimator can be better than, and what chance allows of a root-mean-square."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from helpers.scans import CONVERSION, SIGMA, simulated
+from scipy.stats import chi2
+
+import memscal
+from memscal.model.arrays import FloatArray
+
+
+def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
+    """Largest RMS of ``count`` normal deviates of RMS ``ratio``, but for this chance."""
+    return ratio * float(np.sqrt(chi2.isf(chance, count) / count))
+
+
+@lru_cache
+def cramer_rao(
+    noise: float,
+    *,
+    sigma: float = SIGMA,
+    centre: float = 0.14e-3,
+    points: int = 65,
+    repeats: int = 1,
+) -> tuple[float, float]:
+    """Cramer-Rao bounds of A and sigma, relative; A, sigma, centre and baseline unknown.
+
+    By finite differences of simulated, noise-free scans: not by the estimator's own Jacobian.
+    """
+
+    def voltage(a: float = CONVERSION, s: float = sigma, x: float = centre) -> FloatArray:
+        return simulated(
+            noise=0.0,
+            conversion_constant=a,
+            kernel=memscal.GaussianMixture((1.0,), (s,)),
+            centre=(x, 0.0),
+            points=points,
+            baseline=0.0,
+            drift=0.0,
+        ).u_zz
+
+    step, shift = 1e-4, 0.01e-3
+    columns = [
+        (voltage(a=CONVERSION * (1 + step)) - voltage(a=CONVERSION * (1 - step))) / (2 * step),
+        (voltage(s=sigma * (1 + step)) - voltage(s=sigma * (1 - step))) / (2 * step),
+        (voltage(x=centre + shift) - voltage(x=centre - shift)) / (2 * shift * 1e3),
+        np.ones(points),
+    ]
+    jacobian = np.stack(columns, axis=1)
+    deviation = noise * voltage().max() / np.sqrt(repeats)
+    bound = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian))) * deviation
+    return float(bound[0]), float(bound[1])

@@ -1,0 +1,292 @@
+"""Films for CalculiX: axisymmetric second-order elements, from the mesh to the parsed results.
+
+All in mm, N and MPa.  The elements are eight-noded with reduced integration (CAX8R), which do
+not lock close to incompressibility.  CalculiX solves a sector of two degrees: forces are scaled
+to the full circle here.  The stress at the base is not sampled inside the elements but found
+from the reactions of its nodes, as the traction that is consistent with them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from helpers.getfem_sphere import REACH, grid
+from numpy.typing import NDArray
+
+__all__ = ["Film", "Mesh", "PressedRod", "PressedSphere", "press_rod", "press_sphere"]
+
+FloatArray = NDArray[np.float64]
+SECTORS = 180.0
+# N/mm of a contact spring: the sphere enters the film by less than 1e-7 mm.
+CONTACT_STIFFNESS = 1e4
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Quadrilaterals in rows and columns; middle nodes halfway, none inside the elements.
+
+    Nodes and coordinates are by half columns and half rows, from the axis and from the base.
+    """
+
+    r: FloatArray
+    z: FloatArray
+
+    @classmethod
+    def of_corners(cls, r: FloatArray, z: FloatArray) -> Mesh:
+        return cls(_with_middles(r), _with_middles(z))
+
+    @property
+    def nodes(self) -> NDArray[np.int64]:
+        column, row = np.indices(self.r.shape)
+        exists = (column % 2 == 0) | (row % 2 == 0)
+        return np.where(exists, np.cumsum(exists).reshape(exists.shape), 0)
+
+    @property
+    def elements(self) -> NDArray[np.int64]:
+        n = self.nodes
+        corners = (n[:-2:2, :-2:2], n[2::2, :-2:2], n[2::2, 2::2], n[:-2:2, 2::2])
+        middles = (n[1::2, :-2:2], n[2::2, 1::2], n[1::2, 2::2], n[:-2:2, 1::2])
+        return np.stack(corners + middles, axis=-1).reshape(-1, 8)
+
+
+@dataclass(frozen=True)
+class Film:
+    """A bonded film of a finite radius with a free edge."""
+
+    young_modulus: float
+    poisson_ratio: float
+    thickness: float
+
+
+@dataclass(frozen=True)
+class PressedRod:
+    """Stiffness in N/mm, and stress at the base in MPa for a load of 1 N, at radii in mm."""
+
+    stiffness: float
+    base_r: FloatArray
+    base_normal: FloatArray
+
+
+@dataclass(frozen=True)
+class PressedSphere:
+    """Load in N at a depth in mm, forces of the interface's nodes in N, stress at the base."""
+
+    depth: float
+    load: float
+    r: FloatArray
+    forces: FloatArray
+    areas: FloatArray
+    base_r: FloatArray
+    base_normal: FloatArray
+
+
+def press_rod(
+    film: Film, radius: float, halvings: int, folder: Path, *, sticking: bool
+) -> PressedRod:
+    """Press a flat rod down by a tenth of a millimetre; the problem is linear."""
+    depth = 0.1
+    mesh = rod_mesh(radius, film.thickness, halvings)
+    top = mesh.nodes[:, -1]
+    under = top[mesh.r[:, -1] < radius * (1 + 1e-9)]
+    deck = [
+        *_film_deck(film, mesh),
+        *_node_set("ROD", under),
+        "*STEP",
+        "*STATIC",
+        "*BOUNDARY",
+        f"ROD, 2, 2, {-depth}",
+        *(["ROD, 1, 1"] if sticking else []),
+        "*NODE PRINT, NSET=ROD",
+        "RF",
+        "*NODE PRINT, NSET=BASE",
+        "RF",
+        "*END STEP",
+    ]
+    tables = run(deck, folder)
+    load = -SECTORS * sum(force[1] for force in tables["ROD", 1.0].values())
+    return PressedRod(load / depth, mesh.r[:, 0], _base_stress(mesh, tables["BASE", 1.0]) / load)
+
+
+def press_sphere(
+    film: Film, radius: float, depths: list[float], step: float, layers: int, folder: Path
+) -> list[PressedSphere]:
+    """Press a sphere down without friction, on springs that resist compression only (GAPUNI).
+
+    One spring stands on every node that may be touched, with the sphere's height over it as its
+    clearance: the gap is linear in the displacements, as it is in memscal, and no surface of
+    facets stands in for the sphere.
+    """
+    r, z = np.meshgrid(*grid(step, layers, 4.2, film.thickness), indexing="ij")
+    mesh = Mesh.of_corners(r, z)
+    top, r = mesh.nodes[:, -1], mesh.r[:, -1]
+    # On the axis itself a consistent force is zero.
+    touchable = (r > 0) & (r < 4.2)
+    deck = _film_deck(film, mesh)
+    first = top.max() + 1
+    deck += ["*NODE, NSET=SPHERE"]
+    deck += [f"{first + i}, {x:.13g}, {film.thickness + 1}, 0" for i, x in enumerate(r[touchable])]
+    number = len(mesh.elements) + 1
+    for i, (node, x) in enumerate(zip(top[touchable], r[touchable], strict=True)):
+        deck += [
+            f"*ELEMENT, TYPE=GAPUNI, ELSET=GAP{i}",
+            f"{number + i}, {node}, {first + i}",
+            f"*GAP, ELSET=GAP{i}",
+            f"{radius - np.sqrt(radius**2 - x**2):.13g}, 0, 1, 0, , {CONTACT_STIFFNESS}, 1e-9",
+        ]
+    deck += _to_make_it_iterate(first + r.size, number + r.size)
+    deck += ["*BOUNDARY", "SPHERE, 1, 1", "SPHERE, 3, 3"]
+    for depth in depths:
+        deck += ["*STEP, INC=100", "*CONTROLS, PARAMETERS=FIELD", "1e-6, 1e-4"]
+        deck += ["*STATIC", "1, 1, 1e-5, 1", "*BOUNDARY", f"SPHERE, 2, 2, {-depth:.13g}"]
+        deck += ["*NODE PRINT, NSET=SPHERE", "RF", "*NODE PRINT, NSET=BASE", "RF", "*END STEP"]
+    tables = run(deck, folder)
+    areas = trace_mass(r).sum(axis=1)[touchable]
+    states = []
+    for time, depth in enumerate(depths, start=1):
+        sphere = tables["SPHERE", time]
+        forces = -SECTORS * np.array([sphere[first + i][1] for i in range(areas.size)])
+        stress = _base_stress(mesh, tables["BASE", time])
+        load = float(forces.sum())
+        states.append(PressedSphere(depth, load, r[touchable], forces, areas, r, stress))
+    return states
+
+
+def rod_mesh(radius: float, thickness: float, halvings: int) -> Mesh:
+    """Columns that crowd at the rod's edge and fan out evenly toward the base.
+
+    Straight columns as thin as the edge asks for would let reduced integration's pressure
+    waver at the base.
+    """
+    toward_edge = 0.45 ** np.arange(9)
+    surface = np.concatenate([1 - toward_edge, [1.0], 1 + toward_edge[::-1]]) * radius
+    base = np.linspace(0.0, 0.8 * thickness, surface.size)
+    below = list(base)
+    while below[-1] < REACH:
+        widest = 0.25 * thickness if below[-1] < 4 * thickness else thickness
+        below.append(below[-1] + min(1.25 * (below[-1] - below[-2]), widest))
+    far = np.array(below[base.size :])
+    far = base[-1] + (far - base[-1]) * (REACH - base[-1]) / (far[-1] - base[-1])
+    above = surface[-1] + np.cumsum(0.35 * radius * 1.25 ** np.arange(far.size))
+    above = np.append(np.minimum(above, far)[:-1], REACH)
+    depth = np.append(radius * toward_edge, 0.0)[::-1]
+    depth = np.append(depth, np.linspace(radius, thickness, 9)[1:])[::-1]
+    surface, base = np.append(surface, above), np.append(base, far)
+    for _ in range(halvings):
+        surface, base, depth = (_with_middles(part) for part in (surface, base, depth))
+    fan = 1 / (1 + (depth / (0.2 * thickness)) ** 2)
+    fan = (fan - fan[0]) / (fan[-1] - fan[0])
+    r = base[:, None] + np.outer(surface - base, fan)
+    return Mesh.of_corners(r, np.broadcast_to(thickness - depth, r.shape))
+
+
+def trace_mass(r: FloatArray) -> FloatArray:
+    """Integrals of products of the quadratic shape functions over a circular face."""
+    x, weights = np.polynomial.legendre.leggauss(4)
+    shapes = np.array([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2])
+    mass = np.zeros((r.size, r.size))
+    for i in range(0, r.size - 1, 2):
+        half = (r[i + 2] - r[i]) / 2
+        rings = 2 * np.pi * (r[i + 1] + half * x) * half * weights
+        mass[i : i + 3, i : i + 3] += (shapes * rings) @ shapes.T
+    return mass
+
+
+def run(deck: list[str], folder: Path) -> dict[tuple[str, float], dict[int, FloatArray]]:
+    """Run CalculiX on one thread; the tables that it printed."""
+    (folder / "film.inp").write_text("\n".join(deck) + "\n", encoding="ascii")
+    program = shutil.which("ccx")
+    assert program is not None
+    done = subprocess.run(
+        [program, "film"],
+        cwd=folder,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "Job finished" in done.stdout, done.stdout[-2000:]
+    return parse((folder / "film.dat").read_text(encoding="ascii"))
+
+
+def parse(printed: str) -> dict[tuple[str, float], dict[int, FloatArray]]:
+    """Tables of a .dat file by the set of nodes and the time; each has components by node."""
+    tables: dict[tuple[str, float], dict[int, FloatArray]] = {}
+    for line in printed.splitlines():
+        heading = re.search(r"for set (\S+) and time\s+(\S+)", line)
+        if heading:
+            table = tables.setdefault((heading[1], float(heading[2])), {})
+        elif line.strip():
+            node, *values = line.split()
+            table[int(node)] = np.array(values, dtype=np.float64)
+    return tables
+
+
+def _with_middles(corners: FloatArray) -> FloatArray:
+    for axis in range(corners.ndim):
+        ends = np.moveaxis(corners, axis, 0)
+        both = np.empty((2 * len(ends) - 1, *ends.shape[1:]))
+        both[::2], both[1::2] = ends, (ends[1:] + ends[:-1]) / 2
+        corners = np.moveaxis(both, 0, axis)
+    return corners
+
+
+def _film_deck(film: Film, mesh: Mesh) -> list[str]:
+    nodes, exists = mesh.nodes, mesh.nodes > 0
+    points = zip(nodes[exists], mesh.r[exists], mesh.z[exists], strict=True)
+    return [
+        "*NODE",
+        *(f"{node}, {r:.13g}, {z:.13g}, 0" for node, r, z in points),
+        "*ELEMENT, TYPE=CAX8R, ELSET=FILM",
+        *(f"{i}, {', '.join(map(str, e))}" for i, e in enumerate(mesh.elements, start=1)),
+        "*MATERIAL, NAME=ELASTIC",
+        "*ELASTIC",
+        f"{film.young_modulus}, {film.poisson_ratio}",
+        "*SOLID SECTION, ELSET=FILM, MATERIAL=ELASTIC",
+        *_node_set("BASE", nodes[:, 0]),
+        *_node_set("AXIS", nodes[0]),
+        "*BOUNDARY",
+        "BASE, 1, 2",
+        "AXIS, 1, 1",
+    ]
+
+
+def _node_set(name: str, nodes: NDArray[np.int64]) -> list[str]:
+    return [f"*NSET, NSET={name}", *(f"{node}," for node in nodes if node > 0)]
+
+
+def _to_make_it_iterate(node: int, element: int) -> list[str]:
+    """A held brick apart, of a material with a yield stress.
+
+    Without it CalculiX 2.20 takes a film on gap elements for a linear problem.
+    """
+    corners = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    return [
+        "*NODE, NSET=HELD",
+        *(f"{node + i}, {100 + x}, {y}, {z}" for i, (x, y, z) in enumerate(corners)),
+        "*ELEMENT, TYPE=C3D8, ELSET=BRICK",
+        f"{element}, {', '.join(str(node + i) for i in range(8))}",
+        "*MATERIAL, NAME=YIELDING",
+        "*ELASTIC",
+        "1., 0.",
+        "*PLASTIC",
+        "1e6, 0.",
+        "*SOLID SECTION, ELSET=BRICK, MATERIAL=YIELDING",
+        "*BOUNDARY",
+        "HELD, 1, 3",
+    ]
+
+
+def _base_stress(mesh: Mesh, base: dict[int, FloatArray]) -> FloatArray:
+    """Normal stress, quadratic on every element, that does the work of the reactions.
+
+    The radial reactions are of no such use: CalculiX leaves out of them what the hoop stress on
+    the sides of its sector adds.
+    """
+    forces = SECTORS * np.array([base[node][1] for node in mesh.nodes[:, 0]])
+    return np.linalg.solve(trace_mass(mesh.r[:, 0]), forces)

@@ -1,0 +1,116 @@
+"""Points as a sensor would read them without any error, whose errors are stated all the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from memscal.friction.calculated import (
+    amontons_family,
+    elasto_plastic_family,
+    normal_compliance_family,
+)
+from memscal.friction.family import ProfileFamily
+from memscal.friction.interface_laws import Measured
+from memscal.friction.prediction import LoadPoints, Sensor, members_of
+from memscal.model.film import ElasticFilm
+from memscal.model.indenter import Sphere
+
+LOADS = (0.34, 0.69, 1.37, 2.75)
+MACROSCOPIC = 1.6
+FILM = ElasticFilm(
+    young_modulus=2.2e6,
+    poisson_ratio=0.5,
+    thickness=2e-3,
+    young_modulus_uncertainty=0.1e6,
+    thickness_uncertainty=0.02e-3,
+    poisson_ratio_uncertainty=0.005,
+)
+SPHERE = Sphere(radius=128.8e-3)
+_REACH = 9e-3
+_SIGMA = 561e-6
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Noise of a point over the load's largest signal, scatter of its load, and repeats."""
+
+    noise: float
+    scatter: float
+    repeats: int = 3
+
+
+PAPER = Precision(0.003, 0.02)
+PRECISE = Precision(0.001, 0.002)
+
+
+@lru_cache
+def amontons() -> ProfileFamily:
+    """Return contacts of a rigid interface along the friction coefficient."""
+    return amontons_family(
+        FILM,
+        SPHERE,
+        LOADS,
+        reach=_REACH,
+        friction=(0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, math.inf),
+    )
+
+
+@lru_cache
+def slipping() -> ProfileFamily:
+    """Return contacts along the slip length; short ones, which take long, are few."""
+    lengths = (0.0, 2e-6, 4e-6, 8e-6, 1.6e-5, 4e-5, 8e-5, 2e-4, math.inf)
+    return elasto_plastic_family(
+        FILM, SPHERE, LOADS, friction=MACROSCOPIC, slip_lengths=lengths, reach=_REACH
+    )
+
+
+@lru_cache
+def yielding() -> ProfileFamily:
+    """Return contacts without friction along the length of a normal law."""
+    lengths = (0.0, 1e-6, 2e-6, 4e-6)
+    return normal_compliance_family(
+        FILM, SPHERE, (0.69, 2.75), lengths=lengths, law="greenwood-tripp", reach=_REACH
+    )
+
+
+def sensor(family: ProfileFamily, conversion: float = 0.012, width: float = 0.005) -> Sensor:
+    """Return a Gaussian sensor of 1 V/Pa, with relative errors of A and of G's width."""
+    k = family.wavenumbers.k
+    transfer = np.exp(-((k * _SIGMA) ** 2) / 2)
+    changes = [conversion * transfer, -width * (k * _SIGMA) ** 2 * transfer]
+    return Sensor(family.wavenumbers, transfer, np.stack(changes, axis=1), 1.0)
+
+
+def read_without_error(
+    truth: ProfileFamily, value: float, precision: Precision
+) -> list[LoadPoints]:
+    """Return 33 points 0.5 mm apart at each load of a family, and their repeats, as calculated."""
+    x = np.tile(np.linspace(-8e-3, 8e-3, 33), precision.repeats)
+    gauge = sensor(truth)
+    spectra = members_of(truth, np.array([value])).spectra[0]
+    found = []
+    for own in spectra:
+        u = truth.wavenumbers.synthesise(gauge.transfer * own, np.abs(x))
+        found.append(
+            LoadPoints(
+                u=u,
+                offset=x,
+                log_load=np.zeros(x.size),
+                noise=np.full(x.size, precision.noise * u.max()),
+                load_errors=np.full(x.size, precision.scatter),
+                x_errors=np.zeros(x.size),
+                flat=np.stack([np.ones(x.size), np.linspace(-1, 1, x.size)], axis=1),
+                load_share=0.002,
+            )
+        )
+    return found
+
+
+def measured(points: Sequence[LoadPoints], family: ProfileFamily) -> Measured:
+    """Return points with the contacts that are to explain them."""
+    return Measured(points, sensor(family), family)

@@ -1,0 +1,199 @@
+"""Other programs that find G from a scan: what each can do at its best, by one signature.
+
+A peer takes a scan along a line and the truth, and returns G at :data:`RADII`, of unit integral
+over the plane.  Of the truth every peer is given centre, baseline and drift, which our own
+estimator has to find; those that leave their regularisation to the user are also given the G that
+is looked for, and return the best that any of their settings finds.  Repeats are averaged.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from helpers.scans import plane_error
+from scipy.special import j0
+
+import memscal
+from memscal.axisymmetry.hankel import Wavenumbers, radial_spline
+from memscal.model.arrays import FloatArray
+from memscal.model.scan import Scan
+
+RADII = np.linspace(0.0, 3e-3, 121)
+"""Where every peer gives G, in m."""
+
+PIXEL = 0.125e-3
+"""Half the step of the scans: neither a finer nor a coarser plane brings the peers nearer to G."""
+
+RING_STEP, OUTERMOST_RING = 0.05e-3, 4e-3
+"""The rings of which DeerLab's G is made, in m."""
+
+LARGEST_KH = 20.0
+"""The film passes nothing of finer detail to its base."""
+
+
+class Kernel(Protocol):
+    """A radial function of unit integral over the plane, in 1/m^2."""
+
+    def radial(self, r: FloatArray) -> FloatArray: ...
+
+
+Peer = Callable[[Scan, Kernel], FloatArray]
+
+
+@contextmanager
+def others_warnings() -> Iterator[None]:
+    """Let other programs warn: their deprecations are no failure of ours."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def plain_points(scan: Scan) -> tuple[FloatArray, FloatArray]:
+    """Distances from the true centre (m), and voltages there less true baseline and drift (V)."""
+    truth = scan.synthetic
+    voltage = np.atleast_2d(scan.u_zz).mean(axis=0)
+    slope = 0.5 * truth["drift"] / np.abs(scan.x).max()
+    return np.abs(scan.x - truth["centre"]), voltage - truth["baseline"] - slope * scan.x
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A scan and its base stress per newton as images, as programs for images want them.
+
+    The sensor is at the middle pixel; between the scan's points its voltage runs straight.
+    """
+
+    scan: Scan
+
+    @cached_property
+    def axis(self) -> FloatArray:
+        half = round(np.abs(self.scan.x).max() / PIXEL)
+        return np.arange(-half, half + 1) * PIXEL
+
+    @cached_property
+    def voltage(self) -> FloatArray:
+        distance, voltage = plain_points(self.scan)
+        order = np.argsort(distance)
+        return np.interp(self._radius, distance[order], voltage[order], right=0.0)
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        contact = memscal.indent(self.scan.film, self.scan.indenter, load=1.0)
+        # Most pixels share their distance with seven others.
+        radius, back = np.unique(np.round(self._radius, 12), return_inverse=True)
+        return contact.base_stress(radius)[back].reshape(self._radius.shape)
+
+    @cached_property
+    def _radius(self) -> FloatArray:
+        return np.hypot.outer(self.axis, self.axis)
+
+    def radial(self, image: FloatArray) -> FloatArray:
+        """G at :data:`RADII` from its image in any unit."""
+        middle = self.axis.size // 2
+        unit = image[middle, middle:] / (image.sum() * PIXEL**2)
+        return radial_spline(self.axis[middle:], unit)(RADII)
+
+    def best(self, images: Iterable[FloatArray], truth: Kernel) -> FloatArray:
+        """Of several images of G the one with the least error."""
+        wanted = truth.radial(RADII)
+        return min(images, key=lambda image: plane_error(RADII, self.radial(image), wanted))
+
+
+def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
+    """DeerLab's non-negative least squares, smoothed by as much as Akaike's criterion asks for.
+
+    G is made of rings.  Neither slope nor height are asked for on the axis, where an operator that
+    includes the edges would hold G down.
+    """
+    with others_warnings():
+        import deerlab as dl
+
+    ring = np.arange(round(OUTERMOST_RING / RING_STEP) + 1) * RING_STEP
+    area = 2 * np.pi * ring * RING_STEP
+    area[0] = np.pi * RING_STEP**2 / 4
+    distance, voltage = plain_points(scan)
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    reach = float(distance.max() + OUTERMOST_RING)
+    wavenumbers = Wavenumbers.covering(LARGEST_KH / scan.film.thickness, reach)
+    k = wavenumbers.k
+    # A unit ring of radius q has the transform J_0(kq).
+    spectra = (wavenumbers.weights * contact.base_spectrum(k))[:, None] * j0(np.outer(k, ring))
+    response = (j0(np.outer(distance, k)) @ spectra) * area
+    # DeerLab looks for its regularisation between 1e-8 and 1e3, for voltages and G near one.
+    response /= response.sum(axis=1).max()
+    with others_warnings():
+        fit = dl.snlls(
+            voltage / voltage.max(),
+            response,
+            lbl=np.zeros(ring.size),
+            reg=True,
+            regparam="aic",
+            regop=dl.regoperator(ring / RING_STEP, 2),
+            uq=False,
+        )
+    return np.interp(RADII, ring, fit.lin) / (area @ fit.lin)
+
+
+def tuned_wiener(scan: Scan, truth: Kernel) -> tuple[FloatArray, float]:
+    """scikit-image's Wiener filter with the best of 25 balances: G, and A in V/Pa."""
+    from skimage.restoration import wiener
+
+    plane = Plane(scan)
+    stress = plane.stress.sum()
+    images = (
+        wiener(plane.voltage, plane.stress / stress, balance, clip=False)
+        for balance in np.logspace(-9, 1, 25)
+    )
+    image = plane.best(images, truth)
+    return plane.radial(image), float(image.sum() / (scan.load * stress))
+
+
+def scikit_image(scan: Scan, truth: Kernel) -> FloatArray:
+    """G of :func:`tuned_wiener`."""
+    return tuned_wiener(scan, truth)[0]
+
+
+def photutils(scan: Scan, truth: Kernel) -> FloatArray:
+    """The kernel of photutils that turns the stress into the voltage, with the best of 49 windows.
+
+    A window is flat to a share of the largest wavenumber and tapers off over another share.
+    """
+    with others_warnings():
+        from photutils.psf_matching import SplitCosineBellWindow, make_kernel
+
+    plane = Plane(scan)
+    kernels = (
+        make_kernel(plane.stress, plane.voltage, window=SplitCosineBellWindow(taper, flat))
+        for flat in (0.04, 0.06, 0.08, 0.10, 0.12, 0.15, 0.20)
+        for taper in (0.03, 0.06, 0.09, 0.12, 0.18, 0.24, 0.30)
+    )
+    return plane.radial(plane.best(kernels, truth))
+
+
+def pypher(scan: Scan, truth: Kernel) -> FloatArray:
+    """PyPHER's homogenisation kernel with the best of 25 regularisations."""
+    with others_warnings():
+        from pypher.pypher import homogenization_kernel
+
+    plane = Plane(scan)
+    target, source = plane.voltage / plane.voltage.sum(), plane.stress / plane.stress.sum()
+    kernels = (
+        homogenization_kernel(target, source, reg_fact=weight)[0]
+        for weight in np.logspace(-9, 3, 25)
+    )
+    return plane.radial(plane.best(kernels, truth))
+
+
+PEERS: dict[str, Peer] = {
+    "deerlab": deerlab,
+    "skimage": scikit_image,
+    "photutils": photutils,
+    "pypher": pypher,
+}
+"""By the name that is imported."""

@@ -1,0 +1,205 @@
+"""Synthetic contact scans against contacts solved at each load, conservation, and statistics."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.rounding import assert_same_to_rounding
+from scipy.integrate import simpson
+from scipy.stats import chi2
+
+import memscal
+from memscal.errors import DomainError, InputError
+from memscal.model.arrays import FloatArray
+from memscal.model.scan import Scan
+from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE, simulate_contacts
+from memscal.simulation.rod_scan import PAPER_FILM
+from memscal.simulation.sensor import blurred_stress
+
+RARE = 1e-9
+"""Probability with which a correct program would fail one of the random tests here."""
+
+STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
+EXACT: dict[str, Any] = {**STILL, "load_scatter": 0.0, "position_error": 0.0}
+CENTRED = {"centre": (0.0, 0.0)}
+
+
+@pytest.fixture
+def seed() -> int:
+    """Return another seed in every run; the log of a failed test names it."""
+    value = int(np.random.SeedSequence().generate_state(1)[0])
+    logging.getLogger(__name__).info("seed %d", value)
+    return value
+
+
+def truth(scan: Scan) -> dict[str, Any]:
+    assert scan.synthetic is not None
+    return dict(scan.synthetic)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_the_voltage_over_the_plane_is_the_constant_times_each_load(friction: float) -> None:
+    scan = simulate_contacts(
+        load=[0.34, 1.37], friction=friction, points=801, spacing=0.1e-3,
+        conversion_constant=3e-8, **EXACT, **CENTRED,
+    )  # fmt: skip
+    right = scan.x > -1e-9
+    r, u = scan.x[right], scan.u_zz[:, right]
+    total = 2 * np.pi * simpson(u * r, x=r, axis=1)
+    np.testing.assert_allclose(total, 3e-8 * np.array([0.34, 1.37]), rtol=1e-6)
+
+
+def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int) -> None:
+    options: dict[str, Any] = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
+    options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
+    scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)
+    assert scan.normal_load is not None
+    contacts = memscal.indent(
+        PAPER_FILM, PAPER_SPHERE, load=np.sort(scan.normal_load, axis=None), friction=0.15
+    )
+    solved = {contact.load: contact for contact in contacts}
+    away = np.abs(scan.x - 0.14e-3)
+    expected = np.empty_like(scan.u_zz)
+    for place, load in np.ndenumerate(scan.normal_load):
+        one = blurred_stress([solved[float(load)]], memscal.GaussianMixture(), away[place[1]])
+        expected[place] = 1e-7 * float(one[0])
+    nominal = simulate_contacts(load_scatter=0.0, **options)
+    # What the scatter did is met to a hundredth of what it did, and to the solver's own 1e-4.
+    top = expected.max(axis=1, keepdims=True)
+    assert np.abs(expected - nominal.u_zz).max() > 3e-3 * top.min()
+    assert np.all(np.abs(scan.u_zz - expected) < 3e-4 * top)
+
+
+def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads() -> None:
+    law = memscal.Interface(slip_length=3e-6)
+    scan = simulate_contacts(load=1.37, friction=0.8, interface=law, points=17, **EXACT)
+    contact = memscal.indent(PAPER_FILM, PAPER_SPHERE, load=1.37, friction=0.8, interface=law)
+    r = np.linspace(0, 30e-3, 3001)
+    profile = contact.base_stress(r)
+    # The blurred stress at a place, as an integral over the plane around it.
+    x, y = np.meshgrid(np.linspace(-3.5e-3, 3.5e-3, 141), np.linspace(-3.5e-3, 3.5e-3, 141))
+    weight = memscal.GaussianMixture().radial(np.hypot(x, y)) * (x[0, 1] - x[0, 0]) ** 2
+    for i in (3, 8, 11):
+        stress = np.interp(np.hypot(scan.x[i] - 0.14e-3 + x, y), r, profile)
+        assert scan.u_zz[i] == pytest.approx(1e-7 * float(np.sum(weight * stress)), rel=1e-4)
+
+
+def test_the_noise_is_the_same_voltage_at_every_load(seed: int) -> None:
+    options: dict[str, Any] = {"repeats": 40, "load": [0.34, 2.75], "load_scatter": 0.0}
+    noisy, clean = (simulate_contacts(noise=s, seed=seed, **options) for s in (0.01, 0.0))
+    stated = noisy.u_zz_errors
+    assert stated is not None
+    assert np.ptp(stated) == 0
+    largest = simulate_contacts(load=[2.75], **EXACT).u_zz.max()
+    assert stated.flat[0] == pytest.approx(0.01 * largest, rel=1e-4)
+    scaled = (noisy.u_zz - clean.u_zz) / stated
+    for rows in (scaled[:40], scaled[40:]):
+        low, high = chi2.ppf([RARE, 1 - RARE], rows.size)
+        assert low < np.sum(rows**2) < high
+    for products in (scaled[:, 1:] * scaled[:, :-1], scaled[1:] * scaled[:-1]):
+        assert abs(products.mean()) < 7 / np.sqrt(products.size)
+
+
+def test_loads_and_places_scatter_as_stated_and_are_seen_in_the_voltage(seed: int) -> None:
+    options: dict[str, Any] = {"load": [0.69], "repeats": 80, **STILL, "seed": seed}
+    exact = simulate_contacts(load_scatter=0.0, position_error=0.0, **options)
+    loads = simulate_contacts(load_scatter=0.02, position_error=0.0, record_loads=True, **options)
+    assert loads.normal_load is not None
+    assert loads.normal_load_errors is not None
+    np.testing.assert_allclose(loads.normal_load_errors, 0.002 * loads.normal_load)
+    ratio = loads.normal_load / 0.69 - 1
+    low, high = chi2.ppf([RARE, 1 - RARE], ratio.size) * (0.02**2 + 0.002**2)
+    assert low < np.sum(ratio**2) < high
+    set_by_hand = simulate_contacts(load_scatter=0.02, position_error=0.0, **options)
+    assert_same_to_rounding(set_by_hand.u_zz, loads.u_zz)
+    np.testing.assert_array_equal(set_by_hand.normal_load, np.full((80, 33), 0.69))
+    np.testing.assert_allclose(set_by_hand.normal_load_errors, np.full((80, 33), 0.0138))
+
+    moved = simulate_contacts(load_scatter=0.0, position_error=20e-6, **options)
+    np.testing.assert_array_equal(moved.x_errors, np.full(33, 20e-6))
+    steep = np.abs(np.gradient(exact.u_zz[0], exact.x)) > 0.2 * exact.u_zz.max() / 1e-3
+    assert steep.sum() >= 3
+    away = (moved.u_zz - exact.u_zz)[:, steep] / np.gradient(exact.u_zz[0], exact.x)[steep]
+    low, high = chi2.ppf([RARE, 1 - RARE], away.size)
+    # A slope by differences of half a millimetre is good to some percent here.
+    assert 0.85 * low < np.sum((away / 20e-6) ** 2) < 1.15 * high
+
+
+def test_each_source_of_error_has_numbers_of_its_own(seed: int) -> None:
+    def noise(seed: int, **changes: float) -> FloatArray:
+        options: dict[str, Any] = {"load": [0.69], "seed": seed, "points": 17, **changes}
+        noisy, still = (simulate_contacts(noise=s, **options) for s in (0.01, 0.0))
+        return noisy.u_zz - still.u_zz
+
+    own = noise(seed)
+    exact = noise(seed, load_scatter=0.0, position_error=0.0)
+    # Its scale, the largest signal, is solved on other rings, to the solver's own 1e-4.
+    np.testing.assert_allclose(own, exact, rtol=1e-4)
+    assert not np.allclose(own, noise(seed + 1), atol=1e-6)
+
+
+def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -> None:
+    heavy = simulate_contacts(load=[1.0], load_scale=1.1, **EXACT)
+    true = simulate_contacts(load=[1.1], **EXACT)
+    np.testing.assert_allclose(heavy.u_zz, true.u_zz, rtol=1e-12)
+    assert (heavy.load, truth(heavy)["load_1"]) == pytest.approx((1.0, 1.1))
+    np.testing.assert_array_equal(heavy.normal_load, np.ones(33))
+
+
+def test_the_scan_and_its_truth_say_what_was_pressed() -> None:
+    law = memscal.Interface(
+        normal=memscal.ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6),
+        slip_length=2e-6,
+    )
+    scan = simulate_contacts(
+        load=[0.34, 0.69], repeats=2, friction=0.4, interface=law, points=9, spacing=1e-3,
+        lubrication="lubricated", lubricant="glycerol", seed=5,
+    )  # fmt: skip
+    assert scan.kind == "repeats"
+    np.testing.assert_array_equal(scan.normal_load[:, 0], [0.34, 0.34, 0.69, 0.69])
+    np.testing.assert_allclose(scan.x, np.arange(-4, 5) * 1e-3, atol=1e-18)
+    assert (scan.lubrication, scan.lubricant) == ("lubricated", "glycerol")
+    assert "synthetic" in scan.title.lower()
+    told = truth(scan)
+    assert (told["friction"], told["slip_length"], told["decay_length"]) == (0.4, 2e-6, 1e-6)
+    assert (told["load_1"], told["load_2"]) == (0.34, 0.69)
+    assert (told["young_modulus"], told["indenter_radius"]) == (2.2e6, 128.8e-3)
+
+
+def test_the_defaults_are_the_papers_scan() -> None:
+    scan = simulate_contacts()
+    assert scan.u_zz.shape == (len(PAPER_LOADS), 33)
+    np.testing.assert_allclose(np.diff(scan.x), 0.5e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "problem"),
+    [
+        ({"load": []}, InputError, "list of loads is empty"),
+        ({"load": [0.3, 0.3]}, InputError, "given twice"),
+        ({"load": [-1.0]}, InputError, "load is -1 N"),
+        ({"load": 1e7}, DomainError, "load|film"),
+        ({"points": 1}, InputError, "two contacts"),
+        ({"repeats": 0}, InputError, "one row"),
+        ({"seed": -1}, InputError, "seed"),
+        ({"spacing": 0.0}, InputError, "spacing"),
+        ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
+        ({"load_reading": -0.1}, InputError, "load_reading"),
+        ({"load_scale": 0.0}, InputError, "load_scale"),
+        ({"position_error": -1e-6}, InputError, "position_error"),
+        ({"noise": float("nan")}, InputError, "noise"),
+        ({"centre": (float("inf"), 0.0)}, InputError, "centre"),
+        ({"friction": -0.1}, InputError, "friction"),
+        ({"lubrication": "wet"}, InputError, "lubrication"),
+        ({"lubrication": "dry", "lubricant": "oil"}, InputError, "lubricant"),
+        ({"kernel": 561e-6}, InputError, "transform"),
+    ],
+)
+def test_what_cannot_be_scanned_is_refused(
+    options: dict[str, Any], error: type[Exception], problem: str
+) -> None:
+    with pytest.raises(error, match=problem):
+        simulate_contacts(**{"load": [0.34], **options})

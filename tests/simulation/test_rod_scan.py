@@ -1,0 +1,266 @@
+"""Synthetic scans against direct convolution, conservation of force, and statistics."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import fftconvolve
+from scipy.special import j1
+from scipy.stats import chi2
+
+from memscal import ElasticFilm, GaussianMixture, Rod, SmoothedDisc, indent, simulate
+from memscal.axisymmetry.kernels import RadialKernel
+from memscal.errors import InputError
+from memscal.model.arrays import FloatArray
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+
+RARE = 1e-9
+"""Probability with which a correct program would fail one of the random tests here."""
+
+STILL = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
+RING = GaussianMixture((1.8, -0.8), (0.7e-3, 0.45e-3))
+DISC = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
+KERNELS = {"gaussian": GaussianMixture(), "ring": RING, "disc": DISC}
+
+
+@pytest.fixture
+def seed() -> int:
+    """Return another seed in every run; the log of a failed test names it."""
+    value = int(np.random.SeedSequence().generate_state(1)[0])
+    logging.getLogger(__name__).info("seed %d", value)
+    return value
+
+
+@pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
+def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: RadialKernel) -> None:
+    # The integral of a smooth field is the sum of a raster's pixels; this one, of an
+    # incompressible film, is gone only at 20 thicknesses.
+    scan = simulate(
+        raster=True,
+        points=161,
+        half_range=40e-3,
+        load=2.0,
+        kernel=kernel,
+        conversion_constant=3e-8,
+        centre=(0.2e-3, -0.3e-3),
+        **STILL,
+    )
+    total = scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2
+    assert total == pytest.approx(3e-8 * 2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
+def test_the_voltage_is_a_direct_convolution_in_the_plane(kernel: RadialKernel) -> None:
+    contact = indent(PAPER_FILM, PAPER_ROD, load=2.0)
+    step, pixels = 0.1e-3, np.arange(-120, 121)
+    squares, ring = np.unique(np.add.outer(pixels**2, pixels**2), return_inverse=True)
+    radii = step * np.sqrt(squares)
+    stress, weight = contact.base_stress(radii)[ring], kernel.radial(radii)[ring]
+    blurred = fftconvolve(stress, weight, mode="same") * step**2
+    scan = simulate(load=2.0, kernel=kernel, centre=(0.0, 0.0), half_range=6e-3, points=25, **STILL)
+    # Its positions, every half millimetre, are points of the plane.
+    np.testing.assert_allclose(
+        scan.u_zz, 1e-7 * blurred[120, 60:181:5], atol=1e-6 * scan.u_zz.max()
+    )
+
+
+def test_a_line_is_the_middle_row_of_a_raster() -> None:
+    options: dict[str, Any] = {"points": 33, "centre": (0.3e-3, 0.2e-3), **STILL}
+    raster, line = simulate(raster=True, **options), simulate(**options)
+    assert raster.kind == "raster"
+    assert line.kind == "line"
+    np.testing.assert_array_equal(raster.x, raster.y)
+    np.testing.assert_allclose(raster.u_zz[16], line.u_zz, rtol=1e-9)
+
+
+def test_the_largest_voltage_is_over_the_sensor() -> None:
+    scan = simulate(raster=True, points=33, centre=(1.0e-3, -2.0e-3), half_range=4e-3, **STILL)
+    row, column = np.unravel_index(int(np.argmax(scan.u_zz)), scan.u_zz.shape)
+    assert (scan.x[column], scan.y[row]) == pytest.approx((1.0e-3, -2.0e-3))
+
+
+def test_offset_and_drift_are_shares_of_the_largest_signal() -> None:
+    options: dict[str, Any] = {"noise": 0.0, "half_range": 20e-3, "points": 41, "load": 3.0}
+    largest = simulate(**{**options, **STILL}).u_zz.max()
+    scan = simulate(baseline=0.02, drift=0.01, **options)
+    added = scan.u_zz - simulate(**{**options, **STILL}).u_zz
+    assert added.mean() == pytest.approx(0.02 * largest, rel=1e-9)
+    assert added[-1] - added[0] == pytest.approx(0.01 * largest, rel=1e-9)
+    np.testing.assert_allclose(np.diff(added, 2), 0.0, atol=1e-12 * largest)
+    assert scan.synthetic is not None
+    assert scan.synthetic["baseline"] == pytest.approx(0.02 * largest)
+    assert scan.synthetic["drift"] == pytest.approx(0.01 * largest)
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.05])
+def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed: int) -> None:
+    options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5]}
+    noisy, clean = (simulate(noise=s, seed=seed, **options) for s in (noise, 0.0))
+    residual = noisy.u_zz - clean.u_zz
+    assert noisy.u_zz_errors is not None
+    stated = noisy.u_zz_errors
+    assert np.ptp(stated) == 0
+    assert noisy.synthetic is not None
+    assert noisy.synthetic["noise"] == stated.flat[0]
+    largest = simulate(**{**options, **STILL}).u_zz[-1].max() / 1.5
+    assert stated.flat[0] == pytest.approx(noise * largest, rel=1e-9)
+    low, high = chi2.ppf([RARE, 1 - RARE], residual.size)
+    assert low < np.sum((residual / stated) ** 2) < high
+    # Neighbours, and repeats, are independent: their products have mean 0 and variance 1.
+    scaled = residual / stated
+    for products in (scaled[:, 1:] * scaled[:, :-1], scaled[1:] * scaled[:-1]):
+        assert abs(products.mean()) < 7 / np.sqrt(products.size)
+
+
+def test_noise_is_stated_only_if_there_is_some_and_it_is_wanted() -> None:
+    assert simulate(points=9).u_zz_errors is not None
+    assert simulate(points=9, state_noise=False).u_zz_errors is None
+    assert simulate(points=9, noise=0.0).u_zz_errors is None
+
+
+def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed: int) -> None:
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    first = simulate(points=17, seed=seed).u_zz
+    np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
+    np.random.seed(seed % 1000)  # noqa: NPY002
+    np.testing.assert_array_equal(first, simulate(points=17, seed=seed).u_zz)
+    assert not np.array_equal(first, simulate(points=17, seed=seed + 1).u_zz)
+
+
+def test_several_loads_give_a_repeat_each_in_proportion() -> None:
+    scan = simulate(load=[0.34, 0.69, 1.37], repeats=2, points=17, load_uncertainty=0.02, **STILL)
+    assert scan.kind == "repeats"
+    assert scan.u_zz.shape == (6, 17)
+    loads = np.array([0.34, 0.34, 0.69, 0.69, 1.37, 1.37])
+    assert scan.normal_load is not None
+    np.testing.assert_array_equal(scan.normal_load, np.tile(loads[:, None], 17))
+    np.testing.assert_allclose(scan.u_zz / loads[:, None], np.tile(scan.u_zz[0] / 0.34, (6, 1)))
+    assert scan.load == pytest.approx(0.8)
+    assert scan.load_uncertainty == pytest.approx(0.016)
+
+
+def test_repeats_at_one_load_share_their_signal_but_not_their_noise() -> None:
+    scan = simulate(repeats=3, points=17)
+    assert scan.u_zz.shape == (3, 17)
+    assert scan.normal_load is None
+    assert np.unique(scan.u_zz).size == 51
+    still = simulate(repeats=3, points=17, **STILL)
+    assert np.ptp(still.u_zz, axis=0).max() == 0
+
+
+def test_the_truth_travels_with_the_scan() -> None:
+    scan = simulate(conversion_constant=2e-8, centre=(0.1e-3, 0.2e-3), seed=11, points=9)
+    truth = scan.synthetic
+    assert truth is not None
+    assert truth["conversion_constant"] == 2e-8
+    assert truth["gaussian_sigma"] == 561e-6
+    assert (truth["centre"], truth["centre_y"]) == (0.1e-3, 0.2e-3)
+    assert truth["seed"] == 11
+    assert scan.film == PAPER_FILM
+    assert scan.indenter == PAPER_ROD
+    assert "Synthetic" in scan.notes
+    mixed = simulate(kernel=RING, points=9).synthetic
+    assert mixed is not None
+    assert "gaussian_sigma" not in mixed
+    assert mixed["kernel_weights"] == "1.8, -0.8"
+    assert mixed["kernel_sigmas_um"] == "700, 450"
+
+
+def test_another_film_and_rod_are_simulated_as_they_are() -> None:
+    film = ElasticFilm(young_modulus=1e6, poisson_ratio=0.4, thickness=1e-3)
+    rod = Rod(radius=0.4e-3)
+    scan = simulate(film=film, rod=rod, centre=(0.0, 0.0), points=9, **STILL)
+    assert scan.film is film
+    assert scan.indenter is rod
+    # A narrower stress gives a higher peak: the film is half as thick.
+    assert scan.u_zz.max() > simulate(centre=(0.0, 0.0), points=9, **STILL).u_zz.max()
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"points": 1}, "two positions"),
+        ({"repeats": 0}, "one repeat"),
+        ({"raster": True, "repeats": 2}, "A raster has one repeat at one load"),
+        ({"raster": True, "load": [1.0, 2.0]}, "A raster has one repeat at one load"),
+        ({"load": 0.0}, "load"),
+        ({"load": float("nan")}, "load"),
+        ({"load_uncertainty": -0.1}, "uncertainty of the load"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        simulate(**options)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"conversion_constant": -1e-7},
+        {"noise": float("nan")},
+        {"half_range": 8.0},
+        {"load": []},
+        {"load": [-1.0, 3.0]},
+        {"seed": -1},
+        {"centre": (float("nan"), 0.0)},
+    ],
+)
+def test_bad_simulations_are_refused(options: dict[str, object]):
+    with pytest.raises(InputError):
+        simulate(**options)
+
+
+def test_the_stored_truth_rebuilds_the_mixture():
+    kernel = GaussianMixture((1 / 3, 2 / 3), (0.5e-3, 1e-3))
+    truth = simulate(kernel=kernel, points=9).synthetic
+    assert tuple(float(w) for w in truth["kernel_weights"].split(",")) == kernel.weights
+
+
+def test_the_stored_truth_rebuilds_the_disc() -> None:
+    truth = simulate(kernel=DISC, points=9).synthetic
+    assert truth is not None
+    assert "disc" in str(truth["kernel"])
+    assert "gaussian_sigma" not in truth
+    assert float(truth["kernel_radius_um"]) * 1e-6 == pytest.approx(DISC.radius)
+    assert float(truth["kernel_sigmas_um"]) * 1e-6 == pytest.approx(DISC.sigma)
+
+
+class Own:
+    """A disc by somebody else, of any size, whose transform is no number at k = 0."""
+
+    def __init__(self, size: float = 1.0) -> None:
+        self.size = size
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        phase = k * DISC.radius
+        return self.size * 2 * j1(phase) / phase * np.exp(-0.5 * (DISC.sigma * k) ** 2)
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        return self.size * DISC.radial(r)
+
+    def describe(self) -> dict[str, float | str]:
+        return {"kernel": "my own", "centre_of_mass": 0.0}
+
+
+def test_any_object_with_the_three_methods_is_a_kernel() -> None:
+    own, disc = simulate(kernel=Own(), seed=3), simulate(kernel=DISC, seed=3)
+    np.testing.assert_allclose(own.u_zz, disc.u_zz, rtol=1e-12)
+    assert own.synthetic is not None
+    assert own.synthetic["kernel"] == "my own"
+    assert own.synthetic["centre_of_mass"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("kernel", "problem"),
+    [
+        (Own(size=2.0), "transform is 2 at k = 0, not 1"),
+        (Own(size=float("nan")), "transform is nan at k = 0"),
+        (561e-6, r"a float, which has no transform\(\)"),
+    ],
+)
+def test_what_is_no_apparatus_function_is_refused(kernel: Any, problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        simulate(kernel=kernel, points=9)

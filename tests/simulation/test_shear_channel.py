@@ -1,0 +1,105 @@
+"""The simulated tangential channel: its parity, its size, and nothing moved in the other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.rounding import assert_same_to_rounding
+
+import memscal
+from memscal.axisymmetry.kernels import GaussianMixture
+from memscal.errors import InputError
+from memscal.simulation.contact_scan import simulate_contacts
+from memscal.simulation.experiment import simulate_experiment
+
+KERNEL = GaussianMixture(sigmas=(400e-6,))
+QUIET = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
+BOTH = {"channels": ("zz", "xz"), "shear_kernel": KERNEL, "shear_conversion_constant": 4e-8}
+
+
+def test_the_normal_channel_is_the_same_with_and_without_the_other() -> None:
+    for make in (memscal.simulate, simulate_contacts):
+        one, other = make(seed=3), make(seed=3, **BOTH)
+        assert_same_to_rounding(one.u_zz, other.u_zz)
+        assert not one.channels
+        assert set(other.channels) == {"u_xz", "u_xz_errors"}
+
+
+def test_a_rod_s_shear_is_odd_about_the_sensor_and_falls_where_the_rod_is_beyond_it() -> None:
+    scan = memscal.simulate(centre=(0.0, 0.0), **QUIET, **BOTH)
+    u = scan.channels["u_xz"]
+    np.testing.assert_allclose(u, -u[::-1], atol=1e-12 * np.abs(u).max())
+    assert u[scan.x > 0].max() < 0 < u[scan.x < 0].min()
+    # A narrow G blurs nothing: the voltage is A times the shear itself.
+    narrow = BOTH | {"shear_kernel": GaussianMixture(sigmas=(5e-6,))}
+    sharp = memscal.simulate(centre=(0.0, 0.0), **QUIET, **narrow)
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    expected = 4e-8 * contact.base_shear(np.abs(scan.x)) * np.sign(scan.x)
+    np.testing.assert_allclose(sharp.channels["u_xz"], expected, atol=1e-3 * np.abs(expected).max())
+
+
+def test_a_raster_s_shear_is_one_component_of_a_vector_field() -> None:
+    scan = memscal.simulate(raster=True, points=21, centre=(0.0, 0.0), **QUIET, **BOTH)
+    u = scan.channels["u_xz"]
+    np.testing.assert_allclose(u, -u[:, ::-1], atol=1e-12 * np.abs(u).max())
+    np.testing.assert_allclose(u, u[::-1], atol=1e-12 * np.abs(u).max())
+    # On the diagonal both components are the same: the field is radial.
+    np.testing.assert_allclose(np.hypot(u, u.T), np.hypot(u, u.T)[:, ::-1], rtol=1e-6)
+
+
+def test_a_sphere_s_shear_is_that_of_its_contact_at_its_friction() -> None:
+    for friction in (0.0, 0.3):
+        scan = simulate_contacts(
+            load=1.37,
+            friction=friction,
+            load_scatter=0.0,
+            position_error=0.0,
+            centre=(0.0, 0.0),
+            **QUIET,
+            **BOTH | {"shear_kernel": GaussianMixture(sigmas=(5e-6,))},
+        )
+        contact = memscal.indent(scan.film, scan.indenter, load=1.37, friction=friction)
+        expected = 4e-8 * contact.base_shear(np.abs(scan.x)) * np.sign(scan.x)
+        found = scan.channels["u_xz"]
+        np.testing.assert_allclose(found, expected, atol=2e-3 * np.abs(expected).max())
+
+
+def test_the_truth_of_the_channel_is_stored_and_comes_back_from_a_file(tmp_path: Path) -> None:
+    scan = memscal.simulate(seed=5, **BOTH)
+    assert scan.synthetic is not None
+    assert scan.synthetic["conversion_constant_xz"] == 4e-8
+    assert scan.synthetic["gaussian_sigma_xz"] == 400e-6
+    memscal.write_scan(scan, tmp_path / "scan.h5")
+    again = memscal.read_scan(tmp_path / "scan.h5")
+    np.testing.assert_allclose(again.channels["u_xz"], scan.channels["u_xz"], rtol=1e-12)
+    np.testing.assert_allclose(again.channels["u_xz_errors"], scan.channels["u_xz_errors"])
+    assert again.synthetic is not None
+    assert again.synthetic["noise_xz"] == pytest.approx(scan.synthetic["noise_xz"])
+
+
+def test_the_laboratory_s_channel_is_calibrated_to_its_truth() -> None:
+    off = []
+    for seed in range(10):
+        scan = memscal.simulate(seed=seed, **BOTH)
+        found = memscal.calibrate(scan, channel="xz", method="evidence").apparatus
+        u = found.parameters.uncertainty("gaussian_sigma")
+        off.append((found.gaussian_sigma - 400e-6) / u)
+    # Ten standard normal deviates, at a chance of one in ten thousand for each bound.
+    assert abs(np.mean(off)) < 1.24
+    assert np.sum(np.square(off)) < 35.6
+
+
+def test_a_whole_experiment_has_the_channel_in_all_of_its_scans() -> None:
+    found = simulate_experiment(loads=[0.69], lubricated_loads=[0.69], **BOTH)
+    for scan in found.scans.values():
+        assert "u_xz" in scan.channels
+        assert scan.synthetic is not None
+        assert scan.synthetic["conversion_constant_xz"] == 4e-8
+
+
+@pytest.mark.parametrize("channels", [(), ("xz",), ("zz", "yz"), ("zz", "xz", "xz")])
+def test_channels_that_a_line_along_x_has_not_are_refused(channels: tuple[str, ...]) -> None:
+    with pytest.raises(InputError, match="channels"):
+        memscal.simulate(channels=channels)
