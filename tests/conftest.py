@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import sys
+from collections.abc import Iterator
 
 # Before numpy loads: threads on matrices as small as ours cost ten times the work itself.
 for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
+import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
 # A deadline is a clock: on a busy machine it would fail what is right.
 settings.register_profile("memscal", deadline=None, print_blob=True)
 settings.load_profile("memscal")
+
+REMEMBERING = ("memscal.mechanics.solver.request", "memscal.mechanics.finite_strain")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forget_what_was_solved(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Free the contacts and meshes that a file's tests kept: gigabytes, over all files."""
+    yield
+    for module in (request.module, *(sys.modules.get(name) for name in REMEMBERING)):
+        for value in list(vars(module).values()) if module else []:
+            if hasattr(value, "cache_clear"):
+                value.cache_clear()
+    gc.collect()
