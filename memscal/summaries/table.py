@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import Any, TextIO
 
 from memscal.model.checks import Message, QualityCheck
@@ -136,3 +137,17 @@ class Table:
             for row in [*shown, *rows]
         ]
         return "\n".join([readable(self.title), *lines])
+
+    def html(self) -> str:
+        """Return the table as HTML, marked rows in bold."""
+        head = "".join(f"<th>{escape(readable(cell))}</th>" for cell in self.head)
+        rows = []
+        for number, row in enumerate(self.rows):
+            cells = "".join(f"<td>{escape(readable(cell))}</td>" for cell in row)
+            style = ' style="font-weight: bold"' if number in self.marked else ""
+            rows.append(f"<tr{style}>{cells}</tr>")
+        shown = f"<thead><tr>{head}</tr></thead>" if any(self.head) else ""
+        return (
+            f"<table><caption>{escape(readable(self.title))}</caption>"
+            f"{shown}<tbody>{''.join(rows)}</tbody></table>"
+        )

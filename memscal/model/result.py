@@ -1,0 +1,108 @@
+"""The result that shows itself: as text, as a mapping, as a figure, in a notebook.
+
+What a result says stands in :mod:`memscal.summaries`, what it draws in :mod:`memscal.figures`: both
+stand above all results, and are imported when they are called.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from memscal.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+__all__ = ["Result"]
+
+
+class Result:
+    """A result that prints, tabulates and draws itself.
+
+    ``_summary`` names the module of :mod:`memscal.summaries` that tells of it, by the functions
+    ``tables(result)``, ``mapping(result)`` and, where there is one, ``dataset(result)``,
+    ``frame(result)`` and ``correlated(result)``; ``_figure`` names the module and function of
+    :mod:`memscal.figures` that draws it.
+    """
+
+    _summary: ClassVar[str]
+    _figure: ClassVar[str] = ""
+
+    def summary(self) -> str:
+        """Return the tables of the result as text, as the command line prints them."""
+        return "\n\n".join(table.plain() for table in self._told("tables") if table.rows)
+
+    def __str__(self) -> str:
+        """Return the summary."""
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        """Return the tables as HTML, for notebooks."""
+        return "\n".join(table.html() for table in self._told("tables") if table.rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return values with standard uncertainties and units, as JSON holds them."""
+        mapping: dict[str, Any] = self._told("mapping")
+        return mapping
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the arrays on their axes, each with its unit, in SI units (needs xarray).
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed, or the result holds no arrays.
+        """
+        dataset: xarray.Dataset = self._told("dataset")
+        return dataset
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return the result as a table of numbers, units in the names of columns (needs pandas).
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed, or the result is no table.
+        """
+        frame: pandas.DataFrame = self._told("frame")
+        return frame
+
+    def ufloats(self) -> dict[str, Any]:
+        """Return the parameters as correlated numbers of the package uncertainties, in SI units.
+
+        Raises
+        ------
+        InputError
+            If uncertainties is not installed, or the result states no covariance.
+        """
+        numbers: dict[str, Any] = self._told("correlated")
+        return numbers
+
+    def plot(self, **options: Any) -> Figure:
+        """Draw the result; the figure is returned, and nothing is shown or written."""
+        if not self._figure:
+            raise InputError(f"There is no figure of a {type(self).__name__}.")
+        module, _, function = self._figure.rpartition(".")
+        figure: Figure = getattr(import_module(f"memscal.figures.{module}"), function)(
+            self, **options
+        )
+        return figure
+
+    def _told(self, form: str) -> Any:
+        """Call the function of the result's summary that gives one form of it."""
+        function = getattr(import_module(f"memscal.summaries.{self._summary}"), form, None)
+        if function is None:
+            raise InputError(
+                f"A {type(self).__name__} has no such form.",
+                cure="Its summary() and to_dict() hold all that it says.",
+            )
+        try:
+            return function(self)
+        except ModuleNotFoundError as error:
+            raise InputError(
+                f"{error.name} is not installed.",
+                cure='Install it with the extra "interop": pip install "memscal[interop]".',
+            ) from error
