@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from memscal.errors import InputError
 
 if TYPE_CHECKING:
-    import pandas
+    import pandas as pd
     import xarray
     from matplotlib.figure import Figure
 
@@ -59,7 +59,7 @@ class Result:
         dataset: xarray.Dataset = self._told("dataset")
         return dataset
 
-    def to_dataframe(self) -> pandas.DataFrame:
+    def to_dataframe(self) -> pd.DataFrame:
         """Return the result as a table of numbers, units in the names of columns (needs pandas).
 
         Raises
@@ -67,7 +67,7 @@ class Result:
         InputError
             If pandas is not installed, or the result is no table.
         """
-        frame: pandas.DataFrame = self._told("frame")
+        frame: pd.DataFrame = self._told("frame")
         return frame
 
     def ufloats(self) -> dict[str, Any]:
