@@ -92,15 +92,7 @@ class FieldGrid(Protocol):
 
 @dataclass(frozen=True)
 class EvenGrid:
-    """A quarter plane of ``count`` by ``count`` points from the axis outward.
-
-    Parameters
-    ----------
-    count : int
-        Points along each half axis, the axis itself included.
-    spacing : float
-        Distance of neighbouring points, in m.
-    """
+    """A quarter plane of ``count`` by ``count`` points, ``spacing`` (m) apart, axis included."""
 
     count: int
     spacing: float
@@ -190,19 +182,7 @@ class EvenGrid:
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """A whole rectangular lattice, for a measured raster.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n,) and (m,)
-        Evenly spaced positions relative to the axis of symmetry, in m; odd numbers of them, so
-        that there is a central point.
-
-    Raises
-    ------
-    InputError
-        If there is no central point.
-    """
+    """A rectangular lattice for a raster: odd numbers of even positions about the axis, in m."""
 
     x: FloatArray
     y: FloatArray
@@ -248,11 +228,7 @@ class Lattice:
         return np.asarray(scipy.fft.rfft2(field) * self.cell_area)
 
     def inverse(self, spectrum: FloatArray) -> FloatArray:
-        """Return the field of a spectrum whose origin is the first lattice point.
-
-        A quotient of two spectra has lost the lattice's own origin: its zero is rolled to
-        the central point.
-        """
+        """Return the field of a spectrum whose origin is the first point: a quotient's."""
         shape = (self.y.size, self.x.size)
         return np.asarray(scipy.fft.fftshift(scipy.fft.irfft2(spectrum, s=shape)) / self.cell_area)
 
@@ -270,10 +246,7 @@ class Lattice:
         return float(field.sum() * self.cell_area)
 
     def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Radii along half of x, and the mean over directions there, by cubic splines.
-
-        Beyond the plane its edge is continued.
-        """
+        """Radii along half of x, and the mean over directions there, by cubic splines."""
         from scipy.ndimage import map_coordinates
 
         r = self.x[self.x.size // 2 :]
@@ -284,20 +257,7 @@ class Lattice:
         return r, np.asarray(samples.mean(axis=1))
 
     def refined(self, kernel: FloatArray, factor: int) -> tuple[Lattice, FloatArray]:
-        """Interpolate a centred kernel to a finer lattice about 0, by its Fourier series.
-
-        Parameters
-        ----------
-        kernel : ndarray, shape (m, n), both odd
-            A field that :meth:`inverse` returned.
-        factor : int
-            An odd number: how many new points come for one old.
-
-        Returns
-        -------
-        Lattice, ndarray
-            The finer lattice, with 0 at its central point, and the kernel on it.
-        """
+        """Interpolate a centred kernel to a lattice ``factor`` (odd) times finer, by its series."""
         m, n = kernel.shape
         dy, dx = self.spacing
         spectrum = scipy.fft.rfft2(scipy.fft.ifftshift(kernel))
@@ -332,11 +292,7 @@ class Lattice:
 def on_grid(
     profile: Callable[[FloatArray], FloatArray], grid: FieldGrid, step: float
 ) -> FloatArray:
-    """Values of an axisymmetric function on a grid.
-
-    The profile is tabulated every ``step`` (m) out to the grid's corner and interpolated
-    by an even cubic spline, whose error falls with the fourth power of the step.
-    """
+    """Values of a radial function on a grid, by an even spline through it every ``step`` (m)."""
     reach = float(np.max(grid.radius))
     table = np.linspace(0.0, reach, int(np.ceil(reach / step)) + 4)
     spline = radial_spline(table, profile(table))

@@ -46,24 +46,7 @@ __all__ = [
 
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights of a composite Gauss-Legendre rule on [0, upper].
-
-    Parameters
-    ----------
-    upper : float
-        End of the range.
-    longest : float
-        Longest panel allowed.  With 16 nodes a panel integrates one or two oscillations
-        (up to 16 rad of phase) to rounding; with 64, up to 100 rad.
-    order : int
-        Nodes in each panel.
-
-    Examples
-    --------
-    >>> k, weights = gauss_panels(np.pi, longest=1.0)
-    >>> round(float(weights @ np.sin(k)), 14)
-    2.0
-    """
+    """Nodes and weights on [0, upper], in panels up to ``longest`` with ``order`` nodes each."""
     count = max(1, math.ceil(upper / longest))
     nodes, weights = _legendre(order)
     width = upper / count
@@ -73,31 +56,15 @@ def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatAr
 
 
 def gauss_between(edges: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights of Gauss-Legendre rules between neighbouring edges.
-
-    Parameters
-    ----------
-    edges : ndarray, shape (n + 1,)
-        Increasing ends of the panels.
-    order : int
-        Nodes in each panel.
-
-    Examples
-    --------
-    >>> x, weights = gauss_between(np.array([0.0, 1.0, 3.0]), order=4)
-    >>> round(float(weights @ x**3), 12)
-    20.25
-    """
+    """Return nodes and weights of Gauss-Legendre rules between increasing edges."""
     nodes, weights = _legendre(order)
     half = np.diff(edges)[:, None] / 2
     return (edges[:-1, None] + half * (nodes + 1)).ravel(), (half * weights).ravel()
 
 
 def ring_areas(r: FloatArray) -> FloatArray:
-    """Weights that integrate a radial function over the plane, on even radii from zero.
-
-    The trapezoidal rule with the Euler-Maclaurin correction of its end on the axis.
-    """
+    """Weights (m^2) that integrate a radial function over the plane, on even radii from zero."""
+    # The trapezoidal rule with the Euler-Maclaurin correction of its end on the axis.
     weights = 2 * np.pi * r * np.gradient(r)
     weights[0] += np.pi * (r[1] - r[0]) ** 2 / 6
     return np.asarray(weights)
@@ -122,15 +89,7 @@ _TABLE_PHASE = 40.0
 
 @dataclass(frozen=True, eq=False)
 class Wavenumbers:
-    r"""Quadrature nodes in :math:`k`, on which radial spectra are kept.
-
-    Parameters
-    ----------
-    k : ndarray, shape (n,)
-        Nodes, in rad/m.
-    weights : ndarray, shape (n,)
-        Weights :math:`k\,dk / 2\pi` of the inverse transform, in rad^2/m^2.
-    """
+    r"""Quadrature nodes ``k`` (rad/m), weights :math:`k\,dk/2\pi` of the inverse transform."""
 
     k: FloatArray
     weights: FloatArray
@@ -142,11 +101,7 @@ class Wavenumbers:
         return cls(k, k * dk / (2 * np.pi))
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
-        """Evaluate the inverse transform at radii ``r`` (m), any shape.
-
-        Of several spectra, shape (n, m), the values have a last axis of m.  A transform of
-        ``order`` one gives the radial component of a vector field.
-        """
+        """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
         radii = np.asarray(r, dtype=np.float64)
         matrix = _bessel(order, np.multiply.outer(radii, self.k))
         return np.asarray(matrix @ (spectrum.T * self.weights).T)
@@ -154,17 +109,7 @@ class Wavenumbers:
 
 @dataclass(frozen=True, eq=False)
 class RadialSpectrum:
-    r"""A radial function, held as its Hankel transform on quadrature nodes.
-
-    Parameters
-    ----------
-    wavenumbers : Wavenumbers
-        The nodes.
-    values : ndarray, shape (n,)
-        The transform there.
-    order : int
-        Zero for a scalar; one for the radial component of a vector field.
-    """
+    """A radial function (a vector field's component for order 1) by its transform at nodes."""
 
     wavenumbers: Wavenumbers
     values: FloatArray
@@ -172,10 +117,7 @@ class RadialSpectrum:
 
     @property
     def scalar(self) -> RadialSpectrum:
-        r"""The scalar itself; of a vector field :math:`v = -\nabla\phi` its potential.
-
-        The potential has the transform :math:`\hat v(k)/k`, which is finite at k = 0.
-        """
+        r"""The scalar itself; of a vector field :math:`v = -\nabla\phi` its potential."""
         if self.order == 0:
             return self
         return RadialSpectrum(self.wavenumbers, self.values / self.wavenumbers.k)
@@ -194,10 +136,7 @@ class RadialSpectrum:
 def radial_spline(
     r: FloatArray, f: FloatArray, *, order: int = 0
 ) -> Callable[[FloatArray], FloatArray]:
-    """Return an even cubic spline through a radial table, an odd one for ``order`` one.
-
-    The table is mirrored, so that the spline has no kink on the axis.
-    """
+    """Return an even (odd for ``order`` 1) cubic spline through a table, mirrored at the axis."""
     from scipy.interpolate import CubicSpline
 
     if r.size < 4:
@@ -212,43 +151,7 @@ def radial_spline(
 
 
 def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int = 0) -> FloatArray:
-    r"""Hankel transform of a tabulated radial function.
-
-    An even cubic spline (an odd one for order one) through the table is integrated from 0 to
-    ``r[-1]`` by Gauss-Legendre quadrature fine enough for the table and for the largest ``k``;
-    beyond the table the function counts as zero.
-
-    Parameters
-    ----------
-    r : ndarray, shape (n,)
-        Increasing radii, in m.
-    f : ndarray, shape (n,)
-        Values of the function there.
-    k : ndarray, shape (m,)
-        Wavenumbers, in rad/m.
-    order : int
-        Zero for a scalar; one for the radial component of a vector field.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        :math:`2\pi\int f J_n(kr) r\,dr`, in the unit of ``f`` times m^2.
-
-    Examples
-    --------
-    A Gaussian of unit integral has the transform exp(-s^2 k^2 / 2):
-
-    >>> r = np.linspace(0, 8, 400)
-    >>> gaussian = np.exp(-(r**2) / 2) / (2 * np.pi)
-    >>> bool(np.isclose(hankel_transform(r, gaussian, np.array([1.0]))[0], np.exp(-0.5)))
-    True
-
-    Its radial derivative is a vector field, of transform -k exp(-s^2 k^2 / 2):
-
-    >>> slope = hankel_transform(r, -r * gaussian, np.array([2.0]), order=1)
-    >>> bool(np.isclose(slope[0], -2 * np.exp(-2)))
-    True
-    """
+    r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table that ends at ``r[-1]``."""
     spline = radial_spline(r, f, order=order)
     nodes, weights = gauss_between(_panel_edges(r, float(np.max(np.abs(k)))), _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes

@@ -30,19 +30,14 @@ __all__ = [
     "base_normal_stress",
     "base_shear_spectrum",
     "base_shear_stress",
-    "decay_radius",
 ]
 
+# Depression by pressure and by shear, outward displacement by pressure and by shear.
 HalfSpaceIntegrals = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-r"""Four parts of a surface's displacements: depression by pressure and by shear, outward
-displacement by pressure and by shear."""
 
 
 class InterfaceTraction(Protocol):
-    r"""Axisymmetric pressure and radial shear on the film's surface, within ``radius``.
-
-    Whatever the indenter, the field in the film needs no more than these transforms.
-    """
+    """Axisymmetric pressure and radial shear on the surface; zero beyond ``radius``."""
 
     @property
     def radius(self) -> float:
@@ -61,17 +56,17 @@ class InterfaceTraction(Protocol):
         r"""Return :math:`\int q\,J_1(kr)\,r\,dr` at ``k`` (rad/m), in N."""
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
-        r"""Return what the displacements of a half-space's surface at ``r`` (m) are made of.
-
-        In Pa m: :math:`\int\hat p\,J_0(kr)\,dk`, :math:`\int\hat q\,J_0(kr)\,dk`,
-        :math:`\int\hat p\,J_1(kr)\,dk` and :math:`\int\hat q\,J_1(kr)\,dk`.
-        """
+        r"""Return :math:`\int f\,dk` at ``r`` (m) of pJ0, qJ0, pJ1 and qJ1, in Pa m."""
 
 
 # k h exp(-k h) is below 1e-15 here.
 _LARGEST_KH = 38.0
 # Phase, in rad, that one panel of the k-quadrature may span.
 _PHASE = 14.0
+# Distance from the contact, in thicknesses, beyond which the stress is below 1e-13 of its maximum:
+# it decays as exp(-eta r/h), where i eta is the denominator's zero nearest to the real axis; eta
+# falls from 1.19 at nu = 0 to 0.739 at nu = 1/2.
+_DECAYED = 45.0
 # Radii treated together: bounds the memory and lets near radii use fewer wavenumbers.
 _CHUNK = 128
 
@@ -79,10 +74,7 @@ _CHUNK = 128
 def base_normal_stress(
     elastic_film: ElasticFilm, traction: InterfaceTraction, r: FloatArray
 ) -> FloatArray:
-    """Return the normal stress at the base at the radii ``r`` (m), in Pa, compression positive.
-
-    Accurate to about 1e-13 of its maximum; zero beyond :func:`decay_radius`.
-    """
+    """Return the normal stress at the base at ``r`` (m) in Pa, accurate to 1e-13 of its maximum."""
     return _hankel_synthesis(
         elastic_film, traction, r, lambda k: base_normal_spectrum(elastic_film, traction, k), j0
     )
@@ -100,10 +92,7 @@ def base_normal_spectrum(
 def base_shear_stress(
     elastic_film: ElasticFilm, traction: InterfaceTraction, r: FloatArray
 ) -> FloatArray:
-    """Return the radial traction of the base on the film at ``r`` (m), in Pa.
-
-    Positive outward; negative where the base holds a film back that is squeezed outward.
-    """
+    """Return the radial traction of the base on the film at ``r`` (m) in Pa, positive outward."""
     return _hankel_synthesis(
         elastic_film, traction, r, lambda k: base_shear_spectrum(elastic_film, traction, k), j1
     )
@@ -112,23 +101,10 @@ def base_shear_stress(
 def base_shear_spectrum(
     elastic_film: ElasticFilm, traction: InterfaceTraction, k: FloatArray
 ) -> FloatArray:
-    r"""Return :math:`\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k`` (rad/m), in N.
-
-    That of the traction :math:`\tau = -\sigma_{rz}` of the base on the film.
-    """
+    r"""Return :math:`\int\tau\,J_1(kr)\,r\,dr` of the base's traction on the film, in N."""
     x, nu = k * elastic_film.thickness, elastic_film.poisson_ratio
     pressed = film.base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
     return -(pressed + film.base_shear_from_shear(x, nu) * traction.shear_transform(k))
-
-
-def decay_radius(elastic_film: ElasticFilm, contact_radius: float) -> float:
-    r"""Radius (m) beyond which the stress at the base is below 1e-13 of its maximum.
-
-    The stress decays as :math:`e^{-\eta r/h}`, where :math:`i\eta` is the zero of the transfer
-    functions' denominator nearest to the real axis: :math:`\eta` falls from 1.19 at
-    :math:`\nu = 0` to 0.739 at :math:`\nu = 1/2`.
-    """
-    return contact_radius + 45 * elastic_film.thickness
 
 
 def _hankel_synthesis(
@@ -141,7 +117,7 @@ def _hankel_synthesis(
     """Sum ``spectrum(k) bessel(k r) k dk`` at all radii, chunk by chunk of similar radii."""
     h = elastic_film.thickness
     flat = np.ravel(r)
-    inside = np.flatnonzero(flat <= decay_radius(elastic_film, traction.radius))
+    inside = np.flatnonzero(flat <= traction.radius + _DECAYED * h)
     order = inside[np.argsort(flat[inside], kind="stable")]
     stress = np.zeros_like(flat)
     for start in range(0, order.size, _CHUNK):

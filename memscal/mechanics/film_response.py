@@ -98,10 +98,7 @@ def half_space_coupling(poisson_ratio: float) -> float:
 
 
 def normal_correction(x: ArrayLike, poisson_ratio: float) -> FloatArray:
-    r"""What the base takes from the half-space's compliance, :math:`W - 1`, free of cancellation.
-
-    Decays as :math:`x^2 e^{-2x}`.
-    """
+    """What the base takes from the half-space, :math:`W - 1`; decays as :math:`x^2 e^{-2x}`."""
     x, decay, denominator, kappa = _prepare(x, poisson_ratio)
     rest = kappa * decay + 2 * x + 2 * x**2 + (kappa**2 + 1) / 2
     return -2 * decay * rest / denominator
@@ -122,15 +119,7 @@ def coupling_correction(x: ArrayLike, poisson_ratio: float) -> FloatArray:
 
 
 def base_normal_from_pressure(x: ArrayLike, poisson_ratio: float) -> FloatArray:
-    r"""Normal base stress under a pressure, :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D`.
-
-    ``T(0) = 1``: the base carries the whole load.
-
-    Examples
-    --------
-    >>> round(float(base_normal_from_pressure(0.0, 0.3)), 15)
-    1.0
-    """
+    r"""Base stress under a pressure, :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D`; 1 at x = 0."""
     nu = poisson_ratio
     x, decay, denominator, _ = _prepare(x, nu)
     numerator = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)

@@ -42,20 +42,7 @@ _CROWDING = 5
 
 
 def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
-    r"""Return :math:`\int L_{nn}(x_i, s)\,\phi_j(s)\,s\,ds` for n = 0 and 1.
-
-    Parameters
-    ----------
-    x : ndarray, shape (m,)
-        Radii at which the surface is looked at, in m.
-    rings : ndarray, shape (n,)
-        Radii of the rings, increasing, in m; :math:`\phi_j` is 1 on ring j and falls linearly to
-        zero at its neighbours.
-
-    Returns
-    -------
-    tuple of ndarray, shape (m, n) each, in m.
-    """
+    r"""Return :math:`\int L_{nn}(x_i, s)\,\phi_j\,s\,ds`, n = 0 and 1, shapes (x, rings), in m."""
     starts, ends = rings[:-1], rings[1:]
     lengths = ends - starts
     nodes, weights = np.polynomial.legendre.leggauss(_ORDER)
@@ -81,10 +68,7 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
 
 
 def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
-    r"""Return :math:`\int_{x_i}^\infty \phi_j\,ds` and :math:`\int_0^{x_i} \phi_j\,s\,ds / x_i`.
-
-    As :func:`singular_integrals`; the second is 0 on the axis.
-    """
+    r"""Return :math:`\int_{x_i}^\infty\phi_j\,ds` and :math:`\int_0^{x_i}\phi_j\,s\,ds/x_i`."""
     starts, ends = rings[:-1], rings[1:]
     lengths = ends - starts
     reach = np.clip((x[:, None] - starts) / lengths, 0.0, 1.0)
@@ -118,10 +102,7 @@ def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatA
 def _near_integrals(
     x: FloatArray, starts: FloatArray, ends: FloatArray, near: NDArray[np.bool_]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the integrals with falling and rising hat over the near elements, per kernel.
-
-    An element is cut where it is nearest to the point; in both parts the nodes crowd there.
-    """
+    """Integrate falling and rising hats over near elements, cut at the point; for each kernel."""
     point, element = np.nonzero(near)
     start, end, at = starts[element], ends[element], x[point]
     cut = np.clip(at, start, end)

@@ -39,26 +39,7 @@ _PHASE = 12.0
 
 @dataclass(frozen=True, eq=False)
 class HankelFilm:
-    """A bonded film of infinite extent, whose surface carries tractions on rings.
-
-    Parameters
-    ----------
-    film : ElasticFilm
-        The film.
-    r : ndarray, shape (n,)
-        Radii of the rings in m, increasing from 0.
-
-    Examples
-    --------
-    Under a uniform pressure much wider than thick, a compressible film is an oedometer: it is
-    thinned by p h / M, with the modulus M = 2G (1 - nu)/(1 - 2 nu):
-
-    >>> film = ElasticFilm(young_modulus=1.0, poisson_ratio=0.25, thickness=1.0)
-    >>> wide = HankelFilm(film, np.linspace(0.0, 40.0, 41))
-    >>> oedometer = film.shear_modulus * 2 * 0.75 / 0.5
-    >>> round(float((wide.compliance.normal @ np.ones(41))[0]) * oedometer, 6)
-    1.0
-    """
+    """A bonded film of infinite extent with tractions on rings of radii ``r`` (m), from 0."""
 
     film: ElasticFilm
     r: FloatArray

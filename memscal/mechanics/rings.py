@@ -21,24 +21,7 @@ _CHUNK = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class RingTraction:
-    r"""Pressure and radial shear that are linear between rings, zero beyond the last.
-
-    Parameters
-    ----------
-    rings : ndarray, shape (n,)
-        Radii of the rings in m, increasing from 0.
-    pressures, shears : ndarray, shape (n,)
-        Values on the rings in Pa; pressure positive in compression, shear positive outward.
-
-    Examples
-    --------
-    A cone of pressure carries a third of what a cylinder of its height does:
-
-    >>> cone = RingTraction(np.array([0.0, 1e-3]), np.array([1e5, 0.0]), np.zeros(2))
-    >>> load = 2 * np.pi * cone.pressure_transform(np.zeros(1))[0]
-    >>> round(float(load) / (np.pi * 1e-6 * 1e5), 12)
-    0.333333333333
-    """
+    """Pressure and outward shear (Pa) linear between rings (m, from 0), zero beyond the last."""
 
     rings: FloatArray
     pressures: FloatArray
@@ -95,19 +78,7 @@ class RingTraction:
 
 
 def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
-    r"""Return :math:`\int\phi_j\,J_n(kr)\,r\,dr` of every ring's hat, for n = 0 and 1.
-
-    Parameters
-    ----------
-    rings : ndarray, shape (n,)
-        Radii of the rings in m, increasing.
-    k : ndarray, shape (m,)
-        Wavenumbers in rad/m.
-
-    Returns
-    -------
-    tuple of ndarray, shape (m, n) each, in m^2.
-    """
+    r"""Return :math:`\int\phi_j\,J_n(kr)\,r\,dr` n = 0 and 1, shapes (k, rings), in m^2."""
     s, weights = _nodes(rings, float(k.max()))
     elements = rings.size - 1
     rising = ((s.reshape(elements, -1) - rings[:-1, None]) / np.diff(rings)[:, None]).ravel()

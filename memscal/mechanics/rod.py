@@ -47,20 +47,7 @@ __all__ = ["RodSolution", "RodTraction", "rod_integrals", "solve_rod", "spherica
 def rod_integrals(
     rho: FloatArray, pressure_terms: FloatArray, shear_terms: FloatArray
 ) -> HalfSpaceIntegrals:
-    r"""Return the integrals over :math:`\xi` of the transforms times :math:`J_0, J_1(\xi\rho)`.
-
-    Parameters
-    ----------
-    rho : ndarray, shape (m,)
-        Radii in units of the rod's.
-    pressure_terms, shear_terms : ndarray, shape (n,)
-        Coefficients of the even and the odd spherical Bessel functions.
-
-    Returns
-    -------
-    tuple of four ndarray, shape (m,): of the pressure with J0, the shear with J0, the pressure
-    with J1, and the shear with J1.
-    """
+    """Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's."""
     even, odd = _series(pressure_terms, 0), _series(shear_terms, 1)
     nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
     share, weights = (nodes + 1) / 2, weights / 2
@@ -102,30 +89,7 @@ _SMALLEST = 1e-30
 
 
 def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
-    r"""Return :math:`j_0(x), \ldots, j_{count-1}(x)` as the rows of an array.
-
-    Miller's backward recurrence :math:`j_{l-1} = (2l+1)j_l/x - j_{l+1}`, normalised by
-    :math:`\sum_l (2l+1) j_l^2 = 1`.  One sweep serves all orders, where scipy's function would
-    start afresh for each: some hundred times faster for the long series of a sticking rod.
-
-    Parameters
-    ----------
-    count : int
-        Number of orders, from 0.
-    x : ndarray, shape (n,)
-        Arguments, not negative.
-
-    Returns
-    -------
-    ndarray, shape (count, n)
-        Accurate to rounding, relative to 1.
-
-    Examples
-    --------
-    >>> spherical_bessel(2, np.array([0.0, np.pi])).round(6)
-    array([[1.     , 0.     ],
-           [0.     , 0.31831]])
-    """
+    """Return j_0 to j_(count-1) at ``x``, one row each: some hundred times faster than scipy."""
     x = np.maximum(x, _SMALLEST)
     largest = float(np.max(x, initial=0.0))
     # From here upward the functions are below 1e-16 (Airy decay beyond the turning point).
@@ -162,11 +126,7 @@ _CHUNK = 8192
 
 @dataclass(frozen=True, eq=False)
 class RodTraction:
-    """Traction under a rod of ``radius`` (m) that carries ``load`` (N).
-
-    ``pressure_terms`` (n,) are the :math:`a_n`, with ``pressure_terms[0] == 1``;
-    ``shear_terms`` (n,) are the :math:`b_n`, empty without friction.
-    """
+    """Traction under a rod of ``radius`` (m) and ``load`` (N): coefficients a_n and b_n."""
 
     radius: float
     load: float
@@ -230,19 +190,7 @@ class RodTraction:
 
 @dataclass(frozen=True, eq=False)
 class RodSolution:
-    r"""Solution of the rod problem for one geometry, free of load and modulus.
-
-    Parameters
-    ----------
-    stiffness_factor : float
-        :math:`P / (2 E^* a \delta)` with :math:`E^* = E/(1-\nu^2)`: 1 on a half-space, and the
-        same as :math:`\kappa` of Hayes et al. (1972).
-    pressure_terms, shear_terms : ndarray
-        Coefficients of :class:`RodTraction`.
-    convergence : float
-        Largest change of stiffness and base stress, relative to their maximum, between this
-        solution and one with half the terms and a coarser quadrature.
-    """
+    """Solution of the rod problem for one geometry, free of load and modulus."""
 
     stiffness_factor: float
     pressure_terms: FloatArray
@@ -256,32 +204,7 @@ class RodSolution:
 
 @lru_cache(maxsize=256)
 def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> RodSolution:
-    r"""Solve for a rod of radius :math:`a` on a film of thickness :math:`h`.
-
-    Parameters
-    ----------
-    radius_ratio : float
-        :math:`a/h`.
-    poisson_ratio : float
-        Poisson's ratio of the film, 0 to 0.5.
-    sticking : bool
-        Whether the film sticks to the rod (no radial displacement under it) or slides freely.
-
-    Raises
-    ------
-    DomainError
-        If the rod is more than a hundred times as wide as the film is thick.
-    ConvergenceError
-        If the stress at the base has not settled to 1e-5 with the largest number of terms.
-
-    Examples
-    --------
-    On a film that is four radii thick, incompressible and frictionless:
-
-    >>> solution = solve_rod(0.25, 0.5, sticking=False)
-    >>> round(solution.stiffness_factor, 4)
-    1.3695
-    """
+    """Solve for a rod of radius a on a film of thickness h; ``radius_ratio`` is a/h."""
     if radius_ratio > _WIDEST:
         raise DomainError(
             f"The rod's radius is {radius_ratio:g} times the film's thickness, but this solution "

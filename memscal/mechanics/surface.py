@@ -29,22 +29,7 @@ __all__ = ["FilmField", "FilmModel", "MeshedField", "SurfaceCompliance"]
 
 @dataclass(frozen=True, eq=False)
 class SurfaceCompliance:
-    """Displacements of the film's surface at rings, for tractions linear between the rings.
-
-    Parameters
-    ----------
-    r : ndarray, shape (n,)
-        Radii of the rings in m, increasing from 0.  Beyond the last there is no traction; a
-        traction of the last ring falls to zero as a step.
-    normal : ndarray, shape (n, n)
-        Depression at ``r[i]`` under unit pressure of ring ``j``, in m/Pa.
-    normal_by_shear : ndarray, shape (n, n)
-        Depression at ``r[i]`` under unit outward traction of ring ``j``, in m/Pa.
-    radial_by_pressure : ndarray, shape (n, n)
-        Outward displacement at ``r[i]`` under unit pressure of ring ``j``, in m/Pa.
-    radial : ndarray, shape (n, n)
-        Outward displacement at ``r[i]`` under unit outward traction of ring ``j``, in m/Pa.
-    """
+    """Displacements at the rings by unit traction of every ring: (n, n) matrices in m/Pa."""
 
     r: FloatArray
     normal: FloatArray
@@ -64,10 +49,7 @@ class SurfaceCompliance:
 
 
 class FilmField(Protocol):
-    """The field in a film under given tractions, where it is looked at: its two faces.
-
-    Radii are in m, of any shape.
-    """
+    """The field in a film under given tractions at its two faces; radii in m, of any shape."""
 
     def base_normal(self, r: FloatArray) -> FloatArray:
         """Return the normal stress at the base in Pa, compression positive."""

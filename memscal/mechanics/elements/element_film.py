@@ -40,22 +40,7 @@ _CORNERS = (((0, 0), (2, 0), (0, 2)), ((2, 0), (4, 0), (2, 2)), ((0, 2), (2, 2),
 
 
 def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> FieldMesh:
-    """Return displacement and stress at all nodes of the quartic triangles.
-
-    Parameters
-    ----------
-    system : MixedSystem
-        The finite elements.
-    solution : ndarray, shape (n,)
-        Displacements in film thicknesses, then mean pressures in shear moduli.
-    film : ElasticFilm
-        Gives both their units.
-
-    Notes
-    -----
-    The mean pressure is continuous; the strain is not, and is averaged over the triangles that
-    meet at a node.
-    """
+    """Return displacement and stress at all nodes; the strain is the mean over triangles there."""
     import skfem
 
     # Outward and inward unknowns of the 15 nodes of each triangle, in the element's own order.
@@ -133,40 +118,7 @@ _PER_NODE = 4
 
 @dataclass(frozen=True, eq=False)
 class ElementFilm:
-    """A bonded film of finite radius, whose surface carries tractions on rings.
-
-    The base holds the film in every direction; its outer edge is free.  The mesh is fitted to the
-    rings: on the surface, two intervals between even rings are one side of a triangle.
-
-    Parameters
-    ----------
-    film : ElasticFilm
-        The film.
-    r : ndarray, shape (n,)
-        Radii of the rings in m, increasing from 0.
-    radius : float
-        Radius of the film's free edge, in m.
-    refinement : int
-        How many times shorter than by default the sides of the triangles are.
-
-    Raises
-    ------
-    InputError
-        If the rings do not increase from 0, or the refinement is not a whole number from 1.
-    DomainError
-        If a ring lies beyond the film's edge.
-
-    Examples
-    --------
-    Under a uniform pressure much wider than thick, a compressible film is an oedometer: it is
-    thinned by p h / M, with the modulus M = 2G (1 - nu)/(1 - 2 nu):
-
-    >>> film = ElasticFilm(young_modulus=1.0, poisson_ratio=0.25, thickness=1.0)
-    >>> wide = ElementFilm(film, np.linspace(0.0, 12.0, 41), radius=20.0)
-    >>> oedometer = film.shear_modulus * 2 * 0.75 / 0.5
-    >>> round(float((wide.compliance.normal @ np.ones(41))[0]) * oedometer, 5)
-    1.0
-    """
+    """A bonded film with tractions on rings ``r`` (m, from 0) and a free edge at ``radius`` (m)."""
 
     film: ElasticFilm
     r: FloatArray
@@ -254,19 +206,7 @@ class ElementFilm:
 
 @dataclass(frozen=True, eq=False)
 class ElementField:
-    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`.
-
-    Parameters
-    ----------
-    film : ElasticFilm
-        The film.
-    radius : float
-        Radius of its free edge, in m.
-    system : MixedSystem
-        The finite elements.
-    solution : ndarray, shape (n,)
-        Displacements in film thicknesses, then mean pressures in shear moduli.
-    """
+    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`."""
 
     film: ElasticFilm
     radius: float
@@ -282,32 +222,19 @@ class ElementField:
         return self._at_base(1, r)
 
     def base_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N.
-
-        It has the elements' relative accuracy at small ``k``, but does not fall off like
-        :math:`e^{-kh}` below some 1e-5 of the load.
-        """
+        """Return the transform of the base stress at ``k`` (rad/m), in N, to 1e-5 of the load."""
         r = self._fine_radii
         spectrum = hankel_transform(r, self.base_normal(r), np.ravel(k))
         return spectrum.reshape(np.shape(k))
 
     def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N.
-
-        As accurate as :meth:`base_spectrum`.
-        """
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
         r = self._fine_radii
         spectrum = hankel_transform(r, self.base_shear(r), np.ravel(k), order=1)
         return spectrum.reshape(np.shape(k))
 
     def depression(self, r: FloatArray) -> FloatArray:
-        """Return the normal displacement of the surface in m, positive into the film.
-
-        Raises
-        ------
-        DomainError
-            If a radius lies beyond the film's edge.
-        """
+        """Return the normal displacement of the surface in m, positive into the film."""
         _, _, inward = self.system.side(0.0)
         return self._at_surface(inward, r)
 

@@ -43,15 +43,7 @@ _ROOM = 0.2
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """Nodes and triangles of a film's cross-section.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 2)
-        Radius and depth below the surface of the nodes, in the unit of the rings.
-    triangles : ndarray of int, shape (m, 3)
-        Indices of the corners.
-    """
+    """Nodes (radius and depth, shape (n, 2)) and the corners of triangles (shape (m, 3))."""
 
     points: FloatArray
     triangles: NDArray[np.int64]
@@ -60,23 +52,7 @@ class TriangleMesh:
 def film_triangles(
     rings: FloatArray, *, radius: float, thickness: float, refinement: int = 1
 ) -> TriangleMesh:
-    """Return a mesh of the film between the axis and its free edge.
-
-    Parameters
-    ----------
-    rings : ndarray, shape (n,)
-        Increasing radii of the rings, from 0; at most ``radius``.
-    radius, thickness : float
-        Of the film, in the same unit.
-    refinement : int
-        How many times shorter than by default all sides are.
-
-    Examples
-    --------
-    >>> mesh = film_triangles(np.linspace(0, 1, 101), radius=12.0, thickness=2.0)
-    >>> mesh.triangles.shape[0] < 1000
-    True
-    """
+    """Return a mesh from the axis to the free edge; all lengths in the unit of the rings."""
     sizes = _Sizes(rings[-1], thickness, refinement)
     front = _Front(_surface_nodes(rings, radius, sizes), sizes)
     while not front.is_at_the_base:

@@ -43,20 +43,7 @@ _ORDER = 5
 
 @dataclass(frozen=True, eq=False)
 class QuarticLine:
-    """The functions that quartic triangles have on a straight side of their mesh.
-
-    Parameters
-    ----------
-    r : ndarray, shape (4 m + 1,)
-        Radii of the nodes on ``m`` sides of triangles, increasing: corners and the three
-        nodes that quarter each side.
-
-    Examples
-    --------
-    >>> line = QuarticLine(np.linspace(0.0, 2.0, 9))
-    >>> bool(np.allclose(line.at(np.array([0.3, 1.7])) @ line.r**4, np.array([0.3, 1.7]) ** 4))
-    True
-    """
+    """Quartics on a straight side of a mesh; ``r`` are corners and quarters, shape (4 m + 1,)."""
 
     r: FloatArray
 
@@ -84,10 +71,7 @@ class QuarticLine:
         return csr_array(values.T @ values.multiply((weights * nodes)[:, None]))
 
     def loads_of_hats(self, rings: FloatArray) -> csr_array:
-        r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats :math:`\phi_j`.
-
-        Exact: no kink of a hat or of a quartic lies inside a panel of the quadrature.
-        """
+        r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats, exactly."""
         knots = np.union1d(rings, self.corners[self.corners < rings[-1]])
         nodes, weights = gauss_between(knots, _ORDER)
         hats = hat_values(rings, nodes)
@@ -105,11 +89,7 @@ def hat_values(rings: FloatArray, r: FloatArray) -> csr_array:
 
 
 def smooth_even(line: QuarticLine, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    r"""Return the smooth even function of ``r`` that is nearest to a quartic's nodal values.
-
-    A quintic spline with knots at the corners, nearest in :math:`\int(\cdot)^2\,r\,dr`: the
-    integral :math:`\int(\cdot)\,r\,dr` stays what it is.
-    """
+    """Return the even quintic spline nearest to a quartic's nodal values; its integral stays."""
     return _smooth(line, values, 1.0)
 
 
@@ -156,15 +136,7 @@ _QUADRATURE = 8
 
 @dataclass(frozen=True, eq=False)
 class MixedSystem:
-    """The equations of a bonded film with a free edge, and their factorisation.
-
-    Parameters
-    ----------
-    mesh : TriangleMesh
-        In film thicknesses.
-    poisson_ratio : float
-        From 0 to 0.5.
-    """
+    """The equations of a bonded film with a free edge, in film thicknesses, and their factors."""
 
     mesh: TriangleMesh
     poisson_ratio: float
@@ -256,10 +228,7 @@ class MixedSystem:
         return splu(csc_array(self.matrix[self.free][:, self.free]))
 
     def solve(self, unknowns: NDArray[np.int64], loads: FloatArray) -> FloatArray:
-        """Return all displacements and pressures, shape (all, n), under loads on some unknowns.
-
-        Loads have the shape (unknowns.size, n); what is held takes none.
-        """
+        """Return all unknowns, shape (all, n), under loads, shape (unknowns.size, n), on some."""
         right = np.zeros((self.matrix.shape[0], loads.shape[1]))
         right[unknowns] = loads
         right[self.free] = self._factors.solve(right[self.free])

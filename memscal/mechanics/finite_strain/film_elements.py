@@ -51,17 +51,7 @@ def cofactor(F: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class NeoHookean:
-    r"""The film's material.
-
-    Parameters
-    ----------
-    shear_modulus : float
-        :math:`G`, in MPa: with lengths in mm, the unknowns are then of like size.
-    held : float
-        :math:`\kappa`, in MPa.
-    softness : float
-        :math:`1/(K - \kappa)`, in 1/MPa; 0 where the film is incompressible.
-    """
+    """The film's material: a modulus G and kappa in MPa, and 1/(K - kappa) in 1/MPa."""
 
     shear_modulus: float
     held: float
@@ -134,19 +124,7 @@ def mesh_below_a_rod(
     fold: tuple[float, float],
     finest: float,
 ) -> Any:
-    """Return a mesh of the cross-section that is finest where the rod's edge folds the surface.
-
-    Parameters
-    ----------
-    rod, thickness, radius : float
-        Radius of the rod, and thickness and radius of the film, in mm.
-    refinement : float
-        How many times shorter than by default the sides are.
-    fold : tuple of float
-        Undeformed radii between which the surface comes to lie around the edge, in mm.
-    finest : float
-        Sides there, in mm, at the refinement 1.
-    """
+    """Return a mesh (mm) that is finest where the rod's edge folds the surface."""
     near = _WIDEST_BELOW_A_ROD * thickness / refinement
     side = min(_SHARE_OF_ROD * rod / refinement, near)
     even = np.linspace(0.0, rod, max(2, round(rod / side)) + 1)
@@ -166,15 +144,7 @@ def mesh_below_a_rod(
 def mesh_below_a_sphere(
     *, contact: float, thickness: float, radius: float, refinement: float
 ) -> Any:
-    """Return a mesh of the cross-section, fine up to a radius somewhat beyond the contact's.
-
-    Parameters
-    ----------
-    contact, thickness, radius : float
-        Largest contact radius to expect, thickness and radius of the film, in mm.
-    refinement : float
-        How many times shorter than by default the sides are.
-    """
+    """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
     near = _WIDEST_BELOW_A_SPHERE * thickness / refinement
     side = min(_SHARE_OF_CONTACT * contact / refinement, near)
     count = int(np.ceil(contact / side))
@@ -218,17 +188,7 @@ _QUADRATURE = 6
 
 @dataclass(frozen=True, eq=False)
 class FilmElements:
-    """Forces in a film for given displacements of its nodes and given pressures.
-
-    Unknowns stand as one vector: n radial displacements, n upward displacements, m pressures.
-
-    Parameters
-    ----------
-    mesh : skfem.MeshTri
-        Triangles of the cross-section, radius and height above the base in mm.
-    material : NeoHookean
-        The material.
-    """
+    """Forces for the unknowns (n radial and n upward displacements in mm, m pressures in MPa)."""
 
     mesh: Any
     material: NeoHookean
@@ -305,10 +265,7 @@ class FilmElements:
         return float(np.sum(self.material.energy(*self._state(x)) * self._shape[2]))
 
     def forces(self, x: FloatArray) -> FloatArray:
-        """Return the derivative of the energy by every unknown: nodal forces in N.
-
-        They are what must be applied to the nodes from outside.
-        """
+        """Return the derivative of the energy: the forces (N) to apply to the nodes."""
         F, p = self._state(x)
         gradients, pressures, volumes, moving, pressing = self._shape
         cells = p.shape[0]
@@ -346,11 +303,9 @@ class FilmElements:
         return sparse.coo_array((whole.ravel(), (rows, columns)), shape=shape).tocsr()
 
     def is_inside_out(self, x: FloatArray) -> bool:
-        """Whether a triangle, as a whole, is turned inside out: no state of a film.
-
-        Where the rod's edge folds the film, J strays from 1 between the few pressures that hold
-        it there; that triangles keep their volume is what the elements promise.
-        """
+        """Whether a triangle, as a whole, is turned inside out: no state of a film."""
+        # Where the rod's edge folds the film, J strays from 1 between the few pressures that
+        # hold it there: triangles keep their volume, points do not.
         F, _ = self._state(x)
         volumes = self._shape[2]
         kept = np.sum(determinant(F) * volumes, axis=1) / np.sum(volumes, axis=1)
@@ -358,10 +313,7 @@ class FilmElements:
         return not (np.all(kept > 0) and np.all(F[..., 4] > 0))
 
     def nodal_stress(self, x: FloatArray) -> FloatArray:
-        """Return the Cauchy stress rr, zz, hoop and rz at the nodes in MPa, shape (n, 4).
-
-        It is the mean over the triangles that meet there, tension positive.
-        """
+        """Return the mean Cauchy stress rr, zz, hoop, rz at the nodes in MPa, shape (n, 4)."""
         import skfem
 
         corners = np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])

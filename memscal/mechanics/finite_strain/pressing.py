@@ -53,15 +53,7 @@ class Face(Protocol):
 
 @dataclass(frozen=True)
 class RodFace:
-    """A rod: its end, its rounded edge, and its side wall, which the film drapes itself against.
-
-    Parameters
-    ----------
-    radius : float
-        Radius of the rod.
-    edge : float
-        Radius of the rounding of its edge.
-    """
+    """A rod (radii in mm): its end, its rounded edge, and the wall that the film drapes against."""
 
     radius: float
     edge: float
@@ -141,62 +133,28 @@ class Goal:
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """A film under an indenter.
+    """A film under an indenter."""
 
-    Parameters
-    ----------
-    x : ndarray, shape (size,)
-        The unknowns of :class:`FilmElements`.
-    depth : float
-        Indentation depth, in mm.
-    touching : ndarray of int, shape (m,)
-        Nodes that touch, from the axis outward.
-    place : ndarray, shape (m,)
-        Where on the contour they are, in mm of arc length.
-    load : float
-        Load, in N.
-    iterations : int
-        Newton steps that it took.
-    """
-
-    x: FloatArray
-    depth: float
-    touching: IntArray
-    place: FloatArray
-    load: float = 0.0
-    iterations: int = 0
+    x: FloatArray  # the unknowns of FilmElements
+    depth: float  # mm
+    touching: IntArray  # nodes, from the axis outward
+    place: FloatArray  # their places on the contour, in mm of arc length
+    load: float = 0.0  # N
+    iterations: int = 0  # Newton steps
 
 
 @dataclass(frozen=True, eq=False)
 class Pressing:
-    """A film, an indenter, and whether the surface sticks to it.
-
-    Parameters
-    ----------
-    elements : FilmElements
-        The film.
-    face : Face
-        The indenter.
-    sticking : bool
-        Whether a node stays where it touched; otherwise it slides freely.
-    upright : bool
-        Whether a node that sticks does so at its own undeformed radius (no radial displacement
-        in the contact), and not at the place of the face where it came to touch.
-    """
+    """A film, an indenter, and whether the surface sticks to it."""
 
     elements: FilmElements
     face: Face
     sticking: bool
+    # Whether a node sticks at its undeformed radius, and not where it came to touch the face.
     upright: bool = False
 
     def press(self, start: Pressed, goal: Goal) -> Pressed:
-        """Return the equilibrium at a goal, from a state near it.
-
-        Raises
-        ------
-        NewtonError
-            If Newton's method or the active set does not settle.
-        """
+        """Return the equilibrium at a goal, from a state near it, or raise :class:`NewtonError`."""
         state = start if goal.is_load else replace(start, depth=goal.value)
         state = self.placed(state)
         seen: set[bytes] = set()
@@ -321,13 +279,7 @@ class Step:
 
 
 def follow(pressing: Pressing, start: Pressed, goals: list[Goal]) -> Iterator[Step]:
-    """Yield the states at the goals, in their order.
-
-    Raises
-    ------
-    NewtonError
-        If a goal is out of reach, however short the steps; ``last`` is the last step.
-    """
+    """Yield the states at the goals, in order; the ``last`` of a NewtonError is the last step."""
     path = _Path(pressing, start)
     for goal in goals:
         try:

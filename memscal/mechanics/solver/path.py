@@ -33,16 +33,9 @@ _OVERLAP = 1e-3
 
 
 def meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
-    """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``.
-
-    The rings in contact stay in contact, though one may pull a little at the edge.  Only where
-    that would be more than a little are they free to go.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is no such state.
-    """
+    """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``."""
+    # The rings in contact stay in contact, though one may pull a little at the edge; only where
+    # that is more than a little are they free to go.
     state = take_step(problem, start, Touch(ring), same_contact=True)
     return state if is_contact(problem, state) else take_step(problem, start, Touch(ring))
 
@@ -55,13 +48,7 @@ def is_contact(problem: ContactProblem, state: ContactState) -> bool:
 
 
 def mixture(lower: ContactState, upper: ContactState, target: Target) -> ContactState:
-    """Return the mixture of two states that is at ``target``; statuses are the second's.
-
-    Raises
-    ------
-    ConvergenceError
-        If the target does not lie between them.
-    """
+    """Return the mixture of two states that is at ``target``; statuses are the second's."""
     begin, end = reached(lower, target), reached(upper, target)
     share = (target.value - begin) / (end - begin)
     if not 0 <= share <= 1:
@@ -84,22 +71,7 @@ def reached(state: ContactState, target: Target) -> float:
 
 
 def step_at_once(problem: ContactProblem, smooth: ContactState, target: Target) -> ContactState:
-    """Return the state at ``target``, one step from the untouched film.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-        Film, indenter and interface.
-    smooth : ContactState
-        The frictionless state at the same target, where the search begins.
-    target : Load or Depth
-        Where the step ends.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is no such state.
-    """
+    """Return the state at ``target``, one step from the untouched film."""
     untouched = np.zeros(problem.size)
     start = replace(smooth, anchor=untouched, outward=untouched)
     try:
@@ -145,50 +117,19 @@ _STEPS_OF_A_FIXED_CONTACT = 24
 
 @dataclass(frozen=True, eq=False)
 class PathPoint:
-    """A state that was asked for, and what happened on the way to it.
-
-    Parameters
-    ----------
-    state : ContactState
-        The state.
-    steps : int
-        Steps from the untouched film.
-    elastic_energy : float
-        Energy stored in the film, in J.
-    work : float or None
-        Work done by the indenter, in J; ``None`` where one step says nothing of the way.
-    dissipated_energy : float or None
-        Work done by slip against friction, in J.
-    """
+    """A state that was asked for, and what happened on the way to it; energies in J."""
 
     state: ContactState
-    steps: int
+    steps: int  # from the untouched film
     elastic_energy: float
-    work: float | None
+    work: float | None  # None where one step says nothing of the way
     dissipated_energy: float | None
 
 
 def follow(
     problem: ContactProblem, targets: Sequence[Target], loading: str, increments: int
 ) -> list[PathPoint]:
-    """Return the states at ``targets``, visited in their order.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-        Film, indenter and interface.
-    targets : sequence of Load or Depth
-        Where to stop.
-    loading : str
-        ``"incremental"`` or ``"total"``.
-    increments : int
-        Steps to the largest target, where no ring's touch ends them.
-
-    Raises
-    ------
-    ConvergenceError
-        If a step does not settle; its ``last`` is the :class:`PathPoint` reached before it.
-    """
+    """Return the states at ``targets``; the ``last`` of a ConvergenceError is a PathPoint."""
     if problem.friction > 0 and loading == "total":
         return list(_in_one_step(problem, targets, increments))
     return list(_step_by_step(problem, targets, increments))
@@ -260,14 +201,12 @@ def _step_by_step(
 
 
 def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
-    """Go to the target, ring by ring; return the walk as it was at the last ring before it.
-
-    A path that goes on in the same direction goes on from there: looking at a state between two
-    rings must not change those that follow.
-    """
+    """Go to the target, ring by ring; return the walk as it was at the last ring before it."""
     problem = walk.problem
     while (following := _next_meeting(problem, walk.state, target, rising=rising)) is not None:
         if not _between(following, walk.state, target):
+            # A path that goes on in the same direction goes on from the ring before: looking at a
+            # state between two rings must not change those that follow.
             before = replace(walk)
             walk.step_to(mixture(walk.state, following, target))
             return before
@@ -277,11 +216,8 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
 
 
 def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
-    """Go to a target under an indenter with no more rings to touch, such as a rod.
-
-    On a rigid interface the first loading is one step, because everything grows in proportion.
-    An edge that sticks may pull at the film.
-    """
+    """Go to a target under an indenter with no more rings to touch, such as a rod."""
+    # On a rigid interface the first loading is one step: everything grows in proportion.
     proportional = walk.state.load == 0 and walk.problem.interface.rigid
     count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
     begin = reached(walk.state, target)
@@ -311,17 +247,14 @@ def _onset(state: ContactState, *, rising: bool) -> ContactState:
 def _next_meeting(
     problem: ContactProblem, state: ContactState, target: Target, *, rising: bool
 ) -> ContactState | None:
-    """Return the next state in which the surfaces just meet at a ring at the contact's edge.
-
-    A contact with a hole has two edges: what meets, or parts, first comes next.  ``None`` where
-    the contact cannot grow or shrink.
-    """
+    """Return the next state in which the surfaces just meet at a ring at the contact's edge."""
     onset = _onset(state, rising=rising)
     edge = _reachable(problem, onset.touching)
     if not rising:
         edge = onset.touching & _neighbours(edge)
         if np.count_nonzero(onset.touching) < 2:
             return None
+    # A contact with a hole has two edges: what meets, or parts, first comes next.
     states = [meet_at(problem, onset, int(ring)) for ring in np.flatnonzero(edge)]
     if not states:
         return None

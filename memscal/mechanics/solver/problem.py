@@ -33,26 +33,11 @@ __all__ = ["ContactProblem", "ContactState", "Depth", "Goal", "Load", "Target", 
 
 @dataclass(frozen=True, eq=False)
 class ContactProblem:
-    """A film, an indenter and what is between them.
-
-    Parameters
-    ----------
-    film : ElasticFilm
-        The film.
-    compliance : SurfaceCompliance
-        How its surface answers to tractions on n rings.
-    heights : ndarray, shape (n,)
-        Height of the indenter's face above its lowest point at each ring, in m; ``inf`` where
-        the indenter has ended.
-    friction : float
-        Amontons' coefficient, 0 to ``inf``.
-    interface : Interface
-        Compliance of the interface.
-    """
+    """A film, an indenter and what is between them."""
 
     film: ElasticFilm
     compliance: SurfaceCompliance
-    heights: FloatArray
+    heights: FloatArray  # of the face above its lowest point, in m; inf where it has ended
     friction: float
     interface: Interface
 
@@ -93,35 +78,17 @@ class ContactProblem:
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
-    """A contact in equilibrium, as arrays over the rings.
+    """A contact in equilibrium, as arrays over the rings."""
 
-    Parameters
-    ----------
-    pressure, shear : ndarray, shape (n,)
-        Tractions in Pa; shear positive outward on the film.
-    depth, load : float
-        In m and N.
-    touching : ndarray of bool, shape (n,)
-        Rings in contact.
-    slip : ndarray of int8, shape (n,)
-        Sign of the shear where a ring slips, 0 where it sticks.
-    anchor : ndarray, shape (n,)
-        Outward displacement at which a sticking ring bears no shear, in m.
-    outward : ndarray, shape (n,)
-        Outward displacement in m.
-    iterations : int
-        Linear systems that were solved for it.
-    """
-
-    pressure: FloatArray
-    shear: FloatArray
-    depth: float
-    load: float
+    pressure: FloatArray  # Pa
+    shear: FloatArray  # Pa, positive outward on the film
+    depth: float  # m
+    load: float  # N
     touching: NDArray[np.bool_]
-    slip: NDArray[np.int8]
-    anchor: FloatArray
-    outward: FloatArray
-    iterations: int = 0
+    slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
+    anchor: FloatArray  # outward displacement at which a sticking ring bears no shear, in m
+    outward: FloatArray  # outward displacement in m
+    iterations: int = 0  # linear systems that were solved
 
     def sticking(self, friction: float) -> NDArray[np.bool_]:
         """Return the rings in contact that stick."""

@@ -41,17 +41,7 @@ def even_rings(reach: float, count: int) -> FloatArray:
 
 
 def rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArray:
-    """Return rings that resolve contacts of given radii.
-
-    Parameters
-    ----------
-    edges : sequence of float
-        Expected contact radii, in m.
-    reach : float
-        Radius that pressure reaches, in m: the largest edge, or more where there is no edge.
-    count : int
-        Even rings up to ``reach``; those at the edges come on top.
-    """
+    """Return ``count`` even rings up to ``reach`` (m), and more at the expected ``edges`` (m)."""
     spacing = reach / count
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
     local = np.full(r.size, spacing)
@@ -89,25 +79,7 @@ _FREE_EDGE = 12.0
 
 @dataclass(frozen=True, kw_only=True)
 class RingRequest:
-    """What is asked for; its content is the key under which a solution is remembered.
-
-    Parameters
-    ----------
-    film, indenter, interface
-        What is pressed on what, and what is between them.
-    targets : tuple of Load or Depth
-        Loads (N) or depths (m), in the order in which they are visited.
-    friction : float
-        Amontons' coefficient.
-    loading : str
-        ``"incremental"`` or ``"total"``.
-    backend : str
-        ``"hankel"`` or ``"fem"``.
-    film_radius : float, optional
-        Radius of the film's free edge in m, for finite elements.
-    rings : int, optional
-        Rings from the axis to the largest contact; as many as are needed by default.
-    """
+    """What is asked for; its content is the key under which a solution is remembered."""
 
     film: ElasticFilm
     indenter: Indenter
@@ -122,16 +94,7 @@ class RingRequest:
 
 @lru_cache(maxsize=64)
 def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
-    """Return the contacts of a request, in its order.
-
-    Raises
-    ------
-    DomainError
-        If a contact outgrows the film, the model or the indenter.
-    ConvergenceError
-        If the contact problem does not settle, or has not converged with the most rings; the
-        error's ``last`` is then the last contact that was solved.
-    """
+    """Return the contacts of a request, in its order."""
     edges, reach = _expected(request)
     count = request.rings or _FEWEST_RINGS
     coarse = _solve(request, _rings(request, edges, reach, max(count // 2, 8)))
@@ -162,14 +125,11 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
 
 
 def _expected(request: RingRequest) -> tuple[list[float], float]:
-    """Return the contact radii to expect and how far pressure reaches (m), from a coarse contact.
-
-    The reach of the coarse rings is doubled until the contact ends within them, and shortened
-    until it fills a good part of them.
-    """
+    """Return the contact radii to expect and how far pressure reaches (m), by a coarse contact."""
     if isinstance(request.indenter, Rod):
         return [], request.indenter.radius
     film = request.film
+    # Doubled until the contact ends within the rings; shortened until it fills a good part of them.
     reach = film.thickness
     while True:
         rings = even_rings(reach, _COARSE)

@@ -26,26 +26,12 @@ _Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Statuses:
-    """What is taken for granted while the equations are solved; arrays over the n rings.
+    """What is taken for granted while the equations are solved; arrays over the n rings."""
 
-    Parameters
-    ----------
-    pressing : ndarray of bool
-        Rings that bear a pressure.
-    slip : ndarray of int8
-        Sign of the shear where a ring slips, 0 where it sticks.
-    anchor : ndarray
-        Outward displacement (m) at which a sticking ring bears no shear.
-    separation : ndarray
-        Trial of the separation (m), where the interface is normally compliant.
-    pressure, stretch : ndarray
-        Trial of the pressure (Pa) and of the interface's elastic stretch (m), where the
-        interface is tangentially compliant.
-    """
-
-    pressing: NDArray[np.bool_]
-    slip: NDArray[np.int8]
-    anchor: FloatArray
+    pressing: NDArray[np.bool_]  # rings that bear a pressure
+    slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
+    anchor: FloatArray  # outward displacement (m) at which a sticking ring bears no shear
+    # Trials for a compliant interface: separation (m), pressure (Pa) and elastic stretch (m).
     separation: FloatArray
     pressure: FloatArray
     stretch: FloatArray
@@ -150,13 +136,11 @@ def _add_tangential_compliance(
     matrix: FloatArray,
     right: FloatArray,
 ) -> None:
-    r"""Replace :math:`u = u^0` by :math:`\mu p\,(u - u^0) + \ell q = 0`, linearised.
-
-    The equation is divided by what keeps it of the size of the others, also where p vanishes.
-    """
+    r"""Replace :math:`u = u^0` by :math:`\mu p\,(u - u^0) + \ell q = 0`, linearised."""
     rows, stuck = indices
     mu, length = problem.friction, problem.interface.slip_length
     limit = mu * np.maximum(statuses.pressure[stuck], 0.0)
+    # The equation is divided by what keeps it of the size of the others, also where p vanishes.
     size = limit + length / np.diagonal(problem.compliance.radial)[stuck]
     here = rows.size + np.arange(stuck.size)
     matrix[here] *= (limit / size)[:, None]
@@ -183,24 +167,8 @@ _CAREFUL_AFTER = 30
 def take_step(
     problem: ContactProblem, start: ContactState, goal: Goal, *, same_contact: bool = False
 ) -> ContactState:
-    """Return the equilibrium that follows ``start`` when ``goal`` has been reached.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-        Film, indenter and interface.
-    start : ContactState
-        The state before; its anchors are where sticking rings stay.
-    goal : Load, Depth or Touch
-        Where the step ends.
-    same_contact : bool
-        Whether the rings in contact are those of ``start``, whatever their pressure.
-
-    Raises
-    ------
-    ConvergenceError
-        If the statuses do not settle.
-    """
+    """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
+    # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
     statuses = _first_statuses(problem, start, goal)
     held = goal.ring if isinstance(goal, Touch) else None
     for iteration in range(1, _MOST_ITERATIONS + 1):
@@ -346,11 +314,9 @@ def _revised_separation(
     tractions: Tractions,
     gap: FloatArray,
 ) -> FloatArray:
-    """Return the next trial of the separations.
-
-    Where the surfaces part, the linear equations' own; where they close, the one at which the
-    law bears the linear equations' pressure, because a convex law soon bears far more.
-    """
+    """Return the next trial of the separations."""
+    # Where the surfaces part, the linear equations' own; where they close, the one at which the
+    # law bears the linear equations' pressure, because a convex law soon bears far more.
     before, p = statuses.separation, tractions.pressure
     after = np.maximum(gap, np.minimum(before, 0.0) - _PLUNGE * law.length)
     closing = statuses.pressing & (gap < before) & (p > 0)
