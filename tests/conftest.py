@@ -18,7 +18,7 @@ from hypothesis import settings  # noqa: E402
 settings.register_profile("memscal", deadline=None, print_blob=True)
 settings.load_profile("memscal")
 
-REMEMBERING = ("memscal.mechanics.solver.request", "memscal.mechanics.finite_strain")
+REMEMBERING = ("memscal.mechanics.solver.refinement", "memscal.mechanics.finite_strain.solve")
 
 
 @pytest.fixture(scope="module", autouse=True)

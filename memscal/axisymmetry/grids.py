@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 import scipy.fft
@@ -24,70 +23,6 @@ __all__ = ["EvenGrid", "FieldGrid", "Lattice", "cut", "on_grid"]
 
 #: Directions over which a field of a lattice is averaged.
 _DIRECTIONS = 64
-
-
-class FieldGrid(Protocol):
-    """What deconvolution asks of a grid."""
-
-    @property
-    def axes(self) -> tuple[FloatArray, FloatArray]:
-        """Positions along x and along y of the whole plane, in m."""
-        ...
-
-    @property
-    def radius(self) -> FloatArray:
-        """Distance of each grid point from the axis, in m."""
-        ...
-
-    @property
-    def wavenumber(self) -> FloatArray:
-        """Modulus of the wave vector of each spectral component, in rad/m."""
-        ...
-
-    @property
-    def cell_area(self) -> float:
-        """Area of one cell, in m^2."""
-        ...
-
-    def forward(self, field: FloatArray) -> FloatArray:
-        """Fourier transform of a field on the grid."""
-        ...
-
-    def inverse(self, spectrum: FloatArray) -> FloatArray:
-        """Return the field of a spectrum, with the origin where it belongs on the grid."""
-        ...
-
-    def transfer(self, field: FloatArray) -> FloatArray:
-        """Fourier transform about the origin of a field that :meth:`inverse` returned."""
-        ...
-
-    def convolve(self, kernel: FloatArray, field: FloatArray) -> FloatArray:
-        """Convolve a field that :meth:`inverse` returned with a lifted field."""
-        ...
-
-    def integrate(self, field: FloatArray) -> float:
-        """Integral of a field over the plane."""
-        ...
-
-    def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Radii, in m, and the radial profile of a field there."""
-        ...
-
-    def to_period(self, field: FloatArray) -> FloatArray:
-        """Return one period of the plane, as the transform sees it."""
-        ...
-
-    def from_quotient(self, period: FloatArray) -> FloatArray:
-        """Return a quotient of two periods, its zero at the first point, in the grid's layout."""
-        ...
-
-    def to_image(self, field: FloatArray) -> FloatArray:
-        """Return the whole plane as an image with the axis at its central pixel."""
-        ...
-
-    def from_image(self, image: FloatArray) -> FloatArray:
-        """Return to the grid's own layout; the inverse of :meth:`to_image`."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -287,6 +222,10 @@ class Lattice:
     def from_image(self, image: FloatArray) -> FloatArray:
         """Return the image itself."""
         return image
+
+
+#: What deconvolution works on.
+FieldGrid = EvenGrid | Lattice
 
 
 def on_grid(

@@ -47,12 +47,9 @@ __all__ = [
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
     """Nodes and weights on [0, upper], in panels up to ``longest`` with ``order`` nodes each."""
+    # To rounding 16 nodes integrate up to 16 rad of phase, 64 up to 100 rad.
     count = max(1, math.ceil(upper / longest))
-    nodes, weights = _legendre(order)
-    width = upper / count
-    starts = width * np.arange(count)
-    k = (starts[:, None] + width * (nodes + 1) / 2).ravel()
-    return k, np.tile(width / 2 * weights, count)
+    return gauss_between(np.linspace(0.0, upper, count + 1), order)
 
 
 def gauss_between(edges: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:

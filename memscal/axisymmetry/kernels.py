@@ -96,14 +96,12 @@ class GaussianMixture:
     def transform(self, k: FloatArray) -> FloatArray:
         """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
         terms = zip(self.weights, self.sigmas, strict=True)
-        return np.asarray(sum(w * np.exp(-0.5 * (s * k) ** 2) for w, s in terms))
+        return np.asarray(sum(w * gaussian_transfer(k, s) for w, s in terms))
 
     def radial(self, r: FloatArray) -> FloatArray:
         """G at radii ``r`` (m), in 1/m^2."""
         terms = zip(self.weights, self.sigmas, strict=True)
-        return np.asarray(
-            sum(w * np.exp(-0.5 * (r / s) ** 2) / (2 * np.pi * s**2) for w, s in terms)
-        )
+        return np.asarray(sum(w * unit_gaussian(r, s) for w, s in terms))
 
     def describe(self) -> dict[str, float | str]:
         """Weights and widths as text; the width of a single Gaussian, in m, as a number."""
@@ -157,7 +155,7 @@ class SmoothedDisc:
         """Two-dimensional Fourier transform at ``k`` (rad/m); one at k = 0."""
         phase = np.asarray(k, dtype=np.float64) * self.radius
         disc = np.divide(2 * j1(phase), phase, out=np.ones_like(phase), where=phase != 0)
-        return np.asarray(disc * np.exp(-0.5 * (self.sigma * k) ** 2))
+        return disc * gaussian_transfer(k, self.sigma)
 
     def radial(self, r: FloatArray) -> FloatArray:
         """G at radii ``r`` (m), in 1/m^2."""

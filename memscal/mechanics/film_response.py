@@ -21,10 +21,14 @@ base.  With :math:`\kappa = 3 - 4\nu`, :math:`c = \cosh x`, :math:`s = \sinh x`,
 
 .. math::
 
-    D = \kappa\cosh 2x + 2x^2 + 5 - 12\nu + 8\nu^2 .
+    D &= \kappa\cosh 2x + 2x^2 + 5 - 12\nu + 8\nu^2, \\
+    W &= (\kappa\sinh 2x - 2x)/D, \qquad Y = (\kappa\sinh 2x + 2x)/D, \\
+    X &= (x^2 - \kappa(1-2\nu)s^2)/((1-\nu)D),
 
-They are evaluated with decaying exponentials, so that nothing overflows, and from series where
-the closed form would cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's
+which tend to those of the half-space, :math:`W = Y = 1` and :math:`X = -(1-2\nu)/2(1-\nu)`, for
+large :math:`x`; a ``correction`` is the difference, free of cancellation.
+They are evaluated with decaying exponentials, so that nothing overflows, and by a series where the
+closed form would cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's
 ratio from 0 up to and including 0.5.  (For :math:`W` and :math:`T` see also Frétigny and
 Chateauminois, J. Phys. D 40 (2007) 5418.)
 """
@@ -41,59 +45,21 @@ __all__ = [
     "base_normal_from_shear",
     "base_shear_from_pressure",
     "base_shear_from_shear",
-    "coupling_compliance",
     "coupling_correction",
     "half_space_coupling",
-    "normal_compliance",
     "normal_correction",
-    "radial_compliance",
     "radial_correction",
 ]
 
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
 _LARGEST_X = 340.0
-# Below this x the differences are summed as series, exact to rounding with these terms.
+# Below this x a difference is summed as a series, exact to rounding with these terms.
 _SERIES_BELOW = 0.5
 _TERMS = 9
 
 
-def normal_compliance(x: ArrayLike, poisson_ratio: float) -> FloatArray:
-    r"""Surface depression under a pressure, :math:`W = (\kappa\sinh 2x - 2x)/D`.
-
-    Tends to 1, the half-space's, for large ``x``; for small ``x`` as :math:`x` (compressible)
-    or :math:`2x^3/3` (incompressible).
-
-    Examples
-    --------
-    >>> float(normal_compliance(50.0, 0.5)), float(normal_compliance(0.0, 0.5))
-    (1.0, 0.0)
-    """
-    x, decay, denominator, kappa = _prepare(x, poisson_ratio)
-    return (kappa * _sinh_difference(x, decay) + (kappa - 1) * 4 * x * decay) / denominator
-
-
-def radial_compliance(x: ArrayLike, poisson_ratio: float) -> FloatArray:
-    r"""Radial surface displacement under a radial traction, :math:`Y = (\kappa\sinh 2x + 2x)/D`."""
-    x, decay, denominator, kappa = _prepare(x, poisson_ratio)
-    return (-kappa * np.expm1(-4 * x) + 4 * x * decay) / denominator
-
-
-def coupling_compliance(x: ArrayLike, poisson_ratio: float) -> FloatArray:
-    r"""Coupling of normal and radial, :math:`X = (x^2 - \kappa(1-2\nu)s^2)/((1-\nu)D)`.
-
-    It is both the radial displacement under a pressure and the depression under a radial
-    traction.  Positive where a pressure squeezes the surface outward.
-    """
-    nu = poisson_ratio
-    x, decay, denominator, kappa = _prepare(x, nu)
-    # x^2 - kappa (1-2nu) sinh^2 x, split so that only unlike parts are subtracted.
-    square = 4 * decay * (1 - nu) * (4 * nu - 1) * x**2
-    rest = kappa * (1 - 2 * nu) * _sinh_squared_difference(x, decay)
-    return (square - rest) / ((1 - nu) * denominator)
-
-
 def half_space_coupling(poisson_ratio: float) -> float:
-    r"""Limit of :func:`coupling_compliance` for large ``x``: :math:`-(1-2\nu)/2(1-\nu)`."""
+    r"""Coupling X of the half-space, :math:`-(1-2\nu)/2(1-\nu)`."""
     return -(1 - 2 * poisson_ratio) / (2 * (1 - poisson_ratio))
 
 
@@ -161,30 +127,10 @@ def _prepare(
     return x, decay, denominator, kappa
 
 
-def _sinh_difference(x: FloatArray, decay: FloatArray) -> FloatArray:
-    """Return 2 exp(-2x) (sinh 2x - 2x)."""
-    ratios = [1 / ((2 * j + 2) * (2 * j + 3)) for j in range(1, _TERMS)]
-    series = 2 * decay * _power_series(2 * x, 3, 1 / 6, ratios)
-    return np.where(x < _SERIES_BELOW, series, -np.expm1(-4 * x) - 4 * x * decay)
-
-
-def _sinh_squared_difference(x: FloatArray, decay: FloatArray) -> FloatArray:
-    """Return 2 exp(-2x) (sinh(x)^2 - x^2)."""
-    ratios = [4 / ((2 * j + 1) * (2 * j + 2)) for j in range(2, _TERMS + 1)]
-    series = 2 * decay * _power_series(x, 4, 1 / 3, ratios)
-    return np.where(x < _SERIES_BELOW, series, np.expm1(-2 * x) ** 2 / 2 - 2 * x**2 * decay)
-
-
 def _x_cosh_minus_sinh(x: FloatArray, decay: FloatArray) -> FloatArray:
-    """Return 2 exp(-x) (x cosh x - sinh x)."""
-    ratios = [1 / (2 * j * (2 * j + 3)) for j in range(1, _TERMS)]
-    series = 2 * np.exp(-x) * _power_series(x, 3, 1 / 3, ratios)
+    """Return 2 exp(-x) (x cosh x - sinh x); below some x by its power series."""
+    series = np.ones_like(x)
+    for j in range(_TERMS - 1, 0, -1):
+        series = 1 + x**2 / (2 * j * (2 * j + 3)) * series
+    series *= 2 / 3 * np.exp(-x) * x**3
     return np.where(x < _SERIES_BELOW, series, x * (1 + decay) + np.expm1(-2 * x))
-
-
-def _power_series(x: FloatArray, power: int, first: float, ratios: list[float]) -> FloatArray:
-    """Sum ``first * x**power * (1 + ratios[0] x^2 (1 + ratios[1] x^2 (...)))``."""
-    total = np.ones_like(x)
-    for ratio in reversed(ratios):
-        total = 1 + ratio * x**2 * total
-    return first * x**power * total

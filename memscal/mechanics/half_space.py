@@ -17,7 +17,8 @@ where :math:`L_{nn} = \int_0^\infty J_n(kx)\,J_n(ks)\,dk` are complete elliptic 
     L_{00} = \frac{2}{\pi\max}\,K(t), \qquad
     L_{11} = \frac{2}{\pi\min}\,[K(t) - E(t)]
 
-(Johnson, Contact Mechanics, 1985, chapter 3).  They are singular as :math:`\ln|x - s|`.  Elements
+(Johnson, Contact Mechanics, 1985, chapter 3).  The hat :math:`\phi_j` is 1 on ring j and falls
+linearly to zero at its neighbours.  They are singular as :math:`\ln|x - s|`.  Elements
 near to where they are singular are integrated with nodes that crowd there; all others by a plain
 Gauss rule.  Both are exact to about 1e-11.
 """

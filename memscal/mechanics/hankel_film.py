@@ -91,15 +91,15 @@ class HankelField:
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""
-        w_by_p, w_by_q, _, _ = self._parts(r)
+        w_by_p, w_by_q, _, _ = self._surface(r)
         return np.asarray(w_by_p + w_by_q).reshape(np.shape(r))
 
     def outward(self, r: FloatArray) -> FloatArray:
         """Return the radial displacement of the surface in m, positive outward."""
-        _, _, u_by_p, u_by_q = self._parts(r)
+        _, _, u_by_p, u_by_q = self._surface(r)
         return np.asarray(u_by_p + u_by_q).reshape(np.shape(r))
 
-    def _parts(self, r: FloatArray) -> HalfSpaceIntegrals:
+    def _surface(self, r: FloatArray) -> HalfSpaceIntegrals:
         x = np.ravel(np.asarray(r, dtype=np.float64))
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)

@@ -49,23 +49,8 @@ def indent(
     film: ElasticFilm,
     indenter: Indenter,
     *,
-    load: _Several,
-    depth: None = None,
-    friction: float = 0.0,
-    loading: str = "incremental",
-    backend: str = "hankel",
-    interface: Interface | None = None,
-    strain: str = "linear",
-    film_radius: float | None = None,
-    rings: int | None = None,
-) -> list[Contact]: ...
-@overload
-def indent(
-    film: ElasticFilm,
-    indenter: Indenter,
-    *,
-    load: None = None,
-    depth: _Several,
+    load: _Several | None = None,
+    depth: _Several | None = None,
     friction: float = 0.0,
     loading: str = "incremental",
     backend: str = "hankel",
@@ -135,7 +120,7 @@ def indent(
         If the request lies outside what the model holds for: the contact outgrows the film or
         the indenter's known face, or the indenter would pass through the film.
     ConvergenceError
-        If the contact does not settle, or has not converged; ``last`` is the last contact found.
+        If the contact does not settle, or has not converged; ``last`` is the last one solved.
 
     Notes
     -----
@@ -162,11 +147,14 @@ def indent(
     30.7 um, 2.83 mm
     """
     _check_request(friction, loading, backend, strain, rings)
-    if film_radius is not None and backend == "hankel" and strain == "linear":
-        raise InputError(
-            f"film_radius is {film_radius * 1e3:g} mm, but by Hankel transforms a film has no end.",
-            cure='Use backend="fem" for a film with a free edge.',
-        )
+    if film_radius is not None:
+        require_positive("film_radius", film_radius, "m")
+        if backend == "hankel" and strain == "linear":
+            raise InputError(
+                f"film_radius is {film_radius * 1e3:g} mm, but by Hankel transforms a film has no "
+                "end.",
+                cure='Use backend="fem" for a film with a free edge.',
+            )
     targets, several = _targets(load, depth)
     interface = interface or Interface()
     if strain == "finite":
@@ -180,7 +168,7 @@ def indent(
             film_radius=film_radius,
         )
     elif _is_plain_rod(indenter, friction, backend, interface):
-        contacts = [_rod_contact(film, indenter, target, friction) for target in targets]
+        contacts = tuple(_rod_contact(film, indenter, target, friction) for target in targets)
     else:
         request = RingRequest(
             film=film,
@@ -193,8 +181,8 @@ def indent(
             film_radius=film_radius,
             rings=rings,
         )
-        contacts = list(solve_on_rings(request))
-    return contacts if several else contacts[0]
+        contacts = solve_on_rings(request)
+    return list(contacts) if several else contacts[0]
 
 
 def _targets(
@@ -206,13 +194,13 @@ def _targets(
             "Give either a load or a depth" + (", not both." if load is not None else "."),
             why="One follows from the other.",
         )
-    given = np.asarray(load if depth is None else depth, dtype=np.float64)
-    if given.ndim > 1 or given.size == 0:
-        raise InputError(f"The loads or depths have shape {given.shape}; give a flat list.")
-    for value in given.flat:
+    values = np.asarray(load if depth is None else depth, dtype=np.float64)
+    if values.ndim > 1 or values.size == 0:
+        raise InputError(f"The loads or depths have shape {values.shape}; give a flat list.")
+    for value in values.flat:
         require_positive("load" if depth is None else "depth", value, "N" if depth is None else "m")
     kind = Load if depth is None else Depth
-    return tuple(kind(float(value)) for value in given.flat), given.ndim == 1
+    return tuple(kind(float(value)) for value in values.flat), values.ndim == 1
 
 
 def _is_plain_rod(indenter: Indenter, friction: float, backend: str, interface: Interface) -> bool:
@@ -259,13 +247,13 @@ def _check_request(
     friction: float, loading: str, backend: str, strain: str, rings: int | None
 ) -> None:
     """Refuse what makes no sense."""
-    for name, value, known in (
+    for name, value, choices in (
         ("loading", loading, ("incremental", "total")),
         ("backend", backend, ("hankel", "fem")),
         ("strain", strain, ("linear", "finite")),
     ):
-        if value not in known:
-            raise InputError(f'{name} is {value!r}, but it is "{known[0]}" or "{known[1]}".')
+        if value not in choices:
+            raise InputError(f'{name} is {value!r}, but it is "{choices[0]}" or "{choices[1]}".')
     if math.isnan(friction) or friction < 0:
         raise InputError(f"friction is {friction:g}, but a friction coefficient is not negative.")
     if rings is not None and strain == "finite":

@@ -19,10 +19,9 @@ With both compliances zero the rigid interface returns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from scipy.special import gamma, pbdv
@@ -39,23 +38,6 @@ _FARTHEST = 12.0
 _DEEP = -20.0
 # Entries of the table of the moment.
 _ENTRIES = 3601
-
-
-class NormalLaw(Protocol):
-    """Pressure of a rough interface against the separation of its mean planes."""
-
-    @property
-    def length(self) -> float:
-        """Length over which the pressure changes, in m; 0 for a rigid interface."""
-
-    def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
-        """Return the pressure in Pa at a ``separation`` in m."""
-
-    def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
-        """Return minus the derivative of the pressure by the separation, in Pa/m."""
-
-    def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
-        """Return the separation in m at which the pressure (above 0) is ``pressure`` in Pa."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,21 +88,26 @@ class GreenwoodTripp:
 
     def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return the pressure in Pa at a ``separation`` in m."""
-        return self._scale(film) * _moments()[0](separation / self.roughness)
+        log_moment, _ = _splines()
+        return np.asarray(self._scale(film) * np.exp(log_moment(self._height(separation))))
 
     def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return minus the derivative of the pressure by the separation, in Pa/m."""
-        slope = _moments()[0].slope(separation / self.roughness)
-        return -self._scale(film) / self.roughness * slope
+        log_moment, _ = _splines()
+        slope = log_moment(self._height(separation), 1)
+        return np.asarray(-self.pressure(separation, film) * slope / self.roughness)
 
     def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return the separation in m at which the pressure is ``pressure`` in Pa."""
-        bearing, closeness = _moments()
-        wanted = np.log(pressure / self._scale(film))
-        t = closeness(wanted)
+        log_moment, height_of = _splines()
+        logarithm = np.log(pressure / self._scale(film))
+        height = height_of(logarithm)
         # One step of Newton's method ties the inverse to the law itself.
-        t += (wanted - bearing.log(t)) / bearing.log(t, 1)
-        return np.asarray(self.roughness * np.clip(t, _CLOSEST, _FARTHEST))
+        height += (logarithm - log_moment(height)) / log_moment(height, 1)
+        return np.asarray(self.roughness * np.clip(height, _CLOSEST, _FARTHEST))
+
+    def _height(self, separation: FloatArray) -> FloatArray:
+        return np.clip(separation / self.roughness, _CLOSEST, _FARTHEST)
 
     def _scale(self, film: ElasticFilm) -> float:
         bearing: float = self.asperity_density * self.asperity_radius**0.5 * self.roughness**1.5
@@ -168,6 +155,9 @@ class ExponentialCompliance:
         return np.asarray(-self.decay_length * np.log(pressure / self.reference_pressure))
 
 
+NormalLaw = GreenwoodTripp | ExponentialCompliance
+
+
 @dataclass(frozen=True, kw_only=True)
 class Interface:
     r"""Compliance of the interface between indenter and film; rigid by default.
@@ -206,21 +196,21 @@ class Interface:
     @property
     def description(self) -> str:
         """What yields, in words; empty for a rigid interface."""
-        parts = []
+        compliances = []
         if isinstance(self.normal, GreenwoodTripp) and self.normal.roughness > 0:
-            parts.append(
+            compliances.append(
                 f"Greenwood-Tripp law (roughness {self.normal.roughness * 1e6:.4g} um, "
                 f"{self.normal.asperity_density * 1e-6:.4g} asperities per mm^2 of radius "
                 f"{self.normal.asperity_radius * 1e6:.4g} um)"
             )
         if isinstance(self.normal, ExponentialCompliance) and self.normal.decay_length > 0:
-            parts.append(
+            compliances.append(
                 f"exponential law (length {self.normal.decay_length * 1e6:.4g} um, "
                 f"{self.normal.reference_pressure * 1e-6:.4g} MPa where mean planes meet)"
             )
         if self.slip_length > 0:
-            parts.append(f"slip length {self.slip_length * 1e6:.4g} um")
-        return ", ".join(parts)
+            compliances.append(f"slip length {self.slip_length * 1e6:.4g} um")
+        return ", ".join(compliances)
 
     @property
     def rigid(self) -> bool:
@@ -228,29 +218,14 @@ class Interface:
         return self.normal_law is None and self.slip_length == 0
 
 
-class _Moment:
-    r""":math:`F_{3/2}` as a spline of its logarithm, good to 1e-9: a contact asks for it often."""
-
-    def __init__(self, heights: FloatArray, moments: FloatArray) -> None:
-        from scipy.interpolate import CubicSpline
-
-        self.log = CubicSpline(heights, np.log(moments))
-
-    def __call__(self, t: FloatArray) -> FloatArray:
-        return np.asarray(np.exp(self.log(np.clip(t, _CLOSEST, _FARTHEST))))
-
-    def slope(self, t: FloatArray) -> FloatArray:
-        return self(t) * np.asarray(self.log(np.clip(t, _CLOSEST, _FARTHEST), 1))
-
-
 @lru_cache(maxsize=1)
-def _moments() -> tuple[_Moment, Callable[[FloatArray], FloatArray]]:
-    """Return the moment, and the height for its logarithm."""
+def _splines() -> tuple[Any, Any]:
+    """Return ln F_3/2 over the height, and the height over it: splines, good to 1e-9 and fast."""
     from scipy.interpolate import CubicSpline
 
     heights = np.linspace(_CLOSEST, _FARTHEST, _ENTRIES)
-    moments = _gaussian_moment(1.5, heights)
-    return _Moment(heights, moments), CubicSpline(np.log(moments[::-1]), heights[::-1])
+    logarithms = np.log(_gaussian_moment(1.5, heights))
+    return CubicSpline(heights, logarithms), CubicSpline(logarithms[::-1], heights[::-1])
 
 
 def _gaussian_moment(order: float, t: FloatArray) -> FloatArray:

@@ -63,7 +63,7 @@ class RingTraction:
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(np.asarray(k, dtype=np.float64))
-        found = np.zeros_like(flat)
+        transform = np.zeros_like(flat)
         if flat.size and np.any(values):
             used = self.rings <= self.radius
             rings = self.rings[used]
@@ -72,9 +72,9 @@ class RingTraction:
             bessel = (j0, j1)[order]
             size = max(1, _CHUNK // s.size)
             for start in range(0, flat.size, size):
-                part = slice(start, start + size)
-                found[part] = bessel(np.multiply.outer(flat[part], s)) @ density
-        return found.reshape(np.shape(k))
+                chunk = slice(start, start + size)
+                transform[chunk] = bessel(np.multiply.outer(flat[chunk], s)) @ density
+        return transform.reshape(np.shape(k))
 
 
 def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -90,6 +90,8 @@ _SMALLEST = 1e-30
 
 def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
     """Return j_0 to j_(count-1) at ``x``, one row each: some hundred times faster than scipy."""
+    # Miller's backward recurrence j_(l-1) = (2l+1) j_l/x - j_(l+1), normalised by the sum of
+    # (2l+1) j_l^2, which is 1.  One sweep serves all orders.
     x = np.maximum(x, _SMALLEST)
     largest = float(np.max(x, initial=0.0))
     # From here upward the functions are below 1e-16 (Airy decay beyond the turning point).
@@ -130,8 +132,8 @@ class RodTraction:
 
     radius: float
     load: float
-    pressure_terms: FloatArray
-    shear_terms: FloatArray
+    pressure_terms: FloatArray  # the first is 1
+    shear_terms: FloatArray  # empty without friction
 
     def pressure(self, r: FloatArray) -> FloatArray:
         """Return the pressure at ``r`` (m) in Pa; zero from the edge outward."""
@@ -164,8 +166,10 @@ class RodTraction:
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
         unit = self.load / (2 * np.pi * self.radius)
-        found = rod_integrals(r / self.radius, self.pressure_terms, self.shear_terms)
-        return found[0] * unit, found[1] * unit, found[2] * unit, found[3] * unit
+        w_by_p, w_by_q, u_by_p, u_by_q = rod_integrals(
+            r / self.radius, self.pressure_terms, self.shear_terms
+        )
+        return w_by_p * unit, w_by_q * unit, u_by_p * unit, u_by_q * unit
 
     def _transform(self, terms: FloatArray, first: int, k: FloatArray) -> FloatArray:
         if terms.size == 0:
@@ -192,10 +196,10 @@ class RodTraction:
 class RodSolution:
     """Solution of the rod problem for one geometry, free of load and modulus."""
 
-    stiffness_factor: float
+    stiffness_factor: float  # P / (2 E* a delta), the kappa of Hayes et al. (1972); 1: half-space
     pressure_terms: FloatArray
     shear_terms: FloatArray
-    convergence: float
+    convergence: float  # of stiffness and base stress, from half the terms and a coarser rule
 
     def traction(self, radius: float, load: float) -> RodTraction:
         """Return the traction for a rod of ``radius`` (m) under ``load`` (N)."""

@@ -22,16 +22,15 @@ import numpy as np
 
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
-from memscal.model.film import ElasticFilm
 
-__all__ = ["FilmField", "FilmModel", "MeshedField", "SurfaceCompliance"]
+__all__ = ["FilmField", "MeshedField", "SurfaceCompliance"]
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceCompliance:
     """Displacements at the rings by unit traction of every ring: (n, n) matrices in m/Pa."""
 
-    r: FloatArray
+    r: FloatArray  # m, increasing from 0; a traction of the last ring falls to zero as a step
     normal: FloatArray
     normal_by_shear: FloatArray
     radial_by_pressure: FloatArray
@@ -76,22 +75,3 @@ class MeshedField(Protocol):
 
     def mesh(self) -> FieldMesh:
         """Return displacement and stress on the mesh."""
-
-
-class FilmModel(Protocol):
-    """A film whose surface answers to tractions on rings, by one method or another."""
-
-    @property
-    def film(self) -> ElasticFilm:
-        """The film."""
-
-    @property
-    def compliance(self) -> SurfaceCompliance:
-        """Its surface's compliance."""
-
-    @property
-    def discretisation(self) -> str:
-        """What was discretised and how finely, in words."""
-
-    def field(self, pressure: FloatArray, shear: FloatArray) -> FilmField:
-        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""

@@ -18,9 +18,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import j0
 
+from memscal.mechanics.contact import Contact
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
-from memscal.mechanics.finite_strain.state import FiniteStrainState
 from memscal.mechanics.indent import indent
+from memscal.mechanics.solver.problem import Depth
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 
@@ -72,7 +73,7 @@ class Answer:
     sideways: float
 
 
-def press_with_felupe(state: FiniteStrainState, refinement: float) -> Answer:
+def press_with_felupe(state: Contact, refinement: float) -> Answer:
     """Move the surface of FElupe's film as that of ``state`` where it touches the rod."""
     mesh = film_of_quadrilaterals(refinement)
     z, r = mesh.points.T
@@ -113,7 +114,7 @@ def press_with_felupe(state: FiniteStrainState, refinement: float) -> Answer:
 
 @pytest.mark.parametrize("sticking", [False, True])
 def test_the_film_under_a_rod_agrees_with_felupe(sticking: bool) -> None:
-    (state,) = solve_finite_strain(FILM, ROD, depths=[0.15e-3], sticking=sticking, edge=0.05e-3)
+    (state,) = solve_finite_strain(FILM, ROD, (Depth(0.15e-3),), sticking=sticking, edge=0.05e-3)
     coarse, fine = (press_with_felupe(state, refinement) for refinement in REFINEMENTS)
     load, base = (
         getattr(fine, name) + (getattr(fine, name) - getattr(coarse, name)) / 3

@@ -55,7 +55,7 @@ def film_triangles(
     """Return a mesh from the axis to the free edge; all lengths in the unit of the rings."""
     sizes = _Sizes(rings[-1], thickness, refinement)
     front = _Front(_surface_nodes(rings, radius, sizes), sizes)
-    while not front.is_at_the_base:
+    while np.any(front.depth < thickness):
         front.advance()
     return TriangleMesh(np.array(front.points), np.array(front.triangles, dtype=np.int64))
 
@@ -103,8 +103,8 @@ def _fitted(rings: FloatArray, sizes: _Sizes) -> FloatArray:
             if group.sum() > longest or group.max() > _UNEVEN * group.min():
                 break
             first -= 1
-        wanted = sizes.refinement * (last - first) / _INTERVALS
-        pieces = int(np.ceil(max(gaps[first:last].sum() / longest, wanted)))
+        fewest = sizes.refinement * (last - first) / _INTERVALS
+        pieces = int(np.ceil(max(gaps[first:last].sum() / longest, fewest)))
         corners.extend(np.linspace(rings[last], rings[first], pieces + 1)[1:])
         last = first
     return np.array(corners[::-1])
@@ -120,10 +120,6 @@ class _Front:
         self.node = np.arange(r.size)
         self.points: list[tuple[float, float]] = [(radius, 0.0) for radius in r]
         self.triangles: list[tuple[int, int, int]] = []
-
-    @property
-    def is_at_the_base(self) -> bool:
-        return bool(np.all(self.depth == self.sizes.thickness))
 
     def advance(self) -> None:
         """Go down where that leads least deep, and fill what lies between with triangles."""
@@ -178,8 +174,8 @@ class _Front:
                 corners = [(a, a_below, b_below), (a, b_below, b)]
             else:
                 corners = [(a, a_below, b), (a_below, b_below, b)]
-            self.triangles.extend(each for each in corners if len(set(each)) == 3)
+            self.triangles.extend(triangle for triangle in corners if len(set(triangle)) == 3)
 
-    def _length(self, one: int, other: int) -> float:
-        (r1, d1), (r2, d2) = self.points[one], self.points[other]
+    def _length(self, start: int, end: int) -> float:
+        (r1, d1), (r2, d2) = self.points[start], self.points[end]
         return float(np.hypot(r1 - r2, d1 - d2))

@@ -33,7 +33,7 @@ from memscal.axisymmetry.hankel import gauss_between
 from memscal.mechanics.elements.mesh import TriangleMesh
 from memscal.model.arrays import FloatArray
 
-__all__ = ["MixedSystem", "QuarticLine", "hat_values", "smooth_even", "smooth_odd"]
+__all__ = ["MixedSystem", "QuarticLine", "smooth"]
 
 _DEGREE = 4
 _SMOOTH_DEGREE = 5
@@ -74,11 +74,11 @@ class QuarticLine:
         r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats, exactly."""
         knots = np.union1d(rings, self.corners[self.corners < rings[-1]])
         nodes, weights = gauss_between(knots, _ORDER)
-        hats = hat_values(rings, nodes)
+        hats = _hat_values(rings, nodes)
         return csr_array(self.at(nodes).T @ hats.multiply((weights * nodes)[:, None]))
 
 
-def hat_values(rings: FloatArray, r: FloatArray) -> csr_array:
+def _hat_values(rings: FloatArray, r: FloatArray) -> csr_array:
     """Return the matrix, shape (r.size, rings.size), of the rings' hats at ``r``."""
     element = np.clip(np.searchsorted(rings, r, side="right") - 1, 0, rings.size - 2)
     rising = (r - rings[element]) / (rings[element + 1] - rings[element])
@@ -88,31 +88,23 @@ def hat_values(rings: FloatArray, r: FloatArray) -> csr_array:
     return csr_array((values.ravel(), columns.ravel(), rows), shape=(r.size, rings.size))
 
 
-def smooth_even(line: QuarticLine, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Return the even quintic spline nearest to a quartic's nodal values; its integral stays."""
-    return _smooth(line, values, 1.0)
-
-
-def smooth_odd(line: QuarticLine, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Return the smooth odd function of ``r`` nearest to nodal values; see :func:`smooth_even`."""
-    return _smooth(line, values, -1.0)
-
-
-def _smooth(
-    line: QuarticLine, values: FloatArray, parity: float
+def smooth(
+    line: QuarticLine, values: FloatArray, parity: int
 ) -> Callable[[FloatArray], FloatArray]:
+    """Return the even (1) or odd (-1) quintic spline of ``r`` nearest to a quartic's values."""
+    # Knots at the corners, nearest in the integral of (.)^2 r dr: that of (.) r dr stays.
     from scipy.interpolate import make_lsq_spline
 
     corners = line.corners
     r, weights = gauss_between(corners, _ORDER + 1)
-    given, weights = line.at(r) @ values, np.sqrt(weights * r)
+    quartic, weights = line.at(r) @ values, np.sqrt(weights * r)
     ends = np.full(_SMOOTH_DEGREE + 1, corners[-1])
     halves = line.r[2:-1:2]
     knots = np.concatenate([-ends, -halves[::-1], halves, ends])
     # Mirrored about the axis, so that what is fitted has the right symmetry.
     spline = make_lsq_spline(
         np.concatenate([-r[::-1], r]),
-        np.concatenate([parity * given[::-1], given]),
+        np.concatenate([parity * quartic[::-1], quartic]),
         knots,
         k=_SMOOTH_DEGREE,
         w=np.concatenate([weights[::-1], weights]),
@@ -213,8 +205,8 @@ class MixedSystem:
 
     def side(self, depth: float) -> tuple[QuarticLine, NDArray[np.int64], NDArray[np.int64]]:
         """Return the side of the mesh at a depth, with its outward and inward unknowns."""
-        on_it = self.displacement.get_dofs(lambda x: x[1] == depth)
-        outward, inward = on_it.all(["u^1"]), on_it.all(["u^2"])
+        on_side = self.displacement.get_dofs(lambda x: x[1] == depth)
+        outward, inward = on_side.all(["u^1"]), on_side.all(["u^2"])
         r = self.displacement.doflocs[0]
         outward, inward = outward[np.argsort(r[outward])], inward[np.argsort(r[inward])]
         return QuarticLine(r[inward]), outward, inward

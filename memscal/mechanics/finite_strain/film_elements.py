@@ -45,8 +45,7 @@ def determinant(F: FloatArray) -> FloatArray:
 def cofactor(F: FloatArray) -> FloatArray:
     """Return the derivative of J by the gradient, shape (..., 5)."""
     rr, rz, zr, zz, hoop = np.moveaxis(F, -1, 0)
-    parts = [zz * hoop, -zr * hoop, -rz * hoop, rr * hoop, rr * zz - rz * zr]
-    return np.stack(parts, axis=-1)
+    return np.stack([zz * hoop, -zr * hoop, -rz * hoop, rr * hoop, rr * zz - rz * zr], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -238,8 +237,8 @@ class FilmElements:
         return np.unique(np.concatenate([self.base, self.base + self.n, axis]))
 
     def _line(self, chosen: NDArray[np.bool_]) -> IntArray:
-        found = np.flatnonzero(chosen)
-        return found[np.argsort(self.nodes[0][found], kind="stable")]
+        nodes = np.flatnonzero(chosen)
+        return nodes[np.argsort(self.nodes[0][nodes], kind="stable")]
 
     @cached_property
     def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
@@ -339,10 +338,10 @@ def _shapes(displacement: Any, pressure: Any, radius: FloatArray) -> tuple[Float
         value, slope = np.broadcast_to(np.asarray(field), radius.shape), field.grad
         # u/r on the axis is the slope of u.
         hoop = np.where(on_axis, slope[0], value / np.where(on_axis, 1.0, radius))
-        for row, column, part in (
+        for row, column, derivative in (
             (0, i, slope[0]), (1, i, slope[1]), (4, i, hoop),
             (2, 6 + i, slope[0]), (3, 6 + i, slope[1]),
         ):  # fmt: skip
-            gradients[:, :, row, column] = part
+            gradients[:, :, row, column] = derivative
     pressures = [np.broadcast_to(np.asarray(field), radius.shape) for (field,) in pressure.basis]
     return gradients, np.stack(pressures, axis=-1)

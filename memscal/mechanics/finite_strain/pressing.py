@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from scipy import sparse
@@ -29,7 +28,6 @@ from memscal.mechanics.finite_strain.film_elements import FilmElements, IntArray
 from memscal.model.arrays import FloatArray
 
 __all__ = [
-    "Face",
     "Goal",
     "NewtonError",
     "Pressed",
@@ -39,16 +37,6 @@ __all__ = [
     "Step",
     "follow",
 ]
-
-
-class Face(Protocol):
-    """The contour of an indenter."""
-
-    def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the points at ``s`` and their first and second derivatives, shapes (2, n)."""
-
-    def nearest(self, r: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where on the contour is nearest, and how far outside a point is (or inside)."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +52,7 @@ class RodFace:
         return self.radius - self.edge
 
     def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return points, tangents and curvature vectors."""
+        """Return points, tangents and curvature vectors at ``s`` (mm), shapes (2, n)."""
         angle = np.clip((s - self.flat) / self.edge, 0.0, np.pi / 2)
         sine, cosine = np.sin(angle), np.cos(angle)
         wall = np.maximum(s - self.flat - np.pi / 2 * self.edge, 0.0)
@@ -91,7 +79,7 @@ class SphereFace:
     radius: float
 
     def contour(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return points, tangents and curvature vectors."""
+        """Return points, tangents and curvature vectors at ``s`` (mm), shapes (2, n)."""
         sine, cosine = np.sin(s / self.radius), np.cos(s / self.radius)
         height = 2 * self.radius * np.sin(s / (2 * self.radius)) ** 2
         points = np.stack([self.radius * sine, height])
@@ -148,7 +136,7 @@ class Pressing:
     """A film, an indenter, and whether the surface sticks to it."""
 
     elements: FilmElements
-    face: Face
+    face: RodFace | SphereFace
     sticking: bool
     # Whether a node sticks at its undeformed radius, and not where it came to touch the face.
     upright: bool = False
@@ -226,15 +214,15 @@ class Pressing:
         # radial displacement; and the depth, which moves all touching nodes down.
         free = np.ones(size, dtype=bool)
         free[np.concatenate([elements.held, touching + n])] = False
-        own = np.ones(size)
-        own[touching] = tangents[0]
+        outward = np.ones(size)
+        outward[touching] = tangents[0]
         climbing = sparse.coo_array((tangents[1], (touching + n, touching)), shape=(size, size))
         if self.sticking:
             free[touching] = False
         else:
             curvature = np.zeros(size)
             curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
-        columns = [(sparse.diags_array(own) + climbing).tocsc()[:, np.flatnonzero(free)]]
+        columns = [(sparse.diags_array(outward) + climbing).tocsc()[:, np.flatnonzero(free)]]
         if goal.is_load:
             sinking = np.zeros((size, 1))
             sinking[touching + n] = -1.0

@@ -1,23 +1,21 @@
-"""A film pressed at finite strain: what was found, in SI units, and its field."""
+"""The field in a film at finite strain, and its traction under the indenter, in SI units."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
-from memscal.mechanics.finite_strain.film_elements import IntArray
 from memscal.mechanics.finite_strain.pressing import Pressed, Pressing
+from memscal.mechanics.rings import RingTraction
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
 
-__all__ = ["FiniteStrainField", "FiniteStrainState", "interface_tractions", "outermost"]
+__all__ = ["FiniteStrainField", "interface_traction", "outermost"]
 
 _MM = 1e-3
 _MPA = 1e6
@@ -27,19 +25,9 @@ _MPA = 1e6
 class FiniteStrainField:
     """The field in a film at finite strain; see :class:`memscal.mechanics.surface.FilmField`.
 
-    At the base, what a sensor measures is the Cauchy traction where it is: the base is rigid and
-    the film bonded to it, so that there an element of area neither moves, grows nor turns.  The
-    Cauchy traction is then the nominal one, and radii before and after deformation are the same.
-
-    At the surface, ``depression`` and ``outward`` are functions of the radius of a point *before*
-    the deformation; the point is then at ``r + outward(r)``.
-
-    Parameters
-    ----------
-    pressing : Pressing
-        Film and indenter.
-    pressed : Pressed
-        Their state.
+    The base is rigid and the film bonded to it: an element of area there neither moves, grows nor
+    turns, so that the Cauchy traction, which a sensor measures, is the nominal one.  ``depression``
+    and ``outward`` are functions of a point's radius *before* the deformation.
     """
 
     pressing: Pressing
@@ -47,12 +35,10 @@ class FiniteStrainField:
 
     @cached_property
     def base(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Radii at the base (m), pressure and outward shear on the film there (Pa).
-
-        They are those of the splines that do the same work as the nodal forces on every
-        displacement that is linear between the triangles' corners: more accurate than stresses
-        taken inside the elements, and in balance with the load to rounding.
-        """
+        """Radii at the base (m), pressure and outward shear on the film there (Pa)."""
+        # Of the splines that do the same work as the nodal forces on every displacement that is
+        # linear between the corners: more accurate than stresses taken inside the elements, and in
+        # balance with the load to rounding.
         elements = self.pressing.elements
         forces, nodes = elements.forces(self.pressed.x), elements.base
         r = elements.nodes[0][nodes][::2]
@@ -104,8 +90,8 @@ class FiniteStrainField:
         elements, x = self.pressing.elements, self.pressed.x
         basis = elements.bases[0]
         corners = basis.doflocs[:, basis.element_dofs[:3]]
-        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        turned = one[0] * other[1] < one[1] * other[0]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        turned = first[0] * second[1] < first[1] * second[0]
         triangles = basis.element_dofs.T.copy()
         triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
         return FieldMesh(
@@ -117,65 +103,11 @@ class FiniteStrainField:
         )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FiniteStrainState:
-    """A rigid indenter pressed on a neo-Hookean film at finite strain.
-
-    Parameters
-    ----------
-    film, indenter
-        What was pressed on what.
-    sticking : bool
-        Whether the contact sticks; otherwise it is frictionless.
-    load, depth, contact_radius : float
-        Load in N, indentation depth and (deformed) contact radius in m.
-    inside : FiniteStrainField
-        The field in the film.
-    interface_r, interface_pressure, interface_shear : ndarray, shape (n,)
-        Radii of points in contact after deformation (m, on the end and the rounded edge of a
-        rod, but not on its wall), pressure and outward shear on the film there (Pa, Cauchy).
-    elastic_energy : float
-        Energy stored in the film, in J.
-    work : float or None
-        Work done by the indenter, in J, from the steps of the loading; ``None`` for a sphere that
-        sticks, whose contact has no way (no radial displacement wherever it touches).
-    convergence : float
-        Largest change of base stress, load and depth from a coarser mesh, relative to the largest
-        stress, the load and the depth.
-    steps : int
-        Load steps from the untouched film.
-    discretisation : str
-        What was discretised and how finely, in words.
-    """
-
-    film: ElasticFilm
-    indenter: Indenter
-    sticking: bool
-    load: float
-    depth: float
-    contact_radius: float
-    inside: FiniteStrainField = field(repr=False)
-    interface_r: FloatArray = field(repr=False)
-    interface_pressure: FloatArray = field(repr=False)
-    interface_shear: FloatArray = field(repr=False)
-    elastic_energy: float
-    work: float | None
-    convergence: float
-    steps: int
-    discretisation: str
-
-    def mesh(self) -> FieldMesh:
-        """Return displacement and Cauchy stress on the undeformed mesh."""
-        return self.inside.mesh()
-
-
-def interface_tractions(
-    pressing: Pressing, pressed: Pressed
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return radii (m), pressure and shear (Pa) at the corners of the triangles in contact.
+def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
+    """Return pressure and shear (Pa) at the deformed radii of the triangles' corners in contact.
 
     They are means over the hats of the corners, in the deformed surface: nodal forces of
-    quadratic elements are no tractions of their own (that on the axis has no area).
+    quadratic elements are no tractions (that on the axis has no area).  A rod's wall is left out.
     """
     elements, x = pressing.elements, pressed.x
     nodes = elements.surface
@@ -196,9 +128,10 @@ def interface_tractions(
     area[:-1] += np.pi / 3 * side * (2 * left + right)
     area[1:] += np.pi / 3 * side * (left + 2 * right)
 
-    chosen = touching[::2] & (along[::2] > 1e-6)
+    chosen = np.flatnonzero(touching[::2] & (along[::2] > 1e-6))
+    chosen = chosen[np.argsort(r[::2][chosen], kind="stable")]
     pressure, shear = _on_corners(pushed) / area, _on_corners(dragged) / area
-    return r[::2][chosen] * _MM, pressure[chosen] * _MPA, shear[chosen] * _MPA
+    return RingTraction(r[::2][chosen] * _MM, pressure[chosen] * _MPA, shear[chosen] * _MPA)
 
 
 def _on_corners(forces: FloatArray) -> FloatArray:
@@ -247,7 +180,7 @@ def _interpolated(
 
 def outermost(pressing: Pressing, pressed: Pressed) -> float:
     """Return the radius after deformation at which the contact ends, in mm, between two nodes."""
-    nodes: IntArray = pressing.elements.surface
+    nodes = pressing.elements.surface
     r = pressing.elements.nodes[0][nodes] + pressed.x[nodes]
     last = int(np.flatnonzero(np.isin(nodes, pressed.touching))[-1])
     return float((r[last] + r[min(last + 1, r.size - 1)]) / 2)

@@ -24,7 +24,7 @@ from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load,
 from memscal.mechanics.solver.step import take_step
 from memscal.model.arrays import FloatArray
 
-__all__ = ["PathPoint", "follow", "is_contact", "meet_at", "mixture", "reached", "step_at_once"]
+__all__ = ["PathPoint", "follow"]
 
 # At the very edge, a share of the largest pressure may pull, and a share of the depth overlap:
 # that is what the rings next to it resolve.  It is gone with the next ring.
@@ -32,24 +32,24 @@ _PULL = 1e-2
 _OVERLAP = 1e-3
 
 
-def meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
+def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
     """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``."""
     # The rings in contact stay in contact, though one may pull a little at the edge; only where
     # that is more than a little are they free to go.
     state = take_step(problem, start, Touch(ring), same_contact=True)
-    return state if is_contact(problem, state) else take_step(problem, start, Touch(ring))
+    return state if _is_contact(problem, state) else take_step(problem, start, Touch(ring))
 
 
-def is_contact(problem: ContactProblem, state: ContactState) -> bool:
+def _is_contact(problem: ContactProblem, state: ContactState) -> bool:
     """Whether a state fulfils Signorini's conditions, but for what an edge does not resolve."""
     outside = problem.separations(state)[~state.touching]
     overlaps = np.any(outside < -_OVERLAP * abs(state.depth))
     return bool(state.pressure.min() >= -_PULL * state.pressure.max() and not overlaps)
 
 
-def mixture(lower: ContactState, upper: ContactState, target: Target) -> ContactState:
+def _mixture(lower: ContactState, upper: ContactState, target: Target) -> ContactState:
     """Return the mixture of two states that is at ``target``; statuses are the second's."""
-    begin, end = reached(lower, target), reached(upper, target)
+    begin, end = _reached(lower, target), _reached(upper, target)
     share = (target.value - begin) / (end - begin)
     if not 0 <= share <= 1:
         raise ConvergenceError(
@@ -65,12 +65,12 @@ def mixture(lower: ContactState, upper: ContactState, target: Target) -> Contact
     return replace(upper, **mixed, iterations=lower.iterations + upper.iterations)
 
 
-def reached(state: ContactState, target: Target) -> float:
+def _reached(state: ContactState, target: Target) -> float:
     """Return the load or the depth of a state, as the target counts."""
     return state.load if isinstance(target, Load) else state.depth
 
 
-def step_at_once(problem: ContactProblem, smooth: ContactState, target: Target) -> ContactState:
+def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target) -> ContactState:
     """Return the state at ``target``, one step from the untouched film."""
     untouched = np.zeros(problem.size)
     start = replace(smooth, anchor=untouched, outward=untouched)
@@ -94,15 +94,15 @@ def _between_rings(
 
     rings = min(rings, problem.size - 1)
     upper = meeting_at(rings)
-    while reached(upper, target) < target.value and rings < problem.size - 1:
+    while _reached(upper, target) < target.value and rings < problem.size - 1:
         rings += 1
         upper = meeting_at(rings)
     lower = meeting_at(rings - 1)
-    while reached(lower, target) > target.value and rings > 2:
+    while _reached(lower, target) > target.value and rings > 2:
         rings, upper = rings - 1, lower
         lower = meeting_at(rings - 1)
-    state = mixture(lower, upper, target)
-    if not is_contact(problem, state):
+    state = _mixture(lower, upper, target)
+    if not _is_contact(problem, state):
         raise ConvergenceError(
             f"No contact that is loaded in one step was found at {target}.",
             why="At its edge the film would have to pull at the indenter, or pass through it.",
@@ -141,7 +141,7 @@ def _in_one_step(
     """Solve each target from the untouched film; the frictionless contact is where to begin."""
     smooth = replace(problem, friction=0.0)
     for target, point in zip(targets, _step_by_step(smooth, targets, increments), strict=True):
-        state = step_at_once(problem, point.state, target)
+        state = _step_at_once(problem, point.state, target)
         yield PathPoint(state, 1, _elastic_energy(problem, state), None, None)
 
 
@@ -178,11 +178,11 @@ def _step_by_step(
     resume, upward = walk, True
     farthest = max(target.value for target in targets)
     for target in targets:
-        if math.isclose(reached(walk.state, target), target.value, rel_tol=1e-12):
+        if math.isclose(_reached(walk.state, target), target.value, rel_tol=1e-12):
             # Nothing moves, and nothing that slipped is found to stick.
             yield walk.point()
             continue
-        rising = target.value > reached(walk.state, target)
+        rising = target.value > _reached(walk.state, target)
         if rising == upward:
             walk = resume
         try:
@@ -204,11 +204,12 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     """Go to the target, ring by ring; return the walk as it was at the last ring before it."""
     problem = walk.problem
     while (following := _next_meeting(problem, walk.state, target, rising=rising)) is not None:
-        if not _between(following, walk.state, target):
+        begin, end = _reached(walk.state, target), _reached(following, target)
+        if not (begin < end <= target.value or begin > end >= target.value):
             # A path that goes on in the same direction goes on from the ring before: looking at a
             # state between two rings must not change those that follow.
             before = replace(walk)
-            walk.step_to(mixture(walk.state, following, target))
+            walk.step_to(_mixture(walk.state, following, target))
             return before
         walk.step_to(following)
     _walk_with_given_contact(walk, target)
@@ -220,7 +221,7 @@ def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
     # On a rigid interface the first loading is one step: everything grows in proportion.
     proportional = walk.state.load == 0 and walk.problem.interface.rigid
     count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
-    begin = reached(walk.state, target)
+    begin = _reached(walk.state, target)
     for share in np.arange(1, count + 1) / count:
         value = begin + (target.value - begin) * float(share)
         goal = target if share == 1 else replace(target, value=value)
@@ -230,7 +231,7 @@ def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
 def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) -> None:
     """Go to a target in steps that are even in the contact radius of a sphere."""
     power = 3 if isinstance(target, Load) else 2
-    start = reached(walk.state, target)
+    start = _reached(walk.state, target)
     begin, end = ((value / farthest) ** (1 / power) for value in (start, target.value))
     count = max(1, math.ceil(increments * abs(end - begin) - 1e-9))
     for share in np.linspace(begin, end, count + 1)[1:-1]:
@@ -239,32 +240,26 @@ def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) 
     walk.step_to(take_step(walk.problem, walk.state, target))
 
 
-def _onset(state: ContactState, *, rising: bool) -> ContactState:
-    """Return the state with the rings that meet without pressing in contact, or out of it."""
-    return state if rising else replace(state, touching=state.touching & (state.pressure > 0))
-
-
 def _next_meeting(
     problem: ContactProblem, state: ContactState, target: Target, *, rising: bool
 ) -> ContactState | None:
     """Return the next state in which the surfaces just meet at a ring at the contact's edge."""
-    onset = _onset(state, rising=rising)
-    edge = _reachable(problem, onset.touching)
+    touching = state.touching
     if not rising:
-        edge = onset.touching & _neighbours(edge)
-        if np.count_nonzero(onset.touching) < 2:
+        # Rings that meet without pressing are out of contact on the way back.
+        touching = touching & (state.pressure > 0)
+    edge = ~touching & _neighbours(touching) & np.isfinite(problem.heights)
+    if not rising:
+        edge = touching & _neighbours(edge)
+        if np.count_nonzero(touching) < 2:
             return None
+    onset = replace(state, touching=touching)
     # A contact with a hole has two edges: what meets, or parts, first comes next.
-    states = [meet_at(problem, onset, int(ring)) for ring in np.flatnonzero(edge)]
+    states = [_meet_at(problem, onset, int(ring)) for ring in np.flatnonzero(edge)]
     if not states:
         return None
     nearest = min if rising else max
-    return nearest(states, key=lambda following: reached(following, target))
-
-
-def _reachable(problem: ContactProblem, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the free rings next to the contact that the indenter has not ended at."""
-    return ~touching & _neighbours(touching) & np.isfinite(problem.heights)
+    return nearest(states, key=lambda following: _reached(following, target))
 
 
 def _neighbours(rings: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -272,12 +267,6 @@ def _neighbours(rings: NDArray[np.bool_]) -> NDArray[np.bool_]:
     beside[1:] |= rings[:-1]
     beside[:-1] |= rings[1:]
     return beside
-
-
-def _between(following: ContactState, state: ContactState, target: Target) -> bool:
-    """Whether a step brought the state nearer to the target without passing it."""
-    begin, now = reached(state, target), reached(following, target)
-    return begin < now <= target.value or begin > now >= target.value
 
 
 def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:

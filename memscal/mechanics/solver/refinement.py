@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,12 +17,14 @@ from memscal.mechanics.interface import Interface
 from memscal.mechanics.rings import RingTraction
 from memscal.mechanics.solver.path import PathPoint, follow
 from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target
-from memscal.mechanics.surface import FilmModel
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 
-__all__ = ["RingRequest", "even_rings", "rings_around", "rings_under_a_rod", "solve_on_rings"]
+if TYPE_CHECKING:
+    from memscal.mechanics.elements.element_film import ElementFilm
+
+__all__ = ["RingRequest", "solve_on_rings"]
 
 # Rings beyond the largest contact, so that it can end where it will.
 _MARGIN = 4
@@ -35,12 +38,7 @@ _CROWDING = 4.0
 _PLACING_SAMPLES = 100_001
 
 
-def even_rings(reach: float, count: int) -> FloatArray:
-    """Return ``count`` even rings from the axis to ``reach`` (m)."""
-    return np.linspace(0.0, reach, count)
-
-
-def rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArray:
+def _rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArray:
     """Return ``count`` even rings up to ``reach`` (m), and more at the expected ``edges`` (m)."""
     spacing = reach / count
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
@@ -51,12 +49,6 @@ def rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArray
     # Where the number of rings passed so far is whole, there is one.
     passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (1 / local[1:] + 1 / local[:-1]))])
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
-
-
-def rings_under_a_rod(radius: float, count: int) -> FloatArray:
-    """Return rings from the axis to a rod's edge that crowd towards it, and one on the edge."""
-    inward = np.linspace(1.0, 0.0, count) ** _CROWDING
-    return radius * (1.0 - inward)
 
 
 _FEWEST_RINGS = 48
@@ -120,8 +112,9 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
 
 def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: int) -> FloatArray:
     if isinstance(request.indenter, Rod):
-        return rings_under_a_rod(request.indenter.radius, count)
-    return rings_around(edges, reach, count)
+        # They crowd towards the edge, where one is.
+        return request.indenter.radius * (1.0 - np.linspace(1.0, 0.0, count) ** _CROWDING)
+    return _rings_around(edges, reach, count)
 
 
 def _expected(request: RingRequest) -> tuple[list[float], float]:
@@ -132,9 +125,9 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
     # Doubled until the contact ends within the rings; shortened until it fills a good part of them.
     reach = film.thickness
     while True:
-        rings = even_rings(reach, _COARSE)
+        rings = np.linspace(0.0, reach, _COARSE)
         try:
-            states = [point.state for point in _follow(request, HankelFilm(film, rings))[1]]
+            states = [point.state for point in _follow(request, HankelFilm(film, rings))]
         except ConvergenceError:
             # A contact that has run off the rings may not settle.
             if reach > _WIDEST * film.thickness:
@@ -167,7 +160,7 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
     return edges, within
 
 
-def _follow(request: RingRequest, model: FilmModel) -> tuple[ContactProblem, list[PathPoint]]:
+def _follow(request: RingRequest, model: HankelFilm | ElementFilm) -> list[PathPoint]:
     rings = model.compliance.r
     problem = ContactProblem(
         film=request.film,
@@ -177,12 +170,12 @@ def _follow(request: RingRequest, model: FilmModel) -> tuple[ContactProblem, lis
         interface=request.interface,
     )
     # Between rigid surfaces a step is a ring; where nothing touches all at once, as many steps.
-    return problem, follow(problem, request.targets, request.loading, increments=rings.size)
+    return follow(problem, request.targets, request.loading, increments=rings.size)
 
 
 def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
     """Return the contacts on given rings."""
-    model: FilmModel
+    model: HankelFilm | ElementFilm
     if request.backend == "fem":
         from memscal.mechanics.elements.element_film import ElementFilm
 
@@ -191,7 +184,7 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
     else:
         model = HankelFilm(request.film, rings)
     try:
-        _, points = _follow(request, model)
+        points = _follow(request, model)
     except ConvergenceError as error:
         if isinstance(error.last, PathPoint):
             error.last = _contact(request, model, error.last)
@@ -206,7 +199,7 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
     ]
 
 
-def _contact(request: RingRequest, model: FilmModel, point: PathPoint) -> Contact:
+def _contact(request: RingRequest, model: HankelFilm | ElementFilm, point: PathPoint) -> Contact:
     state, rings = point.state, model.compliance.r
     if state.depth >= request.film.thickness:
         raise too_deep(request.film, request.indenter, state.load, state.depth)

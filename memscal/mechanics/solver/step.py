@@ -19,13 +19,13 @@ from memscal.mechanics.interface import NormalLaw
 from memscal.mechanics.solver.problem import ContactProblem, ContactState, Depth, Goal, Load, Touch
 from memscal.model.arrays import FloatArray
 
-__all__ = ["Statuses", "Tractions", "solve_system", "take_step"]
+__all__ = ["take_step"]
 
 _Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Statuses:
+class _Statuses:
     """What is taken for granted while the equations are solved; arrays over the n rings."""
 
     pressing: NDArray[np.bool_]  # rings that bear a pressure
@@ -38,7 +38,7 @@ class Statuses:
 
 
 @dataclass(frozen=True, eq=False)
-class Tractions:
+class _Tractions:
     """Pressure and shear (Pa) at the rings, and the depth (m)."""
 
     pressure: FloatArray
@@ -46,7 +46,7 @@ class Tractions:
     depth: float
 
 
-def solve_system(problem: ContactProblem, statuses: Statuses, goal: Goal) -> Tractions:
+def _solve_system(problem: ContactProblem, statuses: _Statuses, goal: Goal) -> _Tractions:
     """Return the tractions and the depth that fulfil the equations of ``statuses`` and ``goal``."""
     c, mu = problem.compliance, problem.friction
     off_axis = c.r > 0
@@ -73,14 +73,14 @@ def solve_system(problem: ContactProblem, statuses: Statuses, goal: Goal) -> Tra
             np.zeros((stuck.size, 1)),
         ]
     )
-    last, wanted = _goal_row(problem, goal, normal, rows, unit)
+    last, value = _goal_row(problem, goal, normal, rows, unit)
     matrix = np.vstack([normal[rows], radial, last])
-    right = np.concatenate([-problem.heights[rows], statuses.anchor[stuck], [wanted]])
+    right = np.concatenate([-problem.heights[rows], statuses.anchor[stuck], [value]])
     _add_normal_compliance(problem, statuses, rows, matrix, right)
     if problem.interface.slip_length > 0 and math.isfinite(mu):
         _add_tangential_compliance(problem, statuses, (rows, stuck), matrix, right)
     try:
-        found = np.linalg.solve(matrix, right)
+        solution = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
         raise ConvergenceError(
             "The equations of the contact have no solution.",
@@ -89,10 +89,10 @@ def solve_system(problem: ContactProblem, statuses: Statuses, goal: Goal) -> Tra
         ) from error
 
     pressure, shear = np.zeros(problem.size), np.zeros(problem.size)
-    pressure[rows] = found[: rows.size]
-    shear[rows] = ratio * found[: rows.size]
-    shear[stuck] = found[rows.size : -1]
-    return Tractions(pressure, shear, float(found[-1]) * unit)
+    pressure[rows] = solution[: rows.size]
+    shear[rows] = ratio * solution[: rows.size]
+    shear[stuck] = solution[rows.size : -1]
+    return _Tractions(pressure, shear, float(solution[-1]) * unit)
 
 
 def _goal_row(
@@ -113,7 +113,7 @@ def _goal_row(
 
 def _add_normal_compliance(
     problem: ContactProblem,
-    statuses: Statuses,
+    statuses: _Statuses,
     rows: _Indices,
     matrix: FloatArray,
     right: FloatArray,
@@ -124,14 +124,14 @@ def _add_normal_compliance(
         return
     gap = statuses.separation[rows]
     stiffness = law.stiffness(gap, problem.film)
-    own = np.arange(rows.size)
-    matrix[own, own] += 1 / stiffness
-    right[own] += gap + law.pressure(gap, problem.film) / stiffness
+    diagonal = np.arange(rows.size)
+    matrix[diagonal, diagonal] += 1 / stiffness
+    right[diagonal] += gap + law.pressure(gap, problem.film) / stiffness
 
 
 def _add_tangential_compliance(
     problem: ContactProblem,
-    statuses: Statuses,
+    statuses: _Statuses,
     indices: tuple[_Indices, _Indices],
     matrix: FloatArray,
     right: FloatArray,
@@ -172,7 +172,7 @@ def take_step(
     statuses = _first_statuses(problem, start, goal)
     held = goal.ring if isinstance(goal, Touch) else None
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        tractions = solve_system(problem, statuses, goal)
+        tractions = _solve_system(problem, statuses, goal)
         careful = iteration > _CAREFUL_AFTER
         revised, settled = _revise(problem, statuses, tractions, held=held, careful=careful)
         if same_contact:
@@ -188,7 +188,7 @@ def take_step(
     )
 
 
-def _first_statuses(problem: ContactProblem, start: ContactState, goal: Goal) -> Statuses:
+def _first_statuses(problem: ContactProblem, start: ContactState, goal: Goal) -> _Statuses:
     """Begin with the statuses of the state before."""
     law = problem.normal_law
     pressing = start.touching.copy()
@@ -197,7 +197,7 @@ def _first_statuses(problem: ContactProblem, start: ContactState, goal: Goal) ->
         pressing = _bearing(problem, law, separation)
     if isinstance(goal, Touch):
         pressing[goal.ring] = False
-    return Statuses(
+    return _Statuses(
         pressing=pressing,
         slip=start.slip,
         anchor=start.anchor,
@@ -215,12 +215,12 @@ def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) ->
 
 def _revise(
     problem: ContactProblem,
-    statuses: Statuses,
-    tractions: Tractions,
+    statuses: _Statuses,
+    tractions: _Tractions,
     *,
     held: int | None,
     careful: bool,
-) -> tuple[Statuses, bool]:
+) -> tuple[_Statuses, bool]:
     """Return statuses that the tractions do not contradict, and whether nothing changed."""
     p, q = tractions.pressure, tractions.shear
     w, u = problem.displacements(p, q)
@@ -238,7 +238,7 @@ def _revise(
     moved = np.max(np.abs(p - statuses.pressure)) > _SETTLED * p.max()
     settled = not (normal or tangential or (moved and not problem.interface.rigid))
     length = problem.interface.slip_length
-    revised = Statuses(
+    revised = _Statuses(
         pressing=pressing,
         slip=slip,
         anchor=statuses.anchor,
@@ -250,7 +250,7 @@ def _revise(
 
 
 def _revised_contact(
-    statuses: Statuses,
+    statuses: _Statuses,
     p: FloatArray,
     gap: FloatArray,
     depth: float,
@@ -272,8 +272,8 @@ def _revised_contact(
 
 def _revised_slip(
     problem: ContactProblem,
-    statuses: Statuses,
-    tractions: Tractions,
+    statuses: _Statuses,
+    tractions: _Tractions,
     u: FloatArray,
     *,
     careful: bool,
@@ -310,8 +310,8 @@ def _revised_slip(
 def _revised_separation(
     problem: ContactProblem,
     law: NormalLaw,
-    statuses: Statuses,
-    tractions: Tractions,
+    statuses: _Statuses,
+    tractions: _Tractions,
     gap: FloatArray,
 ) -> FloatArray:
     """Return the next trial of the separations."""
@@ -326,8 +326,8 @@ def _revised_separation(
 
 def _accepted(
     problem: ContactProblem,
-    statuses: Statuses,
-    tractions: Tractions,
+    statuses: _Statuses,
+    tractions: _Tractions,
     held: int | None,
     iterations: int,
 ) -> ContactState:

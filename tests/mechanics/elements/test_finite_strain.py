@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 import skfem
 
-from memscal.errors import ConvergenceError, DomainError, InputError
+from memscal.errors import ConvergenceError
+from memscal.mechanics.contact import Contact
 from memscal.mechanics.finite_strain.film_elements import FilmElements, NeoHookean
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
-from memscal.mechanics.finite_strain.state import FiniteStrainState
 from memscal.mechanics.indent import indent
+from memscal.mechanics.solver.problem import Depth, Load
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Cone, Rod, Sphere
+from memscal.model.indenter import Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD = Rod(radius=0.25e-3)
@@ -29,14 +30,12 @@ def cylinder(nu: float = 0.5) -> FilmElements:
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["sliding", "sticking"])
-def pressed_rods(request: pytest.FixtureRequest) -> list[FiniteStrainState]:
-    depths = [0.02e-3, 0.04e-3, 0.12e-3]
-    return solve_finite_strain(
-        FILM, ROD, depths=depths, sticking=request.param, edge=EDGE, refinement=0.6
-    )
+def pressed_rods(request: pytest.FixtureRequest) -> tuple[Contact, ...]:
+    depths = (Depth(0.02e-3), Depth(0.04e-3), Depth(0.12e-3))
+    return solve_finite_strain(FILM, ROD, depths, sticking=request.param, edge=EDGE, refinement=0.6)
 
 
-@pytest.mark.parametrize("stretch", [0.5, 0.8, 1.6])
+@pytest.mark.parametrize("stretch", [0.5, 1.6])
 def test_a_free_cylinder_is_compressed_as_the_closed_form_says(stretch: float) -> None:
     elements = cylinder()
     G = elements.material.shear_modulus
@@ -93,7 +92,7 @@ def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(
 @pytest.mark.parametrize(("nu", "sticking"), [(0.3, False), (0.5, False), (0.5, True)])
 def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, sticking: bool) -> None:
     film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
-    (state,) = solve_finite_strain(film, SPHERE, loads=[0.1], sticking=sticking, refinement=0.6)
+    (state,) = solve_finite_strain(film, SPHERE, (Load(0.1),), sticking=sticking, refinement=0.6)
     friction = np.inf if sticking else 0.0
     linear = indent(film, SPHERE, load=0.1, friction=friction, loading="total")
     assert state.load == pytest.approx(0.1, rel=1e-9)
@@ -110,7 +109,7 @@ def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, stickin
 @pytest.mark.parametrize("sticking", [False, True])
 def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool) -> None:
     # Only the flat part of its end touches then: a rod of that radius.
-    (state,) = solve_finite_strain(FILM, ROD, depths=[1e-10], sticking=sticking, edge=EDGE)
+    (state,) = solve_finite_strain(FILM, ROD, (Depth(1e-10),), sticking=sticking, edge=EDGE)
     linear = indent(
         FILM,
         Rod(radius=ROD.radius - EDGE),
@@ -119,24 +118,24 @@ def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool) -> Non
     )
     # The stress at the edge of the flat is singular, and the mesh no finer than the rounding's.
     assert state.load == pytest.approx(linear.load, rel=5e-3)
-    found = state.inside.base_normal(RADII) / state.load
+    per_load = state.inside.base_normal(RADII) / state.load
     expected = linear.base_stress(RADII) / linear.load
-    assert found == pytest.approx(expected, abs=1e-3 * float(expected[0]))
+    assert per_load == pytest.approx(expected, abs=1e-3 * float(expected[0]))
 
 
 def test_the_departure_of_the_base_stress_grows_linearly_at_first(
-    pressed_rods: list[FiniteStrainState],
+    pressed_rods: tuple[Contact, ...],
 ) -> None:
     (hardly,) = solve_finite_strain(
         FILM,
         ROD,
-        depths=[1e-8],
-        sticking=pressed_rods[0].sticking,
+        (Depth(1e-8),),
+        sticking=pressed_rods[0].friction > 0,
         edge=EDGE,
         refinement=0.6,
     )
 
-    def departure(state: FiniteStrainState) -> float:
+    def departure(state: Contact) -> float:
         r = np.array([1.5e-3])
         per_load = state.inside.base_spectrum(r * 1e6)[0] / state.load
         return float(per_load / (hardly.inside.base_spectrum(r * 1e6)[0] / hardly.load) - 1)
@@ -145,7 +144,7 @@ def test_the_departure_of_the_base_stress_grows_linearly_at_first(
     assert twice / once == pytest.approx(2.0, rel=0.25)
 
 
-def test_the_base_carries_the_load(pressed_rods: list[FiniteStrainState]) -> None:
+def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]) -> None:
     for state in pressed_rods:
         elements = state.inside.pressing.elements
         forces = elements.forces(state.inside.pressed.x)
@@ -154,24 +153,24 @@ def test_the_base_carries_the_load(pressed_rods: list[FiniteStrainState]) -> Non
 
 
 def test_the_work_of_the_rod_is_the_energy_of_the_film(
-    pressed_rods: list[FiniteStrainState],
+    pressed_rods: tuple[Contact, ...],
 ) -> None:
     last = pressed_rods[-1]
     assert last.work == pytest.approx(last.elastic_energy, rel=1e-3)
 
 
-def test_the_film_drapes_itself_around_the_rod(pressed_rods: list[FiniteStrainState]) -> None:
+def test_the_film_drapes_itself_around_the_rod(pressed_rods: tuple[Contact, ...]) -> None:
     deepest = pressed_rods[-1]
     r, depression, outward = deepest.inside.surface
     moved, above = (r + outward) * 1e3, (deepest.depth - depression) * 1e3
     _, gap = RodFace(0.25, 0.05).nearest(moved, above)
     assert gap.min() > -1e-9
     assert deepest.contact_radius == pytest.approx(ROD.radius, rel=0.03)
-    assert np.all(deepest.interface_pressure >= 0)
+    assert np.all(deepest.traction.pressures >= 0)
 
 
 def test_a_mesh_of_the_state_carries_stress_and_displacement(
-    pressed_rods: list[FiniteStrainState],
+    pressed_rods: tuple[Contact, ...],
 ) -> None:
     state = pressed_rods[-1]
     mesh = state.mesh()
@@ -190,42 +189,29 @@ def test_a_mesh_of_the_state_carries_stress_and_displacement(
 
 def test_a_sticking_sphere_moves_nothing_outward_and_a_sliding_one_does() -> None:
     r = np.linspace(0.0, 1e-3, 11)
-    (slides,) = solve_finite_strain(FILM, SPHERE, depths=[20e-6], refinement=0.5)
-    (sticks,) = solve_finite_strain(FILM, SPHERE, depths=[20e-6], sticking=True, refinement=0.5)
+    (slides,) = solve_finite_strain(FILM, SPHERE, (Depth(20e-6),), refinement=0.5)
+    (sticks,) = solve_finite_strain(FILM, SPHERE, (Depth(20e-6),), sticking=True, refinement=0.5)
     assert np.max(np.abs(sticks.inside.outward(r))) < 1e-12
     assert np.max(np.abs(slides.inside.outward(r))) > 1e-7
     assert sticks.load > slides.load
     assert sticks.work is None
     assert slides.work == pytest.approx(slides.elastic_energy, rel=0.03)
-    assert np.max(np.abs(slides.interface_shear)) < 1e-6 * np.max(slides.interface_pressure)
+    assert np.max(np.abs(slides.traction.shears)) < 1e-6 * np.max(slides.traction.pressures)
 
 
 def test_a_frictionless_film_comes_back_the_way_it_went() -> None:
-    there, deeper, back = solve_finite_strain(FILM, SPHERE, loads=[0.34, 0.5, 0.34], refinement=0.5)
-    assert back.depth == pytest.approx(there.depth, rel=1e-6)
-    assert deeper.depth > there.depth
+    loads = (Load(0.34), Load(0.5), Load(0.34))
+    up, deeper, back = solve_finite_strain(FILM, SPHERE, loads, refinement=0.5)
+    assert back.depth == pytest.approx(up.depth, rel=1e-6)
+    assert deeper.depth > up.depth
 
 
 def test_a_load_that_cannot_be_reached_gives_the_last_state_that_was() -> None:
+    depths = (Depth(0.02e-3), Depth(1.5e-3))
     with pytest.raises(ConvergenceError, match="No equilibrium") as caught:
-        solve_finite_strain(FILM, ROD, depths=[0.02e-3, 1.5e-3], sticking=True, refinement=0.4)
+        solve_finite_strain(FILM, ROD, depths, sticking=True, refinement=0.4)
     last = caught.value.last
-    assert isinstance(last, FiniteStrainState)
+    assert isinstance(last, Contact)
     assert 0.02e-3 < last.depth < 1.5e-3
     assert last.elastic_energy > 0
     assert np.isinf(last.convergence)
-
-
-def test_what_makes_no_sense_is_refused() -> None:
-    with pytest.raises(DomainError, match="cone"):
-        solve_finite_strain(FILM, Cone(inclination=0.1), loads=[1.0])
-    with pytest.raises(DomainError, match="through the film"):
-        solve_finite_strain(FILM, ROD, depths=[2.5e-3])
-    with pytest.raises(DomainError, match="contact would be"):
-        solve_finite_strain(FILM, SPHERE, loads=[500.0])
-    with pytest.raises(InputError, match="either"):
-        solve_finite_strain(FILM, ROD, depths=[1e-4], loads=[0.1])
-    with pytest.raises(InputError, match="rounding"):
-        solve_finite_strain(FILM, ROD, loads=[0.1], edge=1e-3)
-    with pytest.raises(InputError, match="finite and above zero"):
-        solve_finite_strain(FILM, ROD, loads=[-0.1])
