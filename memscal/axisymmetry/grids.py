@@ -1,4 +1,4 @@
-r"""The two grids on which fields are transformed, and lifting a profile to them.
+r"""Grids on which fields are transformed, and the field of a radial profile on them.
 
 A field lifted from a radial profile is real and even in x and in y: a quarter of the plane
 holds it all, and its Fourier transform is a type-I cosine transform

@@ -33,7 +33,7 @@ from scipy.special import ellipkm1, elliprd
 
 from memscal.model.arrays import FloatArray
 
-__all__ = ["coupling_integrals", "singular_integrals"]
+__all__ = ["coupling_integrals", "on_hats", "singular_integrals"]
 
 # Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.
 _ORDER = 8
@@ -55,17 +55,14 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     away = np.maximum(starts - x[:, None], x[:, None] - ends)
     near = away < lengths
 
-    found = []
+    integrals = []
     corrections = _near_integrals(x, starts, ends, near)
     for kernel, (near_falling, near_rising) in zip(kernels, corrections, strict=True):
         left = np.einsum("meo,eo->me", kernel, falling)
         right = np.einsum("meo,eo->me", kernel, rising)
         left[near], right[near] = near_falling, near_rising
-        total = np.zeros((x.size, rings.size))
-        total[:, :-1] += left
-        total[:, 1:] += right
-        found.append(total)
-    return found[0], found[1]
+        integrals.append(on_hats(left, right))
+    return integrals[0], integrals[1]
 
 
 def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -75,19 +72,21 @@ def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     reach = np.clip((x[:, None] - starts) / lengths, 0.0, 1.0)
     # Integrals of 1 - v and v, and of their products with s = start + length v, up to ``reach``.
     falling, rising = reach - reach**2 / 2, reach**2 / 2
-    beyond = (lengths * (0.5 - falling), lengths * (0.5 - rising))
-    within = (
+    beyond = on_hats(lengths * (0.5 - falling), lengths * (0.5 - rising))
+    within = on_hats(
         lengths * (starts * falling + lengths * (reach**2 / 2 - reach**3 / 3)),
         lengths * (starts * rising + lengths * reach**3 / 3),
     )
     inverse = np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
-    sums = []
-    for left, right in (beyond, within):
-        total = np.zeros((x.size, rings.size))
-        total[:, :-1] += left
-        total[:, 1:] += right
-        sums.append(total)
-    return sums[0], sums[1] * inverse
+    return beyond, within * inverse
+
+
+def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Add the integrals of elements (last axis) with their falling and rising hats up to rings."""
+    total = np.zeros((left.shape[0], left.shape[1] + 1))
+    total[:, :-1] += left
+    total[:, 1:] += right
+    return total
 
 
 def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -110,15 +109,15 @@ def _near_integrals(
     v, weights = _crowded()
     totals = [(np.zeros(point.size), np.zeros(point.size)) for _ in range(2)]
     for side in (start, end):
-        part = np.flatnonzero(side != cut)
-        width = (side - cut)[part, None]
-        s = cut[part, None] + width * v
-        distance = np.abs(at - cut)[part, None] + np.abs(width) * v
+        outside = np.flatnonzero(side != cut)
+        width = (side - cut)[outside, None]
+        s = cut[outside, None] + width * v
+        distance = np.abs(at - cut)[outside, None] + np.abs(width) * v
         measure = np.abs(width) * weights * s
-        rising = (s - start[part, None]) / (end - start)[part, None]
-        for total, kernel in zip(totals, _kernels(at[part, None], s, distance), strict=True):
-            total[0][part] += np.sum(kernel * measure * (1 - rising), axis=1)
-            total[1][part] += np.sum(kernel * measure * rising, axis=1)
+        rising = (s - start[outside, None]) / (end - start)[outside, None]
+        for total, kernel in zip(totals, _kernels(at[outside, None], s, distance), strict=True):
+            total[0][outside] += np.sum(kernel * measure * (1 - rising), axis=1)
+            total[1][outside] += np.sum(kernel * measure * rising, axis=1)
     return totals
 
 

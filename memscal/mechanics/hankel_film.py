@@ -1,4 +1,4 @@
-r"""The bonded film by Hankel transforms: compliance of its surface, and the field below it.
+r"""Bonded film by Hankel transforms: compliance of its surface, and the field below it.
 
 The half-space's share of the compliance is in closed form (:mod:`memscal.mechanics.half_space`).
 What the rigid base adds falls off as :math:`(kh)^2 e^{-2kh}` and is summed by Gauss quadrature

@@ -1,4 +1,4 @@
-"""Press an indenter on a film: the entry point of the mechanics."""
+"""Indentation of a film by a rigid indenter: the entry point of the mechanics."""
 
 from __future__ import annotations
 
@@ -124,9 +124,9 @@ def indent(
 
     Notes
     -----
-    Contact is unilateral, friction Amontons'; see :mod:`memscal.mechanics.solver`.  A rod that
-    slides freely or sticks is solved to higher accuracy; see :mod:`memscal.mechanics.rod`.
-    Solutions are remembered: the same request is answered at once.
+    Contact is unilateral, friction Amontons' (:mod:`memscal.mechanics.solver.problem`).  A rod that
+    slides freely or sticks is solved to higher accuracy (:mod:`memscal.mechanics.rod`).  Solutions
+    are cached: the same request is answered at once.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-r"""What lies between indenter and film: friction, and the compliance of a rough interface.
+r"""Interface between indenter and film: friction, and the compliance of a rough surface.
 
 A smooth interface that obeys Amontons' law is rigid: surfaces that touch do not approach each
 other, and do not slide before the shear reaches :math:`\mu p`.  The contact of a rough surface

@@ -1,4 +1,4 @@
-r"""Tractions that are linear between concentric rings, and their Hankel transforms."""
+"""Tractions that are linear between concentric rings, and their Hankel transforms."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import gauss_between
 from memscal.mechanics.base_stress import HalfSpaceIntegrals
-from memscal.mechanics.half_space import coupling_integrals, singular_integrals
+from memscal.mechanics.half_space import coupling_integrals, on_hats, singular_integrals
 from memscal.model.arrays import FloatArray
 
 __all__ = ["RingTraction", "hat_transforms"]
@@ -87,10 +87,7 @@ def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatA
         waves = bessel(np.multiply.outer(k, s)) * (weights * s)
         right = np.add.reduceat(waves * rising, np.arange(0, s.size, s.size // elements), axis=1)
         both = np.add.reduceat(waves, np.arange(0, s.size, s.size // elements), axis=1)
-        total = np.zeros((k.size, rings.size))
-        total[:, 1:] += right
-        total[:, :-1] += both - right
-        transforms.append(total)
+        transforms.append(on_hats(both - right, right))
     return transforms[0], transforms[1]
 
 

@@ -1,4 +1,4 @@
-r"""A rigid flat rod on a bonded film: the mixed boundary-value problem, frictionless or sticking.
+r"""Rigid flat rod on a bonded film: the mixed boundary-value problem, frictionless or sticking.
 
 Under the rod (:math:`r < a`) the surface goes down by the depth :math:`\delta`; outside it is
 free.  Pressure and shear are sought as series whose Hankel transforms are spherical Bessel
@@ -116,9 +116,9 @@ _FEWEST_TERMS = 8
 _MOST_TERMS = 128
 # Doubling of the terms stops when the stress at the base changes by less than this ...
 _SETTLED = 1e-9
-# ... and a solution that changes by more than this in the last doubling is not given away.
+# ... and a solution that changes by more than this in the last doubling is refused.
 _TOLERABLE = 1e-5
-# A wider rod would need more terms; it is also far from anything that is a probe of the film.
+# A wider rod would need more terms, and probes no film.
 _WIDEST = 100.0
 # x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
 _LARGEST_KH = 22.0

@@ -1,4 +1,4 @@
-r"""What a contact solver needs of a film: how its surface answers to tractions on rings.
+r"""Surface of a film: its displacements under tractions on rings, as a contact solver needs them.
 
 Pressure and radial shear at the surface are linear between the radii :math:`r_j` of concentric
 rings (the *hat* functions), and the displacements of the surface are taken at the same radii:

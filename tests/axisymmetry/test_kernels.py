@@ -42,6 +42,8 @@ def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: 
         ((), (), "0 weights"),
         ((1.0,), (0.0,), "above zero"),
         ((1.0,), (-1e-3,), "above zero"),
+        ((1.0,), (np.inf,), "above zero"),
+        ((float("nan"),), (1e-3,), "add up to nan"),
     ],
 )
 def test_a_mixture_that_is_no_apparatus_function_is_refused(
@@ -49,14 +51,6 @@ def test_a_mixture_that_is_no_apparatus_function_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=problem):
         GaussianMixture(weights, sigmas)
-
-
-@pytest.mark.parametrize(
-    "arguments", [((float("nan"),), (1e-3,)), ((1.0,), (float("nan"),)), ((1.0,), (np.inf,))]
-)
-def test_mixtures_of_nan_are_refused(arguments):
-    with pytest.raises(InputError):
-        GaussianMixture(*arguments)
 
 
 def blurred_disc(radius: float, sigma: float, r: FloatArray) -> FloatArray:
@@ -77,8 +71,8 @@ def blurred_disc(radius: float, sigma: float, r: FloatArray) -> FloatArray:
 def test_a_disc_is_the_sum_of_its_points_gaussians(radius: float, sigma: float) -> None:
     disc = SmoothedDisc(radius=radius, sigma=sigma)
     r = np.linspace(0.0, radius + 8 * sigma, 25)
-    wanted = blurred_disc(radius, sigma, r)
-    np.testing.assert_allclose(disc.radial(r), wanted, atol=1e-12 * wanted.max())
+    summed = blurred_disc(radius, sigma, r)
+    np.testing.assert_allclose(disc.radial(r), summed, atol=1e-12 * summed.max())
     assert_same_to_rounding(disc.radial(-r), disc.radial(r))
 
 

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad
-from scipy.special import j0
 
 from memscal.axisymmetry.hankel import gauss_panels
 
@@ -25,16 +23,11 @@ def test_a_rule_of_sixteen_nodes_is_exact_to_degree_thirty_one(
 
 
 @pytest.mark.parametrize(("order", "phase"), [(16, 16.0), (64, 100.0)])
-def test_a_panel_integrates_the_phase_that_its_docstring_allows(order: int, phase: float) -> None:
+def test_a_panel_integrates_the_phase_that_its_nodes_resolve(order: int, phase: float) -> None:
     nodes, weights = gauss_panels(1.0, 1.0, order)
     for start in np.linspace(0.0, 2 * np.pi, 13):
         exact = (np.sin(phase + start) - np.sin(start)) / phase
         assert weights @ np.cos(phase * nodes + start) == pytest.approx(exact, abs=5e-14)
-
-
-def test_too_few_nodes_for_the_phase_would_be_seen() -> None:
-    nodes, weights = gauss_panels(1.0, 1.0, order=16)
-    assert abs(weights @ np.cos(64.0 * nodes) - np.sin(64.0) / 64.0) > 1e-3
 
 
 @given(upper=st.floats(1e-3, 1e3), longest=st.floats(1e-1, 1e4), order=st.integers(1, 20))
@@ -49,10 +42,3 @@ def test_no_panel_is_longer_than_allowed_and_none_is_spent_needlessly(
     assert nodes[0] > 0
     assert nodes[-1] < upper
     assert weights.sum() == pytest.approx(upper, rel=1e-12)
-
-
-def test_an_oscillating_bessel_integral_agrees_with_an_adaptive_rule() -> None:
-    nodes, weights = gauss_panels(40.0, 15.0, order=16)
-    adaptive, error = quad(lambda k: k * np.exp(-k / 5) * j0(k), 0, 40, limit=400, epsabs=1e-13)
-    assert error < 1e-10
-    assert weights @ (nodes * np.exp(-nodes / 5) * j0(nodes)) == pytest.approx(adaptive, abs=1e-9)

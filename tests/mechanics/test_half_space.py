@@ -10,7 +10,6 @@ from scipy.special import ellipe, ellipk, j0, j1
 
 from memscal.mechanics.half_space import coupling_integrals, singular_integrals
 from memscal.mechanics.rings import RingTraction, hat_transforms
-from memscal.mechanics.rod import solve_rod
 
 FloatArray = NDArray[np.float64]
 
@@ -79,18 +78,3 @@ def test_a_ring_traction_transforms_as_the_sum_of_its_hats() -> None:
     np.testing.assert_allclose(
         traction.shear_transform(k).ravel(), of_shear @ q, rtol=1e-11, atol=1e-16
     )
-
-
-@pytest.mark.parametrize("nu", [0.2, 0.5])
-def test_rings_and_spherical_bessel_functions_move_the_surface_alike(nu: float) -> None:
-    # A rod's traction, sampled on rings that crowd to its edge; the last ring carries what the
-    # singular pressure has beyond the last but one.
-    rod = solve_rod(0.25, nu, sticking=True).traction(1.0, 1.0)
-    rings = 1 - np.linspace(1.0, 0.0, 1500) ** 4
-    p, q = rod.pressure(rings), rod.shear(rings)
-    p[-1], q[-1] = 3 * p[-2], 3 * q[-2]
-    x = np.array([0.0, 0.3, 0.9, 1.2, 4.0])
-    ours = rod.half_space_integrals(x)
-    sampled = RingTraction(rings, p, q).half_space_integrals(x)
-    for name, one, other in zip(["w(p)", "w(q)", "u(p)", "u(q)"], ours, sampled, strict=True):
-        np.testing.assert_allclose(one, other, atol=2e-5 * np.abs(ours[0]).max(), err_msg=name)

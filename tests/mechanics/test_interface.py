@@ -109,18 +109,12 @@ def test_every_point_of_a_rough_contact_obeys_the_law(
     np.testing.assert_allclose(pressure, law.pressure(separation, FILM), atol=1e-7 * pressure.max())
 
 
-@pytest.mark.parametrize("load", [0.1, 2.75])
-def test_roughness_widens_a_contact_and_lowers_its_pressure_most_at_light_load(
-    load: float,
-) -> None:
-    smooth, rough = press(load=load), press(Interface(normal=GREENWOOD_TRIPP), load=load)
-    assert rough.contact_radius > smooth.contact_radius
-    assert rough.max_interface_stress < smooth.max_interface_stress
-    lowering = [
-        1 - press(Interface(normal=GREENWOOD_TRIPP), load=p).max_interface_stress
-        / press(load=p).max_interface_stress
-        for p in (0.1, 2.75)
-    ]  # fmt: skip
+def test_roughness_widens_a_contact_and_lowers_its_pressure_most_at_light_load() -> None:
+    lowering = []
+    for load in (0.1, 2.75):
+        smooth, rough = press(load=load), press(Interface(normal=GREENWOOD_TRIPP), load=load)
+        assert rough.contact_radius > smooth.contact_radius
+        lowering.append(1 - rough.max_interface_stress / smooth.max_interface_stress)
     assert lowering[0] > 2 * lowering[1] > 0
 
 

@@ -1,4 +1,4 @@
-r"""The bonded film by finite elements: compliance of its surface, and the field below it.
+"""Bonded film by finite elements: compliance of its surface, and the field below it.
 
 Static condensation: the equations of the film (:mod:`memscal.mechanics.elements.mixed`) are
 factorised once and solved for a unit traction on every ring.  Of each solution, the displacement

@@ -1,4 +1,4 @@
-r"""The mixed finite elements: quartic displacement and cubic mean pressure on triangles.
+r"""Mixed finite elements: quartic displacement and cubic mean pressure on triangles.
 
 With the strain :math:`\varepsilon`, its deviator :math:`e` and the mean pressure :math:`P`,
 

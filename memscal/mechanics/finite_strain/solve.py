@@ -1,4 +1,4 @@
-r"""A neo-Hookean film at finite strain under a rigid rod or sphere, by finite elements.
+"""Neo-Hookean film at finite strain under a rigid rod or sphere, by finite elements.
 
 The linear model is formal where an indenter sinks by a good part of the film's thickness.  Here
 the film is neo-Hookean, displacement and pressure are quadratic and linear on triangles of the
@@ -39,6 +39,7 @@ from memscal.mechanics.finite_strain.state import (
 )
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.problem import Depth, Load, Target
+from memscal.mechanics.solver.refinement import relative_change
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod, Sphere
 
@@ -146,7 +147,8 @@ class _Request:
             for step in follow(pressing, self._start(pressing), self.goals):
                 contact = self._contact(pressing, step)
                 if coarse is not None:
-                    change = _change(contact, coarse[len(contacts)])
+                    r = _SAMPLES * self.film.thickness
+                    change = relative_change(contact, coarse[len(contacts)], r)
                     contact = replace(contact, convergence=change)
                 contacts.append(contact)
         except NewtonError as problem:
@@ -249,11 +251,3 @@ class _Request:
             dissipated_energy=None if work is None else 0.0,
             strain="finite",
         )
-
-
-def _change(fine: Contact, coarse: Contact) -> float:
-    """Return the largest relative difference of base stress, load and depth."""
-    r = _SAMPLES * fine.film.thickness
-    stress = fine.base_stress(r)
-    changed = np.max(np.abs(stress - coarse.base_stress(r))) / np.max(np.abs(stress))
-    return max(float(changed), abs(coarse.load / fine.load - 1), abs(coarse.depth / fine.depth - 1))

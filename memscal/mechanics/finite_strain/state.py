@@ -1,4 +1,4 @@
-"""The field in a film at finite strain, and its traction under the indenter, in SI units."""
+"""Field in a film at finite strain, and its traction under the indenter, in SI units."""
 
 from __future__ import annotations
 

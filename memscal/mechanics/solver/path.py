@@ -1,4 +1,4 @@
-r"""The way to a load: friction remembers, so that a contact is followed step by step.
+r"""Path of a contact to its loads: friction depends on history, and is followed step by step.
 
 *Incremental* loading is the slow one of an experiment.  Between indenter and film that do not
 yield, every step ends when the surfaces meet at the next ring (or part, on the way back): the

@@ -1,4 +1,4 @@
-r"""Contact of a rigid indenter with a film, ring by ring: what is given, and what is sought.
+r"""Contact of a rigid indenter with a film, ring by ring: its conditions and its state.
 
 At every ring the separation of the two surfaces is
 

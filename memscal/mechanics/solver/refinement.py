@@ -1,4 +1,4 @@
-r"""Contacts on rings: placed, solved, and solved again on half as many to see what changes."""
+"""Contacts on rings, which are doubled until base stress, load and depth have settled."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from memscal.model.indenter import Indenter, Rod
 if TYPE_CHECKING:
     from memscal.mechanics.elements.element_film import ElementFilm
 
-__all__ = ["RingRequest", "solve_on_rings"]
+__all__ = ["RingRequest", "relative_change", "solve_on_rings"]
 
 # Rings beyond the largest contact, so that it can end where it will.
 _MARGIN = 4
@@ -55,7 +55,7 @@ _FEWEST_RINGS = 48
 _MOST_RINGS = 384
 # Rings are doubled until base stress, load and depth change by less than this ...
 _SETTLED = 1e-4
-# ... and a solution that changes by more than this is not given away.
+# ... and a solution that changes by more than this is refused.
 _TOLERABLE = 5e-3
 # Rings of the coarse contact that tells where to place the others.
 _COARSE = 40
@@ -174,7 +174,7 @@ def _follow(request: RingRequest, model: HankelFilm | ElementFilm) -> list[PathP
 
 
 def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
-    """Return the contacts on given rings."""
+    """Return the contacts on ``rings`` (m)."""
     model: HankelFilm | ElementFilm
     if request.backend == "fem":
         from memscal.mechanics.elements.element_film import ElementFilm
@@ -190,7 +190,7 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
             error.last = _contact(request, model, error.last)
         raise
     contacts = [_contact(request, model, point) for point in points]
-    # What was asked for is met to rounding; it is given back as it was asked for.
+    # The targets are met to rounding; a contact has the target's own value.
     return [
         replace(contact, load=target.value)
         if isinstance(target, Load)
@@ -263,14 +263,18 @@ def _stick_radius(
 
 
 def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
-    """Return the largest relative change of base stress, load and depth."""
+    """Return the change of a contact from one on fewer rings."""
     reach = fine.contact_radius + 3 * fine.film.thickness
     if request.film_radius is not None:
         # In the corner between the base and a free edge the stress is singular.
         off_the_corner = request.film_radius - fine.film.thickness
         reach = min(reach, max(off_the_corner, request.film_radius / 2))
-    r = np.linspace(0.0, reach, _REQUEST_SAMPLES)
-    ours, theirs = fine.base_stress(r), coarse.base_stress(r)
-    by_stress = float(np.max(np.abs(ours - theirs)) / np.max(np.abs(ours)))
+    return relative_change(fine, coarse, np.linspace(0.0, reach, _REQUEST_SAMPLES))
+
+
+def relative_change(fine: Contact, coarse: Contact, r: FloatArray) -> float:
+    """Return the largest relative change of base stress at ``r`` (m), load and depth."""
+    stress = fine.base_stress(r)
+    by_stress = np.max(np.abs(stress - coarse.base_stress(r))) / np.max(np.abs(stress))
     by_load, by_depth = abs(coarse.load / fine.load - 1), abs(coarse.depth / fine.depth - 1)
     return float(max(by_stress, by_load, by_depth))

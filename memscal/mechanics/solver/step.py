@@ -1,4 +1,4 @@
-r"""One step of a contact: from one equilibrium to the next, by an active-set Newton method.
+r"""Step of a contact from one equilibrium to the next, by an active-set Newton method.
 
 Which rings touch, stick and slip decides which equations hold.  With that known they are linear
 (rigid interface) or smooth (compliant interface); they are solved, the rings that contradict
@@ -26,7 +26,7 @@ _Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class _Statuses:
-    """What is taken for granted while the equations are solved; arrays over the n rings."""
+    """Status and trial values of the n rings while the equations are solved."""
 
     pressing: NDArray[np.bool_]  # rings that bear a pressure
     slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks

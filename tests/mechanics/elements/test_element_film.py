@@ -64,7 +64,9 @@ def test_the_base_is_loaded_as_by_hankel_transforms(nu: float, width: float) -> 
     assert worst(a.base_normal(r), normal, normal) < 2e-4
     assert worst(a.base_shear(r), b.base_shear(r), normal) < 2e-4
     k = np.array([[0.0, 200.0], [1000.0, 3000.0]])
-    assert worst(a.base_spectrum(k), b.base_spectrum(k), b.base_spectrum(k)) < 1e-4
+    load = b.base_spectrum(k)
+    assert worst(a.base_spectrum(k), load, load) < 1e-4
+    assert worst(a.base_shear_spectrum(k), b.base_shear_spectrum(k), load) < 1e-4
 
 
 def test_the_field_at_the_rings_is_what_the_compliance_says() -> None:
@@ -127,18 +129,6 @@ def test_a_compressible_film_under_a_wide_pressure_is_an_oedometer() -> None:
     r = np.array([0.0, 2 * H, 5 * H])
     np.testing.assert_allclose(field.depression(r), 1e4 * H / modulus, rtol=1e-6)
     np.testing.assert_allclose(field.base_normal(r), 1e4, rtol=1e-6)
-
-
-def test_the_edge_is_felt_only_where_it_is_near() -> None:
-    film, r = film_with(0.5), np.linspace(0, H, 61)
-    p, q = tractions(r)
-    at = np.array([0.0, H])
-    far, near, close = (
-        ElementFilm(film, r, radius=radius).field(p, q).depression(at)
-        for radius in (25e-3, 10e-3, 1.5 * H)
-    )
-    assert worst(near, far, far) < 2e-3
-    assert worst(close, far, far) > 2e-2
 
 
 def test_a_graded_rod_edge_is_resolved() -> None:

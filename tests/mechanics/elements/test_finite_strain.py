@@ -123,27 +123,6 @@ def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool) -> Non
     assert per_load == pytest.approx(expected, abs=1e-3 * float(expected[0]))
 
 
-def test_the_departure_of_the_base_stress_grows_linearly_at_first(
-    pressed_rods: tuple[Contact, ...],
-) -> None:
-    (hardly,) = solve_finite_strain(
-        FILM,
-        ROD,
-        (Depth(1e-8),),
-        sticking=pressed_rods[0].friction > 0,
-        edge=EDGE,
-        refinement=0.6,
-    )
-
-    def departure(state: Contact) -> float:
-        r = np.array([1.5e-3])
-        per_load = state.inside.base_spectrum(r * 1e6)[0] / state.load
-        return float(per_load / (hardly.inside.base_spectrum(r * 1e6)[0] / hardly.load) - 1)
-
-    once, twice = departure(pressed_rods[0]), departure(pressed_rods[1])
-    assert twice / once == pytest.approx(2.0, rel=0.25)
-
-
 def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]) -> None:
     for state in pressed_rods:
         elements = state.inside.pressing.elements
