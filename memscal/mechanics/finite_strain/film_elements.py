@@ -1,5 +1,13 @@
 r"""Finite elements for the film at finite strain: energy, forces and their exact tangent.
 
+With the deformation gradient :math:`F` (components rr, rz, zr, zz, hoop) and :math:`J = \det F`
+the neo-Hookean energy per undeformed volume is
+
+.. math:: W = G\left[\tfrac12(F:F - 3) - (J - 1)\right] + \tfrac{K}{2}(J - 1)^2 .
+
+A share :math:`\kappa` of the bulk modulus acts directly, the rest by a pressure
+:math:`p = (\kappa - K)(J - 1)`, which stays finite where :math:`K` does not.
+
 Displacement is quadratic and pressure linear on triangles of the undeformed cross-section
 (Taylor and Hood), a pair that neither locks nor oscillates at :math:`\nu = 1/2`.  The nodal forces
 are the derivatives of the energy by the nodal displacements, and the tangent is theirs: Newton's
@@ -50,11 +58,11 @@ def cofactor(F: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class NeoHookean:
-    """The film's material: a modulus G and kappa in MPa, and 1/(K - kappa) in 1/MPa."""
+    """The film's material, in MPa: with lengths in mm, the unknowns are then of like size."""
 
     shear_modulus: float
-    held: float
-    softness: float
+    held: float  # kappa
+    softness: float  # 1/(K - kappa), 0 where the film is incompressible
 
     @classmethod
     def of(cls, film: ElasticFilm) -> NeoHookean:

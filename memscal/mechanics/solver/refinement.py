@@ -112,7 +112,7 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
 
 def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: int) -> FloatArray:
     if isinstance(request.indenter, Rod):
-        # They crowd towards the edge, where one is.
+        # They crowd towards the edge; the last is on it.
         return request.indenter.radius * (1.0 - np.linspace(1.0, 0.0, count) ** _CROWDING)
     return _rings_around(edges, reach, count)
 
