@@ -56,7 +56,7 @@ class InterfaceTraction(Protocol):
         r"""Return :math:`\int q\,J_1(kr)\,r\,dr` at ``k`` (rad/m), in N."""
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
-        r"""Return :math:`\int f\,dk` at ``r`` (m) of pJ0, qJ0, pJ1 and qJ1, in Pa m."""
+        """Integrals over k of p, q times J0, then of p, q times J1, at ``r`` (m), in Pa m."""
 
 
 # k h exp(-k h) is below 1e-15 here.
