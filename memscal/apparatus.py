@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from os import PathLike
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from memscal.estimation.points import TANGENTIAL
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray, finite_vector, require_increasing
 from memscal.model.provenance import SourceFile
+from memscal.model.result import Result
 
 __all__ = ["ApparatusFunction", "load_apparatus", "opened_apparatus"]
 
@@ -27,7 +29,7 @@ _FEWEST_RADII = 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ApparatusFunction(ApparatusData):
+class ApparatusFunction(Result, ApparatusData):
     r"""A calibrated sensor: :math:`U_{zz} = A\,G \otimes \sigma_{zz}`.
 
     A tangential channel (``sensor.channel`` is ``"xz"`` or ``"yz"``) measures one component of the
@@ -37,6 +39,7 @@ class ApparatusFunction(ApparatusData):
 
     Made by :func:`memscal.calibrate` or :func:`memscal.load_apparatus`; its data are described
     in :class:`memscal.model.apparatus.ApparatusData`.  All quantities are in SI units.
+    ``print(apparatus)`` shows the parameters with their standard uncertainties and the checks.
 
     Examples
     --------
@@ -48,6 +51,9 @@ class ApparatusFunction(ApparatusData):
     >>> bool(apparatus.stress(volts)[0] < contact.base_stress(0.0))
     True
     """
+
+    _summary: ClassVar[str] = "calibration"
+    _figure: ClassVar[str] = "calibration.calibration_figure"
 
     source: SourceFile | None = field(default=None, init=False)
     """The file it was read from.  Like ``content_digest`` it does not pass to a changed copy."""

@@ -6,7 +6,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from os import PathLike
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 import scipy
@@ -40,10 +40,14 @@ from memscal.model.checks import (
 )
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import Process, timestamp
+from memscal.model.result import Result
 from memscal.model.scan import Scan, StressSensor
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "Calibration",
@@ -311,8 +315,10 @@ Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration:
+class Calibration(Result):
     """A finished calibration: its result, and every step that led to it.
+
+    ``print(calibration)`` shows the table of ``memscal calibrate``.
 
     Parameters
     ----------
@@ -325,6 +331,8 @@ class Calibration:
     correlations : mapping of (str, str) to float
         Correlation coefficients of the inputs' errors.
     """
+
+    _summary: ClassVar[str] = "calibration"
 
     apparatus: ApparatusFunction
     solution: Solution
@@ -339,6 +347,10 @@ class Calibration:
     def passed(self) -> bool:
         """Whether every quality check passed."""
         return self.apparatus.passed
+
+    def plot(self, **options: Any) -> Figure:
+        """Draw scan, apparatus function and transfer function; nothing is shown or written."""
+        return self.apparatus.plot(**options)
 
     @single_threaded()
     def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> Sweep:

@@ -6,12 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
-from typing import Any
+from typing import Any, ClassVar
 
 from memscal.calibration.calibrate import calibrate, chosen_method
 from memscal.errors import InputError, MemscalError
 from memscal.model.apparatus import ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
+from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, worker_pool
 
@@ -24,7 +25,7 @@ _LARGEST_CHUNK = 16
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class FleetCalibration:
+class FleetCalibration(Result):
     """What one scan of many says, without its fields; or the error that it met.
 
     Parameters
@@ -46,6 +47,8 @@ class FleetCalibration:
     error : MemscalError or None
         Why there is no result.
     """
+
+    _summary: ClassVar[str] = "fleet"
 
     index: int
     parameters: ParameterSet | None = None

@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -30,6 +30,7 @@ from memscal.estimation.points import measured_mask
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
+from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, single_threaded, worker_pool
 
@@ -281,7 +282,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MonteCarlo:
+class MonteCarlo(Result):
     """Draws of a calibration; from :func:`monte_carlo`.
 
     Parameters
@@ -306,6 +307,8 @@ class MonteCarlo:
     messages : tuple of Message
         What the numbers rest on.
     """
+
+    _summary: ClassVar[str] = "monte_carlo"
 
     draws: int
     seed: int
