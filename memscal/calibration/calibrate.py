@@ -6,7 +6,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import scipy
@@ -45,9 +45,6 @@ from memscal.model.scan import Scan, StressSensor
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = [
     "Calibration",
@@ -333,6 +330,7 @@ class Calibration(Result):
     """
 
     _summary: ClassVar[str] = "calibration"
+    _figure: ClassVar[str] = "calibration.calibration_figure"
 
     apparatus: ApparatusFunction
     solution: Solution
@@ -347,10 +345,6 @@ class Calibration(Result):
     def passed(self) -> bool:
         """Whether every quality check passed."""
         return self.apparatus.passed
-
-    def plot(self, **options: Any) -> Figure:
-        """Draw scan, apparatus function and transfer function; nothing is shown or written."""
-        return self.apparatus.plot(**options)
 
     @single_threaded()
     def sweep(self, *, amplitudes: int = 21, draws: int = 8, seed: int = 0) -> Sweep:

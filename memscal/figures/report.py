@@ -12,7 +12,7 @@ import numpy as np
 from memscal.figures.calibration import calibration_figure, values_text
 from memscal.figures.style import render_figure
 from memscal.model import records
-from memscal.model.apparatus import ApparatusData
+from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import PER_MM, Record, estimated_quantity
@@ -122,7 +122,7 @@ def _budget(data: ApparatusData) -> str:
         quantity = estimated_quantity(name)
         total = float(np.sqrt(sum(u**2 for u in budget.values())))
         cells = [_share(budget.get(source), total, quantity.scale) for source in sources]
-        ratio = data.parameters.uncertainty(name) / abs(data.parameters[name] or np.nan)
+        ratio = _relative(data.parameters, name)
         columns.append(
             (
                 f"{quantity.words} ({quantity.unit})",
@@ -137,6 +137,12 @@ def _budget(data: ApparatusData) -> str:
     return Table("Standard uncertainty by source, and its share of the variance", head, rows).html()
 
 
+def _relative(parameters: ParameterSet, name: str) -> float:
+    if name not in parameters or parameters[name] == 0:
+        return float("nan")
+    return parameters.uncertainty(name) / abs(parameters[name])
+
+
 def _share(u: float | None, total: float, scale: float) -> str:
     if u is None:
         return "–"
@@ -147,7 +153,7 @@ def _setting(data: ApparatusData) -> Table:
     rows = [
         *_stated("", records.SENSOR, data.sensor),
         ("load", f"{data.load:.4g} N"),
-        *_stated("indenter, ", records.INDENTER, data.indenter),
+        *_stated(f"{data.indenter.shape}, ", records.ROUND_INDENTER, data.indenter),
         *_stated("film, ", records.FILM, data.film),
         *_stated("reference, ", records.SOLVER, data.reference),
         *_stated("reference, ", records.NUMERICS, data.reference),
@@ -162,9 +168,13 @@ def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, 
         if isinstance(value, str) and value:
             yield prefix + quantity.words, value
         elif isinstance(value, float) and not quantity.name.endswith("_uncertainty"):
-            u = getattr(holder, f"{quantity.name}_uncertainty", None)
-            u = None if u is None else u / quantity.scale
-            yield prefix + quantity.words, format_measured(value / quantity.scale, u, quantity.unit)
+            value, spread = value / quantity.scale, f"{quantity.name}_uncertainty"
+            text = f"{value:.3g} {quantity.unit}".strip()
+            if hasattr(holder, spread):
+                u = getattr(holder, spread)
+                u = None if u is None else u / quantity.scale
+                text = format_measured(value, u, quantity.unit)
+            yield prefix + quantity.words, text
 
 
 def _provenance(data: ApparatusData) -> str:

@@ -1,4 +1,4 @@
-"""The panels that show the scan: measured voltage, reconvolutions, reference."""
+"""Panels of a scan: measured voltage, reconvolutions, reference, residuals."""
 
 from __future__ import annotations
 
@@ -256,8 +256,8 @@ def _by_distance(data: ApparatusData) -> bool:
 
 
 def _baseline(data: ApparatusData) -> float:
-    known = "baseline" in data.parameters
-    return data.parameters["baseline"] if known else 0.0
+    stated = "baseline" in data.parameters
+    return data.parameters["baseline"] if stated else 0.0
 
 
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
@@ -292,10 +292,7 @@ def draw_residuals(axes: Axes, data: ApparatusData) -> None:
     """
     scan = data.reconvolution
     errors, scale = _residual_scale(data)
-    with_g, with_gaussian = (
-        scan.residual / errors,
-        (scan.u_zz - scan.u_zz_gaussian) / errors,
-    )
+    with_g, with_gaussian = scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors
     limit = _residual_limit(with_g, with_gaussian)
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
     axes.axhline(0.0, color="0.4", lw=0.6)

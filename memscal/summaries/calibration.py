@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     import xarray
 
 __all__ = [
+    "Calibrated",
+    "apparatus_of",
     "correlated",
     "correlated_parameters",
     "dataset",
@@ -53,7 +55,7 @@ _IN_JSON = (
 
 def tables(result: Calibrated) -> list[Table]:
     """Return the estimates with their standard uncertainties, and the quality checks."""
-    apparatus = _apparatus(result)
+    apparatus = apparatus_of(result)
     rows = estimate_rows(apparatus.parameters, apparatus.resolved_wavenumber)
     if method := apparatus.process.configuration.get("method"):
         rows.insert(-1, ("method of division", "", str(method)))
@@ -69,7 +71,7 @@ def tables(result: Calibrated) -> list[Table]:
 
 def mapping(result: Calibrated) -> dict[str, Any]:
     """Return the object of ``calibrate --json``; its form is part of the contract."""
-    apparatus = _apparatus(result)
+    apparatus = apparatus_of(result)
     parameters = apparatus.parameters
     resolved = finite(apparatus.resolved_wavenumber / PER_MM)
     values: dict[str, Any] = {
@@ -96,7 +98,7 @@ def dataset(result: Calibrated) -> xarray.Dataset:
     """Return G(r), the transfer function, the reconvolution and the field, in SI units."""
     import xarray
 
-    apparatus = _apparatus(result)
+    apparatus = apparatus_of(result)
     field = {"g": "field", "g_errors": "field_errors"}
     return xarray.Dataset(
         record_arrays(records.RADIAL, apparatus.radial_profile)
@@ -110,7 +112,7 @@ def dataset(result: Calibrated) -> xarray.Dataset:
 
 def correlated(result: Calibrated) -> dict[str, Any]:
     """Return the parameters as numbers of the package uncertainties, with their covariance."""
-    return correlated_parameters(_apparatus(result).parameters)
+    return correlated_parameters(apparatus_of(result).parameters)
 
 
 def correlated_parameters(parameters: ParameterSet) -> dict[str, Any]:
@@ -145,7 +147,8 @@ def sensor_title(apparatus: ApparatusData) -> str:
     return f"Apparatus function of {name}, channel {sensor.channel}"
 
 
-def _apparatus(result: Calibrated) -> ApparatusData:
+def apparatus_of(result: Calibrated) -> ApparatusData:
+    """Return the apparatus function of a calibration, or the one that it is already."""
     return result.apparatus if isinstance(result, Calibration) else result
 
 
