@@ -1,4 +1,4 @@
-"""The apparatus function in use: predict voltages, convolve stresses, read stresses."""
+"""Apparatus function in use: predicted voltages, convolved stresses, measured stresses."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class ApparatusFunction(Result, ApparatusData):
     _figure: ClassVar[str] = "calibration.calibration_figure"
 
     source: SourceFile | None = field(default=None, init=False)
-    """The file it was read from.  Like ``content_digest`` it does not pass to a changed copy."""
+    """The file it was read from; ``None`` for a changed copy."""
 
     @cached_property
     def content_digest(self) -> str:
@@ -102,7 +102,7 @@ class ApparatusFunction(Result, ApparatusData):
         """
         radii, stress = self._checked(r, sigma_zz)
         profile = self.radial_profile
-        # G passes nothing beyond the last wavenumber of its own grid.
+        # G is zero beyond the last wavenumber of its grid.
         reach = float(radii[-1] + profile.r[-1])
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
@@ -206,7 +206,7 @@ class ApparatusFunction(Result, ApparatusData):
                 f"r begins at {radii[0]:g} m.",
                 cure="Give the stress from the axis (r = 0) outward.",
             )
-        # The steps that matter are those where there is stress to be convolved.
+        # A step matters only where there is stress.
         peak = float(np.abs(stress).max())
         strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak
         coarse = float(np.diff(radii)[strong].max(initial=0.0))
@@ -250,11 +250,11 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
         digest, source = file.attribute("/", DIGEST_ATTRIBUTE), file.source
     apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
     object.__setattr__(apparatus, "source", source)
-    # Rounding may give another one if it were written again: the file's own is what counts.
+    # Written again, it might have another digest by rounding: the file's is kept.
     object.__setattr__(apparatus, "content_digest", str(digest))
     return apparatus
 
 
 def opened_apparatus(apparatus: ApparatusFunction | str | PathLike[str]) -> ApparatusFunction:
-    """Return an apparatus function that is given itself or as the path of its artifact."""
+    """Return the apparatus function, read from its artifact where it is a path."""
     return apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)

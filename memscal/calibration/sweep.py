@@ -1,4 +1,4 @@
-"""How much a calibration depends on the white noise: its amplitude and its seed."""
+"""Sweep of the white noise: how a calibration depends on its amplitude and its seed."""
 
 from __future__ import annotations
 

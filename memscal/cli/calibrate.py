@@ -25,6 +25,8 @@ from memscal.cli.output import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from memscal.calibration.calibrate import Calibration
     from memscal.calibration.monte_carlo import MonteCarlo
     from memscal.calibration.sweep import Sweep
@@ -69,7 +71,7 @@ def _show_disagreements(drawn: MonteCarlo) -> None:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Where the results go."""
+    """Files of the results."""
 
     artifact: Path
     report: Path | None
@@ -89,21 +91,22 @@ class Outputs:
             from memscal.figures.report import html_report
 
             contents[self.report] = html_report(calibration.apparatus).encode("utf-8")
-        if self.figures or self.sweep_figure:
-            from memscal.figures.style import figure_format, render_figure
-
-            figure = calibration.plot() if self.figures else None
-            figures = dict.fromkeys(self.figures, figure)
-            if self.sweep_figure is not None and sweep is not None:
-                figures[self.sweep_figure] = sweep.plot()
-            for path, figure in figures.items():
-                if figure is not None:
-                    contents[path] = render_figure(figure, figure_format(path.suffix))
+        if self.figures:
+            figure = calibration.plot()
+            contents |= {path: _rendered(figure, path) for path in self.figures}
+        if self.sweep_figure is not None and sweep is not None:
+            contents[self.sweep_figure] = _rendered(sweep.plot(), self.sweep_figure)
         return contents
 
 
+def _rendered(figure: Figure, path: Path) -> bytes:
+    from memscal.figures.style import figure_format, render_figure
+
+    return render_figure(figure, figure_format(path.suffix))
+
+
 def _artifact_beside(scan: Path, channel: str) -> Path:
-    """Name the artifact of one of a scan's channels."""
+    """Return the usual name of the artifact of a scan's channel."""
     return beside(scan, ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5")
 
 
