@@ -249,7 +249,10 @@ def failed_checks_text(checks: tuple[QualityCheck, ...]) -> list[str]:
 def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     """Return the lines above the panels, each with colour and weight."""
     ink = COLOURS["measured"]
-    title = textwrap.shorten(sensor_title(data), 95, placeholder=" …")
+    # A long name is cut, not the channel behind it.
+    name, _, channel = sensor_title(data).rpartition(", channel ")
+    name = textwrap.shorten(name, 82, placeholder=" …")
+    title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
     film = data.film
     setting = (
         f"{data.indenter.shape} of radius {data.indenter.radius / MM:.3g} mm, {data.load:.3g} N; "

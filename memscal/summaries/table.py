@@ -8,11 +8,13 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.notation import printable
-from memscal.model.quantities import Record
+
+if TYPE_CHECKING:
+    from memscal.model.quantities import Record
 
 __all__ = [
     "Table",
