@@ -285,6 +285,8 @@ class Comparison:
 class MonteCarlo(Result):
     """Draws of a calibration; from :func:`monte_carlo`.
 
+    ``print(drawn)`` shows the comparison; ``drawn.to_dataframe()`` holds the draws.
+
     Parameters
     ----------
     draws, seed : int
@@ -306,8 +308,6 @@ class MonteCarlo(Result):
         Standard uncertainty of G to first order in noise and inputs, in 1/m^2.
     messages : tuple of Message
         What was drawn, and what was not.
-
-    ``print(drawn)`` shows the comparison; ``drawn.to_dataframe()`` holds the draws.
     """
 
     _summary: ClassVar[str] = "monte_carlo"
@@ -506,10 +506,7 @@ def _sampling_error(draws: FloatArray) -> float:
 
 
 def _messages(
-    calibration: Calibration,
-    comparisons: Sequence[Comparison],
-    failures: Sequence[str],
-    draws: int,
+    calibration: Calibration, comparisons: Sequence[Comparison], failures: Sequence[str], draws: int
 ) -> Iterator[Message]:
     """Return messages on what was drawn, and on uncertainty that no draw shows."""
     if not calibration.effects:

@@ -43,10 +43,7 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_band(axes, radial, floor=-np.inf)
     _draw_profiles(axes, radial.r, radial.g, radial.g_gaussian)
-    low, high = (
-        radial.g - _EXPANDED * radial.g_errors,
-        radial.g + _EXPANDED * radial.g_errors,
-    )
+    low, high = (radial.g - _EXPANDED * radial.g_errors, radial.g + _EXPANDED * radial.g_errors)
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
     # The band may be much larger than G, which must stay legible in it.
     top = min(_largest(high), 3 * peak)
@@ -123,13 +120,7 @@ def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
 
 def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
     axes.plot(r / MM, g / PER_MM2, "-", color=COLOURS["deconvolved"], label="deconvolved G")
-    axes.plot(
-        r / MM,
-        gaussian / PER_MM2,
-        "--",
-        color=COLOURS["gaussian"],
-        label="Gaussian fit",
-    )
+    axes.plot(r / MM, gaussian / PER_MM2, "--", color=COLOURS["gaussian"], label="Gaussian fit")
 
 
 def _shade_unresolved(axes: Axes, limit: float, end: float) -> None:

@@ -79,11 +79,7 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
 
 
 def _draw_measured(
-    axes: Axes,
-    x: FloatArray,
-    u: FloatArray,
-    errors: FloatArray,
-    label: str = "scan, ±u",
+    axes: Axes, x: FloatArray, u: FloatArray, errors: FloatArray, label: str = "scan, ±u"
 ) -> None:
     size, colour = marker_size(x.size), COLOURS["measured"]
     if x.size > SCATTER_THRESHOLD:
@@ -211,12 +207,7 @@ def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
         return
     left = (_centre(data) - radius) / MM
     patch = Rectangle((left, 0.0), 2 * radius / MM, 0.035, transform=axes.get_xaxis_transform())
-    patch.set(
-        facecolor="black",
-        lw=0,
-        zorder=4,
-        label=f"{what}, diameter {2 * radius / MM:.3g} mm",
-    )
+    patch.set(facecolor="black", lw=0, zorder=4, label=f"{what}, diameter {2 * radius / MM:.3g} mm")
     axes.add_patch(patch)
 
 
@@ -343,11 +334,4 @@ def _mark_beyond(axes: Axes, x: FloatArray, z: FloatArray, limit: float, colour:
         beyond = side * z > limit
         if np.any(beyond):
             edge = np.full(int(np.sum(beyond)), 0.93 * side * limit)
-            axes.plot(
-                x[beyond] / MM,
-                edge,
-                marker,
-                color=colour,
-                ms=4,
-                label="_beyond the axis",
-            )
+            axes.plot(x[beyond] / MM, edge, marker, color=colour, ms=4, label="_beyond the axis")

@@ -124,11 +124,7 @@ def new_figure(height: float) -> Figure:
 def panel_letter(axes: Axes, letter: str) -> None:
     """Put the panel's letter at the upper left, outside the frame and clear of all data."""
     label = axes.annotate(
-        letter,
-        (0.0, 1.0),
-        (-30, 4),
-        xycoords="axes fraction",
-        textcoords="offset points",
+        letter, (0.0, 1.0), (-30, 4), xycoords="axes fraction", textcoords="offset points"
     )
     label.set_fontweight("bold")
     label.set_fontsize(10)
