@@ -73,12 +73,6 @@ def test_a_dry_run_checks_everything_and_writes_nothing(run: Run, scan: Path, fo
     assert names(folder) == ["scan.h5"]
 
 
-def test_a_dry_run_in_json_names_the_outputs(run: Run, scan: Path, folder: Path) -> None:
-    found = run("calibrate", scan, "--dry-run", "--json").json
-    assert found["dry_run"] is True
-    assert [Path(path).name for path in found["outputs"]] == ["scan.apparatus.h5"]
-
-
 def test_a_dry_run_refuses_what_a_real_run_would_refuse(run: Run, scan: Path) -> None:
     run("reference", "rod", "-o", "rod.h5")
     profile = memscal.read_reference("rod.h5")
