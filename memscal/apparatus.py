@@ -1,10 +1,11 @@
-"""The apparatus function in use: predict voltages, convolve stresses, read stresses."""
+"""Apparatus function in use: predicted voltages, convolved stresses, measured stresses."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from os import PathLike
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from memscal.estimation.points import TANGENTIAL
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray, finite_vector, require_increasing
 from memscal.model.provenance import SourceFile
+from memscal.model.result import Result
 
 __all__ = ["ApparatusFunction", "load_apparatus", "opened_apparatus"]
 
@@ -27,7 +29,7 @@ _FEWEST_RADII = 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ApparatusFunction(ApparatusData):
+class ApparatusFunction(Result, ApparatusData):
     r"""A calibrated sensor: :math:`U_{zz} = A\,G \otimes \sigma_{zz}`.
 
     A tangential channel (``sensor.channel`` is ``"xz"`` or ``"yz"``) measures one component of the
@@ -37,6 +39,7 @@ class ApparatusFunction(ApparatusData):
 
     Made by :func:`memscal.calibrate` or :func:`memscal.load_apparatus`; its data are described
     in :class:`memscal.model.apparatus.ApparatusData`.  All quantities are in SI units.
+    ``print(apparatus)`` shows the parameters with their standard uncertainties and the checks.
 
     Examples
     --------
@@ -49,8 +52,11 @@ class ApparatusFunction(ApparatusData):
     True
     """
 
+    _summary: ClassVar[str] = "calibration"
+    _figure: ClassVar[str] = "calibration.calibration_figure"
+
     source: SourceFile | None = field(default=None, init=False)
-    """The file it was read from.  Like ``content_digest`` it does not pass to a changed copy."""
+    """The file it was read from; ``None`` for a changed copy."""
 
     @cached_property
     def content_digest(self) -> str:
@@ -96,7 +102,7 @@ class ApparatusFunction(ApparatusData):
         """
         radii, stress = self._checked(r, sigma_zz)
         profile = self.radial_profile
-        # G passes nothing beyond the last wavenumber of its own grid.
+        # G is zero beyond the last wavenumber of its grid.
         reach = float(radii[-1] + profile.r[-1])
         wavenumbers = Wavenumbers.covering(float(self.transfer.k[-1]), reach)
         kernel = hankel_transform(profile.r, profile.g, wavenumbers.k)
@@ -200,7 +206,7 @@ class ApparatusFunction(ApparatusData):
                 f"r begins at {radii[0]:g} m.",
                 cure="Give the stress from the axis (r = 0) outward.",
             )
-        # The steps that matter are those where there is stress to be convolved.
+        # A step matters only where there is stress.
         peak = float(np.abs(stress).max())
         strong = np.maximum(np.abs(stress[1:]), np.abs(stress[:-1])) > _DECAYED * peak
         coarse = float(np.diff(radii)[strong].max(initial=0.0))
@@ -244,11 +250,11 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
         digest, source = file.attribute("/", DIGEST_ATTRIBUTE), file.source
     apparatus = ApparatusFunction(**{item.name: getattr(data, item.name) for item in fields(data)})
     object.__setattr__(apparatus, "source", source)
-    # Rounding may give another one if it were written again: the file's own is what counts.
+    # Written again, it might have another digest by rounding: the file's is kept.
     object.__setattr__(apparatus, "content_digest", str(digest))
     return apparatus
 
 
 def opened_apparatus(apparatus: ApparatusFunction | str | PathLike[str]) -> ApparatusFunction:
-    """Return an apparatus function that is given itself or as the path of its artifact."""
+    """Return the apparatus function, read from its artifact where it is a path."""
     return apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)

@@ -1,4 +1,4 @@
-"""The main job: from a scan to an apparatus function, by the paper's method."""
+"""Calibration: from rod scans to an apparatus function with its covariance and checks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from os import PathLike
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import scipy
@@ -40,6 +40,7 @@ from memscal.model.checks import (
 )
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import Process, timestamp
+from memscal.model.result import Result
 from memscal.model.scan import Scan, StressSensor
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
@@ -101,13 +102,13 @@ def assemble(
 
 
 def _sensor(solution: Solution) -> StressSensor:
-    """The sensor, by the channel that was calibrated: a scan's own is the normal one."""
+    """Return the scan's sensor, with the channel that was calibrated."""
     channel, sensor = solution.estimate.points.channel, solution.scan.sensor
     return sensor if channel == "zz" else replace(sensor, channel=channel)
 
 
 def _further_scans(solution: Solution) -> dict[str, Any]:
-    """Where the scans beside the first came from."""
+    """Return the files of the scans after the first."""
     sources = [scan.source for scan in solution.scans[1:]]
     if not sources:
         return {}
@@ -146,11 +147,11 @@ def _transfer(solution: Solution, results: Results) -> TransferFunction:
 def _reconvolution(solution: Solution) -> Reconvolution:
     estimate = solution.estimate
     points = estimate.points
-    # A raster is shown against the distance from the centre: a line has a side, a plane has not.
+    # A raster is shown against the distance from the centre, a line against the position.
     along = points.x if points.free[0, 0] else points.y
     place = estimate.distance if points.planar or points.scans > 1 else along
     if points.scans > 1 and estimate.model.order:
-        # A shear has a side, too.
+        # The sign of a shear depends on the side.
         place = estimate.offset[estimate.model.axis]
     order = np.argsort(place, kind="stable")
 
@@ -230,7 +231,7 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
 
 
 def _method(solution: Solution) -> list[Message]:
-    """Say of a method that is no fixed window on the spectrum what its uncertainty leaves out."""
+    """Return what the uncertainty leaves out where the method is no fixed window."""
     regulariser = solution.regulariser
     if regulariser.name in _WINDOWS:
         return []
@@ -253,7 +254,7 @@ def _reference(solution: Solution) -> list[Message]:
 
 
 def _model_form(contact: Contact) -> str:
-    """Say what the reference takes for granted."""
+    """Return what the reference assumes."""
     way = "frictionless" if contact.friction == 0 else "sticking"
     depth = f"{contact.depth / contact.film.thickness:.0%} of its thickness at {contact.load:.3g} N"
     if contact.strain == "finite":
@@ -270,7 +271,7 @@ def _model_form(contact: Contact) -> str:
 
 
 def _other_set_up(scan: Scan, stress: StressProfile) -> list[Message]:
-    """Say where a reference was made for another film or indenter than the scan's."""
+    """Return where a reference was made for another film or indenter than the scan's."""
     pairs = []
     if stress.film is not None:
         for name, unit in (("thickness", 1e3), ("poisson_ratio", 1.0)):
@@ -311,8 +312,10 @@ Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration:
+class Calibration(Result):
     """A finished calibration: its result, and every step that led to it.
+
+    ``print(calibration)`` shows the table of ``memscal calibrate``.
 
     Parameters
     ----------
@@ -326,13 +329,16 @@ class Calibration:
         Correlation coefficients of the inputs' errors.
     """
 
+    _summary: ClassVar[str] = "calibration"
+    _figure: ClassVar[str] = "calibration.calibration_figure"
+
     apparatus: ApparatusFunction
     solution: Solution
     effects: Mapping[str, InputEffect] = field(default_factory=dict)
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """Return the result in place of every step's arrays."""
+        """Return method and result, without arrays."""
         return f"<Calibration by {self.solution.regulariser.name}: {self.apparatus!r}>"
 
     @property
@@ -425,13 +431,13 @@ def calibrate(
     True
     """
     scans = require_one_sensor(opened_scans(scan))
-    for each in scans:
-        require_calibration_rod(each)
-    given = _each(reference, scans)
-    stresses = [reference_profile(s, r) for s, r in zip(scans, given, strict=True)]
+    for rod_scan in scans:
+        require_calibration_rod(rod_scan)
+    references = _references(reference, scans)
+    stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     regulariser = chosen_method(method, seed, options)
     solution = solve(scans, stresses, regulariser, channel)
-    others = None if alternative is None else _each(alternative, scans)
+    others = None if alternative is None else _references(alternative, scans)
     effects = _effects(solution, others)
     results = uncertainties(solution, effects, correlations or {})
     checks = quality_checks(solution, results.parameters)
@@ -445,10 +451,10 @@ def calibrate(
     return Calibration(apparatus, solution, effects, dict(correlations or {}))
 
 
-def _each(
+def _references(
     reference: Reference | Sequence[Reference], scans: Sequence[Scan]
 ) -> list[StressProfile | Contact | None]:
-    """Read a reference for each scan; one alone serves all."""
+    """Read a reference for each scan; a single one is that of all scans."""
     if isinstance(reference, Sequence) and not isinstance(reference, str):
         if len(reference) != len(scans):
             raise InputError(
@@ -456,7 +462,7 @@ def _each(
                 f"{'is one scan' if len(scans) == 1 else f'are {len(scans)} scans'}.",
                 cure="Give one for each scan, in their order, or one for all.",
             )
-        return [_read(each) for each in reference]
+        return [_read(item) for item in reference]
     return [_read(reference)] * len(scans)
 
 
@@ -492,9 +498,9 @@ def chosen_method(method: str | Regulariser, seed: int, options: Mapping[str, An
 
 def _settings(regulariser: Regulariser) -> Mapping[str, Any]:
     """Parameters of a regulariser, for the record."""
-    own: Any = regulariser
-    known = is_dataclass(own) and not isinstance(own, type)
-    return {"options": asdict(own) if known else {}}
+    method: Any = regulariser
+    stated = is_dataclass(method) and not isinstance(method, type)
+    return {"options": asdict(method) if stated else {}}
 
 
 def _effects(
@@ -503,9 +509,9 @@ def _effects(
     scans, estimate = solution.scans, solution.estimate
     spectra = None
     if alternatives is not None:
-        known = [other for other in alternatives if other is not None]
-        parts = [estimate.points.only(i) for i in range(len(scans))]
-        spectra = reference_spectra(known, parts, [scan.film.thickness for scan in scans])
+        others = [other for other in alternatives if other is not None]
+        points = [estimate.points.only(i) for i in range(len(scans))]
+        spectra = reference_spectra(others, points, [scan.film.thickness for scan in scans])
     return input_effects(scans, solution.stresses, estimate, spectra)
 
 

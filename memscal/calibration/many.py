@@ -1,4 +1,4 @@
-"""Calibration of many scans, in processes: what each says, or why it says nothing."""
+"""Calibration of many scans, in processes: a result or an error for each."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
-from typing import Any
+from typing import Any, ClassVar
 
 from memscal.calibration.calibrate import calibrate, chosen_method
 from memscal.errors import InputError, MemscalError
 from memscal.model.apparatus import ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
+from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, worker_pool
 
@@ -19,13 +20,15 @@ __all__ = ["FleetCalibration", "calibrate_many"]
 
 #: One item: a scan, its file, or several scans that are fitted together.
 FleetScan = Scan | str | PathLike[str] | Sequence[Scan]
-#: Scans that a process takes at a time: their results wait for each other.
+#: Scans that a process takes at a time.
 _LARGEST_CHUNK = 16
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class FleetCalibration:
-    """What one scan of many says, without its fields; or the error that it met.
+class FleetCalibration(Result):
+    """The calibration of one scan of many, without its fields, or its error.
+
+    ``pandas.concat(result.to_dataframe() for result in results)`` is the table of all scans.
 
     Parameters
     ----------
@@ -42,10 +45,12 @@ class FleetCalibration:
     checks : tuple of QualityCheck
         Quality checks.
     messages : tuple of Message
-        What the calibration tells.
+        Notes and warnings.
     error : MemscalError or None
         Why there is no result.
     """
+
+    _summary: ClassVar[str] = "fleet"
 
     index: int
     parameters: ParameterSet | None = None
@@ -100,8 +105,8 @@ def calibrate_many(
     --------
     >>> import memscal
     >>> scans = [memscal.simulate(noise=0.005, seed=seed) for seed in range(3)]
-    >>> found = memscal.calibrate_many([*scans, "missing.h5"], method="evidence")
-    >>> [one.passed for one in found]
+    >>> results = memscal.calibrate_many([*scans, "missing.h5"], method="evidence")
+    >>> [result.passed for result in results]
     [True, True, True, False]
     """
     require_workers(workers)
@@ -111,8 +116,8 @@ def calibrate_many(
             cure="Give a list of scans; calibrate one with memscal.calibrate(scan).",
         )
     method, seed = options.get("method", "white-noise"), options.get("seed", 0)
-    known = ("reference", "alternative", "channel", "method", "correlations", "seed")
-    chosen_method(method, seed, {name: v for name, v in options.items() if name not in known})
+    others = ("reference", "alternative", "channel", "method", "correlations", "seed")
+    chosen_method(method, seed, {name: v for name, v in options.items() if name not in others})
     task = partial(_calibrated, options=options)
     items = list(enumerate(scans))
     if workers == 1 or len(items) < 2:
@@ -123,7 +128,7 @@ def calibrate_many(
 
 
 def _calibrated(item: tuple[int, FleetScan], options: Mapping[str, Any]) -> FleetCalibration:
-    """Calibrate one scan; whatever goes wrong is its own matter."""
+    """Calibrate one scan; an error is part of its result."""
     index, scan = item
     try:
         apparatus = calibrate(scan, **options).apparatus

@@ -1,6 +1,6 @@
-"""Propagation of distributions (JCGM 101:2008, GUM Supplement 1), beside the first-order budget.
+"""Monte Carlo propagation of distributions (JCGM 101:2008), compared with the first-order budget.
 
-Each draw is a scan of the sensor that the calibration found, with new noise.  The true values of
+Each draw is a scan of the calibrated sensor with new noise.  The true values of
 all inputs whose uncertainty is stated are drawn; the scan states the nominal ones, and is
 calibrated like any other.  What scatters is compared with the same part of the budget: noise and
 inputs.
@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -30,6 +30,7 @@ from memscal.estimation.points import measured_mask
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
+from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, single_threaded, worker_pool
 
@@ -48,11 +49,11 @@ _LARGEST_BLOCK = 8
 
 @dataclass(frozen=True)
 class SolvedInput:
-    """A property of a film or rod, the ``part`` of some scans, that the rod is solved for."""
+    """An uncertain property of the film or rod (``component``) that the rod is solved for."""
 
     source: str
     scans: tuple[int, ...]
-    part: str
+    component: str
     attribute: str
     value: float
     u: float
@@ -66,7 +67,7 @@ class SolvedInput:
 
 @dataclass(frozen=True, eq=False)
 class DrawnScans:
-    """What turns random numbers into scans of a calibrated sensor, and these into results.
+    """Model that turns random numbers into scans of a calibrated sensor, and calibrates them.
 
     ``solution``, ``effects`` and ``correlations`` are the calibration's; every draw has a seed of
     its own, spawned from ``seed``.
@@ -130,7 +131,7 @@ class DrawnScans:
     def standardised(self, normal: FloatArray) -> dict[str, FloatArray]:
         """Turn normal draws, (inputs, ...), into each input's error over its uncertainty."""
         values, vectors = np.linalg.eigh(correlation_matrix(list(self.effects), self.correlations))
-        # The symmetric root: without correlations each input keeps its own draw.
+        # By the symmetric root every input keeps its draw where there are no correlations.
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
         joined: dict[str, FloatArray] = dict(zip(self.effects, root @ normal, strict=True))
         if "model_form" in joined:
@@ -146,7 +147,7 @@ class DrawnScans:
         signal = voltages - estimate.background
         exact = {item.source for item in self.solved}
         for source, effect in self.effects.items():
-            # An effect is that of a larger value in the analysis: the other way round.
+            # An effect is that of a larger value in the analysis, so its sign is turned.
             if source not in exact:
                 change = effect.voltage + effect.scaling * signal
                 voltages = voltages - standard[source] * change
@@ -178,19 +179,19 @@ class DrawnScans:
         for item in self.solved:
             value = np.clip(item.value + item.u * standard[item.source], *item.bounds)
             for i in item.scans:
-                owner = replace(getattr(true[i], item.part), **{item.attribute: float(value)})
-                true[i] = replace(true[i], **{item.part: owner})
-        parts = zip(true, self.solution.estimate.model.references, self._nominal, strict=True)
+                owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
+                true[i] = replace(true[i], **{item.component: owner})
+        references = self.solution.estimate.model.references
         return tuple(
             replace(ref, values=ref.values * (_rod_spectrum(scan, ref) / nominal - 1))
-            for scan, ref, nominal in parts
+            for scan, ref, nominal in zip(true, references, self._nominal, strict=True)
         )
 
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
-        own = self.solution
-        solution = solve(scans, own.stresses, own.regulariser, own.estimate.points.channel)
-        result, radii = solution.deconvolution, own.deconvolution.g.r
+        first = self.solution
+        solution = solve(scans, first.stresses, first.regulariser, first.estimate.points.channel)
+        result, radii = solution.deconvolution, first.deconvolution.g.r
         r, g = result.g.r, result.g.radial
         g = np.where(radii <= r[-1], radial_spline(r, g)(np.minimum(radii, r[-1])), 0.0)
         numbers = (
@@ -202,19 +203,19 @@ class DrawnScans:
 
 def _solved_inputs(scans: tuple[Scan, ...]) -> Iterator[SolvedInput]:
     """Uncertain properties of each distinct film and rod, named as their effects are."""
-    for name, part, attribute in (
+    for name, component, attribute in (
         ("thickness", "film", "thickness"),
         ("poisson_ratio", "film", "poisson_ratio"),
         ("rod_radius", "indenter", "radius"),
     ):
-        owners = [getattr(scan, part) for scan in scans]
+        owners = [getattr(scan, component) for scan in scans]
         for number, owner in enumerate(dict.fromkeys(owners), start=1):
             value, u = getattr(owner, attribute), getattr(owner, f"{attribute}_uncertainty")
             if u:
                 source = name if number == 1 else f"{name}_{number}"
                 bounds = (0.0, 0.5) if name == "poisson_ratio" else (value / 2, np.inf)
-                own = tuple(i for i, other in enumerate(owners) if other == owner)
-                yield SolvedInput(source, own, part, attribute, value, u, bounds)
+                places = tuple(i for i, other in enumerate(owners) if other == owner)
+                yield SolvedInput(source, places, component, attribute, value, u, bounds)
 
 
 def _rod_spectrum(scan: Scan, reference: RadialSpectrum) -> FloatArray:
@@ -281,8 +282,10 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MonteCarlo:
+class MonteCarlo(Result):
     """Draws of a calibration; from :func:`monte_carlo`.
+
+    ``print(drawn)`` shows the comparison; ``drawn.to_dataframe()`` holds the draws.
 
     Parameters
     ----------
@@ -304,8 +307,10 @@ class MonteCarlo:
     g_first_order : ndarray, shape (n,)
         Standard uncertainty of G to first order in noise and inputs, in 1/m^2.
     messages : tuple of Message
-        What the numbers rest on.
+        What was drawn, and what was not.
     """
+
+    _summary: ClassVar[str] = "monte_carlo"
 
     draws: int
     seed: int
@@ -321,9 +326,10 @@ class MonteCarlo:
     messages: tuple[Message, ...]
 
     def __repr__(self) -> str:
-        """Return what was drawn in place of the draws."""
-        apart = [comparison.name for comparison in self.comparisons if not comparison.agrees]
-        verdict = f"the budget does not do for {', '.join(apart)}" if apart else "the budget agrees"
+        """Return what was drawn, and whether the budget agrees."""
+        differing = [comparison.name for comparison in self.comparisons if not comparison.agrees]
+        names = ", ".join(differing)
+        verdict = f"the budget does not agree for {names}" if differing else "the budget agrees"
         return f"<MonteCarlo: {self.draws} draws of {', '.join(self.sources)}; {verdict}>"
 
     @property
@@ -431,7 +437,7 @@ def monte_carlo(
 def _compared(
     calibration: Calibration, name: str, column: FloatArray, solved: Sequence[SolvedInput]
 ) -> Comparison:
-    """Sum up the draws of one parameter, shape (m,), and judge its budget."""
+    """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
     value, mean, spread = parameters[name], float(column.mean()), float(column.std(ddof=1))
     error, u = spread * _sampling_error(column), _random_part(budget)
@@ -456,9 +462,9 @@ def _compared(
 
 
 def _random_part(budget: Mapping[str, float]) -> float:
-    """Standard uncertainty of what scatters; correlations carry the sign of what they add."""
-    parts = np.array([part for source, part in budget.items() if source not in NOT_RANDOM])
-    return float(np.sqrt(max(float(np.sum(parts * np.abs(parts))), 0.0)))
+    """Standard uncertainty of noise and inputs; a correlation's contribution has a sign."""
+    u = np.array([value for source, value in budget.items() if source not in NOT_RANDOM])
+    return float(np.sqrt(max(float(np.sum(u * np.abs(u))), 0.0)))
 
 
 def _reason(
@@ -468,18 +474,18 @@ def _reason(
     budget: Mapping[str, float],
     solved: Sequence[SolvedInput],
 ) -> str:
-    """Say by how much draws and budget disagree, and of a distribution that is cut off."""
-    told = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
+    """Return by how much draws and budget disagree, and whether a distribution is cut off."""
+    text = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
     for item in solved:
         quantiles = ndtri((np.arange(1000) + 0.5) / 1000)
         kept = float(item.truncated(quantiles).std())
         if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:
             return (
-                f"{told} The {item.source.replace('_', ' ')} is cut off at {item.bounds[1]:g}: its "
+                f"{text} The {item.source.replace('_', ' ')} is cut off at {item.bounds[1]:g}: its "
                 f"draws scatter by {kept * item.u:.2g}, not by the {item.u:.2g} that the budget "
                 "counts, and to one side."
             )
-    return f"{told} The calibration is not linear in the noise or an input over its uncertainty."
+    return f"{text} The calibration is not linear in the noise or an input over its uncertainty."
 
 
 def shortest_interval(draws: FloatArray) -> FloatArray:
@@ -500,12 +506,9 @@ def _sampling_error(draws: FloatArray) -> float:
 
 
 def _messages(
-    calibration: Calibration,
-    comparisons: Sequence[Comparison],
-    failures: Sequence[str],
-    draws: int,
+    calibration: Calibration, comparisons: Sequence[Comparison], failures: Sequence[str], draws: int
 ) -> Iterator[Message]:
-    """What was drawn, and what no draw shows."""
+    """Return messages on what was drawn, and on uncertainty that no draw shows."""
     if not calibration.effects:
         text = "No input states an uncertainty: the draws are of noise alone."
         yield Message("uncertainty_unstated", text)

@@ -1,8 +1,9 @@
-"""How much a calibration depends on the white noise: its amplitude and its seed."""
+"""Sweep of the white noise: how a calibration depends on its amplitude and its seed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,12 +12,13 @@ from memscal.deconvolution.division import Regulariser, require_count
 from memscal.deconvolution.windows import WhiteNoise, WhiteNoiseDraw
 from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
+from memscal.model.result import Result
 
 __all__ = ["Sweep", "sweep_noise"]
 
 
-@dataclass(frozen=True, eq=False)
-class Sweep:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Result):
     """Results against the noise amplitude.
 
     Parameters
@@ -33,6 +35,9 @@ class Sweep:
         The same for single draws; NaN for a draw whose quotient has no positive integral.
     """
 
+    _summary: ClassVar[str] = "sweep"
+    _figure: ClassVar[str] = "sweep.sweep_figure"
+
     amplitude: FloatArray
     conversion_constant: FloatArray
     gaussian_sigma_deconvolved: FloatArray
@@ -40,6 +45,12 @@ class Sweep:
     seed_conversion_constant: FloatArray
     seed_gaussian_sigma: FloatArray
     seed_relative_rms: FloatArray
+
+    def __repr__(self) -> str:
+        """Return the amplitudes in place of the arrays."""
+        amplitudes, draws = self.seed_relative_rms.shape
+        low, high = self.amplitude.min(), self.amplitude.max()
+        return f"<Sweep: {amplitudes} amplitudes from {low:g} to {high:g}, {draws} draws at each>"
 
 
 def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -> Sweep:

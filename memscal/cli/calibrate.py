@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,13 +25,14 @@ from memscal.cli.output import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from memscal.calibration.calibrate import Calibration
     from memscal.calibration.monte_carlo import MonteCarlo
     from memscal.calibration.sweep import Sweep
     from memscal.deconvolution.division import Regulariser
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
-    from memscal.summaries.table import Table
 
 __all__ = ["command"]
 
@@ -40,34 +40,38 @@ __all__ = ["command"]
 _MOST_WORKERS = 8
 
 
-def drawn_with_progress(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
-    """Draw in processes, say how far it is, and tell what the numbers rest on."""
+def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
+    """Draw in processes, and show how many draws are done."""
     from memscal.calibration.monte_carlo import monte_carlo
-    from memscal.model.checks import Message
-    from memscal.model.quantities import estimated_quantity
 
     # Starting a process takes about as long as forty draws of a line.
     workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
     with working(f"Drawing {draws} scans") as show:
-        drawn = monte_carlo(
+        return monte_carlo(
             calibration,
             draws=draws,
             seed=seed,
             workers=workers,
             progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
         )
+
+
+def _show_disagreements(drawn: MonteCarlo) -> None:
+    """Write the messages of the draws, and where they and the budget disagree."""
+    from memscal.model.checks import Message
+    from memscal.model.quantities import estimated_quantity
+
     disagreements = [
         Message("disagreement", f"{estimated_quantity(c.name).words}: {c.reason}")
         for c in drawn.comparisons
         if not c.agrees
     ]
     show_messages([*drawn.messages, *disagreements])
-    return drawn
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """Where the results go."""
+    """Files of the results."""
 
     artifact: Path
     report: Path | None
@@ -80,57 +84,47 @@ class Outputs:
         others = (self.report, *self.figures, self.sweep_figure)
         return (self.artifact, *(path for path in others if path is not None))
 
-    def rendered(self, found: Calibration, swept: Sweep | None) -> dict[Path, bytes]:
+    def rendered(self, calibration: Calibration, sweep: Sweep | None) -> dict[Path, bytes]:
         """Return the figures and the report as the bytes of their files."""
-        ready: dict[Path, bytes] = {}
-        if self.figures:
-            from memscal.figures.calibration import calibration_figure
-            from memscal.figures.style import figure_format, render_figure
-
-            figure = calibration_figure(found.apparatus)
-            for path in self.figures:
-                ready[path] = render_figure(figure, figure_format(path.suffix))
+        contents: dict[Path, bytes] = {}
         if self.report is not None:
             from memscal.figures.report import html_report
 
-            ready[self.report] = html_report(found.apparatus).encode("utf-8")
-        if self.sweep_figure is not None and swept is not None:
-            from memscal.figures.style import figure_format, render_figure
-            from memscal.figures.sweep import sweep_figure
-
-            kind = figure_format(self.sweep_figure.suffix)
-            ready[self.sweep_figure] = render_figure(sweep_figure(swept), kind)
-        return ready
-
-    def write(self, found: Calibration, ready: Mapping[Path, bytes], *, force: bool) -> None:
-        """Write the artifact, then what was rendered: nothing is computed any more."""
-        from memscal.formats.files import atomic_write_bytes
-
-        found.apparatus.save(self.artifact, overwrite=force)
-        for path, data in ready.items():
-            atomic_write_bytes(path, data, overwrite=force)
+            contents[self.report] = html_report(calibration.apparatus).encode("utf-8")
+        if self.figures:
+            figure = calibration.plot()
+            contents |= {path: _rendered(figure, path) for path in self.figures}
+        if self.sweep_figure is not None and sweep is not None:
+            contents[self.sweep_figure] = _rendered(sweep.plot(), self.sweep_figure)
+        return contents
 
 
-def artifact_beside(scan: Path, channel: str) -> Path:
-    """Name the artifact of one of a scan's channels."""
+def _rendered(figure: Figure, path: Path) -> bytes:
+    from memscal.figures.style import figure_format, render_figure
+
+    return render_figure(figure, figure_format(path.suffix))
+
+
+def _artifact_beside(scan: Path, channel: str) -> Path:
+    """Return the usual name of the artifact of a scan's channel."""
     return beside(scan, ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5")
 
 
-def chosen_method(
+def _chosen_method(
     method: str | None, options: tuple[str, ...], seed: int | None, channel: str = "zz"
 ) -> Regulariser:
-    """Set up the method, or a channel's usual one; a wrong name or option is a matter of usage."""
+    """Set up the method, by default the channel's; a wrong name or option is a usage error."""
     from memscal.deconvolution.division import create_regulariser
     from memscal.errors import InputError
 
     method = method or ("white-noise" if channel == "zz" else "evidence")
-    given = dict(_option(text) for text in options)
-    if "seed" in given:
+    values = dict(_option(text) for text in options)
+    if "seed" in values:
         raise click.UsageError("Give the seed as --seed, not as --option.")
     try:
-        if given:
-            _check_kinds(given, create_regulariser(method))
-        regulariser = create_regulariser(method, seed=seed or 0, **given)
+        if values:
+            _check_kinds(values, create_regulariser(method))
+        regulariser = create_regulariser(method, seed=seed or 0, **values)
     except InputError as failure:
         raise click.UsageError(f"{failure.problem} {failure.cure}".strip()) from failure
     if seed is not None and not hasattr(regulariser, "seed"):
@@ -138,10 +132,10 @@ def chosen_method(
     return regulariser
 
 
-def correlation(text: str) -> tuple[tuple[str, str], float]:
+def _correlation(text: str) -> tuple[tuple[str, str], float]:
     """Read INPUT,INPUT=R."""
     pair, equals, value = text.partition("=")
-    first, comma, second = (part.strip() for part in pair.partition(","))
+    first, comma, second = (word.strip() for word in pair.partition(","))
     try:
         coefficient = float(value)
     except ValueError:
@@ -161,9 +155,9 @@ def _option(text: str) -> tuple[str, Any]:
         return name, value
 
 
-def _check_kinds(given: dict[str, Any], usual: Regulariser) -> None:
-    """Refuse text where the method's own default is a number, or a part where it is a count."""
-    for name, value in given.items():
+def _check_kinds(values: dict[str, Any], usual: Regulariser) -> None:
+    """Refuse text where the method's default is a number, or a fraction where it is a count."""
+    for name, value in values.items():
         default = getattr(usual, name, None)
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if isinstance(default, float) and not (number and math.isfinite(value)):
@@ -316,10 +310,10 @@ def command(
 
     A failed quality check is exit code 1: the artifact is written and says so.
     """
-    output = output or artifact_beside(scans[0], channel)
+    output = output or _artifact_beside(scans[0], channel)
     outputs = Outputs(output, report, figures, sweep_figure)
-    regulariser = chosen_method(method, options, seed, channel)
-    correlated = dict(correlation(text) for text in correlations)
+    regulariser = _chosen_method(method, options, seed, channel)
+    pairs = [_correlation(text) for text in correlations]
     data, profile = _read(scans, reference)
     other = None if alternative is None else _read_reference(alternative)
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
@@ -331,26 +325,30 @@ def command(
     from memscal.calibration.calibrate import calibrate
 
     with working(f"Calibrating by {regulariser.name}"):
-        found = calibrate(
+        calibration = calibrate(
             data,
             reference=profile,
             alternative=other,
             channel=channel,
             method=regulariser,
-            correlations=correlated,
+            correlations=dict(pairs),
             seed=seed or 0,
         )
-    swept = None
+    sweep, drawn = None, None
     if sweeping or sweep_figure:
         with working("Sweeping the noise amplitude"):
-            swept = found.sweep(seed=seed or 0)
-    drawn = None
+            sweep = calibration.sweep(seed=seed or 0)
     if draws is not None:
-        drawn = drawn_with_progress(found, draws, seed or 0)
+        drawn = _drawn(calibration, draws, seed or 0)
+        _show_disagreements(drawn)
+    from memscal.formats.files import atomic_write_bytes
+
     with working("Drawing"):
-        ready = outputs.rendered(found, swept)
-    outputs.write(found, ready, force=force)
-    return _tell(found, swept, drawn, outputs, as_json)
+        contents = outputs.rendered(calibration, sweep)
+    calibration.apparatus.save(output, overwrite=force)
+    for path, content in contents.items():
+        atomic_write_bytes(path, content, overwrite=force)
+    return _show(calibration, sweep, drawn, outputs, as_json)
 
 
 def _read(
@@ -391,7 +389,7 @@ def _rehearse(
     outputs: Outputs,
     as_json: bool,
 ) -> None:
-    """Go as far as the calibration goes before it computes, and say what it would do."""
+    """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.stages import require_channel_method
     from memscal.cli.output import emit_tables
     from memscal.estimation.points import joined_points, measured_points
@@ -404,10 +402,10 @@ def _rehearse(
 
     require_one_sensor(scans)
     require_channel_method(channel, regulariser)
-    parts = [measured_points(scan, channel) for scan in scans]
+    readings = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
-    reference_spectra(stresses, parts, [scan.film.thickness for scan in scans])
-    points = joined_points(parts)
+    reference_spectra(stresses, readings, [scan.film.thickness for scan in scans])
+    points = joined_points(readings)
     if as_json:
         emit_json(rehearsal_json(stresses[0], regulariser.name, outputs.paths))
     else:
@@ -415,9 +413,9 @@ def _rehearse(
     message("Nothing was written (--dry-run).")
 
 
-def _tell(
-    found: Calibration,
-    swept: Sweep | None,
+def _show(
+    calibration: Calibration,
+    sweep: Sweep | None,
     drawn: MonteCarlo | None,
     outputs: Outputs,
     as_json: bool,
@@ -425,28 +423,21 @@ def _tell(
     """Print the results and the messages; return the exit code."""
     from memscal.cli.failures import exit_code_of
     from memscal.cli.output import emit_tables
-    from memscal.summaries.calibration import calibration_json, calibration_tables
 
+    further = {
+        name: result
+        for name, result in (("sweep", sweep), ("monte_carlo", drawn))
+        if result is not None
+    }
     if as_json:
-        emit_json(calibration_json(found, outputs.artifact) | _further_json(swept, drawn))
+        files = {"schema_version": "1", "artifact": str(outputs.artifact)}
+        values = {name: result.to_dict() for name, result in further.items()}
+        emit_json(files | calibration.to_dict() | values)
     else:
-        emit_tables(*calibration_tables(found), *_further_tables(swept, drawn))
-    show_messages(found.apparatus.process.messages)
+        tables = [table for result in further.values() for table in result.tables()]
+        emit_tables(*calibration.tables(), *tables)
+    show_messages(calibration.apparatus.process.messages)
     for path in outputs.paths:
         message(f"Written: {path}")
-    checks = found.apparatus.checks
+    checks = calibration.apparatus.checks
     return exit_code_of(checks, then=f" {outputs.artifact.name} was written and is marked so.")
-
-
-def _further_json(swept: Sweep | None, drawn: MonteCarlo | None) -> dict[str, Any]:
-    from memscal.summaries.calibration import monte_carlo_json, sweep_json
-
-    found: dict[str, Any] = {} if swept is None else {"sweep": sweep_json(swept)}
-    return found if drawn is None else found | {"monte_carlo": monte_carlo_json(drawn)}
-
-
-def _further_tables(swept: Sweep | None, drawn: MonteCarlo | None) -> list[Table]:
-    from memscal.summaries.calibration import monte_carlo_table, sweep_table
-
-    tables = [] if swept is None else [sweep_table(swept)]
-    return tables if drawn is None else [*tables, monte_carlo_table(drawn)]

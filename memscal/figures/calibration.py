@@ -1,4 +1,4 @@
-"""A calibration in one figure: the paper's Fig. 2, with what it takes to trust it."""
+"""Figure of a calibration: the paper's Fig. 2, with residuals, transfer function and checks."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from memscal.model.apparatus import ApparatusData, ApparatusRadial
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import QualityCheck
 from memscal.model.quantities import KPA, MM, PER_MM, PER_MM2, measured_text
+from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
 __all__ = [
     "calibration_figure",
@@ -42,12 +43,9 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_band(axes, radial, floor=-np.inf)
     _draw_profiles(axes, radial.r, radial.g, radial.g_gaussian)
-    low, high = (
-        radial.g - _EXPANDED * radial.g_errors,
-        radial.g + _EXPANDED * radial.g_errors,
-    )
+    low, high = (radial.g - _EXPANDED * radial.g_errors, radial.g + _EXPANDED * radial.g_errors)
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
-    # An honest band may dwarf G; G must stay legible in it.
+    # The band may be much larger than G, which must stay legible in it.
     top = min(_largest(high), 3 * peak)
     bottom = -min(_largest(-low, floor=0.0), 1.5 * peak)
     axes.set_ylim((bottom - 0.06 * top) / PER_MM2, 1.06 * top / PER_MM2)
@@ -78,7 +76,7 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
 
 
 def draw_transfer(axes: Axes, data: ApparatusData) -> None:
-    """Draw the transfer function's modulus, the window, and where the scan stops speaking."""
+    """Draw the transfer function's modulus, the window, and the resolved band."""
     transfer = data.transfer
     k, limit = transfer.k / PER_MM, transfer.resolved_wavenumber / PER_MM
     end = _shown_wavenumber(k, limit)
@@ -122,13 +120,7 @@ def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
 
 def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
     axes.plot(r / MM, g / PER_MM2, "-", color=COLOURS["deconvolved"], label="deconvolved G")
-    axes.plot(
-        r / MM,
-        gaussian / PER_MM2,
-        "--",
-        color=COLOURS["gaussian"],
-        label="Gaussian fit",
-    )
+    axes.plot(r / MM, gaussian / PER_MM2, "--", color=COLOURS["gaussian"], label="Gaussian fit")
 
 
 def _shade_unresolved(axes: Axes, limit: float, end: float) -> None:
@@ -179,7 +171,7 @@ _MAX_FAILED_LINES = 12
 _MARGIN = 0.012  # left and right of the lines of text, of the width
 
 
-def calibration_figure(data: ApparatusData) -> Figure:
+def calibration_figure(result: Calibrated) -> Figure:
     r"""Draw an apparatus function and the scan that it came from.
 
     Left: the scan with its standard uncertainty, the reconvolutions
@@ -189,22 +181,10 @@ def calibration_figure(data: ApparatusData) -> Figure:
     its band (k = 2) and the Gaussian (d, linear; e, logarithmic), and the transfer function
     with the regularisation's window, hatched where the scan does not resolve it (f).
 
-    Parameters
-    ----------
-    data : ApparatusData
-        The result of a calibration, or what was read from an artifact.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        7.2 inches wide, with an Agg canvas and outside of pyplot; save it with
-        :func:`memscal.figures.style.save_figure`.
-
-    Notes
-    -----
     After Fig. 2 of Scheibert, Prevost, Frelat, Rey and Debrégeas: panel a is its a), panel d
     its b).  In c a point less than 2u above the baseline is drawn as an upper limit.
     """
+    data = apparatus_of(result)
     with house_style():
         lines = _text_lines(data)
         text_height = _LINE_HEIGHT * (len(lines) + 0.6)
@@ -231,7 +211,7 @@ def calibration_figure(data: ApparatusData) -> Figure:
         panels = (scan, residuals, scan_log, radial, radial_log, transfer)
         for letter, axes in zip("abcdef", panels, strict=True):
             panel_letter(axes, letter)
-        # One pass of the layout, then none: rendering twice gives the same picture twice.
+        # One pass of the layout, then none, so that rendering twice gives the same picture.
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
@@ -239,12 +219,12 @@ def calibration_figure(data: ApparatusData) -> Figure:
 
 def values_text(data: ApparatusData) -> str:
     """Return the main values with their standard uncertainties, in one line."""
-    parts = [f"A = {measured_text(data.parameters, 'conversion_constant')}"]
-    parts.append(f"σ = {measured_text(data.parameters, 'gaussian_sigma')} (data space)")
+    values = [f"A = {measured_text(data.parameters, 'conversion_constant')}"]
+    values.append(f"σ = {measured_text(data.parameters, 'gaussian_sigma')} (data space)")
     if "gaussian_sigma_deconvolved" in data.parameters:
         text = measured_text(data.parameters, "gaussian_sigma_deconvolved")
-        parts.append(f"{text} (deconvolved G)")
-    return ",  ".join(parts)
+        values.append(f"{text} (deconvolved G)")
+    return ",  ".join(values)
 
 
 def failed_checks_text(checks: tuple[QualityCheck, ...]) -> list[str]:
@@ -260,11 +240,10 @@ def failed_checks_text(checks: tuple[QualityCheck, ...]) -> list[str]:
 def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     """Return the lines above the panels, each with colour and weight."""
     ink = COLOURS["measured"]
-    sensor = (
-        " ".join(part for part in (data.sensor.name, data.sensor.model) if part) or "the sensor"
-    )
-    sensor = textwrap.shorten(sensor, 60, placeholder=" …") + f", channel {data.sensor.channel}"
-    title = textwrap.shorten(f"Apparatus function of {sensor}", 95, placeholder=" …")
+    # A long name is cut, not the channel behind it.
+    name, _, channel = sensor_title(data).rpartition(", channel ")
+    name = textwrap.shorten(name, 82, placeholder=" …")
+    title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
     film = data.film
     setting = (
         f"{data.indenter.shape} of radius {data.indenter.radius / MM:.3g} mm, {data.load:.3g} N; "

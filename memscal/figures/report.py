@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from html import escape
 from string import Template
 
@@ -11,20 +11,17 @@ import numpy as np
 
 from memscal.figures.calibration import calibration_figure, values_text
 from memscal.figures.style import render_figure
-from memscal.model.apparatus import ApparatusData
+from memscal.model import records
+from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
-from memscal.model.quantities import (
-    MM,
-    PER_MM,
-    estimated_quantity,
-    measured_text,
-    parameter_quantity,
-)
+from memscal.model.quantities import PER_MM, Record, estimated_quantity
+from memscal.summaries.calibration import sensor_title, tables
+from memscal.summaries.table import Table, checks_table
 
-__all__ = ["PAGE", "STYLE", "html_report"]
+__all__ = ["html_report"]
 
-STYLE = """
+_STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff;
   max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
@@ -42,7 +39,6 @@ th[scope=row] { font-weight: 500; min-width: 9rem; }
 thead th { border-bottom: 2px solid #777; }
 td { font-variant-numeric: tabular-nums; }
 tr.failed th, tr.failed td { color: #a11d00; font-weight: 600; }
-tr.total th, tr.total td { font-weight: 600; border-top: 1px solid #777; }
 figure { margin: 1rem 0; }
 img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
 figcaption { color: #555; font-size: .92rem; }
@@ -57,7 +53,7 @@ figcaption { color: #555; font-size: .92rem; }
 """
 
 # The policy makes the promise binding: nothing is fetched and nothing is run.
-PAGE = Template(
+_PAGE = Template(
     """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -77,53 +73,28 @@ $body
 """
 )
 
-_RATIO_SCALE = (
-    "conversion_constant",
-    "conversion_constant_gaussian",
-    "gaussian_sigma",
-    "gaussian_sigma_deconvolved",
-)
-
 
 def html_report(data: ApparatusData) -> str:
     """Return a calibration as a self-contained HTML page, for reading and for printing.
 
-    Values with uncertainty and unit, quality checks with what a failure means, the
-    uncertainty budget, the figure of :func:`~memscal.figures.calibration.calibration_figure`,
-    and the provenance.  The same data give the same text.
-
-    Parameters
-    ----------
-    data : ApparatusData
-        The result of a calibration, or what was read from an artifact.
-
-    Returns
-    -------
-    str
-        The page, in UTF-8's characters; everything that came from a file is escaped.
+    The same data give the same text; everything that came from a file is escaped.
     """
-    title = f"Apparatus function of {_sensor(data) or 'the sensor'}, channel {data.sensor.channel}"
+    title = sensor_title(data)
+    values, _ = tables(data)
+    sections = {
+        "Values": values.html(),
+        "Quality checks": checks_table(data.checks, meanings=True).html(),
+        "Figure": _figure(data),
+        "Uncertainty budget": _budget(data),
+        "What was measured on": _setting(data).html(),
+        "Provenance": _provenance(data),
+    }
     body = "\n".join(
-        (
-            f"<h1>{escape(title)}</h1>",
-            _verdict(data),
-            _section("Values", _values_table(data)),
-            _section("Quality checks", _checks_table(data)),
-            _section("Figure", _figure(data)),
-            _section("Uncertainty budget", _budget_table(data)),
-            _section("What was measured on", _setting_table(data)),
-            _section("Provenance", _provenance(data)),
-        )
+        f"<section>\n<h2>{escape(heading)}</h2>\n{content}\n</section>"
+        for heading, content in sections.items()
     )
-    return PAGE.substitute(title=escape(title), style=STYLE, body=body)
-
-
-def _sensor(data: ApparatusData) -> str:
-    return " ".join(part for part in (data.sensor.name, data.sensor.model) if part)
-
-
-def _section(heading: str, content: str) -> str:
-    return f"<section>\n<h2>{escape(heading)}</h2>\n{content}\n</section>"
+    heading = f"<h1>{escape(title)}</h1>\n{_verdict(data)}\n"
+    return _PAGE.substitute(title=escape(title), style=_STYLE, body=heading + body)
 
 
 def _verdict(data: ApparatusData) -> str:
@@ -141,118 +112,69 @@ def _verdict_text(data: ApparatusData) -> str:
     return f"{count}: {', '.join(failed)}. Read what each failure means before use."
 
 
-def _values_table(data: ApparatusData) -> str:
-    rows = []
-    for name in data.parameters.names:
-        shown, text = (
-            parameter_quantity(data.parameters, name),
-            measured_text(data.parameters, name),
-        )
-        value, spread = data.parameters[name], data.parameters.uncertainty(name)
-        # A share of a position or an offset would mean nothing: its zero is arbitrary.
-        share = f"{100 * spread / abs(value):.2g} %" if name in _RATIO_SCALE and value else "–"
-        rows.append((shown.words, shown.symbol, text, share))
-    resolved = data.resolved_wavenumber / PER_MM
-    rows.append(("resolved up to the wavenumber", "k", f"{resolved:.3g} rad/mm", "–"))
-    caption = "Estimates with their standard uncertainties (k = 1)"
-    return _table(caption, ("quantity", "symbol", "value", "relative uncertainty"), rows)
-
-
-def _checks_table(data: ApparatusData) -> str:
-    rows = [
-        (
-            check.name.replace("_", " "),
-            f"{check.value:.3g}",
-            f"{check.limit:.3g}",
-            "–" if check.p_value is None else f"{check.p_value:.2g}",
-            "passed" if check.passed else "FAILED",
-            check.meaning,
-        )
-        for check in data.checks
-    ]
-    failed = {i for i, check in enumerate(data.checks) if not check.passed}
-    head = ("check", "value", "limit", "p-value", "result", "meaning")
-    return _table(
-        "Each check, its value, its limit and the chance of such a value", head, rows, marked=failed
-    )
-
-
-def _budget_table(data: ApparatusData) -> str:
+def _budget(data: ApparatusData) -> str:
     """Return sources of uncertainty in rows, estimated quantities in columns."""
-    columns = list(data.budget)
-    sources = list(dict.fromkeys(source for name in columns for source in data.budget[name]))
+    sources = dict.fromkeys(source for column in data.budget.values() for source in column)
     if not sources:
         return "<p>No budget by source was stored.</p>"
-    head = [
-        "source",
-        *(
-            f"{estimated_quantity(name).words} ({estimated_quantity(name).unit})"
-            for name in columns
-        ),
-    ]
-    rows = [
-        (source.replace("_", " "), *(_share(data, name, source) for name in columns))
-        for source in sources
-    ]
-    total = [_root_sum_square(data.budget[name].values()) for name in columns]
-    combined = (_in_unit(name, each) for name, each in zip(columns, total, strict=True))
-    rows.append(("root sum of squares", *combined))
-    caption = "Standard uncertainty by source, and its share of the variance"
-    return _table(caption, head, rows, marked={len(rows) - 1}, mark="total")
+    columns = []
+    for name, budget in data.budget.items():
+        quantity = estimated_quantity(name)
+        total = float(np.sqrt(sum(u**2 for u in budget.values())))
+        cells = [_share(budget.get(source), total, quantity.scale) for source in sources]
+        ratio = _relative(data.parameters, name)
+        columns.append(
+            (
+                f"{quantity.words} ({quantity.unit})",
+                *cells,
+                f"{total / quantity.scale:.2g}",
+                f"{100 * ratio:.2g} %" if np.isfinite(ratio) else "–",
+            )
+        )
+    names = [source.replace("_", " ") for source in sources]
+    first = ("source", *names, "root sum of squares", "relative standard uncertainty")
+    head, *rows = zip(first, *columns, strict=True)
+    return Table("Standard uncertainty by source, and its share of the variance", head, rows).html()
 
 
-def _share(data: ApparatusData, name: str, source: str) -> str:
-    if source not in data.budget[name]:
+def _relative(parameters: ParameterSet, name: str) -> float:
+    if name not in parameters or parameters[name] == 0:
+        return float("nan")
+    return parameters.uncertainty(name) / abs(parameters[name])
+
+
+def _share(u: float | None, total: float, scale: float) -> str:
+    if u is None:
         return "–"
-    part, total = data.budget[name][source], _root_sum_square(data.budget[name].values())
-    percent = f" ({100 * (part / total) ** 2:.0f} %)" if total > 0 else ""
-    return _in_unit(name, part) + percent
+    return f"{u / scale:.2g}" + (f" ({100 * (u / total) ** 2:.0f} %)" if total > 0 else "")
 
 
-def _in_unit(name: str, value: float) -> str:
-    return f"{value / estimated_quantity(name).scale:.2g}"
-
-
-def _root_sum_square(parts: Iterable[float]) -> float:
-    return float(np.sqrt(sum(part**2 for part in parts)))
-
-
-def _setting_table(data: ApparatusData) -> str:
-    film, indenter, reference = data.film, data.indenter, data.reference
+def _setting(data: ApparatusData) -> Table:
     rows = [
-        ("sensor", _sensor(data) or "not stated"),
-        ("channel", data.sensor.channel),
+        *_stated("", records.SENSOR, data.sensor),
         ("load", f"{data.load:.4g} N"),
-        (
-            f"{indenter.shape}, radius",
-            format_measured(indenter.radius / MM, _scaled(indenter.radius_uncertainty, MM), "mm"),
-        ),
-        (
-            "film, Young's modulus",
-            format_measured(
-                film.young_modulus / 1e6, _scaled(film.young_modulus_uncertainty, 1e6), "MPa"
-            ),
-        ),
-        (
-            "film, Poisson's ratio",
-            format_measured(film.poisson_ratio, film.poisson_ratio_uncertainty),
-        ),
-        (
-            "film, thickness",
-            format_measured(film.thickness / MM, _scaled(film.thickness_uncertainty, MM), "mm"),
-        ),
-        ("reference, solver", reference.solver or "not stated"),
-        ("reference, discretisation", reference.discretisation or "not stated"),
-        (
-            "reference, estimated relative error",
-            "not stated" if reference.convergence is None else f"{reference.convergence:.1g}",
-        ),
+        *_stated(f"{data.indenter.shape}, ", records.ROUND_INDENTER, data.indenter),
+        *_stated("film, ", records.FILM, data.film),
+        *_stated("reference, ", records.SOLVER, data.reference),
+        *_stated("reference, ", records.NUMERICS, data.reference),
     ]
-    return _table("Sensor, indenter, film and reference", ("item", "value"), rows)
+    return Table("Sensor, indenter, film and reference", ("item", "value"), rows)
 
 
-def _scaled(uncertainty: float | None, scale: float) -> float | None:
-    return None if uncertainty is None else uncertainty / scale
+def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, str]]:
+    """Return what an object states of a record: words, and value with uncertainty and unit."""
+    for quantity in record.quantities:
+        value = getattr(holder, quantity.name, None)
+        if isinstance(value, str) and value:
+            yield prefix + quantity.words, value
+        elif isinstance(value, float) and not quantity.name.endswith("_uncertainty"):
+            value, spread = value / quantity.scale, f"{quantity.name}_uncertainty"
+            text = f"{value:.3g} {quantity.unit}".strip()
+            if hasattr(holder, spread):
+                u = getattr(holder, spread)
+                u = None if u is None else u / quantity.scale
+                text = format_measured(value, u, quantity.unit)
+            yield prefix + quantity.words, text
 
 
 def _provenance(data: ApparatusData) -> str:
@@ -263,18 +185,18 @@ def _provenance(data: ApparatusData) -> str:
         *_source_rows("scan", process.input_scan),
         *_source_rows("reference", process.input_reference),
     ]
-    parts = [_table("What was run on what", ("item", "value"), rows)]
+    blocks = [Table("What was run on what", ("item", "value"), rows).html()]
     for caption, mapping in (("Options", process.configuration), ("Versions", process.environment)):
         if mapping:
             rows = [(str(key), _plain(value)) for key, value in mapping.items()]
-            parts.append(_table(caption, ("name", "value"), rows))
-    parts.append("<h3>Messages</h3>")
+            blocks.append(Table(caption, ("name", "value"), rows).html())
+    blocks.append("<h3>Messages</h3>")
     if process.messages:
         items = "\n".join(f"<li>{escape(message.text)}</li>" for message in process.messages)
-        parts.append(f"<ul>\n{items}\n</ul>")
+        blocks.append(f"<ul>\n{items}\n</ul>")
     else:
-        parts.append("<p>None.</p>")
-    return "\n".join(parts)
+        blocks.append("<p>None.</p>")
+    return "\n".join(blocks)
 
 
 def _source_rows(what: str, source: SourceFile | None) -> list[tuple[str, str]]:
@@ -286,7 +208,7 @@ def _source_rows(what: str, source: SourceFile | None) -> list[tuple[str, str]]:
 def _plain(value: object) -> str:
     """Return an option's value for reading: groups as "name: value", not as Python."""
     if isinstance(value, Mapping):
-        return "; ".join(f"{key}: {_plain(each)}" for key, each in value.items()) or "none"
+        return "; ".join(f"{key}: {_plain(item)}" for key, item in value.items()) or "none"
     return "not given" if value is None else str(value)
 
 
@@ -307,23 +229,3 @@ def _figure(data: ApparatusData) -> str:
         f'<figure>\n<img alt="{escape(alt)}" src="data:image/svg+xml;base64,{svg}">\n'
         f"<figcaption>{escape(caption)}</figcaption>\n</figure>"
     )
-
-
-def _table(
-    caption: str,
-    head: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    *,
-    marked: Iterable[int] = (),
-    mark: str = "failed",
-) -> str:
-    """Return a table whose first column heads its rows; every cell is escaped here."""
-    lines = ["<table>", f"<caption>{escape(caption)}</caption>", "<thead><tr>"]
-    lines += [f'<th scope="col">{escape(cell)}</th>' for cell in head]
-    lines.append("</tr></thead>\n<tbody>")
-    for i, (first, *rest) in enumerate(rows):
-        opening = f'<tr class="{mark}">' if i in set(marked) else "<tr>"
-        cells = "".join(f"<td>{escape(cell)}</td>" for cell in rest)
-        lines.append(f'{opening}<th scope="row">{escape(first)}</th>{cells}</tr>')
-    lines.append("</tbody>\n</table>")
-    return "\n".join(lines)

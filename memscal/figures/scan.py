@@ -1,4 +1,4 @@
-"""The panels that show the scan: measured voltage, reconvolutions, reference."""
+"""Panels of a scan: measured voltage, reconvolutions, reference, residuals."""
 
 from __future__ import annotations
 
@@ -79,11 +79,7 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
 
 
 def _draw_measured(
-    axes: Axes,
-    x: FloatArray,
-    u: FloatArray,
-    errors: FloatArray,
-    label: str = "scan, ±u",
+    axes: Axes, x: FloatArray, u: FloatArray, errors: FloatArray, label: str = "scan, ±u"
 ) -> None:
     size, colour = marker_size(x.size), COLOURS["measured"]
     if x.size > SCATTER_THRESHOLD:
@@ -211,12 +207,7 @@ def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
         return
     left = (_centre(data) - radius) / MM
     patch = Rectangle((left, 0.0), 2 * radius / MM, 0.035, transform=axes.get_xaxis_transform())
-    patch.set(
-        facecolor="black",
-        lw=0,
-        zorder=4,
-        label=f"{what}, diameter {2 * radius / MM:.3g} mm",
-    )
+    patch.set(facecolor="black", lw=0, zorder=4, label=f"{what}, diameter {2 * radius / MM:.3g} mm")
     axes.add_patch(patch)
 
 
@@ -256,8 +247,8 @@ def _by_distance(data: ApparatusData) -> bool:
 
 
 def _baseline(data: ApparatusData) -> float:
-    known = "baseline" in data.parameters
-    return data.parameters["baseline"] if known else 0.0
+    stated = "baseline" in data.parameters
+    return data.parameters["baseline"] if stated else 0.0
 
 
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
@@ -292,10 +283,7 @@ def draw_residuals(axes: Axes, data: ApparatusData) -> None:
     """
     scan = data.reconvolution
     errors, scale = _residual_scale(data)
-    with_g, with_gaussian = (
-        scan.residual / errors,
-        (scan.u_zz - scan.u_zz_gaussian) / errors,
-    )
+    with_g, with_gaussian = scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors
     limit = _residual_limit(with_g, with_gaussian)
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
     axes.axhline(0.0, color="0.4", lw=0.6)
@@ -346,11 +334,4 @@ def _mark_beyond(axes: Axes, x: FloatArray, z: FloatArray, limit: float, colour:
         beyond = side * z > limit
         if np.any(beyond):
             edge = np.full(int(np.sum(beyond)), 0.93 * side * limit)
-            axes.plot(
-                x[beyond] / MM,
-                edge,
-                marker,
-                color=colour,
-                ms=4,
-                label="_beyond the axis",
-            )
+            axes.plot(x[beyond] / MM, edge, marker, color=colour, ms=4, label="_beyond the axis")

@@ -1,4 +1,4 @@
-"""One look for all figures: type, colours, and what never changes with the user's set-up."""
+"""Style of all figures: type, colours, layout, and writing a figure to a file."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ COLOURS = {
     "muted": "#6B6B6B",
     "failed": "#A11D00",
 }
-"""Okabe and Ito's colours, told apart by colour-blind readers; line styles do it in grey."""
+"""Okabe and Ito's colours, for colour-blind readers; line styles differ, too, for grey print."""
 
 SCATTER_THRESHOLD = 400
-"""Above this many points error bars become a fog: dots are drawn instead."""
+"""Above this many points dots are drawn in place of error bars."""
 
 _STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
@@ -95,9 +95,9 @@ _STYLE: dict[str, Any] = {
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Hold matplotlib's settings at the house's, and give back the user's afterwards.
+    """Set matplotlib's settings to those of this module, and restore the user's afterwards.
 
-    The user's own matplotlibrc is set aside, so that a figure looks the same everywhere.
+    The user's matplotlibrc has no effect, so that a figure looks the same everywhere.
     Settings are read both when a figure is built and when it is rendered: both need this.
     """
     with mpl.rc_context():
@@ -108,13 +108,13 @@ def house_style() -> Iterator[None]:
 
 
 def drawable(text: str) -> str:
-    """Return the text with a mark for each character that the house's font cannot draw."""
+    """Return the text with a mark for each character that the font cannot draw."""
     font = get_font(findfont("DejaVu Sans"))
     return "".join(c if font.get_char_index(ord(c)) else "\ufffd" for c in text)
 
 
 def new_figure(height: float) -> Figure:
-    """Return an empty figure of the house's width, with a canvas and no window."""
+    """Return an empty figure of the usual width, with a canvas and no window."""
     layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, wspace=0.04, hspace=0.02)
     figure = Figure(figsize=(FIGURE_WIDTH, height), layout=layout)
     FigureCanvasAgg(figure)
@@ -124,11 +124,7 @@ def new_figure(height: float) -> Figure:
 def panel_letter(axes: Axes, letter: str) -> None:
     """Put the panel's letter at the upper left, outside the frame and clear of all data."""
     label = axes.annotate(
-        letter,
-        (0.0, 1.0),
-        (-30, 4),
-        xycoords="axes fraction",
-        textcoords="offset points",
+        letter, (0.0, 1.0), (-30, 4), xycoords="axes fraction", textcoords="offset points"
     )
     label.set_fontweight("bold")
     label.set_fontsize(10)
@@ -168,18 +164,7 @@ _METADATA: Mapping[str, dict[str, str | None]] = {
 
 
 def figure_format(suffix: str) -> str:
-    """Return matplotlib's name of the format that a file name's suffix asks for.
-
-    Raises
-    ------
-    InputError
-        If the suffix is none of ``.png``, ``.svg`` and ``.pdf``.
-
-    Examples
-    --------
-    >>> figure_format(".PNG")
-    'png'
-    """
+    """Return matplotlib's name of the format that a file name's suffix asks for."""
     if suffix.lower() not in FIGURE_SUFFIXES:
         raise InputError(
             f"A figure cannot be written as {suffix!r}."
@@ -192,20 +177,9 @@ def figure_format(suffix: str) -> str:
 
 
 def render_figure(figure: Figure, file_format: str, *, dpi: float = 200.0) -> bytes:
-    """Return the figure as the bytes of a PNG, SVG or PDF file, free of dates.
+    """Return the figure as the bytes of a PNG, SVG or PDF file, without dates.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        What to render.
-    file_format : str
-        ``"png"``, ``"svg"`` or ``"pdf"``.
-    dpi : float
-        Dots per inch of a PNG, and of the point clouds inside the others.
-
-    Returns
-    -------
-    bytes
+    ``dpi`` is that of a PNG, and of the point clouds inside the others.
     """
     metadata = _METADATA[figure_format("." + file_format)]
     buffer = io.BytesIO()
@@ -215,34 +189,6 @@ def render_figure(figure: Figure, file_format: str, *, dpi: float = 200.0) -> by
 
 
 def save_figure(figure: Figure, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a figure as PNG (200 dots per inch), SVG or PDF, by the suffix of its name.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        What to write.
-    path : path-like
-        The file; its suffix, ``.png``, ``.svg`` or ``.pdf``, chooses the format.
-    overwrite : bool
-        Replace a file that exists.
-
-    Raises
-    ------
-    InputError
-        If the suffix is none of the three.
-    OutputError
-        If the file exists and ``overwrite`` is false, or cannot be written.  What was there
-        before is untouched.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from matplotlib.figure import Figure
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder, "empty.svg")
-    ...     save_figure(Figure(), path)
-    ...     path.read_text()[:5]
-    '<?xml'
-    """
+    """Write a figure as PNG (200 dots per inch), SVG or PDF, by the suffix of its name."""
     file_format = figure_format(Path(path).suffix)
     atomic_write_bytes(path, render_figure(figure, file_format), overwrite=overwrite)

@@ -1,87 +1,29 @@
-"""The paper's claim of insensitivity, drawn: results against the amplitude of the noise."""
+"""Figure of a sweep: results of a calibration against the amplitude of the noise."""
 
 from __future__ import annotations
-
-from typing import Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from memscal.calibration.sweep import Sweep
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM, MV
 
-__all__ = ["SweepLike", "sweep_figure"]
+__all__ = ["sweep_figure"]
 
 _INNER = (0.16, 0.84)  # of the draws: what one standard deviation holds of a normal law
 _SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge
 
 
-class SweepLike(Protocol):
-    """What a sweep over the amplitude of the regularising noise holds, in SI units.
-
-    ``amplitude`` (n,) is relative to the one that the rule chooses.  The three results (n,)
-    come from the exact expectation; those named ``seed_...`` (n, s) from s seeded draws.
-    """
-
-    @property
-    def amplitude(self) -> FloatArray:
-        """Noise amplitude relative to the rule's choice."""
-
-    @property
-    def conversion_constant(self) -> FloatArray:
-        """Conversion constant A, in V/Pa."""
-
-    @property
-    def gaussian_sigma_deconvolved(self) -> FloatArray:
-        """Width of the Gaussian fitted to the deconvolved G, in m."""
-
-    @property
-    def relative_rms(self) -> FloatArray:
-        """Misfit of the reconvolution, of the scan's maximum."""
-
-    @property
-    def seed_conversion_constant(self) -> FloatArray:
-        """Conversion constant of each draw, in V/Pa."""
-
-    @property
-    def seed_gaussian_sigma(self) -> FloatArray:
-        """Width of the Gaussian of each draw, in m."""
-
-    @property
-    def seed_relative_rms(self) -> FloatArray:
-        """Misfit of each draw's reconvolution."""
-
-
-def sweep_figure(sweep: SweepLike) -> Figure:
-    r"""Draw how A, sigma and the reconvolution change with the noise that regularises them.
+def sweep_figure(sweep: Sweep) -> Figure:
+    """Draw how A, sigma and the reconvolution change with the noise that regularises them.
 
     A line joins the results of the exact expectation.  Dots are seeded draws, with their
     median and the range that holds the middle 68 % of them.  Single draws are heavy-tailed:
     those beyond the axis are drawn at its edge as triangles, and counted.
-
-    Parameters
-    ----------
-    sweep : SweepLike
-        Results over noise amplitude and over seeds; there may be no seeds (n, 0).
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Save it with :func:`memscal.figures.style.save_figure`.
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace
-    >>> a, none = np.array([0.1, 1.0, 10.0]), np.empty((3, 0))
-    >>> sweep = SimpleNamespace(
-    ...     amplitude=a, conversion_constant=3e-8 + 0 * a, gaussian_sigma_deconvolved=5e-4 * a,
-    ...     relative_rms=0.01 * a, seed_conversion_constant=none, seed_gaussian_sigma=none,
-    ...     seed_relative_rms=none)
-    >>> [axes.get_ylabel() for axes in sweep_figure(sweep).axes][1:]
-    ['$\\sigma$ of deconvolved $G$ (mm)', 'reconvolution, rms misfit (%)']
     """
     power = _power_of_ten(sweep.conversion_constant / MV)
     rows = (
@@ -208,7 +150,7 @@ def _reach(exact: FloatArray, draws: FloatArray, centre: float) -> float:
 
 def _relative_axis(axes: Axes, amplitude: FloatArray) -> None:
     """Add a right-hand axis: the change from the result at the rule's amplitude, in percent."""
-    (line,) = (each for each in axes.lines if each.get_label() == "exact expectation")
+    (line,) = (line for line in axes.lines if line.get_label() == "exact expectation")
     base = float(np.asarray(line.get_ydata())[np.argmin(np.abs(np.log(amplitude)))])
     if not (np.isfinite(base) and base != 0):
         return

@@ -1,4 +1,4 @@
-"""What a calibration finds: the data of an apparatus function, as stored in its artifact."""
+"""Data of an apparatus function, as its artifact stores them."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class TransferFunction:
     """Modulus of the apparatus function's 2-D Fourier transform along a radius.
 
     ``k`` (n,) in rad/m; ``modulus``, ``modulus_errors`` and ``window`` (the
-    regularisation's, from 0 to 1) are dimensionless.  Beyond ``resolved_wavenumber``
-    (rad/m) the scan says nothing: what stands there is the regularisation's.
+    regularisation's, from 0 to 1) are dimensionless.  Up to ``resolved_wavenumber`` (rad/m) the
+    scan determines the modulus, beyond it the regularisation does.
     """
 
     k: FloatArray

@@ -109,6 +109,11 @@ class Quantity:
         return DIMENSIONS[self.dimension].shown
 
     @property
+    def si_unit(self) -> str:
+        """The SI unit of its values in Python."""
+        return DIMENSIONS[self.dimension].si if self.dimension in DIMENSIONS else self.dimension
+
+    @property
     def scale(self) -> float:
         """How many SI units :attr:`unit` is."""
         if self.shown or self.dimension not in DIMENSIONS:

@@ -1,7 +1,7 @@
-"""The result that shows itself: as text, as a mapping, as a figure, in a notebook.
+"""Base of all results: each shows itself as text, mapping, arrays, figure and notebook cell.
 
-What a result says stands in :mod:`memscal.summaries`, what it draws in :mod:`memscal.figures`: both
-stand above all results, and are imported when they are called.
+What a result says is written in :mod:`memscal.summaries`, its figure in :mod:`memscal.figures`.
+Both import the results, so that they are imported when a method is called.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Result"]
 
+_FORMS = {"dataset": "arrays", "frame": "data frame", "correlated": "covariance of parameters"}
+
 
 class Result:
     """A result that prints, tabulates and draws itself.
 
-    ``_summary`` names the module of :mod:`memscal.summaries` that tells of it, by the functions
+    ``_summary`` names the module of :mod:`memscal.summaries` with the functions
     ``tables(result)``, ``mapping(result)`` and, where there is one, ``dataset(result)``,
     ``frame(result)`` and ``correlated(result)``; ``_figure`` names the module and function of
     :mod:`memscal.figures` that draws it.
@@ -31,9 +33,13 @@ class Result:
     _summary: ClassVar[str]
     _figure: ClassVar[str] = ""
 
+    def tables(self) -> list[Any]:
+        """Return the tables of the result, those without rows left out."""
+        return [table for table in self._told("tables") if table.rows]
+
     def summary(self) -> str:
         """Return the tables of the result as text, as the command line prints them."""
-        return "\n\n".join(table.plain() for table in self._told("tables") if table.rows)
+        return "\n\n".join(table.plain() for table in self.tables())
 
     def __str__(self) -> str:
         """Return the summary."""
@@ -41,7 +47,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         """Return the tables as HTML, for notebooks."""
-        return "\n".join(table.html() for table in self._told("tables") if table.rows)
+        return "\n".join(table.html() for table in self.tables())
 
     def to_dict(self) -> dict[str, Any]:
         """Return values with standard uncertainties and units, as JSON holds them."""
@@ -82,7 +88,13 @@ class Result:
         return numbers
 
     def plot(self, **options: Any) -> Figure:
-        """Draw the result; the figure is returned, and nothing is shown or written."""
+        """Draw the result; the figure is returned, and nothing is shown or written.
+
+        Raises
+        ------
+        InputError
+            If there is no figure of such a result.
+        """
         if not self._figure:
             raise InputError(f"There is no figure of a {type(self).__name__}.")
         module, _, function = self._figure.rpartition(".")
@@ -92,12 +104,12 @@ class Result:
         return figure
 
     def _told(self, form: str) -> Any:
-        """Call the function of the result's summary that gives one form of it."""
+        """Call a function of the result's summary, by its name."""
         function = getattr(import_module(f"memscal.summaries.{self._summary}"), form, None)
         if function is None:
             raise InputError(
-                f"A {type(self).__name__} has no such form.",
-                cure="Its summary() and to_dict() hold all that it says.",
+                f"A {type(self).__name__} has no {_FORMS[form]}.",
+                cure="Use summary() or to_dict().",
             )
         try:
             return function(self)

@@ -5,18 +5,28 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.notation import printable
 
-__all__ = ["Table", "checks_json", "checks_table", "finite", "readable", "texts_of"]
+if TYPE_CHECKING:
+    from memscal.model.quantities import Record
+
+__all__ = [
+    "Table",
+    "checks_json",
+    "checks_table",
+    "finite",
+    "readable",
+    "record_arrays",
+    "texts_of",
+]
 
 _LONGEST = 100_000
-
 
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
@@ -49,7 +59,7 @@ def readable(text: str, stream: TextIO | None = None) -> str:
         text.encode(encoding)
     except UnicodeEncodeError:
         power = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
-        text = power.sub(lambda found: "e" + found[1].translate(_SUPERSCRIPTS), text)
+        text = power.sub(lambda match: "e" + match[1].translate(_SUPERSCRIPTS), text)
         text = "".join(_PLAIN.get(c, c) for c in text)
         text = text.encode(encoding, "replace").decode(encoding)
     return text
@@ -68,11 +78,11 @@ def finite(value: float | None) -> float | None:
 
 def texts_of(messages: Iterable[Message]) -> list[str]:
     """Return messages as the JSON output holds them."""
-    return [each.text for each in messages]
+    return [message.text for message in messages]
 
 
-def checks_table(checks: Sequence[QualityCheck]) -> Table:
-    """Return quality checks with value and limit, and the chance of such a value where known."""
+def checks_table(checks: Sequence[QualityCheck], *, meanings: bool = False) -> Table:
+    """Return quality checks with value, limit, p-value, and on request what each one means."""
     rows = [
         (
             check.name.replace("_", " "),
@@ -80,11 +90,13 @@ def checks_table(checks: Sequence[QualityCheck]) -> Table:
             f"{check.limit:.3g}",
             "" if check.p_value is None else f"{check.p_value:.2g}",
             "passed" if check.passed else "FAILED",
+            *([check.meaning] if meanings else []),
         )
         for check in checks
     ]
     failed = frozenset(i for i, check in enumerate(checks) if not check.passed)
-    return Table("Quality checks", ("check", "value", "limit", "p", "result"), rows, failed)
+    head = ("check", "value", "limit", "p", "result", *(["meaning"] if meanings else []))
+    return Table("Quality checks", head, rows, failed)
 
 
 def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:
@@ -101,24 +113,29 @@ def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:
     ]
 
 
+def record_arrays(
+    record: Record, holder: object, names: Mapping[str, str] | None = None
+) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
+    """Return what an object holds of a record as variables of an xarray Dataset, in SI units.
+
+    ``names`` replaces names of quantities and axes that another record of the Dataset has, too.
+    """
+    names, variables = names or {}, {}
+    for quantity in record.quantities:
+        value = getattr(holder, quantity.name, None)
+        if value is not None:
+            axes = tuple(names.get(axis, axis) for axis in quantity.axes)
+            attributes = {"units": quantity.si_unit, "long_name": quantity.words}
+            variables[names.get(quantity.key, quantity.key)] = (axes, value, attributes)
+    return variables
+
+
 _GAP = "  "
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text.
-
-    Parameters
-    ----------
-    title : str
-        What it shows.
-    head : sequence of str
-        Names of the columns.
-    rows : sequence of sequence of str
-        Cells.
-    marked : collection of int
-        Rows that stand for a failure.
-    """
+    """A table of text: its title, names of the columns (or none), cells, and rows that failed."""
 
     title: str
     head: Sequence[str]
@@ -139,15 +156,18 @@ class Table:
         return "\n".join([readable(self.title), *lines])
 
     def html(self) -> str:
-        """Return the table as HTML, marked rows in bold."""
-        head = "".join(f"<th>{escape(readable(cell))}</th>" for cell in self.head)
-        rows = []
-        for number, row in enumerate(self.rows):
-            cells = "".join(f"<td>{escape(readable(cell))}</td>" for cell in row)
-            style = ' style="font-weight: bold"' if number in self.marked else ""
-            rows.append(f"<tr{style}>{cells}</tr>")
-        shown = f"<thead><tr>{head}</tr></thead>" if any(self.head) else ""
-        return (
-            f"<table><caption>{escape(readable(self.title))}</caption>"
-            f"{shown}<tbody>{''.join(rows)}</tbody></table>"
-        )
+        """Return the table as HTML, each row headed by its first cell, marked rows in bold."""
+        lines = [f"<table>\n<caption>{_cell(self.title)}</caption>"]
+        if any(self.head):
+            cells = "".join(f'<th scope="col">{_cell(cell)}</th>' for cell in self.head)
+            lines.append(f"<thead><tr>{cells}</tr></thead>")
+        lines.append("<tbody>")
+        for i, (first, *others) in enumerate(self.rows):
+            mark = ' class="failed" style="font-weight: bold"' if i in self.marked else ""
+            cells = "".join(f"<td>{_cell(cell)}</td>" for cell in others)
+            lines.append(f'<tr{mark}><th scope="row">{_cell(first)}</th>{cells}</tr>')
+        return "\n".join([*lines, "</tbody>\n</table>"])
+
+
+def _cell(text: str) -> str:
+    return escape(printable(text, _LONGEST))

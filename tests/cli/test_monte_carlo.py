@@ -8,15 +8,6 @@ from helpers.console import Run
 import memscal
 
 
-def test_draws_are_compared_with_the_budget_in_a_table(run: Run, scan: Path) -> None:
-    shown = run("calibrate", scan, "--method", "evidence", "--monte-carlo", 20)
-    assert shown.code == 0, shown.err
-    assert "20 draws of noise" in shown.out
-    for column in ("u by the budget", "u of the draws", "95 % interval", "agrees"):
-        assert column in shown.out
-    assert "full width of G at half maximum" in shown.out
-
-
 def test_draws_are_given_as_json_in_the_units_of_the_rest(run: Run, scan: Path) -> None:
     arguments = ("calibrate", scan, "--method", "evidence", "--monte-carlo", 80, "--seed", 4)
     found = run(*arguments, "--json").json["monte_carlo"]

@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
+from memscal.calibration.sweep import Sweep
 from memscal.figures.style import render_figure
 from memscal.figures.sweep import sweep_figure
-from memscal.model.arrays import FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    amplitude: FloatArray
-    conversion_constant: FloatArray
-    gaussian_sigma_deconvolved: FloatArray
-    relative_rms: FloatArray
-    seed_conversion_constant: FloatArray
-    seed_gaussian_sigma: FloatArray
-    seed_relative_rms: FloatArray
 
 
 def make_sweep(seeds: int = 12, tail: float = 1.0) -> Sweep:

@@ -1,0 +1,78 @@
+"""Monte Carlo draws of a calibration as a table, a mapping and a data frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from memscal.calibration.monte_carlo import Comparison, MonteCarlo
+from memscal.model.quantities import estimated_quantity
+from memscal.summaries.table import Table, finite, texts_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["frame", "mapping", "tables"]
+
+
+def tables(result: MonteCarlo) -> list[Table]:
+    """Return each parameter's standard uncertainty by the budget and by draws."""
+    rows = []
+    for comparison in result.comparisons:
+        quantity = estimated_quantity(comparison.name)
+        scale = quantity.scale
+        low, high = (end / scale for end in comparison.symmetric)
+        rows.append(
+            (
+                f"{quantity.words} ({quantity.unit})",
+                f"{comparison.first_order / scale:.2g}",
+                f"{comparison.uncertainty / scale:.2g}",
+                f"{low:.4g} to {high:.4g}",
+                "yes" if comparison.agrees else "no",
+            )
+        )
+    disagreeing = frozenset(i for i, row in enumerate(rows) if row[-1] == "no")
+    *others, last = (source.replace("_", " ") for source in result.sources)
+    sources = f"{', '.join(others)} and {last}" if others else last
+    title = f"What scatters, by {result.draws} draws of {sources} (seed {result.seed})"
+    head = ("", "u by the budget", "u of the draws", "95 % interval", "agrees")
+    return [Table(title, head, rows, disagreeing)]
+
+
+def mapping(result: MonteCarlo) -> dict[str, Any]:
+    """Return the comparison of every parameter."""
+    return {
+        "draws": result.draws,
+        "seed": result.seed,
+        "sources": list(result.sources),
+        "agrees": result.agrees,
+        "parameters": {c.name: _comparison_json(c) for c in result.comparisons},
+        "messages": texts_of(result.messages),
+    }
+
+
+def _comparison_json(comparison: Comparison) -> dict[str, Any]:
+    quantity = estimated_quantity(comparison.name)
+    scale = quantity.scale
+    return {
+        "value": finite(comparison.value / scale),
+        "mean": finite(comparison.mean / scale),
+        "standard_uncertainty": finite(comparison.uncertainty / scale),
+        "sampling_error": finite(comparison.sampling_error / scale),
+        "interval_95": [finite(end / scale) for end in comparison.symmetric],
+        "shortest_interval_95": [finite(end / scale) for end in comparison.shortest],
+        "first_order": finite(comparison.first_order / scale),
+        "stated": finite(comparison.stated / scale),
+        "unit": quantity.unit.replace("²", "^2"),
+        "agrees": comparison.agrees,
+        "reason": comparison.reason,
+    }
+
+
+def frame(result: MonteCarlo) -> pd.DataFrame:
+    """Return the drawn parameters, one row for each draw that could be calibrated."""
+    import pandas as pd
+
+    names = [comparison.name for comparison in result.comparisons]
+    units = [estimated_quantity(name).si_unit for name in names]
+    columns = [f"{name} ({unit})" for name, unit in zip(names, units, strict=True)]
+    return pd.DataFrame(result.samples, columns=columns)

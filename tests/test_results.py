@@ -1,0 +1,175 @@
+"""Results of a calibration show themselves as the command line, JSON and arrays say it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import memscal
+from memscal.cli import main
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("results") / "scan.h5"
+    memscal.write_scan(memscal.simulate(seed=1, points=33, drift=0.2), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def calibration(scan: Path) -> memscal.Calibration:
+    return memscal.calibrate(scan)
+
+
+@pytest.fixture(scope="module")
+def loaded(calibration: memscal.Calibration, scan: Path) -> memscal.ApparatusFunction:
+    path = scan.with_name("saved.h5")
+    calibration.apparatus.save(path)
+    return memscal.load_apparatus(path)
+
+
+@pytest.fixture(scope="module")
+def drawn(calibration: memscal.Calibration) -> memscal.MonteCarlo:
+    return memscal.monte_carlo(calibration, draws=6)
+
+
+def printed(capsys: pytest.CaptureFixture[str], scan: Path, *options: str) -> str:
+    capsys.readouterr()
+    main(["calibrate", str(scan), "-o", str(scan.with_name("out.h5")), "--force", *options])
+    return capsys.readouterr().out
+
+
+def test_print_shows_the_tables_of_the_command(
+    calibration: memscal.Calibration,
+    drawn: memscal.MonteCarlo,
+    scan: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shown = printed(capsys, scan, "--sweep", "--monte-carlo", "6")
+    sweep = calibration.sweep()
+    assert shown == f"{calibration}\n\n{sweep}\n\n{drawn}\n"
+    values = json.loads(printed(capsys, scan, "--sweep", "--monte-carlo", "6", "--json"))
+    assert Path(values.pop("artifact")).name == "out.h5"
+    expected = {"sweep": sweep.to_dict(), "monte_carlo": drawn.to_dict()}
+    assert values == json.loads(json.dumps(calibration.to_dict() | expected))
+    for result in (calibration, calibration.apparatus, sweep, drawn):
+        assert "\n" not in repr(result)
+
+
+def test_an_artifact_from_a_file_shows_what_it_holds(
+    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction
+) -> None:
+    lines, of_file = str(calibration).splitlines(), str(loaded).splitlines()
+    assert [line for line in lines if not line.startswith("  reconvolution with")] == of_file
+    values = calibration.to_dict()
+    del values["reconvolution"]
+    for name, value in loaded.to_dict().items():
+        if isinstance(value, dict):
+            assert value["unit"] == values[name]["unit"]
+            assert value["value"] == pytest.approx(values[name]["value"], rel=1e-9)
+        else:
+            assert name == "checks" or value == values[name]
+    assert list(values) == list(loaded.to_dict())
+
+
+def test_html_holds_values_and_checks(calibration: memscal.Calibration) -> None:
+    html = calibration._repr_html_()
+    assert "conversion constant" in html
+    for check in calibration.apparatus.checks:
+        name = check.name.replace("_", " ")
+        assert f'<th scope="row">{name}</th>' in html
+    assert html.count("FAILED") == sum(not check.passed for check in calibration.apparatus.checks)
+    assert 'class="failed"' in html
+
+
+def test_ufloats_have_the_covariance_of_the_parameters(
+    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction, scan: Path
+) -> None:
+    uncertainties = pytest.importorskip("uncertainties")
+    (fleet,) = memscal.calibrate_many([scan])
+    for result, parameters in (
+        (calibration, calibration.apparatus.parameters),
+        (loaded, loaded.parameters),
+        (fleet, calibration.apparatus.parameters),
+    ):
+        numbers = result.ufloats()
+        assert tuple(numbers) == parameters.names
+        scale = np.sqrt(np.diag(parameters.covariance))
+        covariance = np.array(uncertainties.covariance_matrix(list(numbers.values())))
+        np.testing.assert_allclose(
+            covariance / np.outer(scale, scale),
+            parameters.covariance / np.outer(scale, scale),
+            atol=1e-9,
+        )
+    ratio = numbers["conversion_constant"] / numbers["conversion_constant_gaussian"]
+    assert ratio.nominal_value == pytest.approx(1, abs=0.1)
+
+
+def test_arrays_stand_on_their_axes_in_si_units(
+    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction
+) -> None:
+    pytest.importorskip("xarray")
+    for result, apparatus in ((calibration, calibration.apparatus), (loaded, loaded)):
+        arrays = result.to_xarray()
+        profile, field = apparatus.radial_profile, apparatus.field
+        for name, dims, values, unit in (
+            ("g", ("r",), profile.g, "1/m^2"),
+            ("r", ("r",), profile.r, "m"),
+            ("g_covariance", ("r", "r_prime"), profile.g_covariance, "1/m^4"),
+            ("modulus", ("k",), apparatus.transfer.modulus, "1"),
+            ("k", ("k",), apparatus.transfer.k, "rad/m"),
+            ("u_zz", ("position",), apparatus.reconvolution.u_zz, "V"),
+            ("field", ("y", "x"), field.g, "1/m^2"),
+            ("x", ("x",), field.x, "m"),
+        ):
+            assert (arrays[name].dims, arrays[name].attrs["units"]) == (dims, unit)
+            np.testing.assert_allclose(arrays[name].values, values)
+        assert set(arrays.sizes) == {"r", "r_prime", "k", "position", "x", "y"}
+    swept = calibration.sweep(amplitudes=3, draws=2).to_xarray()
+    assert swept["seed_conversion_constant"].sizes == {"amplitude": 3, "draw": 2}
+
+
+def test_draws_and_scans_are_rows_of_data_frames(drawn: memscal.MonteCarlo, scan: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    draws = drawn.to_dataframe()
+    np.testing.assert_allclose(draws["gaussian_sigma (m)"], drawn.samples[:, 1])
+    assert draws.shape == drawn.samples.shape
+    fleet = memscal.calibrate_many([scan, "missing.h5"])
+    rows = pandas.concat([result.to_dataframe() for result in fleet])
+    assert list(rows.index) == [0, 1]
+    assert fleet[0].parameters is not None
+    u = fleet[0].parameters.uncertainty("conversion_constant")
+    assert rows["u(conversion_constant) (V/Pa)"][0] == pytest.approx(u)
+    assert "missing.h5" in rows["error"][1]
+    assert "missing.h5" in str(fleet[1])
+    assert "missing.h5" in fleet[1].to_dict()["error"]
+    assert fleet[0].to_dict()["conversion_constant"]["unit"] == "mV/Pa"
+    assert "Quality checks" in str(fleet[0])
+    with pytest.raises(memscal.MemscalError, match="could not be calibrated"):
+        fleet[1].ufloats()
+
+
+def test_figures_are_those_of_the_command(
+    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction, drawn: memscal.MonteCarlo
+) -> None:
+    assert len(calibration.plot().axes) == len(loaded.plot().axes)
+    labels = [axes.get_ylabel() for axes in calibration.sweep(amplitudes=3, draws=1).plot().axes]
+    assert any("rms misfit" in label for label in labels)
+    with pytest.raises(memscal.MemscalError, match="no figure of a MonteCarlo"):
+        drawn.plot()
+    with pytest.raises(memscal.MemscalError, match="no arrays"):
+        drawn.to_xarray()
+
+
+def test_a_missing_library_is_named_with_the_extra_that_brings_it(
+    calibration: memscal.Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(
+        memscal.MemscalError, match=r"(?s)xarray is not installed.*memscal\[interop\]"
+    ):
+        calibration.to_xarray()
