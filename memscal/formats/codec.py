@@ -45,7 +45,7 @@ def _write_file(_: Quantity, source: SourceFile) -> Group:
 
 
 def _read_file(file: SafeFile, path: str) -> SourceFile:
-    name, checksum = (require_text(file, f"{path}/{part}") for part in ("file_name", "checksum"))
+    name, checksum = (require_text(file, f"{path}/{key}") for key in ("file_name", "checksum"))
     return SourceFile(name, checksum)
 
 
@@ -102,15 +102,10 @@ def read_record(
     defaults: Mapping[str, Any] = _NOTHING,
     sizes: Mapping[str, int] = _NOTHING,
 ) -> dict[str, Any]:
-    """Return what stands at a path, in SI units, by the names of the quantities.
+    """Return the values at a path, in SI units, by the names of the quantities.
 
     What a file need not state is left out, or taken from ``defaults`` where they name it.
     Arrays have the shape of their axes, those in ``sizes`` or in the group.
-
-    Raises
-    ------
-    FormatError, UnitError
-        If a quantity is missing, or has another kind, unit or shape; the message names its path.
     """
     values = dict(defaults)
     lengths = dict(sizes)

@@ -55,13 +55,7 @@ _COVARIANCE = (
 
 
 def parameter_dimension(name: str, unit: str = "") -> str:
-    """Return the dimension of a parameter: by its SI unit where that is given, else by its name.
-
-    Examples
-    --------
-    >>> parameter_dimension("gaussian_sigma_deconvolved")
-    'length'
-    """
+    """Return the dimension of a parameter: by its SI unit where that is given, else by its name."""
     if unit:
         return dimension_of(unit, f"parameter {name}")
     declared = declared_quantity(name)

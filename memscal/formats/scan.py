@@ -277,13 +277,7 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
 def ensure_folder_writable(
     folder: str | os.PathLike[str], names: Iterable[str], *, overwrite: bool
 ) -> None:
-    """Prove that files of these names can be written in a folder, which need not exist yet.
-
-    Raises
-    ------
-    OutputError
-        If one cannot be written, or exists and may not be replaced.
-    """
+    """Prove that files of these names can be written in a folder, which need not exist yet."""
     target = Path(folder)
     if not target.exists() and not target.is_symlink():
         ensure_writable(target)
@@ -304,28 +298,6 @@ def write_scans(
     """Write scans as memscal-scan files of one folder, all of them or none.
 
     All are written whole under other names first, and only then take their own.
-
-    Parameters
-    ----------
-    scans : mapping of str to Scan
-        The scans by the names of their files.
-    folder : path
-        The folder; it is made if it does not exist.
-    overwrite : bool
-        Whether existing files may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If a file exists or cannot be written; what was there before is then untouched.
-
-    Examples
-    --------
-    >>> from memscal.simulation.rod_scan import simulate
-    >>> with tempfile.TemporaryDirectory() as place:
-    ...     write_scans({"one.h5": simulate(), "two.h5": simulate(seed=1)}, f"{place}/run")
-    ...     sorted(os.listdir(f"{place}/run"))
-    ['one.h5', 'two.h5']
     """
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)

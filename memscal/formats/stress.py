@@ -137,17 +137,7 @@ def scans_group(scans: Sequence[MeasuredScan]) -> Group:
 def read_scans(
     file: SafeFile, paths: Sequence[str], numbers: Sequence[int], sources: Mapping[str, SourceFile]
 ) -> tuple[MeasuredScan, ...]:
-    """Read what was scanned.
-
-    Parameters
-    ----------
-    file : SafeFile
-        A file of measured stress.
-    paths, numbers : sequence
-        The groups of the profiles, and which scan each comes from, counted from one.
-    sources : mapping of str to SourceFile
-        The scans' files by name (``scan_1``), where they are stated.
-    """
+    """Read what was scanned."""
     stored = json_value(file, "/entry/scans/names", list, None)
     known = max(numbers) if stored is None else len(stored)
     if max(numbers) > known:
@@ -279,13 +269,7 @@ def stress_from(file: SafeFile) -> MeasuredStress:
 def write_stress(
     measured: MeasuredStress, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write measured stress as a memscal-stress file, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the file exists and ``overwrite`` is false, or cannot be written.
-    """
+    """Write measured stress as a memscal-stress file, whole or not at all."""
     write_tree(file_tree(STRESS_SCHEMA, _entry(measured)), path, overwrite=overwrite)
 
 

@@ -81,33 +81,9 @@ _MAX_LENGTH = 64
 
 
 def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> FloatArray:
-    """Convert values from a file's unit to SI.
+    """Convert values from a file's unit to SI; ``where`` names them in a message.
 
-    Parameters
-    ----------
-    values : array_like
-        Numbers in ``unit``.
-    unit : str or None
-        The unit; ``None`` means that none is stated, which only a dimensionless quantity may.
-    dimension : str
-        A key of :data:`SI_UNITS`.
-    where : str
-        File and HDF5 path (or column), for the message.
-
-    Returns
-    -------
-    ndarray
-        The numbers in ``SI_UNITS[dimension]``.
-
-    Raises
-    ------
-    UnitError
-        If the unit is missing, unknown, or of another dimension.
-
-    Examples
-    --------
-    >>> to_si([0.25, 561.0], "um", "length", "scan.h5: /entry/data/x")
-    array([2.50e-07, 5.61e-04])
+    Only a dimensionless quantity may have no unit (``None``).
     """
     numbers = np.asarray(values, dtype=np.float64)
     if unit is None:
@@ -127,25 +103,13 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
 
 
 def from_si(values: ArrayLike, dimension: str) -> tuple[FloatArray, str]:
-    """Convert SI values to the unit that our files use; return them with that unit.
-
-    Examples
-    --------
-    >>> from_si([561e-6], "length")
-    (array([0.561]), 'mm')
-    """
+    """Convert SI values to the unit that our files use; return them with that unit."""
     unit = FILE_UNITS[dimension]
     return _scaled(np.asarray(values, dtype=np.float64), -_CANONICAL[unit][1]), unit
 
 
 def dimension_of(unit: str, where: str) -> str:
-    """Return the dimension of a unit whose quantity is not known beforehand.
-
-    Raises
-    ------
-    UnitError
-        If the unit is none of those that memscal works with.
-    """
+    """Return the dimension of a unit whose quantity is not known beforehand."""
     canonical = _CANONICAL.get(unit.strip())
     if canonical is not None:
         return canonical[0]
