@@ -126,22 +126,18 @@ def read(path: Path, options: dict[str, Any]) -> ImportedProfile:
         from memscal.formats.tables.reference import read_reference_table
 
         return read_reference_table(
-            path, **_of_names(options, (*_OF_TABLES, *_SHARED, *_READING, "load")), **setting
+            path, **_stated(options, (*_OF_TABLES, *_SHARED, *_READING, "load")), **setting
         )
     from memscal.formats.meshes.reference_mesh import read_reference_mesh
 
-    places = _of_names(options, ("base", "centre"))
+    places = _stated(options, ("base", "centre"))
     if "base" in places:
         places["base"] = si(places["base"], -3)
     if "centre" in places:
         places["centre"] = tuple(si(position, -3) for position in places["centre"])
     return read_reference_mesh(
-        path, **_of_names(options, (*_SHARED, "vertical", "load")), **places, **setting
+        path, **_stated(options, (*_SHARED, "vertical", "load")), **places, **setting
     )
-
-
-def _of_names(values: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    return {name: values[name] for name in names if values[name] is not None}
 
 
 def is_mesh(path: Path) -> bool:

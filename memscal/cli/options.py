@@ -113,22 +113,10 @@ def film_options(
         ("thickness", Quantity("mm"), "Thickness of the film, in mm."),
     ]
     if uncertainties:
+        words = ("Young's modulus, in MPa.", "Poisson's ratio.", "the thickness, in mm.")
         entries += [
-            (
-                "young-modulus-uncertainty",
-                Quantity("MPa", open_low=False),
-                _UNCERTAINTY + "Young's modulus, in MPa.",
-            ),
-            (
-                "poisson-ratio-uncertainty",
-                Quantity("ratio", open_low=False),
-                _UNCERTAINTY + "Poisson's ratio.",
-            ),
-            (
-                "thickness-uncertainty",
-                Quantity("mm", open_low=False),
-                _UNCERTAINTY + "the thickness, in mm.",
-            ),
+            (f"{name}-uncertainty", Quantity(kind.unit, open_low=False), _UNCERTAINTY + about)
+            for (name, kind, _), about in zip(entries, words, strict=True)
         ]
     return _all_of(entries, values)
 

@@ -175,7 +175,9 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     """Yield the groups that such a file may hold, with what is declared for each."""
     yield "/entry/parameters", estimated_record(file, "/entry/parameters")
     yield from _LAYOUTS[schema].items()
-    yield from ((path, records.STRESS_PROFILE) for path in profile_paths(file))
+    for path in profile_paths(file):
+        yield path, records.STRESS_NUMBERS
+        yield path, records.STRESS_PROFILE
 
 
 def _listed(file: SafeFile, schema: str) -> Iterator[tuple[str, Quantity]]:

@@ -24,7 +24,6 @@ __all__ = [
     "altered",
     "any_scalar",
     "json_value",
-    "optional_array",
     "optional_scalar",
     "optional_text",
     "require_array",
@@ -93,13 +92,6 @@ def require_array(
             cure="Check the shape of the array.",
         )
     return to_si(values, units_of(file, path), dimension, file.where(path))
-
-
-def optional_array(
-    file: SafeFile, path: str, dimension: str, *, ndim: int | None = None
-) -> FloatArray | None:
-    """Return the array at a path in SI units, or ``None`` where there is none."""
-    return require_array(file, path, dimension, ndim=ndim) if file.has(path) else None
 
 
 def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
