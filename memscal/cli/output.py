@@ -98,8 +98,8 @@ def warn(text: str) -> None:
 
 def show_messages(messages: Iterable[Message]) -> None:
     """Write the messages of a result to standard error, each as a note or a warning."""
-    for each in messages:
-        (warn if each.severity == "warning" else note)(each.text)
+    for item in messages:
+        (warn if item.severity == "warning" else note)(item.text)
 
 
 def error(problem: str, why: str = "", cure: str = "") -> None:
