@@ -74,11 +74,7 @@ class FitError(MemscalError):
 class ConvergenceError(MemscalError):
     """A numerical solution that did not reach its stated accuracy.
 
-    Attributes
-    ----------
-    last : object or None
-        The last state that did converge, where there is one: for a contact, a
-        :class:`memscal.Contact`.
+    ``last`` is the last state that did converge, such as a :class:`memscal.Contact`, or ``None``.
     """
 
     last: object | None = None

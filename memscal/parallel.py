@@ -72,13 +72,7 @@ _MOST_WORKERS = 61
 
 
 def require_workers(workers: Any) -> None:
-    """Refuse a number of processes that makes no sense.
-
-    Raises
-    ------
-    InputError
-        If it is no whole number from 1 to 61.
-    """
+    """Refuse a number of processes that makes no sense."""
     if not isinstance(workers, Integral) or not 1 <= int(workers) <= _MOST_WORKERS:
         raise InputError(
             f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}.",

@@ -1,12 +1,20 @@
-"""What starting memscal loads: cold start is part of the product."""
+"""What importing memscal loads, and which of its names are public."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
+from inspect import isfunction
+from typing import Any, get_args, get_type_hints
 
 import pytest
+
+import memscal
+
+WORKING_STATE = {"Comparison", "Posterior", "Solution"}
+"""Types of attributes through which a result shows how it was computed."""
 
 LIST_LIBRARIES = """
 import json, sys
@@ -37,15 +45,55 @@ sys.exit(main())
 """
 
 
-def test_naming_the_package_loads_nothing_else() -> None:
-    assert libraries_after("import memscal") == {"memscal"}
+def test_importing_the_package_loads_only_its_lazy_loader() -> None:
+    assert libraries_after("import memscal") == {"lazy_loader", "memscal"}
 
 
 @pytest.mark.parametrize("arguments", ["'--help'", "'--version'", "'calibrate', '--help'"])
 def test_asking_for_help_loads_click_alone(arguments: str) -> None:
-    assert libraries_after(HELP.format(arguments=arguments)) == {"memscal", "click"}
+    assert libraries_after(HELP.format(arguments=arguments)) == {"click", "lazy_loader", "memscal"}
 
 
 def test_calibrating_is_possible_without_the_libraries_of_other_jobs() -> None:
     loaded = libraries_after("import memscal; memscal.calibrate, memscal.read_scan")
     assert loaded.isdisjoint({"matplotlib", "meshio", "pint", "rich", "skfem", "skimage"})
+
+
+def classes(hint: Any) -> Iterator[type]:
+    """The classes of memscal that a type hint names."""
+    if isinstance(hint, type) and hint.__module__.startswith("memscal."):
+        yield hint
+    for argument in get_args(hint):
+        yield from classes(argument)
+
+
+def offered(public: Any) -> Iterator[Any]:
+    """The type hints of what a public function returns, or of a public class's attributes."""
+    names = {name: getattr(memscal, name) for name in memscal.__all__}
+    members = [public]
+    if isinstance(public, type):
+        members = [member for name, member in vars(public).items() if not name.startswith("_")]
+        hints = get_type_hints(public, localns=names)
+        yield from (hint for name, hint in hints.items() if not name.startswith("_"))
+    for member in members:
+        function = next(
+            (
+                getattr(member, name)
+                for name in ("fget", "func", "__func__")
+                if hasattr(member, name)
+            ),
+            member,
+        )
+        if isfunction(function):
+            yield get_type_hints(function, localns=names).get("return")
+
+
+def test_every_type_that_a_public_name_offers_is_public() -> None:
+    hidden = {
+        offer.__name__
+        for name in memscal.__all__
+        for hint in offered(getattr(memscal, name))
+        for offer in classes(hint)
+        if getattr(memscal, offer.__name__, None) is not offer
+    }
+    assert hidden == WORKING_STATE

@@ -16,18 +16,10 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command ``memscal``.
+    """Run the command ``memscal`` and return its exit code.
 
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        What follows the command's name; the process's own arguments by default.
-
-    Returns
-    -------
-    int
-        The exit code: 0 done; 1 done, but a quality check failed; 2 usage; 3 input refused;
-        4 output not written; 70 internal error; 130 interrupted.
+    0 done; 1 done, but a quality check failed; 2 usage; 3 input refused; 4 output not written;
+    70 internal error; 130 interrupted.
     """
 
     def run(session: Session) -> int:

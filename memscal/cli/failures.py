@@ -39,8 +39,8 @@ class Session:
     debug: bool = False
 
 
-def _set_debug(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
-    if wanted:
+def _set_debug(ctx: click.Context, _: click.Parameter, debug: bool) -> None:
+    if debug:
         ctx.ensure_object(Session).debug = True
 
 
@@ -117,14 +117,7 @@ def exit_code_of(
 ) -> int:
     """Return the exit code that quality checks give; warn of those that failed.
 
-    Parameters
-    ----------
-    checks : sequence of QualityCheck
-        All checks.
-    named : sequence of str, optional
-        How those that failed are told; by default, each by its name.
-    then : str
-        What to say after that.
+    ``named`` are the words for those, by default their names; ``then`` follows them.
     """
     failed = [check.name for check in checks if not check.passed]
     if not failed:

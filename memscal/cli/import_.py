@@ -108,38 +108,36 @@ def needed(path: Path) -> tuple[str, ...]:
     return (*(() if is_mesh(path) else _OF_TABLES), "r_unit", "sigma", "sigma_unit", "load")
 
 
-def strange(path: Path, given: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
+def strange(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
     """Return the options given that a mesh, or a table, has no use for, and which it is."""
     kind, names = ("mesh", (*_OF_TABLES, *_READING)) if is_mesh(path) else ("table", _OF_MESHES)
-    return kind, tuple(name for name in names if given[name] is not None)
+    return kind, tuple(name for name in names if options[name] is not None)
 
 
-def read(path: Path, given: dict[str, Any]) -> ImportedProfile:
+def read(path: Path, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting: dict[str, Any] = {
-        "film": None if all(given[name] is None for name in FILM) else film_from(given),
-        "indenter": None if given["radius"] is None else indenter_from(given["indenter"], given),
+        "film": None if all(options[name] is None for name in FILM) else film_from(options),
+        "indenter": None
+        if options["radius"] is None
+        else indenter_from(options["indenter"], options),
     }
     if not is_mesh(path):
         from memscal.formats.tables.reference import read_reference_table
 
         return read_reference_table(
-            path, **_of_names(given, (*_OF_TABLES, *_SHARED, *_READING, "load")), **setting
+            path, **_stated(options, (*_OF_TABLES, *_SHARED, *_READING, "load")), **setting
         )
     from memscal.formats.meshes.reference_mesh import read_reference_mesh
 
-    places = _of_names(given, ("base", "centre"))
+    places = _stated(options, ("base", "centre"))
     if "base" in places:
         places["base"] = si(places["base"], -3)
     if "centre" in places:
-        places["centre"] = tuple(si(each, -3) for each in places["centre"])
+        places["centre"] = tuple(si(position, -3) for position in places["centre"])
     return read_reference_mesh(
-        path, **_of_names(given, (*_SHARED, "vertical", "load")), **places, **setting
+        path, **_stated(options, (*_SHARED, "vertical", "load")), **places, **setting
     )
-
-
-def _of_names(values: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    return {name: values[name] for name in names if values[name] is not None}
 
 
 def is_mesh(path: Path) -> bool:
@@ -277,55 +275,57 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @json_option
 @force_option
 @debug_option
-def command(table: Path, output: Path, kind: str, as_json: bool, force: bool, **given: Any) -> int:
+def command(
+    table: Path, output: Path, kind: str, as_json: bool, force: bool, **options: Any
+) -> int:
     """Convert a TABLE (CSV) to a scan or to a reference, or a mesh (VTU, VTK, XDMF) to a reference.
 
     A table says neither its units nor what was pressed on what: the options do. Readings are kept
     as they are. How many readings, repeats and places were read, and what is missing, is printed,
     and kept in the notes of the file.
     """
-    given["repeat"] = given["repeat"] or None
-    _check_usage(table, kind, given)
-    given |= {name: int(given[name]) for name in _SIGNS if given[name] is not None}
+    options["repeat"] = options["repeat"] or None
+    _check_usage(table, kind, options)
+    options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
     prove_writable([output], force=force, inputs=[table])
-    found = _scan(table, given) if kind == "scan" else read(table, given)
-    _write(found, output, force)
-    warnings = [note for note in found.notes if note.severity == "warning"]
+    imported = _scan(table, options) if kind == "scan" else read(table, options)
+    _write(imported, output, force)
+    warnings = [note for note in imported.notes if note.severity == "warning"]
     if as_json:
         emit_json(
             {
                 "schema_version": "1",
                 "output": str(output),
                 "format": kind,
-                "notes": marked_texts(found.notes),
+                "notes": marked_texts(imported.notes),
             }
         )
     else:
-        emit(readable("\n".join(note.text for note in found.notes if note not in warnings)))
+        emit(readable("\n".join(note.text for note in imported.notes if note not in warnings)))
     show_messages(warnings)
     message(f"Written: {output}")
     return DONE
 
 
-def _check_usage(path: Path, kind: str, given: dict[str, Any]) -> None:
+def _check_usage(path: Path, kind: str, options: dict[str, Any]) -> None:
     """Name every option that is missing, or that belongs to something else, at once."""
     if kind == "scan" and is_mesh(path):
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
     names = _NEEDED if kind == "scan" else needed(path)
-    missing = [name for name in names if given[name] is None]
+    missing = [name for name in names if options[name] is None]
     if missing:
         raise click.UsageError(
             f"A {kind} needs more: add {_named(missing)}. See the examples of "
             "`memscal import --help`."
         )
-    if kind == "scan" and given["load"] is None and given["load_column"] is None:
+    if kind == "scan" and options["load"] is None and options["load_column"] is None:
         raise click.UsageError("The load is not given: add --load (in N) or --load-column.")
     other = "reference" if kind == "scan" else "scan"
-    misplaced = [name for name in _ONLY[other] if given[name] is not None]
+    misplaced = [name for name in _ONLY[other] if options[name] is not None]
     if misplaced:
         raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
     if kind == "reference":
-        what, unused = strange(path, given)
+        what, unused = strange(path, options)
         if unused:
             raise click.UsageError(f"A {what} has no use for {_named(unused)}.")
 
@@ -339,31 +339,33 @@ def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
     return {name: values[name] for name in names if values[name] is not None}
 
 
-def _scan(path: Path, given: dict[str, Any]) -> ImportedScan:
-    film, indenter = film_from(given), indenter_from(given["indenter"], given)
+def _scan(path: Path, options: dict[str, Any]) -> ImportedScan:
+    film, indenter = film_from(options), indenter_from(options["indenter"], options)
     from memscal.formats.tables.scan import read_scan_table
     from memscal.model.scan import StressSensor
 
-    labels = {key: given[name] for key, name in _SENSOR_NAMES.items() if given[name] is not None}
+    labels = {
+        key: options[name] for key, name in _SENSOR_NAMES.items() if options[name] is not None
+    }
     return read_scan_table(
         path,
-        **_stated(given, [*_SCAN_NAMES, *_TABLE_NAMES]),
-        load_scatter=si(given["load_scatter"], -2),
-        x_error=si(given["position_error"], -6),
+        **_stated(options, [*_SCAN_NAMES, *_TABLE_NAMES]),
+        load_scatter=si(options["load_scatter"], -2),
+        x_error=si(options["position_error"], -6),
         film=film,
         indenter=indenter,
         sensor=StressSensor(**labels),
     )
 
 
-def _write(found: ImportedScan | ImportedProfile, output: Path, force: bool) -> None:
+def _write(imported: ImportedScan | ImportedProfile, output: Path, force: bool) -> None:
     from memscal.formats.tables.scan import ImportedScan
 
-    if isinstance(found, ImportedScan):
+    if isinstance(imported, ImportedScan):
         from memscal.formats.scan import write_scan
 
-        write_scan(found.scan, output, overwrite=force)
+        write_scan(imported.scan, output, overwrite=force)
     else:
         from memscal.formats.reference import write_reference
 
-        write_reference(found.profile, output, overwrite=force)
+        write_reference(imported.profile, output, overwrite=force)

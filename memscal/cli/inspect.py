@@ -37,32 +37,33 @@ def command(file: Path, as_json: bool) -> int:
     """
     from memscal.formats.inspection import describe
 
-    found = describe(file)
+    contents = describe(file)
     if as_json:
-        emit_json(found)
+        emit_json(contents)
     else:
         from memscal.cli.output import emit_tables
 
-        emit_tables(*_tables(found))
+        emit_tables(*_tables(contents))
     return DONE
 
 
-def _tables(found: Mapping[str, Any]) -> Iterator[Table]:
+def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     from memscal.summaries.table import Table
 
     rows = [
-        ("schema", f"{found['schema']} {found['schema_version']}"),
-        ("title", found["title"]),
-        ("sha256", found["sha256"]),
+        ("schema", f"{contents['schema']} {contents['schema_version']}"),
+        ("title", contents["title"]),
+        ("sha256", contents["sha256"]),
     ]
-    yield Table(str(found["file"]), ("", ""), [row for row in rows if row[1]])
+    yield Table(str(contents["file"]), ("", ""), [row for row in rows if row[1]])
 
     head = ("quantity", "value", "path")
     quantities = [
-        (item["name"].replace("_", " "), _value(item), item["path"]) for item in found["quantities"]
+        (item["name"].replace("_", " "), _value(item), item["path"])
+        for item in contents["quantities"]
     ]
     yield Table("Quantities (± standard uncertainty, k = 1)", head, quantities)
-    arrays = [_array_row(item) for item in found["arrays"]]
+    arrays = [_array_row(item) for item in contents["arrays"]]
     yield Table("Arrays", ("path", "shape", "from", "to", "unit", "missing"), arrays)
     checks = [
         (
@@ -71,17 +72,17 @@ def _tables(found: Mapping[str, Any]) -> Iterator[Table]:
             "-" if check["limit"] is None else f"{check['limit']:.3g}",
             "passed" if check["passed"] else "FAILED",
         )
-        for check in found["checks"]
+        for check in contents["checks"]
     ]
-    failed = frozenset(i for i, check in enumerate(found["checks"]) if not check["passed"])
+    failed = frozenset(i for i, check in enumerate(contents["checks"]) if not check["passed"])
     yield Table("Quality checks", ("check", "value", "limit", "result"), checks, failed)
     meanings = [
         (check["name"].replace("_", " "), check["meaning"])
-        for check in found["checks"]
+        for check in contents["checks"]
         if not check["passed"]
     ]
     yield Table("What the failures mean", ("", ""), meanings)
-    yield Table("Provenance", ("", ""), list(_provenance(found["provenance"])))
+    yield Table("Provenance", ("", ""), list(_provenance(contents["provenance"])))
 
 
 def _value(item: Mapping[str, Any]) -> str:
@@ -125,20 +126,20 @@ def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _provenance(found: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for name, value in found.items():
+def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for name, value in provenance.items():
         words = name.replace("_", " ")
         if isinstance(value, Mapping):
-            for key, part in value.items():
-                yield f"{words}: {key}".replace("_", " "), _plain(part)
+            for key, item in value.items():
+                yield f"{words}: {key}".replace("_", " "), _plain(item)
         elif isinstance(value, list):
-            for part in value:
-                yield words, str(part)
+            for item in value:
+                yield words, str(item)
         else:
             yield from ((words, line) for line in str(value).splitlines() if line)
 
 
 def _plain(value: object) -> str:
     if isinstance(value, Mapping):
-        return "; ".join(f"{key}: {_plain(part)}" for key, part in value.items()) or "none"
+        return "; ".join(f"{key}: {_plain(item)}" for key, item in value.items()) or "none"
     return "not given" if value is None else str(value)

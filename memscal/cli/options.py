@@ -41,19 +41,7 @@ FILE = click.Path(path_type=Path)
 
 
 class Quantity(_Number):
-    """A finite number in a unit, which is shown as the name of the value.
-
-    Parameters
-    ----------
-    unit : str
-        As it reads in the help: ``mm``, ``percent``.
-    low, high : float
-        What it must lie between.
-    open_low : bool
-        Whether ``low`` itself is refused.
-    infinite : bool
-        Whether ``inf`` is allowed.
-    """
+    """A finite number in a unit, which is shown as the name of the value."""
 
     def __init__(
         self,
@@ -117,7 +105,7 @@ def film_options(
     *, defaults: Mapping[str, float] | None = None, uncertainties: bool = True
 ) -> Callable[[_Command], _Command]:
     """Add the film: modulus, Poisson's ratio, thickness, with or without their uncertainties."""
-    known = {} if defaults is None else defaults
+    values = {} if defaults is None else defaults
     ratio = Quantity("ratio", high=0.5, open_low=False)
     entries: list[tuple[str, Quantity, str]] = [
         ("young-modulus", Quantity("MPa"), "Young's modulus of the film, in MPa."),
@@ -125,24 +113,12 @@ def film_options(
         ("thickness", Quantity("mm"), "Thickness of the film, in mm."),
     ]
     if uncertainties:
+        words = ("Young's modulus, in MPa.", "Poisson's ratio.", "the thickness, in mm.")
         entries += [
-            (
-                "young-modulus-uncertainty",
-                Quantity("MPa", open_low=False),
-                _UNCERTAINTY + "Young's modulus, in MPa.",
-            ),
-            (
-                "poisson-ratio-uncertainty",
-                Quantity("ratio", open_low=False),
-                _UNCERTAINTY + "Poisson's ratio.",
-            ),
-            (
-                "thickness-uncertainty",
-                Quantity("mm", open_low=False),
-                _UNCERTAINTY + "the thickness, in mm.",
-            ),
+            (f"{name}-uncertainty", Quantity(kind.unit, open_low=False), _UNCERTAINTY + about)
+            for (name, kind, _), about in zip(entries, words, strict=True)
         ]
-    return _all_of(entries, known)
+    return _all_of(entries, values)
 
 
 def radius_options(
@@ -180,13 +156,7 @@ def si(value: float, power: int) -> float: ...
 @overload
 def si(value: float | None, power: int) -> float | None: ...
 def si(value: float | None, power: int) -> float | None:
-    """Return a value times a power of ten, rounded as if it had been typed so.
-
-    Examples
-    --------
-    >>> si(0.14, -3), 0.14 / 1e3
-    (0.00014, 0.00014000000000000001)
-    """
+    """Return a value times a power of ten, rounded as if it had been typed so."""
     if value is None or not math.isfinite(value):
         return value
     from decimal import Decimal
@@ -194,47 +164,35 @@ def si(value: float | None, power: int) -> float | None:
     return float(Decimal(repr(value)).scaleb(power))
 
 
-def film_from(given: Mapping[str, Any]) -> ElasticFilm:
-    """Return the film that the options describe.
-
-    Raises
-    ------
-    click.UsageError
-        If a part of it is missing.
-    """
-    _require("The film", given, FILM)
+def film_from(options: Mapping[str, Any]) -> ElasticFilm:
+    """Return the film that the options describe."""
+    _require("The film", options, FILM)
     from memscal.model.film import ElasticFilm
 
     return ElasticFilm(
-        young_modulus=si(given["young_modulus"], 6),
-        poisson_ratio=given["poisson_ratio"],
-        thickness=si(given["thickness"], -3),
-        young_modulus_uncertainty=si(given.get("young_modulus_uncertainty"), 6),
-        poisson_ratio_uncertainty=given.get("poisson_ratio_uncertainty"),
-        thickness_uncertainty=si(given.get("thickness_uncertainty"), -3),
+        young_modulus=si(options["young_modulus"], 6),
+        poisson_ratio=options["poisson_ratio"],
+        thickness=si(options["thickness"], -3),
+        young_modulus_uncertainty=si(options.get("young_modulus_uncertainty"), 6),
+        poisson_ratio_uncertainty=options.get("poisson_ratio_uncertainty"),
+        thickness_uncertainty=si(options.get("thickness_uncertainty"), -3),
     )
 
 
-def indenter_from(shape: str, given: Mapping[str, Any]) -> RoundIndenter:
-    """Return the indenter that the options describe.
-
-    Raises
-    ------
-    click.UsageError
-        If its radius is missing.
-    """
-    _require("The indenter", given, ("radius",))
+def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
+    """Return the indenter that the options describe."""
+    _require("The indenter", options, ("radius",))
     from memscal.model.indenter import Rod, Sphere
 
     kind = {"rod": Rod, "sphere": Sphere}[shape]
-    spread = si(given.get("radius_uncertainty"), -3)
-    return kind(radius=si(given["radius"], -3), radius_uncertainty=spread)
+    spread = si(options.get("radius_uncertainty"), -3)
+    return kind(radius=si(options["radius"], -3), radius_uncertainty=spread)
 
 
-def _require(what: str, given: Mapping[str, Any], names: tuple[str, ...]) -> None:
-    missing = ["--" + name.replace("_", "-") for name in names if given[name] is None]
+def _require(subject: str, options: Mapping[str, Any], names: tuple[str, ...]) -> None:
+    missing = ["--" + name.replace("_", "-") for name in names if options[name] is None]
     if missing:
-        raise click.UsageError(f"{what} is not fully given: add {', '.join(missing)}.")
+        raise click.UsageError(f"{subject} is not fully given: add {', '.join(missing)}.")
 
 
 _OPTIONS = (
@@ -278,16 +236,10 @@ def kernel_options(command: _Command) -> _Command:
     return command
 
 
-def require_one_kernel(given: Mapping[str, Any]) -> None:
-    """Refuse options that describe no kernel, or two.
-
-    Raises
-    ------
-    click.UsageError
-        If weights and widths do not pair, or a disc has several blurs.
-    """
-    sigmas, weights = given["sigmas"], given["weights"]
-    if given["disc_radius"] is not None:
+def require_one_kernel(options: Mapping[str, Any]) -> None:
+    """Refuse options that describe no kernel, or two."""
+    sigmas, weights = options["sigmas"], options["weights"]
+    if options["disc_radius"] is not None:
         if weights or len(sigmas) > 1:
             raise click.UsageError(
                 "A disc is blurred by one Gaussian: give --disc-radius and one --sigma, and no "
@@ -299,11 +251,11 @@ def require_one_kernel(given: Mapping[str, Any]) -> None:
         )
 
 
-def kernel_from(given: Mapping[str, Any]) -> RadialKernel:
+def kernel_from(options: Mapping[str, Any]) -> RadialKernel:
     """Return the apparatus function that the options describe."""
     from memscal.axisymmetry.kernels import GaussianMixture, SmoothedDisc
 
-    sigmas = tuple(si(sigma, -6) for sigma in given["sigmas"])
-    if given["disc_radius"] is not None:
-        return SmoothedDisc(radius=si(given["disc_radius"], -6), sigma=sigmas[0])
-    return GaussianMixture(given["weights"] or (1.0,), sigmas)
+    sigmas = tuple(si(sigma, -6) for sigma in options["sigmas"])
+    if options["disc_radius"] is not None:
+        return SmoothedDisc(radius=si(options["disc_radius"], -6), sigma=sigmas[0])
+    return GaussianMixture(options["weights"] or (1.0,), sigmas)

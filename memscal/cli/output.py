@@ -38,11 +38,6 @@ def emit(text: str) -> None:
 
     A reader that goes away (``| head``) is no failure: the work is done, and its exit code
     says how it went.
-
-    Raises
-    ------
-    OutputError
-        If standard output cannot be written, as on a full disk.
     """
     if sys.stdout is None:
         return
@@ -103,8 +98,8 @@ def warn(text: str) -> None:
 
 def show_messages(messages: Iterable[Message]) -> None:
     """Write the messages of a result to standard error, each as a note or a warning."""
-    for each in messages:
-        (warn if each.severity == "warning" else note)(each.text)
+    for item in messages:
+        (warn if item.severity == "warning" else note)(item.text)
 
 
 def error(problem: str, why: str = "", cure: str = "") -> None:
@@ -239,29 +234,13 @@ class FigurePath(click.Path):
 
 
 def beside(path: Path, suffix: str) -> Path:
-    """Return the name of a result beside its input.
-
-    Examples
-    --------
-    >>> beside(Path("data/scan.h5"), ".apparatus.h5").name
-    'scan.apparatus.h5'
-    >>> beside(Path("run_0.5mm"), ".apparatus.h5").name
-    'run_0.5mm.apparatus.h5'
-    """
+    """Return the name of a result beside its input."""
     stem = path.stem if path.suffix.lower() in _HDF5_SUFFIXES else path.name
     return path.with_name(stem + suffix)
 
 
 def prove_writable(outputs: Sequence[Path], *, force: bool, inputs: Sequence[Path] = ()) -> None:
-    """Refuse outputs that share a name, and prove that each can be written.
-
-    Raises
-    ------
-    click.UsageError
-        If two outputs are the same file.
-    OutputError
-        If one cannot be written, exists (without ``force``), or is an input.
-    """
+    """Refuse outputs that share a name, and prove that each can be written."""
     from memscal.formats.files import ensure_writable
 
     seen: dict[Path, Path] = {}

@@ -13,7 +13,6 @@ from memscal.formats.groups import (
     instrument_group,
     parameter_group,
     process_group,
-    profile_groups,
     quality_group,
     read_budget,
     read_film,
@@ -23,6 +22,7 @@ from memscal.formats.groups import (
     read_quality,
     read_round_indenter,
     read_sensor,
+    reference_groups,
     sample_group,
 )
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -63,7 +63,6 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     load = require_scalar(file, "/entry/indenter/load", "force")
     film = read_film(file, "/entry/sample/film")
     indenter = read_round_indenter(file, "/entry/indenter")
-    paths = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
     return ApparatusData(
         field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
@@ -80,7 +79,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         indenter=indenter,
         sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
         load=load,
-        reference=read_profile(file, *paths, load=load, film=film, indenter=indenter),
+        reference=read_profile(file, load=load, film=film, indenter=indenter),
         process=read_process(file, "/entry/process"),
     )
 
@@ -101,7 +100,6 @@ def artifact_tree(data: ApparatusData) -> Group:
 
 
 def _entry(data: ApparatusData) -> Group:
-    reference, parameters, process = profile_groups(data.reference)
     sensor = data.sensor.name
     children: dict[str, Node] = {
         "title": f"Apparatus function of {sensor}" if sensor else "Apparatus function",
@@ -115,9 +113,7 @@ def _entry(data: ApparatusData) -> Group:
         "sample": sample_group(data.film),
         "instrument": instrument_group(data.sensor),
         "indenter": indenter_group(data.indenter, data.load),
-        "reference": reference,
-        "reference_parameters": parameters,
-        "reference_process": process,
+        **reference_groups(data.reference),
         "process": process_group(data.process),
     }
     return Group("NXentry", children, {"default": "apparatus_function"})

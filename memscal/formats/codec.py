@@ -7,16 +7,27 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from memscal.errors import FormatError
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import Attribute, Group, Node, count, note, si
+from memscal.formats.hdf5.writer import Attribute, Group, Node, count, index_axis, note, si
 from memscal.formats.json_text import to_json
 from memscal.formats.values import json_value, require_array, require_scalar, require_text
 from memscal.model.checks import Message, messages_from_json, messages_to_json
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Quantity, Record
 
-__all__ = ["KINDS", "Kind", "listed", "origins", "read_record", "write_record"]
+__all__ = [
+    "KINDS",
+    "Kind",
+    "listed",
+    "origins",
+    "read_record",
+    "read_source",
+    "write_record",
+    "write_source",
+]
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -39,13 +50,15 @@ def _write_json_note(quantity: Quantity, value: Any) -> Group:
     return note(text, media_type="application/json", description=quantity.words)
 
 
-def _write_file(_: Quantity, source: SourceFile) -> Group:
+def write_source(source: SourceFile) -> Group:
+    """Return the name and the checksum of a file that was read as an NXnote."""
     named = {"file_name": source.file_name, "checksum": source.sha256, "algorithm": "sha256"}
     return Group("NXnote", named)
 
 
-def _read_file(file: SafeFile, path: str) -> SourceFile:
-    name, checksum = (require_text(file, f"{path}/{part}") for part in ("file_name", "checksum"))
+def read_source(file: SafeFile, path: str) -> SourceFile:
+    """Read the name and the checksum of a file that was read."""
+    name, checksum = (require_text(file, f"{path}/{key}") for key in ("file_name", "checksum"))
     return SourceFile(name, checksum)
 
 
@@ -72,19 +85,26 @@ KINDS = {
     "truth": Kind(lambda _, truth: count(int(truth)), _read_truth, always=True),
     "mapping": Kind(_write_json_note, _read_mapping, always=True, inside="/data"),
     "messages": Kind(_write_messages, _read_messages, always=True, inside="/data"),
-    "file": Kind(_write_file, _read_file),
+    "file": Kind(lambda _, source: write_source(source), read_source),
 }
 """Kinds of quantity beside the numbers, by :attr:`Quantity.dimension`."""
 
 
 def write_record(record: Record, stated: object, **others: Node) -> Group:
-    """Return the group of an object or a mapping, with other nodes behind its quantities."""
+    """Return the group of an object or a mapping, with other nodes behind its quantities.
+
+    An axis that is no quantity of the record counts from 0.
+    """
     children: dict[str, Node] = {}
+    keys = {quantity.key for quantity in record.quantities}
     for quantity in record.quantities:
         name = quantity.name
         value = stated[name] if isinstance(stated, Mapping) else getattr(stated, name)
         kind = KINDS.get(quantity.dimension)
         if value is not None and kind is None:
+            for axis, size in zip(quantity.axes, np.shape(value), strict=True):
+                if axis not in keys:
+                    children.setdefault(axis, index_axis(axis, size))
             children[quantity.key] = si(value, quantity.dimension, quantity.axes)
         elif value is not None and kind is not None and (value or kind.always):
             children[quantity.key] = kind.write(quantity, value)
@@ -102,15 +122,10 @@ def read_record(
     defaults: Mapping[str, Any] = _NOTHING,
     sizes: Mapping[str, int] = _NOTHING,
 ) -> dict[str, Any]:
-    """Return what stands at a path, in SI units, by the names of the quantities.
+    """Return the values at a path, in SI units, by the names of the quantities.
 
     What a file need not state is left out, or taken from ``defaults`` where they name it.
     Arrays have the shape of their axes, those in ``sizes`` or in the group.
-
-    Raises
-    ------
-    FormatError, UnitError
-        If a quantity is missing, or has another kind, unit or shape; the message names its path.
     """
     values = dict(defaults)
     lengths = dict(sizes)

@@ -39,27 +39,6 @@ def ensure_writable(
 
     A small file is written beside the target and removed again: permissions alone do not
     say whether a disk is full or read-only.
-
-    Parameters
-    ----------
-    path : path
-        The output.
-    overwrite : bool
-        Whether an existing regular file may be replaced.
-    inputs : iterable of path
-        Files that are read in the same run: the output may be none of them.
-
-    Raises
-    ------
-    OutputError
-        If the output cannot be written, exists, or is an input.
-
-    Examples
-    --------
-    >>> ensure_writable("/no/such/folder/a.h5")
-    Traceback (most recent call last):
-    ...
-    memscal.errors.OutputError: The output /no/such/folder/a.h5 cannot be written: ...
     """
     target = _checked_target(path, overwrite=overwrite, inputs=inputs)
     temporary = _temporary_name(target)
@@ -83,22 +62,6 @@ def atomic_write_bytes(
     The bytes go to a temporary file beside the target, are flushed to the disk, and take
     the target's name in one step; the temporary file is removed on any failure.  A process
     that is killed half-way leaves the old target as it was.
-
-    Parameters
-    ----------
-    path : path
-        The target; a symbolic link is followed, and its target replaced.
-    data : bytes
-        The content.
-    overwrite : bool
-        Whether an existing regular file may be replaced.
-    inputs : iterable of path
-        Files that the target may not be.
-
-    Raises
-    ------
-    OutputError
-        If the target exists, is an input, or the system refuses to write it.
     """
     target = _checked_target(path, overwrite=overwrite, inputs=inputs)
     temporary = _temporary_name(target)
@@ -132,9 +95,9 @@ def _checked_target(
         return target
     except OSError as error:
         raise _output_error(Path(shown), error) from error
-    for given in inputs:
+    for source in inputs:
         with contextlib.suppress(OSError):
-            if os.path.samestat(status, os.stat(given)):
+            if os.path.samestat(status, os.stat(source)):
                 raise OutputError(
                     f"The output {shown} is also an input.",
                     why=f"Writing it would destroy what is being read. {_UNTOUCHED}",
@@ -212,15 +175,7 @@ def _output_error(target: Path, error: OSError) -> OutputError:
 
 
 def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> bytes:
-    """Read a regular file of bounded size, once, without ever waiting for another program.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it cannot be read.
-    UnsafeFileError
-        If it is not a regular file, or too large.
-    """
+    """Read a regular file of bounded size, once, without ever waiting for another program."""
     shown = os.fspath(path)
     flags = os.O_RDONLY
     for name in ("O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY", "O_BINARY"):
@@ -249,16 +204,16 @@ def read_bytes(path: str | os.PathLike[str], *, limit: int = MAX_FILE_BYTES) -> 
 
 def _read_whole(descriptor: int, shown: str, limit: int) -> bytes:
     """Read to the end; a file that grows meanwhile still meets the limit."""
-    parts, size = [], 0
+    chunks, size = [], 0
     try:
-        while part := os.read(descriptor, min(2**20, limit + 1 - size)):
-            parts.append(part)
-            size += len(part)
+        while chunk := os.read(descriptor, min(2**20, limit + 1 - size)):
+            chunks.append(chunk)
+            size += len(chunk)
             if size > limit:
                 raise _too_large(shown, size, limit)
     except OSError as error:
         raise InputError(f"{shown} cannot be read: {error.strerror}.") from error
-    return b"".join(parts)
+    return b"".join(chunks)
 
 
 def _too_large(shown: str, size: int, limit: int) -> UnsafeFileError:

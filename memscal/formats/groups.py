@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 
@@ -44,6 +43,7 @@ __all__ = [
     "read_quality",
     "read_round_indenter",
     "read_sensor",
+    "reference_groups",
     "sample_group",
 ]
 
@@ -55,13 +55,7 @@ _COVARIANCE = (
 
 
 def parameter_dimension(name: str, unit: str = "") -> str:
-    """Return the dimension of a parameter: by its SI unit where that is given, else by its name.
-
-    Examples
-    --------
-    >>> parameter_dimension("gaussian_sigma_deconvolved")
-    'length'
-    """
+    """Return the dimension of a parameter: by its SI unit where that is given, else by its name."""
     if unit:
         return dimension_of(unit, f"parameter {name}")
     declared = declared_quantity(name)
@@ -168,7 +162,6 @@ def _unit_scale(file: SafeFile, path: str) -> float:
 
 
 _ROUND: dict[str, type[RoundIndenter]] = {shape.shape: shape for shape in (Rod, Sphere)}
-_NO_TEXTS: Mapping[str, str] = MappingProxyType({})
 
 
 def read_film(file: SafeFile, path: str) -> ElasticFilm:
@@ -176,10 +169,11 @@ def read_film(file: SafeFile, path: str) -> ElasticFilm:
     return ElasticFilm(**read_record(records.FILM, file, path))
 
 
-def sample_group(film: ElasticFilm, texts: Mapping[str, str] = _NO_TEXTS) -> Group:
-    """Return the NXsample that holds the film, and the texts beside it that are not empty."""
-    stated = {name: text for name, text in texts.items() if text}
-    return Group("NXsample", {"film": write_record(records.FILM, film), **stated})
+def sample_group(film: ElasticFilm, lubrication: str = "", lubricant: str = "") -> Group:
+    """Return the NXsample that holds the film, and how it was lubricated."""
+    stated = {"lubrication": lubrication, "lubricant": lubricant}
+    contact = write_record(records.SAMPLE, stated).children
+    return Group("NXsample", {"film": write_record(records.FILM, film), **contact})
 
 
 def indenter_group(
@@ -251,17 +245,26 @@ def profile_groups(profile: StressProfile) -> tuple[Group, Group, Group]:
     )
 
 
+def reference_groups(profile: StressProfile) -> dict[str, Node]:
+    """Return the groups of a stress profile within the entry of a scan or an artifact."""
+    names = ("reference", "reference_parameters", "reference_process")
+    return dict(zip(names, profile_groups(profile), strict=True))
+
+
 def read_profile(
     file: SafeFile,
-    data: str,
-    parameters: str,
-    process: str,
+    data: str = "/entry/reference",
+    parameters: str = "/entry/reference_parameters",
+    process: str = "/entry/reference_process",
     *,
     load: float | None = None,
     film: ElasticFilm | None = None,
     indenter: Indenter | None = None,
 ) -> StressProfile:
-    """Read a stress profile; load, film and indenter are those given where it names none."""
+    """Read a stress profile, by default that of a scan or an artifact.
+
+    Load, film and indenter are those given where it names none.
+    """
     if file.has(f"{parameters}/film"):
         film = read_film(file, f"{parameters}/film")
     if file.has(f"{parameters}/indenter"):

@@ -175,13 +175,15 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     """Yield the groups that such a file may hold, with what is declared for each."""
     yield "/entry/parameters", estimated_record(file, "/entry/parameters")
     yield from _LAYOUTS[schema].items()
-    yield from ((path, records.STRESS_PROFILE) for path in profile_paths(file))
+    for path in profile_paths(file):
+        yield path, records.STRESS_NUMBERS
+        yield path, records.STRESS_PROFILE
 
 
 def _listed(file: SafeFile, schema: str) -> Iterator[tuple[str, Quantity]]:
     """Yield the path of every quantity that is declared and there."""
-    for path, known in _layout(file, schema):
-        yield from listed(known, file, path)
+    for path, layout in _layout(file, schema):
+        yield from listed(layout, file, path)
 
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
@@ -200,10 +202,10 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     errors = f"{path}_errors"
     if not file.has(errors):
         return None
-    spread, unit, own = file.array(errors), units_of(file, path), units_of(file, errors)
-    if own != unit:
+    spread, unit, spread_unit = file.array(errors), units_of(file, path), units_of(file, errors)
+    if spread_unit != unit:
         dimension = dimension_of(unit or "1", file.where(path))
-        spread = to_si(spread, own, dimension, file.where(errors)) / to_si(
+        spread = to_si(spread, spread_unit, dimension, file.where(errors)) / to_si(
             1.0, unit, dimension, file.where(path)
         )
     return _plain(spread)

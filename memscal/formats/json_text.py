@@ -14,47 +14,39 @@ from memscal.errors import InputError
 __all__ = ["from_json", "to_json"]
 
 
-def to_json(what: str, value: Any) -> str:
+def to_json(subject: str, value: Any) -> str:
     """Write plain values as JSON; the same values always give the same text.
 
     Numbers that are not finite become the strings ``"nan"``, ``"inf"`` and ``"-inf"``:
     standard JSON has no others.
-
-    Raises
-    ------
-    InputError
-        If a value is not a mapping, a sequence, text, a number, a truth value or ``None``.
-
-    Examples
-    --------
-    >>> to_json("options", {"seed": np.int64(3), "friction": float("inf")})
-    '{"friction": "inf", "seed": 3}'
     """
-    return json.dumps(_plain(what, value), sort_keys=True, allow_nan=False)
+    return json.dumps(_plain(subject, value), sort_keys=True, allow_nan=False)
 
 
-def from_json(what: str, text: str) -> Any:
+def from_json(subject: str, text: str) -> Any:
     """Read JSON from a file; damaged text becomes an :class:`InputError` that names it."""
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{what} is not JSON: {error}.", cure="Write the file again.") from error
+        raise InputError(
+            f"{subject} is not JSON: {error}.", cure="Write the file again."
+        ) from error
 
 
-def _plain(what: str, value: Any) -> Any:
+def _plain(subject: str, value: Any) -> Any:
     if value is None or isinstance(value, (str, bool, int)):
         return value
     if isinstance(value, np.generic):
-        return _plain(what, value.item())
+        return _plain(subject, value.item())
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
     if isinstance(value, np.ndarray):
-        return _plain(what, value.tolist())
+        return _plain(subject, value.tolist())
     if isinstance(value, Mapping):
-        return {str(key): _plain(what, item) for key, item in value.items()}
+        return {str(key): _plain(subject, item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(what, item) for item in value]
+        return [_plain(subject, item) for item in value]
     raise InputError(
-        f"{what} holds a {type(value).__name__}, which JSON cannot say.",
+        f"{subject} holds a {type(value).__name__}, which JSON cannot say.",
         cure="Give numbers, text, truth values, lists and mappings.",
     )

@@ -11,16 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from memscal.errors import FormatError, OutputError
+from memscal.formats.codec import read_record, write_record
 from memscal.formats.files import ensure_writable
 from memscal.formats.groups import (
     indenter_group,
     instrument_group,
     parameter_dimension,
-    profile_groups,
     read_film,
     read_profile,
     read_round_indenter,
     read_sensor,
+    reference_groups,
     sample_group,
 )
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
@@ -30,7 +31,6 @@ from memscal.formats.hdf5.writer import (
     Number,
     file_tree,
     index_axis,
-    note,
     si,
     write_tree,
 )
@@ -39,13 +39,14 @@ from memscal.formats.schema import SCAN_SCHEMA
 from memscal.formats.values import (
     any_scalar,
     json_value,
-    optional_array,
     optional_scalar,
     optional_text,
     require_array,
-    require_scalar,
     require_schema,
 )
+from memscal.model import records
+from memscal.model.arrays import FloatArray
+from memscal.model.quantities import by_name
 from memscal.model.scan import Scan
 
 __all__ = ["ensure_folder_writable", "read_scan", "write_scan", "write_scans"]
@@ -55,6 +56,9 @@ _DATA = "/entry/data"
 _SAMPLE = "/entry/sample"
 _AXES = {"line": ("x",), "repeats": ("repeat", "x"), "raster": ("y", "x")}
 _ALONG_Y = {"line": ("y",), "repeats": ("repeat", "y")}
+_DECLARED = by_name(records.SCAN_DATA.quantities)
+# The other arrays have the shape of the signal, which is that of the scan.
+_OF_ONE_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _POINTS = ("point",)
 # One name for each axis of the correlation: netCDF tools want each dimension once.
 _PAIRS = ("point", "point_prime")
@@ -102,52 +106,53 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
 def scan_from(file: SafeFile) -> Scan:
     """Read the scan of an open memscal-scan file."""
     require_schema(file, SCAN_SCHEMA)
-    load = require_scalar(file, "/entry/indenter/load", "force")
+    load = read_record(records.LOAD, file, "/entry/indenter")
     film = read_film(file, f"{_SAMPLE}/film")
     indenter = read_round_indenter(file, "/entry/indenter")
     axes = _check_axes(file)
     only_y = axes == _POINTS and not file.has(f"{_DATA}/x")
-    along_y = only_y or axes in _ALONG_Y.values()
-    along = "y" if along_y else "x"
-    channels = {
-        name: require_array(file, f"{_DATA}/{name}", "voltage")
-        for name in _CHANNELS
-        if file.has(f"{_DATA}/{name}")
-    }
+    along = "y" if only_y or axes in _ALONG_Y.values() else "x"
+    arrays = _read_arrays(file, along)
     reference = None
     if file.has("/entry/reference"):
-        parts = ("/entry/reference", "/entry/reference_parameters", "/entry/reference_process")
-        reference = read_profile(file, *parts, load=load, film=film, indenter=indenter)
+        reference = read_profile(file, load=load["load"], film=film, indenter=indenter)
+    contact = read_record(records.SAMPLE, file, _SAMPLE)
+    contact["lubrication"] = contact.get("lubrication", "").strip().lower()
     return Scan(
-        x=require_array(file, f"{_DATA}/{along}", "length", ndim=1),
-        y=None if along_y else optional_array(file, f"{_DATA}/y", "length", ndim=1),
+        x=arrays.pop(along),
+        y=arrays.pop("y", None),
+        x_errors=arrays.pop(f"{along}_errors", None),
         repeat=file.array(f"{_DATA}/repeat") if _numbered(file, axes) else None,
-        x_errors=optional_array(file, f"{_DATA}/{along}_errors", "length", ndim=1),
         direction=along,
-        position_scale_uncertainty=optional_scalar(
-            file, f"{_DATA}/position_scale_errors", "dimensionless"
-        ),
-        u_zz=require_array(file, f"{_DATA}/u_zz", "voltage"),
-        u_zz_errors=optional_array(file, f"{_DATA}/u_zz_errors", "voltage"),
-        u_zz_correlation=optional_array(file, f"{_DATA}/u_zz_correlation", "dimensionless", ndim=2),
-        normal_load=optional_array(file, f"{_DATA}/normal_load", "force"),
-        normal_load_errors=optional_array(file, f"{_DATA}/normal_load_errors", "force"),
-        channels=channels,
-        load=load,
-        load_uncertainty=optional_scalar(file, "/entry/indenter/load_errors", "force"),
+        channels={name: arrays.pop(name) for name in _CHANNELS if name in arrays},
+        **arrays,
+        **load,
         indenter=indenter,
         film=film,
-        lubrication=optional_text(file, f"{_SAMPLE}/lubrication").strip().lower(),
-        lubricant=optional_text(file, f"{_SAMPLE}/lubricant"),
+        **contact,
         sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
         title=optional_text(file, "/entry/title"),
-        start_time=optional_text(file, "/entry/start_time"),
-        end_time=optional_text(file, "/entry/end_time"),
-        notes=optional_text(file, "/entry/notes/data"),
+        **read_record(records.EXPERIMENT, file, "/entry"),
         reference=reference,
         synthetic=_read_synthetic(file),
         source=file.source,
     )
+
+
+def _read_arrays(file: SafeFile, along: str) -> dict[str, Any]:
+    """Read the positions and the readings; :class:`Scan` compares their shapes."""
+    unused = {"repeat", *(("y_errors",) if along == "x" else ("x", "x_errors"))}
+    arrays: dict[str, Any] = {
+        "position_scale_uncertainty": optional_scalar(
+            file, f"{_DATA}/position_scale_errors", "dimensionless"
+        )
+    }
+    for name, quantity in _DECLARED.items():
+        path = f"{_DATA}/{name}"
+        if name not in unused and (file.has(path) or name in (along, "u_zz")):
+            ndim = len(quantity.axes) if name in _OF_ONE_SHAPE else None
+            arrays[name] = require_array(file, path, quantity.dimension, ndim=ndim)
+    return arrays
 
 
 def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -171,20 +176,19 @@ def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = Fa
 
 
 def _entry(scan: Scan) -> Group:
-    texts = {"title": scan.title, "start_time": scan.start_time, "end_time": scan.end_time}
-    children: dict[str, Node] = {name: text for name, text in texts.items() if text}
-    children["data"] = _data_group(scan)
-    children["indenter"] = indenter_group(scan.indenter, scan.load, scan.load_uncertainty)
-    contact = {"lubrication": scan.lubrication, "lubricant": scan.lubricant}
-    children["sample"] = sample_group(scan.film, contact)
-    children["instrument"] = instrument_group(scan.sensor)
-    if scan.notes:
-        children["notes"] = note(scan.notes)
+    texts = dict(write_record(records.EXPERIMENT, scan).children)
+    notes = {"notes": texts.pop("notes")} if scan.notes else {}
+    children: dict[str, Node] = {"title": scan.title} if scan.title else {}
+    children |= {
+        **texts,
+        "data": _data_group(scan),
+        "indenter": indenter_group(scan.indenter, scan.load, scan.load_uncertainty),
+        "sample": sample_group(scan.film, scan.lubrication, scan.lubricant),
+        "instrument": instrument_group(scan.sensor),
+        **notes,
+    }
     if scan.reference is not None:
-        data, parameters, process = profile_groups(scan.reference)
-        children["reference"] = data
-        children["reference_parameters"] = parameters
-        children["reference_process"] = process
+        children |= reference_groups(scan.reference)
     if scan.synthetic is not None:
         children["synthetic"] = _synthetic_group(scan.synthetic)
     return Group("NXentry", children, {"default": "data"})
@@ -193,34 +197,34 @@ def _entry(scan: Scan) -> Group:
 def _data_group(scan: Scan) -> Group:
     along, points = scan.direction, scan.kind == "points"
     axes = _POINTS if points else (_ALONG_Y if along == "y" else _AXES)[scan.kind]
-    data: dict[str, Node] = {}
-    if points:
-        data["point"] = index_axis("point", scan.x.size)
-    if scan.y is not None:
-        data["y"] = si(scan.y, "length", axes if points else ("y",))
+    data: dict[str, Node] = {"point": index_axis("point", scan.x.size)} if points else {}
+    data |= _nodes({"y": scan.y}, axes if points else ("y",))
     if scan.repeat is not None:
         data["repeat"] = Number(scan.repeat, "1", axes)
     elif scan.kind == "repeats":
         data["repeat"] = index_axis("repeat", scan.u_zz.shape[0])
-    data[along] = si(scan.x, "length", axes if points else (along,))
-    if scan.x_errors is not None:
-        data[f"{along}_errors"] = si(scan.x_errors, "length", axes if points else (along,))
+    positions = {along: scan.x, f"{along}_errors": scan.x_errors}
+    data |= _nodes(positions, axes if points else (along,))
     if scan.position_scale_uncertainty is not None:
         data["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
-    data["u_zz"] = si(scan.u_zz, "voltage", axes)
+    data |= _nodes({"u_zz": scan.u_zz}, axes)
     if scan.u_zz_correlation is not None:
-        for axis in _PAIRS:
-            data[axis] = index_axis(axis, scan.u_zz_correlation.shape[0])
-        data["u_zz_correlation"] = si(scan.u_zz_correlation, "dimensionless", _PAIRS)
-    if scan.u_zz_errors is not None:
-        data["u_zz_errors"] = si(scan.u_zz_errors, "voltage", axes)
-    if scan.normal_load is not None:
-        data["normal_load"] = si(scan.normal_load, "force", axes)
-    if scan.normal_load_errors is not None:
-        data["normal_load_errors"] = si(scan.normal_load_errors, "force", axes)
-    for name, values in scan.channels.items():
-        data[name] = si(values, "voltage", axes)
+        data |= {axis: index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
+        data |= _nodes({"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
+    rest = {
+        name: getattr(scan, name) for name in ("u_zz_errors", "normal_load", "normal_load_errors")
+    }
+    data |= _nodes(rest | dict(scan.channels), axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
+
+
+def _nodes(values: Mapping[str, FloatArray | None], axes: tuple[str, ...]) -> dict[str, Node]:
+    """Return the arrays that there are, along the axes of this scan."""
+    return {
+        name: si(array, _DECLARED[name].dimension, axes)
+        for name, array in values.items()
+        if array is not None
+    }
 
 
 def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
@@ -277,13 +281,7 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
 def ensure_folder_writable(
     folder: str | os.PathLike[str], names: Iterable[str], *, overwrite: bool
 ) -> None:
-    """Prove that files of these names can be written in a folder, which need not exist yet.
-
-    Raises
-    ------
-    OutputError
-        If one cannot be written, or exists and may not be replaced.
-    """
+    """Prove that files of these names can be written in a folder, which need not exist yet."""
     target = Path(folder)
     if not target.exists() and not target.is_symlink():
         ensure_writable(target)
@@ -304,28 +302,6 @@ def write_scans(
     """Write scans as memscal-scan files of one folder, all of them or none.
 
     All are written whole under other names first, and only then take their own.
-
-    Parameters
-    ----------
-    scans : mapping of str to Scan
-        The scans by the names of their files.
-    folder : path
-        The folder; it is made if it does not exist.
-    overwrite : bool
-        Whether existing files may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If a file exists or cannot be written; what was there before is then untouched.
-
-    Examples
-    --------
-    >>> from memscal.simulation.rod_scan import simulate
-    >>> with tempfile.TemporaryDirectory() as place:
-    ...     write_scans({"one.h5": simulate(), "two.h5": simulate(seed=1)}, f"{place}/run")
-    ...     sorted(os.listdir(f"{place}/run"))
-    ['one.h5', 'two.h5']
     """
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from memscal.errors import FormatError
+from memscal.formats.codec import read_record, read_source, write_record, write_source
 from memscal.formats.groups import (
     budget_group,
     indenter_group,
@@ -23,20 +26,18 @@ from memscal.formats.groups import (
     sample_group,
 )
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, count, file_tree, index_axis, si, write_tree
+from memscal.formats.hdf5.writer import Group, Node, count, file_tree, si, write_tree
 from memscal.formats.json_text import to_json
 from memscal.formats.schema import STRESS_SCHEMA
 from memscal.formats.values import (
     altered,
     json_value,
-    optional_array,
-    optional_scalar,
     optional_text,
     require_array,
     require_scalar,
     require_schema,
-    require_text,
 )
+from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import (
     MeasuredPoints,
@@ -45,114 +46,49 @@ from memscal.model.measured_stress import (
     MeasuredStress,
 )
 from memscal.model.provenance import SourceFile
+from memscal.model.quantities import Quantity, record
 
-__all__ = [
-    "points_groups",
-    "profile_paths",
-    "read_points",
-    "read_scans",
-    "read_stress",
-    "scans_group",
-    "stress_from",
-    "write_stress",
-]
+__all__ = ["profile_paths", "read_stress", "stress_from", "write_stress"]
 
 _CHANNELS = ("zz", "xz", "yz")
-_POINT = ("point",)
-_PAIRS = ("point", "point_prime")
+_NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 
-def points_groups(points: Mapping[str, MeasuredPoints]) -> dict[str, Node]:
+def _points_groups(points: Mapping[str, MeasuredPoints]) -> dict[str, Node]:
     """Return the points of each channel as an NXdata of its own: ``points_zz`` and so on."""
-    return {f"points_{channel}": _points_group(channel, p) for channel, p in points.items()}
+    return {
+        f"points_{channel}": write_record(records.points_record(channel), values)
+        for channel, values in points.items()
+    }
 
 
-def read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
+def _read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
     return {
-        channel: _read_channel(file, f"{path}/points_{channel}", f"u_{channel}")
+        channel: MeasuredPoints(
+            **{"noise": None}
+            | read_record(records.points_record(channel), file, f"{path}/points_{channel}")
+        )
         for channel in _CHANNELS
         if file.has(f"{path}/points_{channel}")
     }
 
 
-def _points_group(channel: str, points: MeasuredPoints) -> Group:
-    u = f"u_{channel}"
-    children: dict[str, Node] = {
-        "point": index_axis("point", points.u.size),
-        "x": si(points.x, "length", _POINT),
-        "y": si(points.y, "length", _POINT),
-        "position_errors": si(points.x_errors, "length", _POINT),
-        u: si(points.u, "voltage", _POINT),
-        "outlier_weight": si(points.weight, "dimensionless", _POINT),
-        "normal_load": si(points.load, "force", _POINT),
-        "normal_load_errors": si(points.load_errors, "force", _POINT),
-    }
-    if points.noise is not None:
-        children[f"{u}_errors"] = si(points.noise, "voltage", _POINT)
-    if points.correlation is not None:
-        children["point_prime"] = index_axis("point_prime", points.u.size)
-        children[f"{u}_correlation"] = si(points.correlation, "dimensionless", _PAIRS)
-    return Group("NXdata", children, {"signal": u, "axes": _POINT})
-
-
-def _read_channel(file: SafeFile, path: str, u: str) -> MeasuredPoints:
-    voltage = require_array(file, f"{path}/{u}", "voltage", ndim=1)
-    n = voltage.size
-
-    def shaped(name: str, values: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
-        if values is not None and values.shape != shape:
-            raise FormatError(
-                f"{file.where(path)}/{name} has shape {values.shape}, but {u} gives {shape}."
-            )
-        return values
-
-    def array(name: str, dimension: str) -> FloatArray:
-        values = require_array(file, f"{path}/{name}", dimension)
-        shaped(name, values, (n,))
-        return values
-
-    noise, correlation = f"{u}_errors", f"{u}_correlation"
-    return MeasuredPoints(
-        x=array("x", "length"),
-        y=array("y", "length"),
-        x_errors=array("position_errors", "length"),
-        u=voltage,
-        noise=shaped(noise, optional_array(file, f"{path}/{noise}", "voltage"), (n,)),
-        weight=array("outlier_weight", "dimensionless"),
-        load=array("normal_load", "force"),
-        load_errors=array("normal_load_errors", "force"),
-        correlation=shaped(
-            correlation, optional_array(file, f"{path}/{correlation}", "dimensionless"), (n, n)
-        ),
-    )
-
-
-def scans_group(scans: Sequence[MeasuredScan]) -> Group:
+def _scans_group(scans: Sequence[MeasuredScan]) -> Group:
     """Return what was scanned as an NXcollection, one group for each scan."""
     groups: dict[str, Node] = {f"scan_{i + 1}": _scan_group(scan) for i, scan in enumerate(scans)}
     return Group("NXcollection", {"names": to_json("scans", list(groups)), **groups})
 
 
-def read_scans(
+def _read_scans(
     file: SafeFile, paths: Sequence[str], numbers: Sequence[int], sources: Mapping[str, SourceFile]
 ) -> tuple[MeasuredScan, ...]:
-    """Read what was scanned.
-
-    Parameters
-    ----------
-    file : SafeFile
-        A file of measured stress.
-    paths, numbers : sequence
-        The groups of the profiles, and which scan each comes from, counted from one.
-    sources : mapping of str to SourceFile
-        The scans' files by name (``scan_1``), where they are stated.
-    """
+    """Read the scans; ``numbers`` say which, from 1, the profile at each of the paths is of."""
     stored = json_value(file, "/entry/scans/names", list, None)
-    known = max(numbers) if stored is None else len(stored)
-    if max(numbers) > known:
+    size = max(numbers) if stored is None else len(stored)
+    if max(numbers) > size:
         raise FormatError(
-            f"{file.where('/entry')}: a profile comes from scan {max(numbers)} of {known}.",
+            f"{file.where('/entry')}: a profile comes from scan {max(numbers)} of {size}.",
             cure="Run memscal apply again.",
         )
     if stored is None:
@@ -160,7 +96,7 @@ def read_scans(
         path_of = dict(zip(reversed(numbers), reversed(paths), strict=True))
         return tuple(
             _old_scan(file, path_of.get(i, paths[0]), sources.get(f"scan_{i}"))
-            for i in range(1, known + 1)
+            for i in range(1, size + 1)
         )
     return tuple(
         _read_scan(file, f"/entry/scans/{name}", sources.get(str(name))) for name in stored
@@ -169,14 +105,11 @@ def read_scans(
 
 def _scan_group(scan: MeasuredScan) -> Group:
     children: dict[str, Node] = {
-        "sample": sample_group(scan.film, {"lubrication": scan.lubrication}),
+        "sample": sample_group(scan.film, scan.lubrication),
         "indenter": indenter_group(scan.indenter),
         "instrument": instrument_group(scan.sensor),
-        "width": si(scan.width, "length"),
-        "synthetic": count(int(scan.synthetic)),
+        **write_record(records.MEASURED_SCAN, scan).children,
     }
-    if scan.position_scale_uncertainty is not None:
-        children["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
     return Group("NXcollection", children)
 
 
@@ -185,12 +118,8 @@ def _read_scan(file: SafeFile, path: str, source: SourceFile | None) -> Measured
         film=read_film(file, f"{path}/sample/film"),
         indenter=read_round_indenter(file, f"{path}/indenter"),
         sensor=read_sensor(file, f"{path}/instrument/stress_sensor"),
-        width=require_scalar(file, f"{path}/width", "length"),
         lubrication=optional_text(file, f"{path}/sample/lubrication"),
-        position_scale_uncertainty=optional_scalar(
-            file, f"{path}/position_scale_errors", "dimensionless"
-        ),
-        synthetic=bool(require_scalar(file, f"{path}/synthetic", "dimensionless")),
+        **read_record(records.MEASURED_SCAN, file, path),
         source=source,
     )
 
@@ -255,19 +184,14 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         )
     sources = _read_sources(file)
     numbers = [_scan_number(file, path) for path in paths]
-    scans = read_scans(file, paths, numbers, sources)
+    scans = _read_scans(file, paths, numbers, sources)
     return MeasuredStress(
         profiles=tuple(
             _read_profile(file, path, scans[number - 1])
             for path, number in zip(paths, numbers, strict=True)
         ),
         scans=scans,
-        conversion_constant=require_scalar(
-            file, "/entry/sensor/conversion_constant", "voltage per stress"
-        ),
-        conversion_constant_uncertainty=require_scalar(
-            file, "/entry/sensor/conversion_constant_errors", "voltage per stress"
-        ),
+        **read_record(records.CONVERSION, file, "/entry/sensor"),
         checks=read_quality(file, "/entry/quality"),
         overridden=tuple(str(text) for text in json_value(file, "/entry/overridden", list, [])),
         process=read_process(file, "/entry/process"),
@@ -279,13 +203,7 @@ def stress_from(file: SafeFile) -> MeasuredStress:
 def write_stress(
     measured: MeasuredStress, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write measured stress as a memscal-stress file, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the file exists and ``overwrite`` is false, or cannot be written.
-    """
+    """Write measured stress as a memscal-stress file, whole or not at all."""
     write_tree(file_tree(STRESS_SCHEMA, _entry(measured)), path, overwrite=overwrite)
 
 
@@ -298,13 +216,9 @@ def _entry(measured: MeasuredStress) -> Group:
     names = [f"profile_{i + 1}" for i in range(len(measured.profiles))]
     first = measured.scans[0]
     sensor = first.sensor.name
-    a, u_a = measured.conversion_constant, measured.conversion_constant_uncertainty
-    used: dict[str, Node] = {
-        "conversion_constant": si(a, "voltage per stress"),
-        "conversion_constant_errors": si(u_a, "voltage per stress"),
-    }
+    digest: dict[str, Node] = {}
     if measured.artifact_digest:
-        used["content_sha256"] = measured.artifact_digest
+        digest["content_sha256"] = measured.artifact_digest
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
         "profiles": to_json("profiles", names),
@@ -312,14 +226,14 @@ def _entry(measured: MeasuredStress) -> Group:
             name: _profile_group(profile, measured.scans)
             for name, profile in zip(names, measured.profiles, strict=True)
         },
-        "sensor": Group("NXcollection", used),
+        "sensor": write_record(records.CONVERSION, measured, **digest),
         "quality": quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
         # Those of the first scan; each scan states its own beside them.
         "sample": sample_group(first.film),
         "instrument": instrument_group(first.sensor),
         "indenter": indenter_group(first.indenter),
-        "scans": scans_group(measured.scans),
+        "scans": _scans_group(measured.scans),
         "inputs": _inputs_group(measured),
         "process": process_group(measured.process),
     }
@@ -330,22 +244,14 @@ def _inputs_group(measured: MeasuredStress) -> Group:
     sources = {"artifact": measured.artifact}
     sources |= {f"scan_{i + 1}": scan.source for i, scan in enumerate(measured.scans)}
     groups: dict[str, Node] = {
-        name: Group(
-            "NXnote",
-            {"file_name": source.file_name, "checksum": source.sha256, "algorithm": "sha256"},
-        )
-        for name, source in sources.items()
-        if source is not None
+        name: write_source(source) for name, source in sources.items() if source is not None
     }
     return Group("NXcollection", {"names": to_json("inputs", list(groups)), **groups})
 
 
 def _read_sources(file: SafeFile) -> dict[str, SourceFile]:
     return {
-        str(name): SourceFile(
-            require_text(file, f"/entry/inputs/{name}/file_name"),
-            require_text(file, f"/entry/inputs/{name}/checksum"),
-        )
+        str(name): read_source(file, f"/entry/inputs/{name}")
         for name in json_value(file, "/entry/inputs/names", list, [])
     }
 
@@ -363,103 +269,82 @@ def _scan_number(file: SafeFile, path: str) -> int:
 
 
 def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) -> Group:
-    centre, spread = profile.centre, profile.centre_uncertainty
+    arrays = write_record(records.STRESS_PROFILE, profile)
+    numbers = dict(write_record(records.STRESS_NUMBERS, _numbers(profile)).children)
+    # What not every profile has comes last.
+    rest = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
+    if profile.curve_r.size:
+        rest["curve"] = write_record(records.STRESS_CURVE, profile)
     children: dict[str, Node] = {
-        "r": si(profile.r, "length", ("r",)),
-        "r_prime": si(profile.r, "length", ("r_prime",)),
-        "x": si(profile.x, "length", ("r",)),
-        "y": si(profile.y, "length", ("r",)),
-        "s_zz": si(profile.s_zz, "stress", ("r",)),
-        "s_zz_errors": si(profile.s_zz_errors, "stress", ("r",)),
-        "covariance": si(profile.covariance, "stress squared", _AXES),
+        **arrays.children,
         "sources": to_json("sources", list(profile.covariances)),
         **{
             _PREFIX + source: si(values, "stress squared", _AXES)
             for source, values in profile.covariances.items()
         },
         "scan": count(scans.index(profile.scan) + 1),
-        "load": si(profile.load, "force"),
-        "force": si(profile.force, "force"),
-        "force_errors": si(profile.force_uncertainty, "force"),
-        "maximum": si(profile.maximum, "stress"),
-        "maximum_errors": si(profile.maximum_uncertainty, "stress"),
-        "centre": si(centre[0], "length"),
-        "centre_errors": si(spread[0], "length"),
-        "baseline": si(profile.baseline, "voltage"),
-        "baseline_errors": si(profile.baseline_uncertainty, "voltage"),
-        "contact_radius": si(profile.contact_radius, "length"),
+        **numbers,
         "budget": budget_group(
             {"force": profile.force_budget, "maximum": profile.maximum_budget}, _BUDGET
         ),
-        **points_groups(profile.points),
+        **_points_groups(profile.points),
+        **rest,
     }
-    if spread[1] > 0:
-        children["centre_y"] = si(centre[1], "length")
-        children["centre_y_errors"] = si(spread[1], "length")
-    if profile.load_uncertainty is not None:
-        children["load_errors"] = si(profile.load_uncertainty, "force")
-    if profile.lubrication:
-        children["lubrication"] = profile.lubrication
-    if profile.curve_r.size:
-        curve: dict[str, Node] = {
-            "r": si(profile.curve_r, "length", ("r",)),
-            "s_zz": si(profile.curve_s_zz, "stress", ("r",)),
-        }
-        children["curve"] = Group("NXdata", curve, {"signal": "s_zz", "axes": ("r",)})
-    return Group("NXdata", children, {"signal": "s_zz", "axes": ("r",)})
+    return replace(arrays, children=children)
+
+
+def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
+    """Return the numbers of a profile; a line does not tell where its centre lies across it."""
+    names = {quantity.name for quantity in records.STRESS_NUMBERS.quantities}
+    numbers = {name: getattr(profile, name) for name in names if not name.startswith("centre")}
+    for i, name in enumerate(("centre", "centre_y")):
+        stated = i == 0 or profile.centre_uncertainty[i] > 0
+        numbers[name] = profile.centre[i] if stated else None
+        numbers[f"{name}_uncertainty"] = profile.centre_uncertainty[i] if stated else None
+    return numbers
 
 
 def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProfile:
-    def number(name: str, dimension: str) -> float:
-        return require_scalar(file, f"{path}/{name}", dimension)
-
-    def array(name: str, dimension: str, shape: tuple[int, ...]) -> FloatArray:
-        values = require_array(file, f"{path}/{name}", dimension)
-        if values.shape != shape:
-            raise FormatError(
-                f"{file.where(path)}/{name} has shape {values.shape}, but r gives {shape}."
-            )
-        return values
-
-    def along(first: str, second: str) -> FloatArray:
-        # A line does not tell where its centre lies across it.
-        across = optional_scalar(file, f"{path}/{second}", "length")
-        return np.array([number(first, "length"), across or 0.0])
-
-    r = require_array(file, f"{path}/r", "length", ndim=1)
-    n = r.size
-    stored = json_value(file, f"{path}/sources", list, [])
-    covariances: Mapping[str, FloatArray] = {
-        str(source): array(f"{_PREFIX}{source}", "stress squared", (n, n)) for source in stored
-    }
+    arrays = read_record(records.STRESS_PROFILE, file, path)
+    n = arrays["r"].size
+    sources = [str(source) for source in json_value(file, f"{path}/sources", list, [])]
+    declared = (
+        Quantity(_PREFIX + source, "stress squared", axes=_AXES, required=True)
+        for source in sources
+    )
+    stored = read_record(record("NXdata", *declared), file, path, sizes={"r": n})
     budget = read_budget(file, f"{path}/budget")
-    if not covariances or not budget.keys() >= _BUDGET.keys():
+    if not sources or not budget.keys() >= _BUDGET.keys():
         raise FormatError(
             f"{file.where(path)} states no covariance of its stress, or no budget.",
             why="Measured stress without uncertainty means little.",
         )
-    y = optional_array(file, f"{path}/y", "length", ndim=1)
-    curve_r = optional_array(file, f"{path}/curve/r", "length", ndim=1)
-    m = 0 if curve_r is None else curve_r.size
+    curve: dict[str, FloatArray] = {"curve_r": np.zeros(0), "curve_s_zz": np.zeros(0)}
+    if file.has(f"{path}/curve"):
+        curve = read_record(records.STRESS_CURVE, file, f"{path}/curve")
+    numbers = read_record(records.STRESS_NUMBERS, file, path)
+    centre, uncertainty = (
+        np.array([numbers[f"centre{end}"], numbers.get(f"centre_y{end}", 0.0)])
+        for end in ("", "_uncertainty")
+    )
     return MeasuredProfile(
         scan=scan,
-        load=number("load", "force"),
-        load_uncertainty=optional_scalar(file, f"{path}/load_errors", "force"),
-        r=r,
-        x=array("x", "length", (n,)),
-        y=np.zeros(n) if y is None else y,
-        s_zz=array("s_zz", "stress", (n,)),
-        covariances=covariances,
-        force=number("force", "force"),
+        load=numbers["load"],
+        load_uncertainty=numbers.get("load_uncertainty"),
+        r=arrays["r"],
+        x=arrays["x"],
+        y=arrays.get("y", np.zeros(n)),
+        s_zz=arrays["s_zz"],
+        covariances={source: stored[f"{_PREFIX}{source}"] for source in sources},
+        force=numbers["force"],
         force_budget=budget["force"],
-        maximum=number("maximum", "stress"),
+        maximum=numbers["maximum"],
         maximum_budget=budget["maximum"],
-        centre=along("centre", "centre_y"),
-        centre_uncertainty=along("centre_errors", "centre_y_errors"),
-        baseline=number("baseline", "voltage"),
-        baseline_uncertainty=number("baseline_errors", "voltage"),
-        contact_radius=number("contact_radius", "length"),
-        curve_r=np.zeros(0) if curve_r is None else curve_r,
-        curve_s_zz=array("curve/s_zz", "stress", (m,)) if m else np.zeros(0),
-        points=read_points(file, path),
+        centre=centre,
+        centre_uncertainty=uncertainty,
+        baseline=numbers["baseline"],
+        baseline_uncertainty=numbers["baseline_uncertainty"],
+        contact_radius=numbers["contact_radius"],
+        **curve,
+        points=_read_points(file, path),
     )

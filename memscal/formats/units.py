@@ -25,51 +25,27 @@ SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 FILE_UNITS = {name: dimension.stored for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension that our writers use."""
 
-# Canonical unit -> (dimension, power of ten that takes it to SI).
+# Canonical units of each dimension with the power of ten that takes them to SI; the micro sign and
+# the Greek mu are two characters.
+_POWERS = {
+    "length": {"m": 0, "cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},
+    "voltage": {"V": 0, "mV": -3, "uV": -6, "µV": -6, "μV": -6},
+    "force": {"kN": 3, "N": 0, "mN": -3, "uN": -6},
+    "stress": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
+    "stress squared": {"Pa^2": 0, "kPa^2": 6},
+    "voltage per stress": {"V/Pa": 0, "mV/Pa": -3, "V/MPa": -6, "mV/kPa": -6, "mV/MPa": -9},
+    "area": {"m^2": 0, "mm^2": -6, "um^2": -12},
+    "per area": {"1/m^2": 0, "1/mm^2": 6},
+    "per area squared": {"1/m^4": 0, "1/mm^4": 12},
+    "wavenumber": {"rad/m": 0, "rad/mm": 3, "1/m": 0, "1/mm": 3},
+    "voltage per length": {"V/m": 0, "mV/mm": 0},
+    "angle": {"rad": 0},
+    "dimensionless": {"1": 0, "": 0},
+}
 _CANONICAL = {
-    "m": ("length", 0),
-    "cm": ("length", -2),
-    "mm": ("length", -3),
-    "um": ("length", -6),
-    "µm": ("length", -6),  # micro sign
-    "μm": ("length", -6),  # Greek mu
-    "nm": ("length", -9),
-    "V": ("voltage", 0),
-    "mV": ("voltage", -3),
-    "uV": ("voltage", -6),
-    "µV": ("voltage", -6),
-    "μV": ("voltage", -6),
-    "kN": ("force", 3),
-    "N": ("force", 0),
-    "mN": ("force", -3),
-    "uN": ("force", -6),
-    "Pa": ("stress", 0),
-    "kPa": ("stress", 3),
-    "MPa": ("stress", 6),
-    "GPa": ("stress", 9),
-    "Pa^2": ("stress squared", 0),
-    "kPa^2": ("stress squared", 6),
-    "V/Pa": ("voltage per stress", 0),
-    "mV/Pa": ("voltage per stress", -3),
-    "V/MPa": ("voltage per stress", -6),
-    "mV/kPa": ("voltage per stress", -6),
-    "mV/MPa": ("voltage per stress", -9),
-    "m^2": ("area", 0),
-    "mm^2": ("area", -6),
-    "um^2": ("area", -12),
-    "1/m^2": ("per area", 0),
-    "1/mm^2": ("per area", 6),
-    "1/m^4": ("per area squared", 0),
-    "1/mm^4": ("per area squared", 12),
-    "rad/m": ("wavenumber", 0),
-    "rad/mm": ("wavenumber", 3),
-    "1/m": ("wavenumber", 0),
-    "1/mm": ("wavenumber", 3),
-    "V/m": ("voltage per length", 0),
-    "mV/mm": ("voltage per length", 0),
-    "rad": ("angle", 0),
-    "1": ("dimensionless", 0),
-    "": ("dimensionless", 0),
+    unit: (dimension, power)
+    for dimension, units in _POWERS.items()
+    for unit, power in units.items()
 }
 
 # What pint may be asked: names, products and small powers.  Arithmetic such as 9**9**9 is a
@@ -81,33 +57,9 @@ _MAX_LENGTH = 64
 
 
 def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> FloatArray:
-    """Convert values from a file's unit to SI.
+    """Convert values from a file's unit to SI; ``where`` names them in a message.
 
-    Parameters
-    ----------
-    values : array_like
-        Numbers in ``unit``.
-    unit : str or None
-        The unit; ``None`` means that none is stated, which only a dimensionless quantity may.
-    dimension : str
-        A key of :data:`SI_UNITS`.
-    where : str
-        File and HDF5 path (or column), for the message.
-
-    Returns
-    -------
-    ndarray
-        The numbers in ``SI_UNITS[dimension]``.
-
-    Raises
-    ------
-    UnitError
-        If the unit is missing, unknown, or of another dimension.
-
-    Examples
-    --------
-    >>> to_si([0.25, 561.0], "um", "length", "scan.h5: /entry/data/x")
-    array([2.50e-07, 5.61e-04])
+    Only a dimensionless quantity may have no unit (``None``).
     """
     numbers = np.asarray(values, dtype=np.float64)
     if unit is None:
@@ -127,25 +79,13 @@ def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> Fl
 
 
 def from_si(values: ArrayLike, dimension: str) -> tuple[FloatArray, str]:
-    """Convert SI values to the unit that our files use; return them with that unit.
-
-    Examples
-    --------
-    >>> from_si([561e-6], "length")
-    (array([0.561]), 'mm')
-    """
+    """Convert SI values to the unit that our files use; return them with that unit."""
     unit = FILE_UNITS[dimension]
     return _scaled(np.asarray(values, dtype=np.float64), -_CANONICAL[unit][1]), unit
 
 
 def dimension_of(unit: str, where: str) -> str:
-    """Return the dimension of a unit whose quantity is not known beforehand.
-
-    Raises
-    ------
-    UnitError
-        If the unit is none of those that memscal works with.
-    """
+    """Return the dimension of a unit whose quantity is not known beforehand."""
     canonical = _CANONICAL.get(unit.strip())
     if canonical is not None:
         return canonical[0]

@@ -24,7 +24,6 @@ __all__ = [
     "altered",
     "any_scalar",
     "json_value",
-    "optional_array",
     "optional_scalar",
     "optional_text",
     "require_array",
@@ -40,9 +39,9 @@ _MAX_ITEMS = 10_000
 
 def require_schema(file: SafeFile, schema: str) -> str:
     """Return the schema version; refuse another schema or a newer major version."""
-    found = file.attribute("/", SCHEMA_ATTRIBUTE)
-    if found != schema:
-        what = "no memscal schema" if found is None else f'the schema "{found}"'
+    stored = file.attribute("/", SCHEMA_ATTRIBUTE)
+    if stored != schema:
+        what = "no memscal schema" if stored is None else f'the schema "{stored}"'
         raise FormatError(
             f'{file.name} has {what}, but "{schema}" is needed here.',
             why=f"The root attribute {SCHEMA_ATTRIBUTE} says what a file holds.",
@@ -55,14 +54,14 @@ def require_schema(file: SafeFile, schema: str) -> str:
             f'{file.name} has the schema version "{version}", which is not a version.',
             cure=f'Set the root attribute {VERSION_ATTRIBUTE}, such as "{SCHEMA_VERSION}".',
         )
-    known = SCHEMA_VERSION.partition(".")[0]
-    if int(major) > int(known):
+    newest = SCHEMA_VERSION.partition(".")[0]
+    if int(major) > int(newest):
         raise SchemaVersionError(
             f"{file.name} was written by a newer memscal: {schema} version {version}.",
-            why=f"This memscal reads versions up to {known}.x and would misread it.",
+            why=f"This memscal reads versions up to {newest}.x and would misread it.",
             cure="Upgrade memscal.",
         )
-    if int(major) < int(known):
+    if int(major) < int(newest):
         raise SchemaVersionError(
             f"{file.name} has {schema} version {version}, which is not read any more.",
             cure="Write it again with the current memscal.",
@@ -93,13 +92,6 @@ def require_array(
             cure="Check the shape of the array.",
         )
     return to_si(values, units_of(file, path), dimension, file.where(path))
-
-
-def optional_array(
-    file: SafeFile, path: str, dimension: str, *, ndim: int | None = None
-) -> FloatArray | None:
-    """Return the array at a path in SI units, or ``None`` where there is none."""
-    return require_array(file, path, dimension, ndim=ndim) if file.has(path) else None
 
 
 def require_scalar(file: SafeFile, path: str, dimension: str) -> float:

@@ -94,16 +94,20 @@ def whole_numbers(what: str, values: ArrayLike) -> NDArray[np.int64]:
     return numbers
 
 
-def same_content(one: Any, other: Any) -> bool:
+def same_content(first: Any, second: Any) -> bool:
     """Whether two records hold the same, array by array; NaN is equal to NaN."""
-    if isinstance(one, np.ndarray):
-        return isinstance(other, np.ndarray) and np.array_equal(one, other, equal_nan=True)
-    if isinstance(one, float) and isinstance(other, float):
-        return one == other or (one != one and other != other)
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(same_content(one[key], other[key]) for key in one)
-    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
-        return len(one) == len(other) and all(map(same_content, one, other))
-    if is_dataclass(one) and type(one) is type(other):
-        return all(same_content(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
-    return bool(one == other)
+    if isinstance(first, np.ndarray):
+        return isinstance(second, np.ndarray) and np.array_equal(first, second, equal_nan=True)
+    if isinstance(first, float) and isinstance(second, float):
+        return first == second or (first != first and second != second)
+    if isinstance(first, Mapping) and isinstance(second, Mapping):
+        return first.keys() == second.keys() and all(
+            same_content(first[key], second[key]) for key in first
+        )
+    if isinstance(first, tuple | list) and isinstance(second, tuple | list):
+        return len(first) == len(second) and all(map(same_content, first, second))
+    if is_dataclass(first) and type(first) is type(second):
+        return all(
+            same_content(getattr(first, f.name), getattr(second, f.name)) for f in fields(first)
+        )
+    return bool(first == second)

@@ -23,38 +23,6 @@ def format_measured(
     The uncertainty keeps two significant digits and the value is rounded to the same place,
     as the GUM (JCGM 100:2008, 7.2) advises.  Very large and very small numbers share one
     power of ten.
-
-    Parameters
-    ----------
-    value : float
-        The value, in ``unit``.
-    uncertainty : float or None
-        Its standard uncertainty (k = 1), in ``unit``.  ``None``, zero or a number that is
-        not finite means that none is stated, and the text says so.
-    unit : str
-        Unit as it should read; ``""`` or ``"1"`` for a dimensionless quantity.
-    concise : bool
-        Write ``0.5612(34) mm`` in place of ``(0.5612 ± 0.0034) mm``.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        If the uncertainty is negative.
-
-    Examples
-    --------
-    >>> format_measured(0.56123, 0.00342, "mm")
-    '(0.5612 ± 0.0034) mm'
-    >>> format_measured(0.56123, 0.00342, "mm", concise=True)
-    '0.5612(34) mm'
-    >>> format_measured(3.0123e-5, 1.2e-7, "mV/Pa")
-    '(3.012 ± 0.012)×10⁻⁵ mV/Pa'
-    >>> format_measured(0.56123, None, "mm")
-    '0.5612 mm (no uncertainty stated)'
     """
     tail = "" if unit in ("", "1") else f" {unit}"
     if not math.isfinite(value):
@@ -103,22 +71,7 @@ def _two_digits(spread: Decimal) -> Decimal:
 
 
 def format_bound(bound: float, *, upper: bool) -> str:
-    """Write a bound to two digits, rounded outward: no more is said than was found.
-
-    Parameters
-    ----------
-    bound : float
-        A bound of something that is not negative.
-    upper : bool
-        Whether it is an upper bound, which is rounded up; a lower one is rounded down.
-
-    Examples
-    --------
-    >>> format_bound(0.2471, upper=False), format_bound(0.0123, upper=True)
-    ('0.24', '0.013')
-    >>> format_bound(0.2, upper=False), format_bound(0.0, upper=False)
-    ('0.20', '0')
-    """
+    """Write a bound to two digits, rounded outward: no more is said than was found."""
     if bound <= 0:
         return "0"
     place = 1 - math.floor(math.log10(bound))
@@ -134,11 +87,6 @@ def printable(value: object, limit: int) -> str:
     r"""Return text without the characters that could steer a terminal.
 
     Bytes are decoded as UTF-8 with replacement; line feeds and tabs stay.
-
-    Examples
-    --------
-    >>> printable(b"rod\x1b[2J\xff", 100)
-    'rod[2J\ufffd'
     """
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
     return "".join(c for c in text[:limit] if c.isprintable() or c in "\n\t")

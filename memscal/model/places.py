@@ -63,13 +63,6 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
 
     Close is a tenth of the usual distance within a pass.  On a plane the readings at one node of
     an even lattice share a place too.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n,)
-        Positions, in m; all of ``y`` (or of ``x``) equal on a line.
-    repeat : ndarray of int, shape (n,)
-        Which pass each point belongs to.
     """
     positions = np.stack([x, y], axis=1)
     close, pairs = _neighbours(positions, repeat)

@@ -214,7 +214,7 @@ TRUTH = ESTIMATED | by_name(
 
 def declared_quantity(name: str) -> Quantity | None:
     """Return the quantity that a parameter's name begins with, the longest that fits."""
-    names = [known for known in TRUTH if name == known or name.startswith(f"{known}_")]
+    names = [declared for declared in TRUTH if name == declared or name.startswith(f"{declared}_")]
     return TRUTH[max(names, key=len)] if names else None
 
 
@@ -222,13 +222,6 @@ def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
     """Return how an estimated parameter is shown; one that is not known keeps its name.
 
     A number at the end of a known name says which scan it belongs to.
-
-    Examples
-    --------
-    >>> estimated_quantity("centre").unit
-    'mm'
-    >>> estimated_quantity("tilt_of_stage", "V/m").unit, estimated_quantity("tilt_of_stage").words
-    ('mV/mm', 'tilt of stage')
     """
     start, _, number = name.rpartition("_")
     if start in ESTIMATED and number.isdigit():
@@ -251,15 +244,7 @@ def parameter_quantity(parameters: ParameterSet, name: str) -> Quantity:
 
 
 def measured_text(parameters: ParameterSet, name: str) -> str:
-    """Return one parameter as text with its standard uncertainty and unit.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> p = ParameterSet(("gaussian_sigma",), np.array([5.612e-4]), np.array([[1.2e-11]]))
-    >>> measured_text(p, "gaussian_sigma")
-    '(0.5612 ± 0.0035) mm'
-    """
+    """Return one parameter as text with its standard uncertainty and unit."""
     shown = parameter_quantity(parameters, name)
     uncertainty = parameters.uncertainty(name)
     return format_measured(parameters[name] / shown.scale, uncertainty / shown.scale, shown.unit)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from memscal.model.quantities import Quantity, measured, record
+from memscal.model.quantities import Quantity, Record, measured, record
 
 __all__ = [
     "CHECK",
@@ -15,6 +15,7 @@ __all__ = [
     "INDENTER",
     "INDENTER_FACE",
     "LOAD",
+    "MEASURED_SCAN",
     "NUMERICS",
     "PROCESS",
     "PROFILE",
@@ -28,9 +29,12 @@ __all__ = [
     "SCAN_DATA",
     "SENSOR",
     "SOLVER",
+    "STRESS_CURVE",
+    "STRESS_NUMBERS",
     "STRESS_PROFILE",
     "SYNTHETIC",
     "TRANSFER",
+    "points_record",
 ]
 
 _L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
@@ -234,15 +238,8 @@ PROCESS = record(
 # Along r; x and y are the indenter's positions.
 STRESS_PROFILE = record(
     "NXdata",
-    *measured(Quantity("load", "force", "stated load", "P", required=True)),
-    Quantity("lubrication", "text", "dry or lubricated"),
-    *measured(Quantity("force", "force", "force of the measured stress", "F", required=True)),
-    *measured(Quantity("maximum", _P, "largest measured stress", "S", required=True)),
-    *measured(Quantity("centre", _L, "centre along x", "x₀", required=True)),
-    *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
-    *measured(Quantity("baseline", _U, "baseline", "U₀", required=True)),
-    Quantity("contact_radius", _L, "contact radius", "a", required=True),
     Quantity("r", _L, "distance from the centre", "r", _R, required=True),
+    Quantity("r", _L, "distance from the centre", axes=("r_prime",), stored="r_prime"),
     Quantity("x", _L, "position along x", "x", _R, required=True),
     Quantity("y", _L, "position along y", "y", _R),
     Quantity("s_zz", _P, "measured normal stress", "S_zz", _R, required=True),
@@ -250,3 +247,49 @@ STRESS_PROFILE = record(
     Quantity("covariance", "stress squared", "covariance of S_zz", axes=_RR, required=True),
     signal="s_zz",
 )
+STRESS_NUMBERS = record(
+    "NXdata",
+    *measured(Quantity("load", "force", "stated load", "P", required=True)),
+    Quantity("lubrication", "text", "dry or lubricated"),
+    *measured(Quantity("force", "force", "force of the measured stress", "F", required=True)),
+    *measured(Quantity("maximum", _P, "largest measured stress", "S", required=True)),
+    *measured(Quantity("centre", _L, "centre along x", "x₀", required=True), required=True),
+    *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
+    *measured(Quantity("baseline", _U, "baseline", "U₀", required=True), required=True),
+    Quantity("contact_radius", _L, "contact radius", "a", required=True),
+)
+STRESS_CURVE = record(
+    "NXdata",
+    Quantity("curve_r", _L, "distance from the centre", "r", _R, required=True, stored="r"),
+    Quantity("curve_s_zz", _P, "fitted stress", "S_zz", _R, required=True, stored="s_zz"),
+    signal="s_zz",
+)
+MEASURED_SCAN = record(
+    "NXcollection",
+    Quantity("width", _L, "extent of the positions", required=True),
+    Quantity("synthetic", "truth", "whether the scan is synthetic", required=True),
+    Quantity(
+        "position_scale_uncertainty",
+        _ONE,
+        "relative uncertainty of all positions",
+        stored="position_scale_errors",
+    ),
+)
+
+
+def points_record(channel: str) -> Record:
+    """Return the record of the measured points of a channel: ``zz``, ``xz`` or ``yz``."""
+    u, point = f"u_{channel}", ("point",)
+    return record(
+        "NXdata",
+        Quantity("x", _L, "position along x", axes=point, required=True),
+        Quantity("y", _L, "position along y", axes=point, required=True),
+        Quantity("x_errors", _L, axes=point, required=True, stored="position_errors"),
+        Quantity("u", _U, "voltage", axes=point, required=True, stored=u),
+        Quantity("weight", _ONE, axes=point, required=True, stored="outlier_weight"),
+        Quantity("load", "force", axes=point, required=True, stored="normal_load"),
+        Quantity("load_errors", "force", axes=point, required=True, stored="normal_load_errors"),
+        Quantity("noise", _U, axes=point, stored=f"{u}_errors"),
+        Quantity("correlation", _ONE, axes=("point", "point_prime"), stored=f"{u}_correlation"),
+        signal=u,
+    )

@@ -55,14 +55,7 @@ class _Contacts(Protocol):
 
 
 def require_contacts(scan: _Contacts) -> None:
-    """Refuse uncertainties of loads that are none, and an unknown state of lubrication.
-
-    Raises
-    ------
-    InputError
-        If an uncertainty is negative or infinite, or stands without its load, or if the
-        lubrication is unknown, or contradicts the lubricant.
-    """
+    """Refuse uncertainties of loads that are none, and an unknown state of lubrication."""
     errors = scan.normal_load_errors
     if errors is not None:
         if scan.normal_load is None:
@@ -88,40 +81,31 @@ def require_contacts(scan: _Contacts) -> None:
         )
 
 
-def checked_correlation(given: ArrayLike, size: int) -> FloatArray:
-    """Return a read-only copy of a correlation of ``size`` points; refuse what no noise can have.
-
-    Raises
-    ------
-    InputError
-        If it has another shape, is no correlation, or is not positive definite.
-
-    Examples
-    --------
-    >>> checked_correlation([[1.0, 0.5], [0.5, 1.0]], 2).shape
-    (2, 2)
-    """
-    found = frozen_array(given)
-    if found.shape != (size, size) or not np.isfinite(found).all():
+def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
+    """Return a read-only copy of a correlation of ``size`` points, which must be one of noise."""
+    correlation = frozen_array(stated)
+    if correlation.shape != (size, size) or not np.isfinite(correlation).all():
         raise InputError(
-            f"u_zz_correlation has shape {found.shape}, but it should be ({size}, {size}) and "
-            "finite.",
+            f"u_zz_correlation has shape {correlation.shape}, but it should be ({size}, {size}) "
+            "and finite.",
             why="It correlates every point of one repeat with every other.",
         )
-    if not np.allclose(found, found.T, atol=1e-9) or not np.allclose(np.diag(found), 1.0):
+    if not np.allclose(correlation, correlation.T, atol=1e-9) or not np.allclose(
+        np.diag(correlation), 1.0
+    ):
         raise InputError(
             "u_zz_correlation is not a correlation: not symmetric, or not one on its diagonal.",
             cure="Divide a covariance by the standard uncertainties of row and column, and "
             "give those as u_zz_errors.",
         )
-    least = float(np.linalg.eigvalsh(found)[0])
+    least = float(np.linalg.eigvalsh(correlation)[0])
     if least <= _LEAST_EIGENVALUE:
         raise InputError(
             f"u_zz_correlation is not positive definite: it has the eigenvalue {least:.3g}.",
             why="Some combination of the voltages would have no noise, or less than none.",
             cure="Add the electronic noise, which is independent from point to point.",
         )
-    return found
+    return correlation
 
 
 def require_plane(x: FloatArray, y: FloatArray) -> None:
@@ -343,14 +327,14 @@ class Scan:
         n, shape = self.x.size, self.u_zz.shape
         if self.y is not None:
             good = shape == (self.y.size, n) or shape == (n,) == self.y.shape
-            wanted = f"({self.y.size}, {n}), from y and x"
+            expected = f"({self.y.size}, {n}), from y and x"
             if self.y.size == n:
-                wanted += f", or ({n},), one voltage for each point"
+                expected += f", or ({n},), one voltage for each point"
         else:
             good = self.u_zz.ndim in (1, 2) and shape[-1:] == (n,) and self.u_zz.size > 0
-            wanted = f"({n},) or (repeat, {n})"
+            expected = f"({n},) or (repeat, {n})"
         if not good:
-            raise InputError(f"u_zz has shape {shape}, but it should be {wanted}.")
+            raise InputError(f"u_zz has shape {shape}, but it should be {expected}.")
         if self.repeat is not None and not self.repeat.shape == self.x.shape == shape:
             raise InputError(
                 f"repeat has shape {self.repeat.shape}, but x has {self.x.shape} and u_zz {shape}.",

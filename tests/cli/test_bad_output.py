@@ -58,19 +58,6 @@ def test_a_full_disk_is_known_before_computing(
     assert names(folder) == ["out.h5", "scan.h5"]
 
 
-def test_a_disk_that_fills_up_meanwhile_leaves_the_old_artifact(
-    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # The proof before computing is one flush; the artifact's own is the second.
-    monkeypatch.setattr("os.fsync", failing_after(1, errno.ENOSPC, os.fsync))
-    refused = run("calibrate", scan, "-o", old, "--force")
-    assert refused.code == 4
-    assert refused.out == ""
-    assert "untouched" in refused.err
-    assert old.read_bytes() == OLD
-    assert names(folder) == ["out.h5", "scan.h5"]
-
-
 @pytest.mark.usefixtures("no_computing")
 def test_a_read_only_disk_is_known_before_computing(
     run: Run, scan: Path, old: Path, monkeypatch: pytest.MonkeyPatch
@@ -208,19 +195,3 @@ def test_a_python_warning_becomes_one_line_of_words(
     done = run("calibrate", scan)
     assert done.code == 0
     assert "Warning: UserWarning: the film is old" in done.err.splitlines()
-
-
-@pytest.mark.parametrize("name", ["out.h5", "out.png"])
-def test_a_file_that_appears_during_the_computing_is_not_replaced(
-    run: Run, scan: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    from memscal.calibration.calibrate import calibrate
-
-    def slow(*given: object, **options: object) -> object:
-        (folder / name).write_bytes(b"of another program")
-        return calibrate(*given, **options)  # type: ignore[arg-type]
-
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", slow)
-    refused = run("calibrate", scan, "-o", "out.h5", "--figure", "out.png")
-    assert refused.code == 4
-    assert (folder / name).read_bytes() == b"of another program"

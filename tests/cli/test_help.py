@@ -83,11 +83,6 @@ def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments: list[str], 
     assert refused.out == ""
 
 
-def test_without_a_command_the_help_is_shown(run: Run) -> None:
-    shown = run()
-    assert "calibrate" in shown.out + shown.err
-
-
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_shell_gets_its_completion_script(run: Run, shell: str) -> None:
     done = run("completion", shell)

@@ -59,55 +59,6 @@ def test_the_options_say_what_the_table_does_not(run: Run, table: Path) -> None:
     assert scan.title == "Monday's scan"
 
 
-def test_messy_repeats_are_kept_as_points_and_it_is_said(run: Run, folder: Path) -> None:
-    rng = np.random.default_rng(0)
-    places = np.repeat(np.arange(-8.0, 8.5, 0.5), 3)
-    numbers = np.tile([0, 1, 2], 33)
-    messy = places + rng.uniform(-0.02, 0.02, places.size)
-    u = 3 * np.exp(-(places**2) / 2)
-    rows = np.delete(np.stack([messy, u, numbers], axis=1), 10, axis=0)
-    write_table(folder / "scan.csv", "position,voltage,repeat", rows)
-    repeats = [*COLUMNS, *SET_UP, "--repeat", "repeat"]
-    done = run("import", "scan.csv", "-o", "scan.h5", *repeats)
-    assert done.code == 0, done.err
-    assert "98 readings in 3 repeats at 33 places, typically 0.5" in done.out
-    assert "1 more would make every repeat complete." in done.out
-    scan = memscal.read_scan("scan.h5")
-    assert scan.kind == "points"
-    np.testing.assert_allclose(scan.x, rows[:, 0] * 1e-3, rtol=1e-12)
-    assert "98" in run("inspect", "scan.h5").out
-    as_json = run("import", "scan.csv", "-o", "again.h5", *repeats, "--json")
-    assert any("98 readings" in note for note in as_json.json["notes"])
-
-
-def test_a_raster_of_another_kind_of_sensor_states_its_scale(run: Run, folder: Path) -> None:
-    x, y = np.meshgrid(np.arange(8.0), np.arange(6.0))
-    rows = np.stack([x.ravel(), y.ravel(), np.hypot(x, y).ravel()], axis=1)
-    write_table(folder / "raster.csv", "x,y,field", rows)
-    raster = ["--x", 1, "--y", 2, "--x-unit", "mm", "--u", "field", "--u-unit", "uT", *SET_UP]
-    refused = run("import", "raster.csv", "-o", "raster.h5", *raster)
-    assert refused.code == 3
-    assert "--u-scale" in refused.err
-    done = run("import", "raster.csv", "-o", "raster.h5", *raster, "--u-scale", 1e-6)
-    assert done.code == 0, done.err
-    assert "1e-06 V was taken for one uT" in done.out
-    scan = memscal.read_scan("raster.h5")
-    assert (scan.kind, scan.u_zz.shape) == ("points", (48,))
-    np.testing.assert_allclose(scan.u_zz, 1e-3 * np.hypot(scan.x, scan.y), rtol=1e-12)
-
-
-def test_a_column_of_loads_is_kept_per_point(run: Run, folder: Path) -> None:
-    rows = np.stack([np.arange(9.0), np.arange(9.0), np.full(9, 500.0)], axis=1)
-    write_table(folder / "scan.csv", "position,voltage,force", rows)
-    rest = SET_UP[4:]
-    load = ["--load-column", "force", "--load-unit", "mN"]
-    assert run("import", "scan.csv", "-o", "scan.h5", *COLUMNS, *rest, *load).code == 0
-    scan = memscal.read_scan("scan.h5")
-    assert scan.load == 0.5
-    assert scan.normal_load is not None
-    assert np.all(scan.normal_load == 0.5)
-
-
 def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(
     run: Run, folder: Path
 ) -> None:

@@ -42,13 +42,6 @@ def test_a_mesh_becomes_a_reference_that_a_calibration_can_use(run: Run, scan: P
     assert calibrated.code in {0, 1}, calibrated.err  # done, though no rod pressed like this
 
 
-def test_the_notes_are_in_the_json_object(run: Run, mesh: Path) -> None:
-    done = run("import", mesh, "-o", "film.h5", *MESH, "--sigma", "S", "--json")
-    assert done.code == 0, done.err
-    assert any("41 nodes" in note for note in done.json["notes"])
-    assert names(mesh.parent) == ["film.h5", "film.vtu"]
-
-
 def test_lengths_on_the_command_line_are_in_mm(run: Run, folder: Path) -> None:
     film = section("yx", heights=np.linspace(3.0, 5.0, 4))
     film.point_data = {"p": -pressure(film.points[:, 1])}

@@ -9,8 +9,6 @@ import h5py
 import pytest
 from helpers.console import Run
 
-from memscal.formats.inspection import describe
-
 
 @pytest.fixture(scope="module")
 def shared_artifact(drifting_scan: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -39,11 +37,6 @@ def test_inspect_shows_values_arrays_checks_and_provenance(run: Run, artifact: P
         "white-noise",
     ):
         assert text in shown.out
-
-
-def test_inspect_in_json_is_the_librarys_description(run: Run, artifact: Path, scan: Path) -> None:
-    for path in (artifact, scan):
-        assert run("inspect", path, "--json").json == describe(path)
 
 
 def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path) -> None:

@@ -45,10 +45,6 @@ def test_a_number_stays_the_same_in_every_encoding(encoding: str, text: str) -> 
     assert readable("σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa", stream(encoding)) == text
 
 
-def test_controls_of_a_terminal_do_not_get_through() -> None:
-    assert "\x1b" not in readable("a\x1b[31mb", stream("utf-8"))
-
-
 def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]) -> None:
     emit_tables(TABLE, Table("empty", ("a",), []))
     assert capsys.readouterr().out == (

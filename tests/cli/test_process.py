@@ -50,11 +50,6 @@ def test_a_failed_check_is_the_exit_code_of_the_process(drifting_scan: Path, fol
     assert (folder / "out.h5").is_file()
 
 
-def test_a_refusal_is_the_exit_code_of_the_process(folder: Path) -> None:
-    done = run("calibrate", "missing.h5", cwd=folder)
-    assert (done.returncode, done.stdout) == (3, "")
-
-
 def test_a_file_size_limit_leaves_the_old_artifact(scan: Path, folder: Path) -> None:
     (folder / "out.h5").write_bytes(b"old")
 

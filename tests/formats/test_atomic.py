@@ -12,12 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.builders import make_profile, make_scan
 
 from memscal.errors import OutputError
 from memscal.formats.files import atomic_write_bytes, ensure_writable
-from memscal.formats.reference import write_reference
-from memscal.formats.scan import read_scan, write_scan
 
 OLD = b"the old output"
 
@@ -246,21 +243,3 @@ def test_a_proof_that_succeeds_leaves_no_trace(target: Path):
     ensure_writable(target, overwrite=True)
     ensure_writable(target.parent / "new.h5")
     assert_untouched(target)
-
-
-def test_a_scan_that_fails_to_be_written_leaves_the_old_one_readable(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    path = tmp_path / "scan.h5"
-    write_scan(make_scan(title="old"), path)
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", fail_with(errno.ENOSPC))
-        with pytest.raises(OutputError):
-            write_scan(make_scan(title="new"), path, overwrite=True)
-    assert read_scan(path).title == "old"
-
-
-def test_writers_refuse_to_overwrite_by_default(tmp_path: Path):
-    write_reference(make_profile(), tmp_path / "a.h5")
-    with pytest.raises(OutputError, match="exists already"):
-        write_reference(make_profile(), tmp_path / "a.h5")

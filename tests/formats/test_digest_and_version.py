@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from memscal.errors import FormatError, SchemaVersionError
 from memscal.formats.artifact import read_artifact, write_artifact
 from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import content_digest
-from memscal.formats.inspection import check, describe
+from memscal.formats.inspection import check
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 from memscal.formats.schema import CONTENTS_PATH, SCHEMA_VERSION
@@ -120,14 +119,6 @@ def test_what_was_added_at_a_path_that_is_read_is_refused(artifact: Path):
     assert not all(finding.passed for finding in check(artifact))
 
 
-def test_a_scan_is_told_the_same_by_check(tmp_path: Path):
-    write_scan(make_scan(title=""), tmp_path / "a.h5")
-    assert all(finding.passed for finding in check(tmp_path / "a.h5"))
-    with h5py.File(tmp_path / "a.h5", "r+") as file:
-        file["/entry/title"] = "of another scan"
-    assert not all(finding.passed for finding in check(tmp_path / "a.h5"))
-
-
 @pytest.fixture(params=["scan", "reference", "artifact"])
 def versioned(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
     path = tmp_path / f"{request.param}.h5"
@@ -168,31 +159,6 @@ def test_a_newer_major_version_is_refused_in_plain_words(versioned: Any, version
 @pytest.mark.parametrize("version", ["1.0.0", SCHEMA_VERSION, "1.7.3"])
 def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, version: str):
     assert versioned(version).load == 1.0
-
-
-def store_as_version_1_0(file: h5py.File) -> None:
-    """Put the covariance where version 1.0 had it, in the group of the radial profile."""
-    contents = json.loads(file[CONTENTS_PATH][()])
-    for name in ("r_prime", "g_covariance"):
-        old, new = f"/entry/radial_profile/{name}", f"/entry/radial_covariance/{name}"
-        file.move(new, old)
-        contents[old] = contents.pop(new)
-    del file["/entry/radial_covariance"], file[CONTENTS_PATH]
-    del contents["/entry/radial_covariance"], contents["/entry/radial_covariance/r"]
-    file[CONTENTS_PATH] = json.dumps(contents)
-    file.attrs["memscal_schema_version"] = "1.0.0"
-    rewrite_digest(file)
-
-
-def test_an_artifact_of_version_1_0_is_read_with_its_covariance(artifact: Path):
-    new = read_artifact(artifact).radial_profile
-    with h5py.File(artifact, "r+") as file:
-        store_as_version_1_0(file)
-    old = read_artifact(artifact).radial_profile
-    for name in ("r", "g", "g_errors", "g_gaussian", "g_covariance"):
-        np.testing.assert_allclose(getattr(old, name), getattr(new, name), rtol=1e-15)
-    paths = [array["path"] for array in describe(artifact)["arrays"]]
-    assert "/entry/radial_profile/g_covariance" in paths
 
 
 @pytest.mark.parametrize(

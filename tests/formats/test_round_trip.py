@@ -114,11 +114,6 @@ def test_a_reference_comes_back(tmp_path: Path):
     assert_same(read_reference(tmp_path / "sphere.h5"), profile, but=("source",))
 
 
-def test_full_stick_keeps_its_infinite_friction(tmp_path: Path):
-    write_reference(make_profile(friction_coefficient=np.inf), tmp_path / "a.h5")
-    assert read_reference(tmp_path / "a.h5").friction_coefficient == np.inf
-
-
 def test_a_reference_that_is_only_a_table_comes_back(tmp_path: Path):
     absent = "sigma_rz depth contact_radius stick_radius friction_coefficient film indenter"
     bare: dict[str, Any] = dict.fromkeys([*absent.split(), "convergence"])

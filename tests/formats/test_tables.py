@@ -135,7 +135,7 @@ def test_a_raster_is_points_and_its_places_and_steps_are_named(
     found = scan_table(tmp_path, text, y="y", repeat="n" if numbered else None)
     assert (found.scan.kind, found.scan.u_zz.shape) == ("points", (96,))
     np.testing.assert_allclose(found.scan.y, y * 1e-3, rtol=1e-12)
-    (note,) = [note for note in found.notes if "96 readings" in note]
+    (note,) = [note.text for note in found.notes if "96 readings" in note.text]
     assert ("in 3 repeats" in note) == numbered
     if numbered or noise in (0.0, 0.02):
         assert "at 32 places" in note

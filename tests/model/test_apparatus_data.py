@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.builders import CONVERSION, SIGMA, make_artifact
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -38,10 +37,3 @@ def test_parameters_that_do_not_fit_together_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="2 parameter names"):
         ParameterSet(("a", "b"), values, covariance, units)
-
-
-def test_short_cuts_lead_to_the_parameters() -> None:
-    data = make_artifact()
-    assert data.conversion_constant == CONVERSION
-    assert data.gaussian_sigma == SIGMA
-    assert data.resolved_wavenumber == data.transfer.resolved_wavenumber == 3.7e3

@@ -14,11 +14,6 @@ from hypothesis import strategies as st
 from memscal.errors import InputError
 
 
-@pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
-def test_a_scan_knows_its_kind(kind: str) -> None:
-    assert make_scan(kind).kind == kind
-
-
 def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
     scan = make_scan("repeats")
     one = slice(0, 1)
@@ -78,16 +73,6 @@ def test_a_scan_that_contradicts_itself_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=problem):
         make_scan(kind, **changes)
-
-
-def test_a_missing_point_is_no_fault() -> None:
-    scan = make_scan(u_zz=np.full(33, np.nan))
-    assert np.all(np.isnan(scan.u_zz))
-
-
-def test_positions_need_not_be_sorted_centred_or_even() -> None:
-    x = np.random.default_rng(1).permutation(np.geomspace(1e-3, 9e-3, 33))
-    np.testing.assert_array_equal(make_scan(x=x).x, x)
 
 
 def test_a_scan_keeps_its_own_copy_of_its_data() -> None:

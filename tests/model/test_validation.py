@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from memscal.errors import InputError
 from memscal.model.arrays import (
     finite_vector,
-    frozen_array,
     require_increasing,
     require_non_negative,
     require_positive,
@@ -54,18 +53,6 @@ def test_a_refusal_names_quantity_value_and_unit() -> None:
         require_positive("film thickness", -2e-3, "m")
     with pytest.raises(InputError, match=r"ratio is 0\.7, but it must lie from 0 to 0\.5"):
         require_range("ratio", 0.7, 0.0, 0.5)
-
-
-@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1))
-def test_a_vector_is_copied_and_cannot_be_written(values: list[float]) -> None:
-    source = np.array(values)
-    vector = finite_vector("r", source)
-    source += 1.0
-    np.testing.assert_array_equal(vector, values)
-    with pytest.raises(ValueError, match="read-only"):
-        vector[0] = 0.0
-    with pytest.raises(ValueError, match="read-only"):
-        frozen_array(values)[0] = 0.0
 
 
 @pytest.mark.parametrize(

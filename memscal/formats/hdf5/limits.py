@@ -30,13 +30,7 @@ _MAX_BLOCKS = 1000
 
 
 def text_length(data: bytes, address: int) -> int:
-    """Return the length that the descriptor at an address claims, in bytes.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Return the length that the descriptor at an address claims, in bytes."""
     if not 0 <= address <= len(data) - _DESCRIPTOR:
         raise ValueError("the text lies outside the file")
     return _claim(data, data, address)
@@ -70,30 +64,16 @@ def _check_heap(file: bytes, address: int) -> None:
 
 
 def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -> list[int]:
-    """Return the lengths that an attribute's descriptors claim, in bytes.
+    """Return the lengths, in bytes, that the descriptors of an object's attribute claim.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    header : int
-        Address of the object's header.
-    name : bytes
-        The attribute.
-    number : int
-        How many texts it holds.
-
-    Raises
-    ------
-    ValueError
-        If the attribute is not found, or the header is damaged.
+    ``header`` is the address of the object's header; the attribute holds ``number`` texts.
     """
     try:
         for kind, flags, message in _messages(data, header):
             if kind != _ATTRIBUTE or flags & _SHARED:
                 continue
-            found, start = _attribute(message)
-            if found == name:
+            attribute, start = _attribute(message)
+            if attribute == name:
                 starts = [start + i * _DESCRIPTOR for i in range(number)]
                 return [_claim(data, message, at) for at in starts]
     except (struct.error, IndexError) as error:
@@ -110,21 +90,21 @@ def _dense_lengths(data: bytes, name: bytes, number: int) -> Iterator[int]:
     Where an object has many attributes they lie in a heap of their own; its structure need
     not be followed, because a message stands there as it would in the header.
     """
-    wanted = name + b"\0"
-    position = data.find(wanted)
+    terminated = name + b"\0"
+    position = data.find(terminated)
     while position >= 0:
         for size, versions in ((8, (1, 2)), (9, (3,))):
             start = position - size
             if start < 0 or data[start] not in versions:
                 continue
             message = data[start : start + 2**16]
-            named, values = _attribute(message)
-            dtype = size + (-(-len(wanted) // 8) * 8 if data[start] == 1 else len(wanted))
+            attribute, values = _attribute(message)
+            dtype = size + (-(-len(terminated) // 8) * 8 if data[start] == 1 else len(terminated))
             variable = dtype < len(message) and message[dtype] & 0x0F == _VARIABLE_LENGTH
-            if named == name and variable and len(message) >= values + number * _DESCRIPTOR:
+            if attribute == name and variable and len(message) >= values + number * _DESCRIPTOR:
                 for i in range(number):
                     yield _claim(data, message, values + i * _DESCRIPTOR)
-        position = data.find(wanted, position + 1)
+        position = data.find(terminated, position + 1)
 
 
 def _attribute(message: bytes) -> tuple[bytes, int]:
@@ -215,8 +195,8 @@ def check_layout(where: str, dataset: Any, *, text: bool) -> None:
     check_type(where, dataset.get_type(), text=text)
     shape = dataset.shape
     if len(shape) > (0 if text else _MAX_RANK):
-        wanted = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
-        raise refuse(where, f"has {len(shape)} dimensions", f"It should have {wanted}.")
+        expected = "one piece of text" if text else f"at most {_MAX_RANK} dimensions"
+        raise refuse(where, f"has {len(shape)} dimensions", f"It should have {expected}.")
     limit = MAX_TEXT_BYTES if text else MAX_DATASET_BYTES
     if claimed_bytes(dataset) > limit:
         raise refuse(
@@ -244,7 +224,7 @@ def _check_storage(where: str, dataset: Any) -> None:
 
 
 def _check_filters(where: str, plist: Any) -> None:
-    known = {
+    filters = {
         h5py.h5z.FILTER_DEFLATE: "gzip",
         h5py.h5z.FILTER_SHUFFLE: "shuffle",
         h5py.h5z.FILTER_FLETCHER32: "fletcher32",
@@ -252,7 +232,7 @@ def _check_filters(where: str, plist: Any) -> None:
     seen: set[int] = set()
     for i in range(plist.get_nfilters()):
         code = plist.get_filter(i)[0]
-        if code not in known:
+        if code not in filters:
             raise refuse(
                 where,
                 f"uses the HDF5 filter {code}",
@@ -261,7 +241,7 @@ def _check_filters(where: str, plist: Any) -> None:
         if code in seen:
             raise refuse(
                 where,
-                f"uses the filter {known[code]} more than once",
+                f"uses the filter {filters[code]} more than once",
                 "Filters on filters can blow a small file up without limit.",
             )
         seen.add(code)

@@ -42,23 +42,9 @@ def damage_named(
     why: str = "The file is damaged or incomplete",
     cure: str = "Get the file again from where it came from.",
 ) -> Iterator[None]:
-    """Turn whatever a library raises on damaged bytes into one kind of error.
+    """Turn whatever a library raises on damaged bytes into a :class:`FormatError`.
 
-    Parameters
-    ----------
-    problem : str
-        The file, the path inside it, and what cannot be done, without a full stop.
-    why : str
-        What it means, without a full stop: the library's own words follow.
-    cure : str
-        What the user can do.
-
-    Raises
-    ------
-    FormatError
-        In place of any other exception; errors of memscal itself pass.
-    UnsafeFileError
-        If memory ran out.
+    ``problem`` and ``why`` come without a full stop: the library's own words follow.
     """
     try:
         yield
@@ -83,13 +69,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @contextlib.contextmanager
 def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
-    """Open an HDF5 file safely, for the time of a ``with`` block.
-
-    Raises
-    ------
-    FormatError
-        If it is not an HDF5 file, is damaged, or holds something that is not read.
-    """
+    """Open an HDF5 file safely, for the time of a ``with`` block."""
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
     if not data.startswith(_SIGNATURE):
@@ -114,19 +94,7 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
 
 
 class SafeFile:
-    """An open file whose content is reached by known paths only.
-
-    Parameters
-    ----------
-    file : h5py.File
-        The file, opened from memory.
-    name : str
-        Its base name, for messages.
-    source : SourceFile
-        Name and SHA-256 of its bytes.
-    data : bytes
-        The bytes.
-    """
+    """An open file whose content is reached by known paths only."""
 
     def __init__(self, file: Any, name: str, source: SourceFile, data: bytes) -> None:
         self.name = name
@@ -185,14 +153,14 @@ class SafeFile:
         if path not in self._opened:
             folder, _, name = path.rpartition("/")
             self._opened[path] = self._follow(self._open(folder or "/"), path, name)
-        found = self._opened[path]
-        if found is not None and self._listed is not None and path not in self._listed:
+        item = self._opened[path]
+        if item is not None and self._listed is not None and path not in self._listed:
             raise FormatError(
                 f"{self.where(path)} was added after the file was written.",
                 why="The list of its contents lacks it, so that no digest covers it.",
                 cure="Remove it, or make the file again.",
             )
-        return found
+        return item
 
     def _follow(self, folder: Any, path: str, name: str) -> Any:
         key = name.encode("ascii")
@@ -207,12 +175,12 @@ class SafeFile:
         return h5py.h5o.open(folder, key)
 
     def _dataset(self, path: str) -> Any:
-        found = self._open(path)
-        if found is None:
+        item = self._open(path)
+        if item is None:
             raise FormatError(f"{self.where(path)} is missing.")
-        if not isinstance(found, h5py.h5d.DatasetID):
+        if not isinstance(item, h5py.h5d.DatasetID):
             raise FormatError(f"{self.where(path)} is not a dataset.")
-        return found
+        return item
 
     def _spend(self, path: str, size: int) -> None:
         self._budget -= size

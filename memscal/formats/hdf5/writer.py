@@ -70,11 +70,11 @@ class Group:
     @property
     def all_attributes(self) -> dict[str, Attribute]:
         """The attributes, the class first, and for NXdata the index of each axis."""
-        found: dict[str, Attribute] = {"NX_class": self.nx_class, **self.attributes}
+        attributes: dict[str, Attribute] = {"NX_class": self.nx_class, **self.attributes}
         axes = self.attributes.get("axes", ())
         if isinstance(axes, tuple):
-            found |= {f"{axis}_indices": i for i, axis in enumerate(axes)}
-        return found
+            attributes |= {f"{axis}_indices": i for i, axis in enumerate(axes)}
+        return attributes
 
 
 Node = Group | Number | str
@@ -200,13 +200,7 @@ def write_tree(
     overwrite: bool = False,
     inputs: Iterable[str | os.PathLike[str]] = (),
 ) -> None:
-    """Write a tree as one HDF5 file, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the file exists (and ``overwrite`` is false), is an input, or cannot be written.
-    """
+    """Write a tree as one HDF5 file, whole or not at all."""
     atomic_write_bytes(path, tree_to_bytes(root), overwrite=overwrite, inputs=inputs)
 
 

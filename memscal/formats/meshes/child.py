@@ -60,8 +60,8 @@ def heavy_arrays(
         for address in _ADDRESS.finditer(data):
             words = [text.decode("utf-8", "replace").strip() for text in address.groups()]
             file_name, inside = words[0], "/" + words[1].strip("/")
-            own, ending = os.path.splitext(file_name)
-            if own != stem or ending.lower() not in _HDF5_ENDINGS:
+            file_stem, ending = os.path.splitext(file_name)
+            if file_stem != stem or ending.lower() not in _HDF5_ENDINGS:
                 raise UnsafeFileError(
                     f"{name} takes its numbers from {printable(file_name, _MAX_SHOWN)!r}, which is "
                     "not read.",

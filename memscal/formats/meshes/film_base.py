@@ -24,20 +24,10 @@ _DIRECTIONS = 72
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """How a mesh lies in space.
+    """How a mesh lies in space: ``points`` (n, 3) and ``tolerance`` in m.
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Coordinates, in m.
-    radial : tuple of int
-        The axis along the radius of a section; both axes of the base's plane in 3-D.
-    vertical : int
-        The axis across the film.
-    tolerance : float
-        Distance within which coordinates are the same, in m.
-    notes : tuple of Message
-        What was taken.
+    ``radial`` is the axis along the radius of a section, or both axes of the base's plane in 3-D;
+    ``vertical`` is the axis across the film.
     """
 
     points: FloatArray
@@ -54,18 +44,9 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """What lies on the base of the film.
+    """Nodes on the base of the film, and its cells with a side there and that side's middle.
 
-    Parameters
-    ----------
-    nodes : ndarray of int
-        Nodes on the base that belong to the film.
-    cells : tuple of (Cells, ndarray of int, ndarray)
-        For each block of cells: those with a side on the base, and the middles of these sides.
-    outward : {1, -1}
-        Direction of the vertical axis out of the film, through its base.
-    notes : tuple of str
-        What was taken.
+    ``outward`` is the direction, 1 or -1, of the vertical axis out of the film through its base.
     """
 
     nodes: NDArray[np.int64]

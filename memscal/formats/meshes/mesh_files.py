@@ -53,22 +53,10 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A mesh and its fields, as they stand in a file.
+    """A mesh and its fields as stored: ``points`` (n, 3), ``point_data`` (n, components).
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Coordinates, in the file's unit.
-    cells : tuple of Cells
-        Blocks of cells of one kind.
-    point_data : dict of str to ndarray, shape (n, components)
-        Fields at the points.
-    sources : tuple of SourceFile
-        The file, and after it the files that it draws its numbers from.
-    notes : tuple of str
-        What was met on the way.
-    tensor_order : bool
-        Whether six components are known to be a tensor's in VTK's order.
+    ``sources`` are the file and those it draws numbers from; ``tensor_order`` says whether six
+    components are known to be a tensor's in VTK's order.
     """
 
     points: FloatArray
@@ -212,36 +200,6 @@ def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool
     ``stress_Pa``, tension positive, in VTK's order of a symmetric tensor: XX
     (:math:`\sigma_{rr}`), YY (:math:`\sigma_{zz}`), ZZ (:math:`\sigma_{\theta\theta}`), XY
     (:math:`\sigma_{rz}`), and zeros for YZ and XZ.
-
-    Parameters
-    ----------
-    mesh : FieldMesh
-        The fields; their notes become a comment at the head of the file.
-    path : path
-        The file; its name should end in ``.vtu``.
-    overwrite : bool
-        Whether an existing file may be replaced.
-
-    Raises
-    ------
-    InputError
-        If meshio is not installed.
-    OutputError
-        If the file exists or cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> corner = FieldMesh(
-    ...     points=[[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]],
-    ...     triangles=[[0, 1, 2]],
-    ...     displacement=np.zeros((3, 2)),
-    ...     stress=np.zeros((3, 4)),
-    ... )
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_mesh(corner, f"{folder}/corner.vtu")
-    ...     sorted(read_mesh(f"{folder}/corner.vtu").point_data)
-    ['displacement_mm', 'stress_Pa']
     """
     _require_meshio()
     import meshio

@@ -54,46 +54,14 @@ def read_reference_mesh(
 ) -> ImportedProfile:
     r"""Read the stress at the base of the film from a mesh with a stress field.
 
-    Parameters
-    ----------
-    path : path
-        A VTU (.vtu), legacy VTK (.vtk) or XDMF (.xdmf) file: an axisymmetric section with the
-        axis at radius 0, or a film in 3-D, which is averaged over circles.
-    sigma : str
-        The field: one value (the normal stress), or a stress tensor of 4 components (radial,
-        vertical, hoop, shear), 6 (xx, yy, zz, xy, yz, xz) or 9; ``"name:2"`` is component 2.
-    r_unit, sigma_unit : str
-        Units of the coordinates and of the stress; a mesh states neither.
-    load : float
-        Normal load of the calculation, in N.
-    sign : {-1, 1}
-        -1 where compression is negative, as in practically every FEM program.
-    shear : str, optional
-        The field of the radial shear stress, for sections only; a tensor's own by default.
-    shear_sign : {1, -1}, optional
-        1 where the field is the radial traction of the base on the film, positive outward; by
-        default it is taken for the stress component :math:`\sigma_{rz}`.
-    vertical : {"x", "y", "z"}, optional
-        The axis across the film: by default the second of a section's two, and z in 3-D.
-    base : float, optional
-        Position of the base on that axis, in m; the lowest by default.
-    centre : tuple of float, optional
-        Where the indenter's axis meets the base of a film in 3-D, in m; (0, 0) by default.
-    film, indenter : optional
-        What was pressed on what.
-    solver : str
-        The program.
-
-    Returns
-    -------
-    ImportedProfile
-        The profile, and what was taken for what: also recorded in ``profile.notes``.
-
-    Raises
-    ------
-    InputError
-        If meshio is not installed, the field or the base is not there, a value is missing, or
-        force and load differ by more than a factor of two.
+    The mesh is an axisymmetric section with the axis at radius 0, or a film in 3-D, which is
+    averaged over circles around ``centre``, in m.  ``sigma`` names a field of the normal stress,
+    or of a tensor of 4 components (radial, vertical, hoop, shear), 6 (xx, yy, zz, xy, yz, xz) or
+    9; ``"name:2"`` is component 2.  ``shear`` names the field of a section's radial shear stress,
+    by default the tensor's.  ``sign`` is -1 where compression is negative; ``shear_sign`` is 1
+    where the shear is the radial traction of the base on the film, and by default the shear is
+    taken for the component :math:`\sigma_{rz}`.  ``base`` is the base's position on the axis
+    ``vertical``, in m, by default the lowest; ``load`` is in N.
     """
     require_sign("sign", sign)
     if shear_sign is not None:
@@ -187,22 +155,22 @@ def _shear_component(
 
 
 def _at_base(
-    mesh: Mesh, frame: Frame, base: Base, wanted: Component
+    mesh: Mesh, frame: Frame, base: Base, component: Component
 ) -> tuple[FloatArray, FloatArray]:
     """Return places in the base and the values there: at nodes, or at the middles of sides."""
     radial = list(frame.radial)
-    if wanted.at_points:
+    if component.at_points:
         places = frame.points[base.nodes][:, radial]
-        return places, mesh.point_data[wanted.field][base.nodes, wanted.column]
-    here = [block for block in base.cells if wanted.field in block[0].data]
+        return places, mesh.point_data[component.field][base.nodes, component.column]
+    here = [block for block in base.cells if component.field in block[0].data]
     if not sum(len(cells) for _, cells, _ in here):
         raise InputError(
-            f"No cell with a value of {wanted.field!r} has a side on the base in "
+            f"No cell with a value of {component.field!r} has a side on the base in "
             f"{mesh.source.file_name}.",
             cure="Name the position of the base (base; --base), or save the stress at the nodes.",
         )
     places = np.concatenate([middles for _, _, middles in here])[:, radial]
-    values = [block.data[wanted.field][cells, wanted.column] for block, cells, _ in here]
+    values = [block.data[component.field][cells, component.column] for block, cells, _ in here]
     return places, np.concatenate(values)
 
 

@@ -35,28 +35,28 @@ class Component:
         return f"{self.meaning} of the field {self.field!r} {place}"
 
 
-def find_normal(mesh: Mesh, frame: Frame, wanted: str) -> Component:
+def find_normal(mesh: Mesh, frame: Frame, field: str) -> Component:
     """Return the normal stress across the film in the field ``wanted``.
 
     The field has one component or is a stress tensor; ``name:number`` takes a component of it,
     counted from 1.
     """
     up = frame.vertical
-    return _find(mesh, frame, wanted, (up, up))
+    return _find(mesh, frame, field, (up, up))
 
 
-def find_shear(mesh: Mesh, frame: Frame, wanted: str) -> Component:
+def find_shear(mesh: Mesh, frame: Frame, field: str) -> Component:
     """Return the radial shear stress of a section in the field ``wanted``; see above."""
-    return _find(mesh, frame, wanted, (frame.radial[0], frame.vertical))
+    return _find(mesh, frame, field, (frame.radial[0], frame.vertical))
 
 
-def _find(mesh: Mesh, frame: Frame, wanted: str, pair: tuple[int, int]) -> Component:
+def _find(mesh: Mesh, frame: Frame, field: str, pair: tuple[int, int]) -> Component:
     sizes = {name: values.shape[1] for name, values in mesh.point_data.items()}
     in_cells = {
         name: values.shape[1] for block in mesh.solid for name, values in block.data.items()
     }
-    name, _, number = wanted.rpartition(":")
-    if wanted not in {*sizes, *in_cells} and name in {*sizes, *in_cells} and number.isdecimal():
+    name, _, number = field.rpartition(":")
+    if field not in {*sizes, *in_cells} and name in {*sizes, *in_cells} and number.isdecimal():
         count = sizes.get(name, in_cells.get(name, 0))
         if not 1 <= int(number) <= count:
             raise InputError(
@@ -64,17 +64,17 @@ def _find(mesh: Mesh, frame: Frame, wanted: str, pair: tuple[int, int]) -> Compo
                 why=f"It has {count}, counted from 1.",
             )
         return Component(name, name in sizes, int(number) - 1, f"component {number}")
-    if wanted not in {*sizes, *in_cells}:
-        raise _no_such_field(mesh, wanted, sizes, in_cells)
-    count = sizes.get(wanted, in_cells.get(wanted, 0))
+    if field not in {*sizes, *in_cells}:
+        raise _no_such_field(mesh, field, sizes, in_cells)
+    count = sizes.get(field, in_cells.get(field, 0))
     if count == _SCALAR:
-        return Component(wanted, wanted in sizes, 0, "the value")
-    column, meaning = _of_tensor(mesh, frame, wanted, count, pair)
-    return Component(wanted, wanted in sizes, column, meaning, tensor=True)
+        return Component(field, field in sizes, 0, "the value")
+    column, meaning = _of_tensor(mesh, frame, field, count, pair)
+    return Component(field, field in sizes, column, meaning, tensor=True)
 
 
 def _of_tensor(
-    mesh: Mesh, frame: Frame, wanted: str, count: int, pair: tuple[int, int]
+    mesh: Mesh, frame: Frame, field: str, count: int, pair: tuple[int, int]
 ) -> tuple[int, str]:
     """Return the column of a tensor's component, and what it is called."""
     axes = "".join(AXES[i] for i in sorted(pair))
@@ -82,31 +82,31 @@ def _of_tensor(
         return 3 * pair[0] + pair[1], f"the component {axes}"
     if count == _SIX and mesh.tensor_order:
         return _SYMMETRIC.index(axes), f"the component {axes} (of {', '.join(_SYMMETRIC)})"
-    if count == _AXISYMMETRIC and len(frame.radial) == 1 and not _is_plane(mesh, wanted):
+    if count == _AXISYMMETRIC and len(frame.radial) == 1 and not _is_plane(mesh, field):
         normal = pair[0] == pair[1]
         return (1 if normal else 3), (
             f"component {2 if normal else 4} of 4 (radial, vertical, hoop, shear)"
         )
     raise InputError(
-        f"The field {wanted!r} in {mesh.source.file_name} has {count} components, and which of "
+        f"The field {field!r} in {mesh.source.file_name} has {count} components, and which of "
         "them is meant is not plain.",
         why="In an XDMF file the order of a tensor's six components depends on the program."
         if count == _SIX
         else "A stress is one value, or a tensor of 4 components (radial, vertical, hoop and shear "
         "in a section), 6 or 9.",
-        cure=f'Name one, counted from 1, such as "{wanted}:2".',
+        cure=f'Name one, counted from 1, such as "{field}:2".',
     )
 
 
-def _is_plane(mesh: Mesh, wanted: str) -> bool:
+def _is_plane(mesh: Mesh, field: str) -> bool:
     """Return whether four components are xx, xy, yx, yy: the middle ones are the same."""
     fields = [mesh.point_data, *(block.data for block in mesh.solid)]
-    tensors = [values[wanted] for values in fields if wanted in values]
+    tensors = [values[field] for values in fields if field in values]
     return all(np.array_equal(tensor[:, 1], tensor[:, 2]) for tensor in tensors)
 
 
 def _no_such_field(
-    mesh: Mesh, wanted: str, points: dict[str, int], cells: dict[str, int]
+    mesh: Mesh, field: str, points: dict[str, int], cells: dict[str, int]
 ) -> InputError:
     def listed(fields: dict[str, int], where: str) -> str:
         names = [f"{name} ({count})" for name, count in list(fields.items())[:_MOST_LISTED]]
@@ -124,7 +124,7 @@ def _no_such_field(
         else ("It has no fields at all.")
     )
     return InputError(
-        f"{mesh.source.file_name} has no field {printable(wanted, 80)!r}.",
+        f"{mesh.source.file_name} has no field {printable(field, 80)!r}.",
         why=has,
         cure="Give the name of the stress among them, or save the mesh with its stress.",
     )

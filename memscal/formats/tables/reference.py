@@ -46,26 +46,10 @@ class ImportedProfile:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
-    """Stress at the base as it was found, in SI, and how to speak of it.
+    """Stress at the base as a file states it, in SI, and the words for it in messages.
 
-    Parameters
-    ----------
-    columns : dict of str to ndarray, shape (n,)
-        ``r``, ``sigma_zz`` (positive in compression) and, where it is known, ``sigma_rz``.
-    source : SourceFile
-        The file.
-    notes : sequence of Message
-        What was done so far.
-    kind, item : str
-        What the file is and what a sample is in it: ``table`` and ``data row``.
-    units : tuple of str
-        The units of length and stress that were taken.
-    sign : {1, -1}
-        The sign by which the normal stress was turned.
-    spacing : float
-        Radii that differ by no more, in m, are the same.
-    discretisation : str
-        The mesh.
+    ``columns`` (n,) are ``r``, ``sigma_zz`` (positive in compression) and, if stated, ``sigma_rz``;
+    radii within ``spacing``, in m, are the same; ``kind`` is what the file is, ``item`` a sample.
     """
 
     columns: dict[str, FloatArray]
@@ -91,13 +75,7 @@ def require_sign(name: str, value: int) -> None:
 
 
 def require_numbers(samples: Samples) -> None:
-    """Refuse samples of which one is not a number that can be worked with.
-
-    Raises
-    ------
-    InputError
-        If a value is missing, infinite or absurd.
-    """
+    """Refuse samples of which one is not a number that can be worked with."""
     for quantity, values in samples.columns.items():
         bad = np.flatnonzero(~(np.abs(values) < _ABSURD))
         if bad.size:
@@ -117,14 +95,7 @@ def profile_of(
     indenter: Indenter | None,
     solver: str,
 ) -> ImportedProfile:
-    """Check samples of a stress, sort them by radius, and hold their force against the load.
-
-    Raises
-    ------
-    InputError
-        If a value is missing, a radius is negative, the stress is mostly tensile, or it carries
-        less than half or more than twice the load (less, only if it decays within the samples).
-    """
+    """Check samples of a stress, sort them by radius, and hold their force against the load."""
     name = samples.source.file_name
     require_numbers(samples)
     lowest = float(samples.columns["r"].min())
@@ -245,42 +216,11 @@ def read_reference_table(
 ) -> ImportedProfile:
     """Read the stress at the base of the film from a table with one row per radius.
 
-    Parameters
-    ----------
-    path : path
-        A delimited text file.
-    r, sigma : str or int
-        Columns of radius and normal stress: a name, or a number counted from 1.
-    r_unit, sigma_unit : str
-        Their units; ``sigma_unit`` holds for ``shear`` too.
-    load : float
-        Normal load of the calculation, in N.
-    sign : {1, -1}
-        -1 where the program counts compression as negative, as most FEM programs do; it
-        turns the normal stress only.
-    shear : str or int, optional
-        Column of the radial shear stress.
-    shear_sign : {1, -1}
-        1 where the column is the radial traction of the base on the film, positive outward; -1
-        where it is the stress component S13 (S_rz) with the third axis from the base to the
-        surface, because the film's lower face looks the other way.
-    film, indenter : optional
-        What was pressed on what.
-    solver : str
-        The program.
-    delimiter, decimal : str, optional
-        Column separator and decimal mark; found from the file by default.
-
-    Returns
-    -------
-    ImportedProfile
-        The profile, sorted by radius, and what was done: also recorded in ``profile.notes``.
-
-    Raises
-    ------
-    InputError
-        If a value is missing, a radius is negative, the stress is mostly tensile, or it carries
-        less than half or more than twice the load (less, only if it decays within the table).
+    Columns are names, or numbers counted from 1; ``sigma_unit`` holds for ``shear`` too; ``load``
+    is in N.  ``sign`` is -1 where compression is negative, and turns the normal stress only;
+    ``shear_sign`` is 1 where the shear is the radial traction of the base on the film, positive
+    outward, and -1 where it is the component S13 (S_rz) with the third axis from the base to the
+    surface.
     """
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)

@@ -72,59 +72,12 @@ def read_scan_table(
     ``repeat`` they are a line; repeats over exactly the same positions become rows of one array
     (repeat, x); all else is a scan of single points.
 
-    Parameters
-    ----------
-    path : path
-        A delimited text file.
-    x, u : str or int
-        Columns of position and voltage: a name, or a number counted from 1.
-    x_unit, u_unit : str
-        Their units; ``x_unit`` holds for ``y`` too.
-    film, indenter
-        What was pressed on what: a table does not say it.
-    load : float, optional
-        Nominal load in N; by default the median of ``load_column``.
-    y : str or int, optional
-        Column of the second position, of points in a plane.
-    repeat : str or int, or several, optional
-        Column that numbers the repeats.
-        Of several columns each combination is a line: of the load that was set and of the pass,
-        where a table holds several of both.
-    u_xz, u_yz, load_column : str or int, optional
-        Columns of further channels (in ``u_unit``) and of the load at each point.
-    load_unit : str
-        Unit of ``load_column``.
-    load_uncertainty : float, optional
-        Standard uncertainty of the load common to all points, in N.
-    load_scatter : float, optional
-        Relative standard uncertainty of each point's own load, independent from point to point,
-        as of a weight that is set down by hand.
-    x_error : float, optional
-        Standard uncertainty of each position, independent from point to point, in m.
-    lubrication, lubricant : str
-        ``"dry"`` or ``"lubricated"``, and with what; empty if not stated.
-    u_scale : float, optional
-        Volts per unit of the ``u`` columns, for a sensor whose output is not a voltage;
-        ``u_unit`` is then only its name, and the notes of the scan record the choice.
-    u_sign : {1, -1}
-        -1 where the voltage falls under compression, as with swapped leads: ``u`` is turned, and
-        the notes of the scan record it.  The other channels stay as they are.
-    sensor, title
-        Carried into the scan.
-    delimiter, decimal : str, optional
-        Column separator and decimal mark; found from the file by default.
-
-    Returns
-    -------
-    ImportedScan
-        The scan, and what was done: also recorded in ``scan.notes``.
-
-    Raises
-    ------
-    InputError
-        If a column is missing, or no row has a position.
-    UnitError
-        If ``u_unit`` is not a voltage and no ``u_scale`` is given.
+    Columns are names, or numbers counted from 1; ``x_unit`` holds for ``y`` too, ``u_unit`` for
+    all channels.  Several columns ``repeat`` number the lines together.  ``load`` is the median
+    of ``load_column`` by default; ``load_uncertainty``, in N, is common to all points,
+    ``load_scatter``, relative, and ``x_error``, in m, are independent from point to point.
+    ``u_scale`` is the volts per unit of a sensor whose output is no voltage; ``u_sign`` is -1
+    where u falls under compression.  The notes of the scan record both.
     """
     if u_sign not in (1, -1):
         raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
@@ -197,24 +150,24 @@ def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) ->
     values = np.stack([table.column(column) for column in columns])
     if len(columns) == 1:
         return np.asarray(values[0])
-    known = np.isfinite(values).all(axis=0)
-    found, number = np.unique(values[:, known], axis=1, return_inverse=True)
-    lines = np.full(known.size, np.nan)
-    lines[known] = 1 + number.reshape(-1)  # NumPy 2.0 kept an axis here
-    named = " and ".join(repr(column) for column in columns)
-    notes.append(f"{found.shape[1]} lines: one for each combination of the columns {named}.")
+    finite = np.isfinite(values).all(axis=0)
+    combinations, number = np.unique(values[:, finite], axis=1, return_inverse=True)
+    lines = np.full(finite.size, np.nan)
+    lines[finite] = 1 + number.reshape(-1)  # NumPy 2.0 kept an axis here
+    names = " and ".join(repr(column) for column in columns)
+    notes.append(f"{combinations.shape[1]} lines: one for each combination of the columns {names}.")
     return lines
 
 
 def _placed(columns: Mapping[str, FloatArray], notes: list[str]) -> dict[str, FloatArray]:
     """Leave out rows without a position or the number of a repeat; count the repeats from 0."""
     stated = [columns[name] for name in ("x", "y", "repeat") if name in columns]
-    known = np.isfinite(stated).all(axis=0)
-    if not known.any():
+    finite = np.isfinite(stated).all(axis=0)
+    if not finite.any():
         raise InputError("No row of the table has a position.", cure="Check the columns.")
-    if not known.all():
-        notes.append(f"{int((~known).sum())} rows without a position were left out.")
-    kept = {name: values[known] for name, values in columns.items()}
+    if not finite.all():
+        notes.append(f"{int((~finite).sum())} rows without a position were left out.")
+    kept = {name: values[finite] for name, values in columns.items()}
     if "repeat" in kept:
         kept["repeat"] = np.unique(kept["repeat"], return_inverse=True)[1].astype(np.float64)
     return kept

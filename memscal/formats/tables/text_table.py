@@ -42,49 +42,36 @@ class Table:
     decimal: str
     notes: tuple[str, ...]
 
-    def column(self, wanted: str | int) -> FloatArray:
-        """Return a column as numbers, NaN where a cell is empty.
-
-        Parameters
-        ----------
-        wanted : str or int
-            The name in the header, or the number counted from 1.
-
-        Raises
-        ------
-        InputError
-            If there is no such column.
-        FormatError
-            If a cell is not a number.
-        """
-        i = self._index(wanted)
+    def column(self, column_name: str | int) -> FloatArray:
+        """Return a column as numbers, NaN where a cell is empty."""
+        i = self._index(column_name)
         values = np.empty(len(self.rows))
         for k, row in enumerate(self.rows):
-            values[k] = self._number(row[i] if i < len(row) else "", k, wanted)
+            values[k] = self._number(row[i] if i < len(row) else "", k, column_name)
         return values
 
-    def where(self, wanted: str | int) -> str:
+    def where(self, column_name: str | int) -> str:
         """Return file and column as messages name them."""
-        return f"{self.source.file_name}: column {wanted!r}"
+        return f"{self.source.file_name}: column {column_name!r}"
 
-    def _index(self, wanted: str | int) -> int:
-        if isinstance(wanted, str) and wanted in self.names:
-            if self.names.count(wanted) > 1:
+    def _index(self, column_name: str | int) -> int:
+        if isinstance(column_name, str) and column_name in self.names:
+            if self.names.count(column_name) > 1:
                 raise InputError(
-                    f"{self.source.file_name} has several columns named {wanted!r}.",
+                    f"{self.source.file_name} has several columns named {column_name!r}.",
                     cure="Give the number of the column, counted from 1.",
                 )
-            return self.names.index(wanted)
-        number = int(wanted) if isinstance(wanted, int) or wanted.isdecimal() else 0
+            return self.names.index(column_name)
+        number = int(column_name) if isinstance(column_name, int) or column_name.isdecimal() else 0
         if not 1 <= number <= len(self.names):
             raise InputError(
-                f"{self.source.file_name} has no column {wanted!r}.",
+                f"{self.source.file_name} has no column {column_name!r}.",
                 why="Its columns are: " + ", ".join(self.names) + ".",
                 cure="Give one of these names, or a number counted from 1.",
             )
         return number - 1
 
-    def _number(self, cell: str, k: int, wanted: str | int) -> float:
+    def _number(self, cell: str, k: int, column_name: str | int) -> float:
         if cell.lower() in _MISSING:
             return float("nan")
         text = cell.replace(self.decimal, ".") if self.decimal != "." else cell
@@ -92,7 +79,7 @@ class Table:
             return float(text.replace("D", "E").replace("d", "e"))
         except ValueError as error:
             raise FormatError(
-                f"{self.where(wanted)}, data row {k + 1}: "
+                f"{self.where(column_name)}, data row {k + 1}: "
                 f"{printable(cell, _MAX_NAME)!r} is not a number.",
                 cure="Correct or remove this row, or state the decimal mark.",
             ) from error
@@ -106,18 +93,6 @@ def read_table(
     Lines that begin with ``#`` or ``%`` are comments, and those above the table are kept in
     its notes; the first line with a cell that is no number is the header, and without one the
     columns have numbers only.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-    delimiter, decimal : str, optional
-        What separates the columns, and the decimal mark; found from the file by default.
-
-    Raises
-    ------
-    FormatError
-        If there is no table in it.
     """
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
@@ -219,39 +194,7 @@ def read_indenter_table(
     r_unit: str = "mm",
     z_unit: str = "um",
 ) -> Profile:
-    r"""Read an indenter's profile from a table with one row per radius.
-
-    Parameters
-    ----------
-    path : path
-        A delimited text file.
-    r, z : str or int
-        Columns of radius and height: a name, or a number counted from 1.
-    r_unit, z_unit : str
-        Their units.
-
-    Returns
-    -------
-    Profile
-        With heights above the lowest point of the table.
-
-    Raises
-    ------
-    FormatError, UnitError, InputError
-        If the table cannot be read or is no profile: radii that do not increase from 0, fewer
-        than four of them, a height that is missing, or a flat face.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder, "tip.csv")
-    ...     rows = "r,z\n0,0\n0.5,1\n1,4\n1.5,9\n"
-    ...     _ = path.write_text(rows)
-    ...     read_indenter_table(path)
-    <Profile: 4 radii to 1.5 mm, heights to 9 um>
-    """
+    r"""Read an indenter's profile from a table with one row per radius."""
     table = read_table(path)
     radii = to_si(table.column(r), r_unit, "length", table.where(r))
     heights = to_si(table.column(z), z_unit, "length", table.where(z))
