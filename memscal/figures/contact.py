@@ -25,7 +25,7 @@ _SHOWN_MEANS = 3.0
 _NAMED = 6
 
 
-def contact_figure(contacts: Sequence[Contact]) -> Figure:
+def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
     """Draw contacts: tractions at the interface, stress at the base, load against depth.
 
     Parameters
@@ -54,6 +54,8 @@ def contact_figure(contacts: Sequence[Contact]) -> Figure:
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['radius (mm)', 'radius (mm)']
     """
+    if isinstance(contacts, Contact):
+        contacts = [contacts]
     if not contacts:
         raise InputError("There is no contact to draw.")
     several = len(contacts) > 1

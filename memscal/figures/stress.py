@@ -184,8 +184,10 @@ def _draw_stress(axes: Axes, found: Restoration, compared: Comparison | None) ->
     blurred = found.blurred_stress(found.r) / KPA
     axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.", label=r"blurred again, $G*\sigma$")
     if compared is not None:
-        frictionless = isinstance(compared.stress, Contact)
-        label = "calculated, no friction" if frictionless else "expected"
+        label = "expected"
+        if isinstance(compared.stress, Contact):
+            friction = compared.stress.friction
+            label = f"calculated, {f'friction {friction:.3g}' if friction else 'no friction'}"
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
     many = found.points.u.size > SCATTER_THRESHOLD
     size = 1.2 if many else 0.8 * marker_size(found.points.u.size)

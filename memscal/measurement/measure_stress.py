@@ -55,6 +55,7 @@ from memscal.parallel import single_threaded
 from memscal.version import __version__
 
 __all__ = [
+    "SHARED_SOURCES",
     "check_of_all_forces",
     "checks_of_restoration",
     "joined_stress",
@@ -62,6 +63,9 @@ __all__ = [
     "pooled_force",
     "stress_checks",
 ]
+
+#: Sources of a force's uncertainty that all profiles have in common.
+SHARED_SOURCES = ("apparatus", "film", "position_scale")
 
 _FORCE_LIMIT = 3.0
 #: One check of all profiles together may be stricter than one for each.
@@ -111,7 +115,7 @@ def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
     weight = own**-2 / np.sum(own**-2)
     ratio = np.array([profile.force / profile.load for profile in profiles])
     variance = float(np.sum((weight * own) ** 2))
-    for source in ("apparatus", "film", "position_scale", "load"):
+    for source in (*SHARED_SOURCES, "load"):
         variance += float(weight @ [part[source] for part in parts]) ** 2
     return float(weight @ ratio), math.sqrt(variance)
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,7 @@ from memscal.model.checks import Message, QualityCheck, chi_square_limit
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
+from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
@@ -312,7 +313,7 @@ def read_expected(expected: Expected) -> StressProfile | Contact:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Restoration:
+class Restoration(Result):
     r"""The stress at the film's base that explains a scan, with its uncertainty.
 
     Parameters
@@ -344,6 +345,9 @@ class Restoration:
     comparison: Comparison | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = ()
+
+    _summary: ClassVar[str] = "restoration"
+    _figure: ClassVar[str] = "stress.restoration_figure"
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
@@ -504,6 +508,15 @@ class Restoration:
             solver="memscal, restored from a scan",
             notes="Measured, not calculated: restored with an apparatus function.",
         )
+
+    def scalar_rows(self) -> FloatArray:
+        """Rows that read force, stress on the axis, free centres and baseline from the state."""
+        nodes, first_drift = self.posterior.nodes, self._first_drift
+        last = slice(nodes, first_drift + 1)
+        rows = np.zeros((2 + first_drift + 1 - nodes, self.posterior.state.size))
+        rows[0, :nodes], rows[1, :nodes] = self._at_zero, self._synthesis(0.0)
+        rows[2:, last] = np.eye(first_drift + 1 - nodes)
+        return rows
 
     @property
     def _first_drift(self) -> int:

@@ -347,7 +347,8 @@ def design(
         centre=centre,
     )
     evaluated = partial(evaluate, method=method, seed=seed)
-    return evaluated(plan) if vary is None else least_design(plan, wishes, vary, evaluated)
+    planned = evaluated(plan) if vary is None else least_design(plan, wishes, vary, evaluated)
+    return replace(planned, want=dict(want or {}))
 
 
 def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[Design]:

@@ -9,7 +9,8 @@ the data's own.  Everything after that is the calibration's own code.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from memscal.estimation.reference import (
 )
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, freeze_arrays
+from memscal.model.result import Result
 from memscal.planning.plan import Plan
 
 __all__ = ["Design", "Expected", "evaluate", "expected_calibration"]
@@ -119,7 +121,7 @@ def _propagated(solution: Solution, effects: Mapping[str, InputEffect]) -> Resul
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design:
+class Design(Result):
     """A planned scan and what it would find, with standard uncertainties (k = 1).
 
     Parameters
@@ -141,6 +143,8 @@ class Design:
         Its transfer function at wavenumbers in rad/m.
     resolved_wavenumber : float
         Up to which the scan would determine G, in rad/m.
+    want : mapping of str to float
+        What the plan was varied to reach, as it was asked for.
     """
 
     plan: Plan
@@ -154,6 +158,10 @@ class Design:
     transfer: FloatArray
     transfer_errors: FloatArray
     resolved_wavenumber: float
+    want: Mapping[str, float] = field(default_factory=dict)
+
+    _summary: ClassVar[str] = "design"
+    _figure: ClassVar[str] = "design.design_figure"
 
     def __post_init__(self) -> None:
         freeze_arrays(self, "r", "g", "g_errors", "k", "transfer", "transfer_errors")
