@@ -22,7 +22,7 @@ from memscal.cli.options import (
     si,
 )
 from memscal.cli.output import FigurePath, emit_json, emit_tables, message, note, prove_writable
-from memscal.cli.simulate import FILM
+from memscal.cli.simulate import FILM, number_option
 
 if TYPE_CHECKING:
     from memscal.planning.expected import Design
@@ -62,14 +62,14 @@ class _Wish(_WishType):
         """Read name and number; the name is the library's to judge."""
         if isinstance(value, tuple):
             return value
-        name, found, text = str(value).partition("=")
+        name, equals, text = str(value).partition("=")
         percent = text.strip().endswith("%")
         try:
             number = float(text.strip().removesuffix("%"))
         except ValueError:
-            found = ""
+            equals = ""
             number = 0.0
-        if not found:
+        if not equals:
             self.fail(f"{value!r} is no wish: write sigma=1% or resolved=4 (rad/mm).", param, ctx)
         name = name.strip()
         if percent == (name == "resolved"):
@@ -80,36 +80,18 @@ class _Wish(_WishType):
 
 @click.command("design", epilog=EXAMPLES)
 @kernel_options
-@click.option(
-    "--load",
-    type=Quantity("N"),
-    default=1.0,
-    show_default=True,
-    help="Normal load, in N.",
-)
-@click.option(
+@number_option("--load", "N", 1.0, "Normal load, in N.")
+@number_option(
     "--load-uncertainty",
-    type=Quantity("percent", open_low=False),
-    default=1.0,
-    show_default=True,
-    help="Standard uncertainty (k = 1) of the load, in percent.",
+    "percent",
+    1.0,
+    "Standard uncertainty (k = 1) of the load, in percent.",
+    open_low=False,
 )
 @radius_options(default=0.25, uncertainty=0.0025)
 @film_options(defaults=FILM)
-@click.option(
-    "--step",
-    type=Quantity("mm"),
-    default=0.25,
-    show_default=True,
-    help="Distance of neighbouring positions, in mm.",
-)
-@click.option(
-    "--half-range",
-    type=Quantity("mm"),
-    default=8.0,
-    show_default=True,
-    help="Positions run from minus to plus this, in mm.",
-)
+@number_option("--step", "mm", 0.25, "Distance of neighbouring positions, in mm.")
+@number_option("--half-range", "mm", 8.0, "Positions run from minus to plus this, in mm.")
 @click.option(
     "--repeats",
     type=click.IntRange(min=1),
@@ -117,25 +99,24 @@ class _Wish(_WishType):
     show_default=True,
     help="How often the line is scanned.",
 )
-@click.option(
+@number_option(
     "--noise",
-    type=Quantity("percent"),
-    default=0.5,
-    show_default=True,
-    help="Standard deviation of one voltage, in percent of the signal with the rod right above "
-    "the sensor.",
+    "percent",
+    0.5,
+    "Standard deviation of one voltage, in percent of the signal with the rod right above the "
+    "sensor.",
 )
 @click.option(
     "--noise-voltage",
     type=Quantity("mV"),
     help="The same in mV, in place of --noise.",
 )
-@click.option(
+@number_option(
     "--centre",
-    type=Quantity("mm", low=-float("inf")),
-    default=0.0,
-    show_default=True,
-    help="Expected position of the sensor along the scan, in mm.",
+    "mm",
+    0.0,
+    "Expected position of the sensor along the scan, in mm.",
+    low=-float("inf"),
 )
 @click.option(
     "--method",
@@ -174,19 +155,19 @@ def command(
     vary: str | None,
     as_json: bool,
     force: bool,
-    **given: Any,
+    **options: Any,
 ) -> int:
     """Predict the uncertainties of a calibration before its scan is made.
 
     Without simulation: from the Fisher information of the planned scan and the prior of the
-    estimate, with the uncertainties of film, rod and load. What the options do not say is the
+    estimate, with the uncertainties of film, rod and load. Defaults are the
     paper's. With --want and --vary, the least scan that reaches what is wanted.
     """
-    require_one_kernel(given)
+    require_one_kernel(options)
     if bool(wishes) != (vary is not None):
         raise click.UsageError("--want and --vary go together: what to reach, and by what.")
     prove_writable(figures, force=force)
-    planned = _designed(given, dict(wishes), vary)
+    planned = _designed(options, dict(wishes), vary)
     _draw(planned, vary, figures, force=force)
 
     if as_json:
@@ -201,26 +182,26 @@ def command(
     return DONE
 
 
-def _designed(given: dict[str, Any], wishes: dict[str, float], vary: str | None) -> Design:
+def _designed(options: dict[str, Any], wishes: dict[str, float], vary: str | None) -> Design:
     from memscal.model.indenter import Rod
     from memscal.planning.design import design
 
-    rod = indenter_from("rod", given)
+    rod = indenter_from("rod", options)
     assert isinstance(rod, Rod)
     return design(
-        film=film_from(given),
+        film=film_from(options),
         rod=rod,
-        kernel=kernel_from(given),
-        conversion_constant=si(given["conversion_constant"], -3),
-        load=given["load"],
-        load_uncertainty=si(given["load_uncertainty"], -2),
-        step=si(given["step"], -3),
-        half_range=si(given["half_range"], -3),
-        repeats=given["repeats"],
-        noise=si(given["noise"], -2),
-        noise_voltage=si(given["noise_voltage"], -3),
-        centre=si(given["centre"], -3),
-        method=given["method"],
+        kernel=kernel_from(options),
+        conversion_constant=si(options["conversion_constant"], -3),
+        load=options["load"],
+        load_uncertainty=si(options["load_uncertainty"], -2),
+        step=si(options["step"], -3),
+        half_range=si(options["half_range"], -3),
+        repeats=options["repeats"],
+        noise=si(options["noise"], -2),
+        noise_voltage=si(options["noise_voltage"], -3),
+        centre=si(options["centre"], -3),
+        method=options["method"],
         want=wishes,
         vary=None if vary is None else vary.replace("-", "_"),
     )

@@ -78,44 +78,32 @@ def interface_options(command: _Command) -> _Command:
     return slip(greenwood(exponential(command)))
 
 
-def indenter_of(shape: str, given: Mapping[str, Any]) -> Indenter:
-    """Return the indenter that the options describe.
-
-    Raises
-    ------
-    click.UsageError
-        If its own option is missing, or one of another shape is given.
-    """
-    own = _DESCRIBED_BY[shape]
-    for name in sorted(set(_DESCRIBED_BY.values()) - {own}):
-        if given[name] is not None:
+def indenter_of(shape: str, options: Mapping[str, Any]) -> Indenter:
+    """Return the indenter that the options describe."""
+    needed = _DESCRIBED_BY[shape]
+    for name in sorted(set(_DESCRIBED_BY.values()) - {needed}):
+        if options[name] is not None:
             raise click.UsageError(f"{_option(name)} does not describe a {shape}.")
     if shape in _RADIUS:
-        return indenter_from(shape, {**given, "radius": given["radius"] or _RADIUS[shape]})
-    if given[own] is None:
-        raise click.UsageError(f"A {shape} needs {_option(own)}.")
+        return indenter_from(shape, {**options, "radius": options["radius"] or _RADIUS[shape]})
+    if options[needed] is None:
+        raise click.UsageError(f"A {shape} needs {_option(needed)}.")
     if shape == "cone":
         from memscal.model.indenter import Cone
 
-        return Cone(inclination=math.radians(given["inclination"]))
+        return Cone(inclination=math.radians(options["inclination"]))
     from memscal.formats.tables.text_table import read_indenter_table
 
     return read_indenter_table(
-        given["profile_table"], r_unit=given["r_unit"], z_unit=given["z_unit"]
+        options["profile_table"], r_unit=options["r_unit"], z_unit=options["z_unit"]
     )
 
 
-def interface_of(given: Mapping[str, Any]) -> Interface:
-    """Return the interface that the options describe.
-
-    Raises
-    ------
-    click.UsageError
-        If two normal laws are given.
-    """
+def interface_of(options: Mapping[str, Any]) -> Interface:
+    """Return the interface that the options describe."""
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
-    rough, exponential = given["greenwood_tripp"], given["exponential"]
+    rough, exponential = options["greenwood_tripp"], options["exponential"]
     if rough and exponential:
         raise click.UsageError("Give --greenwood-tripp or --exponential: one normal law.")
     normal: GreenwoodTripp | ExponentialCompliance | None = None
@@ -129,7 +117,7 @@ def interface_of(given: Mapping[str, Any]) -> Interface:
         normal = ExponentialCompliance(
             decay_length=si(exponential[0], -6), reference_pressure=si(exponential[1], 6)
         )
-    return Interface(normal=normal, slip_length=si(given["slip_length"], -6))
+    return Interface(normal=normal, slip_length=si(options["slip_length"], -6))
 
 
 def _option(name: str) -> str:
@@ -260,21 +248,21 @@ def command(
     mesh: Path | None,
     as_json: bool,
     force: bool,
-    **given: Any,
+    **options: Any,
 ) -> int:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
-    What the options do not say is the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and
+    Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and
     2 mm; a rod of radius 0.25 mm, a sphere of radius 128.8 mm.
     """
-    _check_usage(loads, depths, output, mesh, given)
+    _check_usage(loads, depths, output, mesh, options)
     files = [path for path in (output, mesh, *figures) if path is not None]
-    table = given["profile_table"]
+    table = options["profile_table"]
     prove_writable(files, force=force, inputs=[table] if table else [])
-    contacts = _pressed(indenter, loads, depths, given)
+    contacts = _pressed(indenter, loads, depths, options)
     _write(contacts, output, figures, mesh, force=force)
 
-    _print(contacts, given["loading"], output, as_json=as_json)
+    _print(contacts, options["loading"], output, as_json=as_json)
     for path in files:
         message(f"Written: {path}")
     return DONE
@@ -285,7 +273,7 @@ def _check_usage(
     depths: tuple[float, ...],
     output: Path | None,
     mesh: Path | None,
-    given: dict[str, Any],
+    options: dict[str, Any],
 ) -> None:
     if loads and depths:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
@@ -294,23 +282,27 @@ def _check_usage(
             raise click.UsageError(
                 f"A file holds one load: with --{name} give one --load or one --depth."
             )
-    if mesh is not None and given["backend"] != "fem" and given["strain"] != "finite":
+    if mesh is not None and options["backend"] != "fem" and options["strain"] != "finite":
         raise click.UsageError("--mesh shows finite elements: add --backend fem.")
     if mesh is not None and mesh.suffix.lower() != ".vtu":
         raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
 
 
 def _pressed(
-    indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], given: dict[str, Any]
+    indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], options: dict[str, Any]
 ) -> list[Contact]:
-    film, body, interface = film_from(given), indenter_of(indenter, given), interface_of(given)
+    film, body, interface = (
+        film_from(options),
+        indenter_of(indenter, options),
+        interface_of(options),
+    )
 
     from memscal.mechanics.indent import indent
 
     settings: dict[str, Any] = {
-        name: given[name] for name in ("friction", "loading", "backend", "strain", "rings")
+        name: options[name] for name in ("friction", "loading", "backend", "strain", "rings")
     }
-    settings |= {"interface": interface, "film_radius": si(given["film_radius"], -3)}
+    settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
     if depths:
         return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
     return indent(film, body, load=list(loads or (1.0,)), **settings)

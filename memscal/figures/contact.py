@@ -1,4 +1,4 @@
-"""Contacts of an indenter with a film: what acts at the interface, and what reaches the base."""
+"""Figure of contacts: tractions at the interface, stress at the base, load against depth."""
 
 from __future__ import annotations
 
@@ -26,33 +26,10 @@ _NAMED = 6
 
 
 def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
-    """Draw contacts: tractions at the interface, stress at the base, load against depth.
+    """Draw one contact, or several such as the states of a loading.
 
-    Parameters
-    ----------
-    contacts : sequence of Contact
-        One or several, such as the states of a loading.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panel a, pressure and shear at the interface; b, the same at the base; with several
-        contacts, c, load against depth.
-
-    Raises
-    ------
-    InputError
-        If there is no contact.
-
-    Examples
-    --------
-    >>> from memscal.mechanics.indent import indent
-    >>> from memscal.model.film import ElasticFilm
-    >>> from memscal.model.indenter import Sphere
-    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    >>> figure = contact_figure([indent(film, Sphere(radius=0.1288), load=1.0, friction=0.3)])
-    >>> [axes.get_xlabel() for axes in figure.axes]
-    ['radius (mm)', 'radius (mm)']
+    Panel a, pressure and shear at the interface; b, the same at the base; with several contacts,
+    c, load against depth.
     """
     if isinstance(contacts, Contact):
         contacts = [contacts]

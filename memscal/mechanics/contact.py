@@ -1,4 +1,4 @@
-"""A solved contact: what stands between indenter and film, and what reaches the base."""
+"""Contact of a rigid indenter with a bonded film: tractions, displacements, stress at the base."""
 
 from __future__ import annotations
 

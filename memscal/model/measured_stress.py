@@ -128,7 +128,7 @@ class MeasuredProfile:
     maximum_budget : mapping of str to float
         Its standard uncertainty by source, in Pa.
     centre, centre_uncertainty : ndarray, shape (2,)
-        Centre (x0, y0) of the profile, in m; zero where a line does not tell.
+        Centre (x0, y0) of the profile, in m; zero across a line.
     baseline, baseline_uncertainty : float
         Baseline in the middle of the scan, in V.
     contact_radius : float

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["contacts_table", "dataset", "depth_messages", "frame", "mapping", "tables"]
 
-#: Share of the film's thickness up to which linear elasticity is taken at its word.
+#: Share of the film's thickness up to which linear elasticity is taken as valid.
 _SHALLOW = 0.1
 _SINGULAR = (
     "The pressure under a flat rod grows without bound towards its edge: "

@@ -181,7 +181,7 @@ def frame(restored: Restoration) -> pd.DataFrame:
 
 def correlated(restored: Restoration) -> dict[str, Any]:
     """Return force, stress on the axis, centre and baseline with their joint covariance."""
-    names = ["force", "stress_on_axis", *(name for _, name in _free_centres(restored)), "baseline"]
-    rows = restored.scalar_rows()
-    values = rows @ restored.posterior.state
-    return correlated_numbers(names, values, rows @ restored.posterior.covariance @ rows.T)
+    centres = {name: float(restored.centre[i]) for i, name in _free_centres(restored)}
+    values = {"force": restored.force, "stress_on_axis": float(restored.stress(0.0)), **centres}
+    values["baseline"] = restored.baseline
+    return correlated_numbers(list(values), list(values.values()), restored.scalar_covariance)
