@@ -319,7 +319,7 @@ def _write(
     """Write the files; what is drawn is drawn before the first of them is there."""
     rendered: dict[Path, bytes] = {}
     if figures:
-        from memscal.figures.contact import contact_figure
+        from memscal.figures.stress import contact_figure
         from memscal.figures.style import figure_format, render_figure
 
         figure = contact_figure(contacts)

@@ -25,7 +25,7 @@ from memscal.cli.options import (
     require_one_kernel,
     si,
 )
-from memscal.cli.output import emit_json, message, note, prove_writable
+from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable
 from memscal.cli.reference import interface_of, interface_options
 
 if TYPE_CHECKING:
@@ -147,14 +147,14 @@ _OPTIONS = (
 )
 
 
-def sphere_options(command: _Command) -> _Command:
+def _sphere_options(command: _Command) -> _Command:
     """Add the options of an experiment with a sphere."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
 
 
-def experiment_from(options: Mapping[str, Any]) -> Experiment:
+def _experiment_from(options: Mapping[str, Any]) -> Experiment:
     """Simulate the experiment that the options describe."""
     film, rod = film_from(options), indenter_from("rod", options)
     radius = {
@@ -199,45 +199,22 @@ def experiment_from(options: Mapping[str, Any]) -> Experiment:
     )
 
 
-def tell_scan(scan: Scan, output: Path, as_json: bool) -> None:
-    """Print the truth of one scan."""
-    if as_json:
-        emit_json({"schema_version": "1", **_described(scan, output)})
-        return
-    from memscal.cli.output import emit_tables
-    from memscal.summaries.table import Table
-
-    rows = [
-        ("kind", scan.kind),
-        ("points", _shape(scan)),
-        *(_entry(*item) for item in dict(scan.synthetic or {}).items()),
-    ]
-    emit_tables(Table("Synthetic scan (calculated, not measured) and its truth", ("", ""), rows))
-
-
-def tell_experiment(scans: Mapping[Path, Scan], as_json: bool) -> None:
-    """Print the truth of an experiment, one column for each scan."""
-    if as_json:
-        described = [_described(scan, path) for path, scan in scans.items()]
-        emit_json({"schema_version": "1", "synthetic": True, "scans": described})
-        return
-    from memscal.cli.output import emit_tables
+def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
+    """Print the truth of scans, one column for each."""
     from memscal.summaries.table import Table
 
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
-    names: list[str] = []
-    for truth in sorted(truths, key=len, reverse=True):
-        names += [name for name in truth if name not in names]
+    names = dict.fromkeys(name for truth in sorted(truths, key=len, reverse=True) for name in truth)
     rows: list[Sequence[str]] = [
         ("kind", *(scan.kind for scan in scans.values())),
-        ("points", *(_shape(scan) for scan in scans.values())),
+        ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
     ]
     for name in names:
         words = next(_entry(name, truth[name])[0] for truth in truths if name in truth)
         values = (_entry(name, truth[name])[1] if name in truth else "-" for truth in truths)
         rows.append((words, *values))
-    head = ("", *(path.name for path in scans))
-    emit_tables(Table("Synthetic experiment (calculated, not measured) and its truth", head, rows))
+    head = ("", *(path.name if len(scans) > 1 else "" for path in scans))
+    emit_tables(Table(f"Synthetic {title} (calculated, not measured) and its truth", head, rows))
 
 
 def _described(scan: Scan, path: Path) -> dict[str, Any]:
@@ -253,10 +230,6 @@ def _described(scan: Scan, path: Path) -> dict[str, Any]:
 def _standard(value: float | str) -> float | str:
     """Return a value of standard JSON: infinite friction is ``"inf"``."""
     return "inf" if value == float("inf") else value
-
-
-def _shape(scan: Scan) -> str:
-    return " x ".join(str(n) for n in scan.u_zz.shape)
 
 
 def _entry(name: str, value: float | str) -> tuple[str, str]:
@@ -394,7 +367,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     metavar="N",
     help="Seed of the noise.",
 )
-@sphere_options
+@_sphere_options
 @json_option
 @force_option
 @debug_option
@@ -417,7 +390,10 @@ def command(
     from memscal.formats.scan import write_scan
 
     write_scan(scan, output, overwrite=force)
-    tell_scan(scan, output, as_json)
+    if as_json:
+        emit_json({"schema_version": "1", **_described(scan, output)})
+    else:
+        _print_truth({output: scan}, "scan")
     note("The scan is synthetic: nothing in it was measured.")
     message(f"Written: {output}")
     return DONE
@@ -452,12 +428,16 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
     from memscal.formats.scan import ensure_folder_writable, write_scans
 
     ensure_folder_writable(folder, FILES, overwrite=force)
-    experiment = experiment_from(options)
-    scans = {f"{name}.h5": scan for name, scan in experiment.scans.items()}
-    write_scans(scans, folder, overwrite=force)
-    tell_experiment({folder / name: scan for name, scan in scans.items()}, as_json)
+    experiment = _experiment_from(options)
+    scans = {folder / f"{name}.h5": scan for name, scan in experiment.scans.items()}
+    write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
+    if as_json:
+        described = [_described(scan, path) for path, scan in scans.items()]
+        emit_json({"schema_version": "1", "synthetic": True, "scans": described})
+    else:
+        _print_truth(scans, "experiment")
     note("The scans are synthetic: nothing in them was measured.")
-    message(f"Written: {', '.join(str(folder / name) for name in scans)}")
+    message(f"Written: {', '.join(map(str, scans))}")
     return DONE
 
 

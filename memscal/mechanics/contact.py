@@ -118,7 +118,7 @@ class Contact(Result):
     strain: str = "linear"
 
     _summary: ClassVar[str] = "contact"
-    _figure: ClassVar[str] = "contact.contact_figure"
+    _figure: ClassVar[str] = "stress.contact_figure"
 
     def __repr__(self) -> str:
         """Return what was pressed, load, depth and radius in place of the field."""
