@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from os import PathLike
 
@@ -38,8 +38,8 @@ from memscal.model.checks import (
     chi_square_limit,
     failed_check_messages,
 )
-from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
+from memscal.model.records import FILM
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 
@@ -56,10 +56,10 @@ __all__ = [
 ]
 
 #: Properties of one film agree within this share where no uncertainty is stated ...
-_SAME = {"young_modulus": 0.02, "poisson_ratio": 0.02, "thickness": 0.02}
+_SAME = 0.02
 #: ... and within this many standard uncertainties of their difference where it is.
 _COVERAGE = 2.0
-_UNITS = {"young_modulus": ("MPa", 1e-6), "poisson_ratio": ("", 1.0), "thickness": ("mm", 1e3)}
+_COMPARED = ("young_modulus", "poisson_ratio", "thickness")
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
@@ -77,21 +77,6 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
             "its own.",
             cure="Give the scan of one load.",
         )
-
-
-def restored_or_explained(estimate: Callable[[], ProfileEstimate]) -> ProfileEstimate:
-    """Return an estimate; a failure is said of a stress, not of a calibration."""
-    try:
-        return estimate()
-    except CentreError:
-        raise
-    except FitError as failure:
-        raise FitError(
-            "The scan determines no stress at the base of the film.",
-            why="Its voltage does not rise clear of noise and baseline as the indenter passes one "
-            "centre, or the scan is too short to tell the profile's tail from the baseline.",
-            cure="Check channel and positions; scan farther; raise the load or average repeats.",
-        ) from failure
 
 
 def _require_same_sensor(scan: Scan, apparatus: ApparatusFunction) -> None:
@@ -122,11 +107,6 @@ def require_covariance(apparatus: ApparatusFunction) -> None:
         )
 
 
-def mismatches(scan: Scan, apparatus: ApparatusFunction) -> tuple[str, ...]:
-    """Return in words what a scan and an artifact do not have in common."""
-    return (*_sensors(scan, apparatus), *_films(scan.film, apparatus.film))
-
-
 def accept_mismatches(
     scan: Scan, apparatus: ApparatusFunction, place: str, *, override: bool
 ) -> tuple[str, ...]:
@@ -138,7 +118,7 @@ def accept_mismatches(
             why="A shear is no normal stress: this cannot be overridden.",
             cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
         )
-    differences = mismatches(scan, apparatus)
+    differences = list(_differences(scan, apparatus))
     if differences and not override:
         raise InputError(
             f"{place} does not belong to the artifact: {'; '.join(differences)}.",
@@ -150,32 +130,32 @@ def accept_mismatches(
     return tuple(f"{place}: {text}" for text in differences)
 
 
-def _sensors(scan: Scan, apparatus: ApparatusFunction) -> Iterator[str]:
-    ours, theirs = scan.sensor, apparatus.sensor
-    if ours.name and theirs.name and ours.name != theirs.name:
-        yield f'sensor "{ours.name}" in the scan, "{theirs.name}" in the artifact'
-    if ours.channel != theirs.channel:
-        yield f"channel {ours.channel} in the scan, {theirs.channel} in the artifact"
-
-
-def _films(ours: ElasticFilm, theirs: ElasticFilm) -> Iterator[str]:
-    if ours.name and theirs.name and ours.name != theirs.name:
-        yield f'film "{ours.name}" in the scan, "{theirs.name}" in the artifact'
-    for name, share in _SAME.items():
-        mine, its = getattr(ours, name), getattr(theirs, name)
-        spreads = [getattr(film, f"{name}_uncertainty") or 0.0 for film in (ours, theirs)]
-        allowed = max(share * its, _COVERAGE * math.hypot(*spreads))
-        if abs(mine - its) > allowed:
-            unit, factor = _UNITS[name]
-            values = [f"{value * factor:.4g} {unit}".rstrip() for value in (mine, its)]
-            words = name.replace("_", " ").replace("poisson ratio", "Poisson's ratio")
-            yield f"film {words} {values[0]} in the scan, {values[1]} in the artifact"
+def _differences(scan: Scan, apparatus: ApparatusFunction) -> Iterator[str]:
+    """Yield in words what a scan and an artifact do not have in common."""
+    for what, quote, ours, theirs in (
+        ("sensor", '"', scan.sensor.name, apparatus.sensor.name),
+        ("channel", "", scan.sensor.channel, apparatus.sensor.channel),
+        ("film", '"', scan.film.name, apparatus.film.name),
+    ):
+        unnamed = what != "channel" and not (ours and theirs)
+        if ours != theirs and not unnamed:
+            yield f"{what} {quote}{ours}{quote} in the scan, {quote}{theirs}{quote} in the artifact"
+    films = scan.film, apparatus.film
+    for quantity in FILM.quantities:
+        if quantity.name not in _COMPARED:
+            continue
+        values = [getattr(film, quantity.name) for film in films]
+        spreads = [getattr(film, f"{quantity.name}_uncertainty") or 0.0 for film in films]
+        allowed = max(_SAME * values[1], _COVERAGE * math.hypot(*spreads))
+        if abs(values[0] - values[1]) > allowed:
+            ours, theirs = (f"{v / quantity.scale:.4g} {quantity.unit}".rstrip() for v in values)
+            words = quantity.name.replace("_", " ").replace("poisson ratio", "Poisson's ratio")
+            yield f"film {words} {ours} in the scan, {theirs} in the artifact"
 
 
 _FORCE_LIMIT = 3.0
 #: What the shapes of pressure themselves leave open of the force, however small the noise.
 _NEGLIGIBLE_FORCE = 0.01
-_SAME_FILM = 0.02
 
 
 def restoration_checks(restored: Restoration) -> tuple[QualityCheck, ...]:
@@ -219,7 +199,7 @@ def _force(restored: Restoration) -> QualityCheck:
 def _film(restored: Restoration) -> QualityCheck:
     ours, theirs = restored.scan.film, restored.apparatus.film
     spread = np.hypot(ours.thickness_uncertainty or 0.0, theirs.thickness_uncertainty or 0.0)
-    limit = max(_SAME_FILM, 2 * float(spread) / theirs.thickness)
+    limit = max(_SAME, 2 * float(spread) / theirs.thickness)
     return check(
         "film_agreement",
         abs(ours.thickness / theirs.thickness - 1),
@@ -438,4 +418,14 @@ def gaussian_pressure(
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
     through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan.film, wavenumbers.k))
-    return restored_or_explained(lambda: estimate_profile(points, through)), transfer
+    try:
+        return estimate_profile(points, through), transfer
+    except CentreError:
+        raise
+    except FitError as failure:
+        raise FitError(
+            "The scan determines no stress at the base of the film.",
+            why="Its voltage does not rise clear of noise and baseline as the indenter passes one "
+            "centre, or the scan is too short to tell the profile's tail from the baseline.",
+            cure="Check channel and positions; scan farther; raise the load or average repeats.",
+        ) from failure
