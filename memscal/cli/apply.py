@@ -13,6 +13,7 @@ from memscal.cli.output import (
     FigurePath,
     beside,
     emit_json,
+    emit_tables,
     message,
     prove_writable,
     show_messages,
@@ -83,42 +84,34 @@ def command(
     written = output or beside(scans[0], ".stress.h5")
     prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
 
+    from memscal.cli.failures import exit_code_of
     from memscal.measurement.measure_stress import measure_stress
+    from memscal.summaries.stress import tables
 
     with working("Measuring"):
-        found = measure_stress(data, artifact, override=override)
+        stress = measure_stress(data, artifact, override=override)
     with working("Drawing"):
-        ready = _rendered(found, figures)
-    found.save(written, overwrite=force)
-    if ready:
+        drawn = _rendered(stress, figures)
+    stress.save(written, overwrite=force)
+    if drawn:
         from memscal.formats.files import atomic_write_bytes
 
-        for path, content in ready.items():
+        for path, content in drawn.items():
             atomic_write_bytes(path, content, overwrite=force)
-    return _tell(found, written, [written, *figures], as_json)
+    if as_json:
+        emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
+    else:
+        emit_tables(*tables(stress))
+    show_messages(stress.messages)
+    for path in (written, *figures):
+        message(f"Written: {path}")
+    return exit_code_of(stress.checks)
 
 
-def _rendered(found: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, bytes]:
+def _rendered(stress: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, bytes]:
     if not figures:
         return {}
-    from memscal.figures.stress import measured_stress_figure
     from memscal.figures.style import figure_format, render_figure
 
-    figure = measured_stress_figure(found)
+    figure = stress.plot()
     return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}
-
-
-def _tell(found: MeasuredStress, output: Path, files: list[Path], as_json: bool) -> int:
-    """Print the results and the messages; return the exit code."""
-    from memscal.cli.failures import exit_code_of
-    from memscal.cli.output import emit_tables
-    from memscal.summaries.stress import stress_json, stress_tables
-
-    if as_json:
-        emit_json(stress_json(found, output))
-    else:
-        emit_tables(*stress_tables(found))
-    show_messages(found.messages)
-    for path in files:
-        message(f"Written: {path}")
-    return exit_code_of(found.checks)

@@ -21,15 +21,21 @@ from memscal.cli.options import (
     radius_options,
     si,
 )
-from memscal.cli.output import FigurePath, emit_json, message, note, prove_writable
-from memscal.summaries.table import finite
+from memscal.cli.output import (
+    FigurePath,
+    emit_json,
+    emit_tables,
+    message,
+    prove_writable,
+    show_messages,
+)
 
 if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
     from memscal.mechanics.interface import Interface
     from memscal.model.indenter import Indenter
 
-__all__ = ["SHAPES", "command", "indenter_of", "interface_of", "interface_options", "tell"]
+__all__ = ["SHAPES", "command", "interface_of", "interface_options"]
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -72,44 +78,32 @@ def interface_options(command: _Command) -> _Command:
     return slip(greenwood(exponential(command)))
 
 
-def indenter_of(shape: str, given: Mapping[str, Any]) -> Indenter:
-    """Return the indenter that the options describe.
-
-    Raises
-    ------
-    click.UsageError
-        If its own option is missing, or one of another shape is given.
-    """
-    own = _DESCRIBED_BY[shape]
-    for name in sorted(set(_DESCRIBED_BY.values()) - {own}):
-        if given[name] is not None:
+def indenter_of(shape: str, options: Mapping[str, Any]) -> Indenter:
+    """Return the indenter that the options describe."""
+    needed = _DESCRIBED_BY[shape]
+    for name in sorted(set(_DESCRIBED_BY.values()) - {needed}):
+        if options[name] is not None:
             raise click.UsageError(f"{_option(name)} does not describe a {shape}.")
     if shape in _RADIUS:
-        return indenter_from(shape, {**given, "radius": given["radius"] or _RADIUS[shape]})
-    if given[own] is None:
-        raise click.UsageError(f"A {shape} needs {_option(own)}.")
+        return indenter_from(shape, {**options, "radius": options["radius"] or _RADIUS[shape]})
+    if options[needed] is None:
+        raise click.UsageError(f"A {shape} needs {_option(needed)}.")
     if shape == "cone":
         from memscal.model.indenter import Cone
 
-        return Cone(inclination=math.radians(given["inclination"]))
+        return Cone(inclination=math.radians(options["inclination"]))
     from memscal.formats.tables.text_table import read_indenter_table
 
     return read_indenter_table(
-        given["profile_table"], r_unit=given["r_unit"], z_unit=given["z_unit"]
+        options["profile_table"], r_unit=options["r_unit"], z_unit=options["z_unit"]
     )
 
 
-def interface_of(given: Mapping[str, Any]) -> Interface:
-    """Return the interface that the options describe.
-
-    Raises
-    ------
-    click.UsageError
-        If two normal laws are given.
-    """
+def interface_of(options: Mapping[str, Any]) -> Interface:
+    """Return the interface that the options describe."""
     from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
-    rough, exponential = given["greenwood_tripp"], given["exponential"]
+    rough, exponential = options["greenwood_tripp"], options["exponential"]
     if rough and exponential:
         raise click.UsageError("Give --greenwood-tripp or --exponential: one normal law.")
     normal: GreenwoodTripp | ExponentialCompliance | None = None
@@ -123,7 +117,7 @@ def interface_of(given: Mapping[str, Any]) -> Interface:
         normal = ExponentialCompliance(
             decay_length=si(exponential[0], -6), reference_pressure=si(exponential[1], 6)
         )
-    return Interface(normal=normal, slip_length=si(given["slip_length"], -6))
+    return Interface(normal=normal, slip_length=si(options["slip_length"], -6))
 
 
 def _option(name: str) -> str:
@@ -254,21 +248,21 @@ def command(
     mesh: Path | None,
     as_json: bool,
     force: bool,
-    **given: Any,
+    **options: Any,
 ) -> int:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
-    What the options do not say is the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and
+    Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and
     2 mm; a rod of radius 0.25 mm, a sphere of radius 128.8 mm.
     """
-    _check_usage(loads, depths, output, mesh, given)
+    _check_usage(loads, depths, output, mesh, options)
     files = [path for path in (output, mesh, *figures) if path is not None]
-    table = given["profile_table"]
+    table = options["profile_table"]
     prove_writable(files, force=force, inputs=[table] if table else [])
-    contacts = _pressed(indenter, loads, depths, given)
+    contacts = _pressed(indenter, loads, depths, options)
     _write(contacts, output, figures, mesh, force=force)
 
-    tell(contacts, given["loading"], output, as_json=as_json)
+    _print(contacts, options["loading"], output, as_json=as_json)
     for path in files:
         message(f"Written: {path}")
     return DONE
@@ -279,7 +273,7 @@ def _check_usage(
     depths: tuple[float, ...],
     output: Path | None,
     mesh: Path | None,
-    given: dict[str, Any],
+    options: dict[str, Any],
 ) -> None:
     if loads and depths:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
@@ -288,23 +282,27 @@ def _check_usage(
             raise click.UsageError(
                 f"A file holds one load: with --{name} give one --load or one --depth."
             )
-    if mesh is not None and given["backend"] != "fem" and given["strain"] != "finite":
+    if mesh is not None and options["backend"] != "fem" and options["strain"] != "finite":
         raise click.UsageError("--mesh shows finite elements: add --backend fem.")
     if mesh is not None and mesh.suffix.lower() != ".vtu":
         raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
 
 
 def _pressed(
-    indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], given: dict[str, Any]
+    indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], options: dict[str, Any]
 ) -> list[Contact]:
-    film, body, interface = film_from(given), indenter_of(indenter, given), interface_of(given)
+    film, body, interface = (
+        film_from(options),
+        indenter_of(indenter, options),
+        interface_of(options),
+    )
 
     from memscal.mechanics.indent import indent
 
     settings: dict[str, Any] = {
-        name: given[name] for name in ("friction", "loading", "backend", "strain", "rings")
+        name: options[name] for name in ("friction", "loading", "backend", "strain", "rings")
     }
-    settings |= {"interface": interface, "film_radius": si(given["film_radius"], -3)}
+    settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
     if depths:
         return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
     return indent(film, body, load=list(loads or (1.0,)), **settings)
@@ -321,7 +319,7 @@ def _write(
     """Write the files; what is drawn is drawn before the first of them is there."""
     rendered: dict[Path, bytes] = {}
     if figures:
-        from memscal.figures.contact import contact_figure
+        from memscal.figures.stress import contact_figure
         from memscal.figures.style import figure_format, render_figure
 
         figure = contact_figure(contacts)
@@ -342,126 +340,18 @@ def _write(
             atomic_write_bytes(path, data, overwrite=force)
 
 
-#: Share of the film's thickness up to which linear elasticity is taken at its word.
-_SHALLOW = 0.1
-
-_SINGULAR = (
-    "The pressure under a flat rod grows without bound towards its edge: "
-    "there is no largest interface stress."
-)
-
-
-def tell(contacts: Sequence[Contact], loading: str, output: Path | None, *, as_json: bool) -> None:
+def _print(
+    contacts: Sequence[Contact], loading: str, output: Path | None, *, as_json: bool
+) -> None:
     """Print the contacts as a table or as one JSON object; notes go to stderr."""
-    warnings = [text for contact in contacts if (text := _deep(contact))]
+    from memscal.summaries.contact import contacts_table, depth_messages
+
+    messages, warnings = depth_messages(contacts)
     if as_json:
-        if contacts[0].indenter.shape == "rod":
-            warnings.insert(0, _SINGULAR)
+        # A rod's contact does not depend on the loading that was asked for.
+        solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
         head = {"schema_version": "1", "output": None if output is None else str(output)}
-        solutions = [_solution(contact, loading) for contact in contacts]
         emit_json({**head, "solutions": solutions, "warnings": warnings})
     else:
-        from memscal.cli.output import emit_tables
-        from memscal.summaries.table import Table
-
-        emit_tables(Table(_title(contacts[0], loading), *_columns(contacts)))
-    for text in warnings:
-        if text is not _SINGULAR:
-            note(text)
-
-
-def _deep(contact: Contact) -> str:
-    """Say where linear elasticity is formal."""
-    share = contact.depth / contact.film.thickness
-    if share <= _SHALLOW or contact.strain == "finite":
-        return ""
-    return (
-        f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the film's "
-        "thickness: linear elasticity is formal there, and its error is not part of the "
-        "convergence. --strain finite shows what it changes, under a rod or a sphere."
-    )
-
-
-def _solution(contact: Contact, loading: str) -> dict[str, Any]:
-    """Return one solution in the contract's names and units."""
-
-    def quantity(value: float | None, unit: str) -> dict[str, Any]:
-        return {"value": None if value is None else finite(float(value)), "unit": unit}
-
-    return {
-        "load": quantity(contact.load, "N"),
-        "depth": quantity(contact.depth * 1e6, "um"),
-        "contact_radius": quantity(contact.contact_radius * 1e3, "mm"),
-        "stick_radius": quantity(contact.stick_radius * 1e3, "mm"),
-        "max_interface_stress": quantity(contact.max_interface_stress, "Pa"),
-        "max_base_stress": quantity(contact.max_base_stress, "Pa"),
-        "friction_coefficient": quantity(contact.friction, "1"),
-        "sticking": math.isinf(contact.friction),
-        "loading": loading,
-        "backend": contact.backend,
-        "strain": contact.strain,
-        "convergence": quantity(contact.convergence, "1"),
-        "steps": contact.steps,
-        "elastic_energy": quantity(contact.elastic_energy, "J"),
-        "work": quantity(contact.work, "J"),
-        "dissipated_energy": quantity(contact.dissipated_energy, "J"),
-        "discretisation": contact.discretisation,
-    }
-
-
-def _title(contact: Contact, loading: str) -> str:
-    """Say in one line what was pressed on what, and how it was solved."""
-    film, rod = contact.film, contact.indenter.shape == "rod"
-    if contact.friction == 0:
-        friction = "frictionless"
-    elif math.isinf(contact.friction):
-        friction = "sticking"
-    else:
-        friction = f"friction {contact.friction:.4g}"
-    way = "" if rod or contact.friction == 0 else f", {loading} loading"
-    described = contact.interface.description
-    interface = f"; interface: {described}" if described else ""
-    strain = ", finite strain" if contact.strain == "finite" else ""
-    return (
-        f"{_name(contact)} on a film of {film.thickness * 1e3:.4g} mm, "
-        f"E = {film.young_modulus * 1e-6:.4g} MPa, Poisson's ratio {film.poisson_ratio:.4g}: "
-        f"{friction}{way} ({contact.backend}{strain}){interface}"
-    )
-
-
-def _name(contact: Contact) -> str:
-    from memscal.model.indenter import Cone, RoundIndenter
-
-    body = contact.indenter
-    if isinstance(body, RoundIndenter):
-        return f"A {body.shape} of radius {body.radius * 1e3:.4g} mm"
-    if isinstance(body, Cone):
-        return f"A cone inclined by {math.degrees(body.inclination):.4g} degrees"
-    return f"A profile to {body.extent * 1e3:.4g} mm"
-
-
-def _columns(contacts: Sequence[Contact]) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows; a column that says nothing under this indenter is left out."""
-    rod = contacts[0].indenter.shape == "rod"
-    frictional = contacts[0].friction > 0
-    columns: list[tuple[str, list[str]]] = [
-        ("load (N)", [f"{c.load:.4g}" for c in contacts]),
-        ("depth (um)", [f"{c.depth * 1e6:.4g}" for c in contacts]),
-    ]
-    if rod:
-        ratio = [f"{c.load / c.depth * 1e-3:.4g}" for c in contacts]
-        columns.append(("load/depth (N/mm)", ratio))
-    else:
-        columns.append(("contact radius (mm)", [f"{c.contact_radius * 1e3:.4g}" for c in contacts]))
-    if frictional:
-        columns.append(("stick radius (mm)", [f"{c.stick_radius * 1e3:.4g}" for c in contacts]))
-    if not rod:
-        peaks = [f"{c.max_interface_stress * 1e-3:.5g}" for c in contacts]
-        columns.append(("interface peak (kPa)", peaks))
-    columns += [
-        ("base peak (kPa)", [f"{c.max_base_stress * 1e-3:.5g}" for c in contacts]),
-        ("steps", [f"{c.steps}" for c in contacts]),
-        ("change", [f"{c.convergence:.1g}" for c in contacts]),
-    ]
-    rows = [list(row) for row in zip(*(cells for _, cells in columns), strict=True)]
-    return [name for name, _ in columns], rows
+        emit_tables(contacts_table(contacts))
+    show_messages(messages)

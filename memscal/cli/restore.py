@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from memscal.cli.options import FILE, force_option, json_option
 from memscal.cli.output import (
     FigurePath,
     emit_json,
+    emit_tables,
     message,
     note,
     prove_writable,
@@ -20,8 +22,7 @@ from memscal.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from memscal.measurement.restoration import Comparison, Restoration
-    from memscal.model.scan import Scan
+    from memscal.measurement.restoration import Restoration
 
 __all__ = ["command"]
 
@@ -84,71 +85,59 @@ def command(
     from memscal.formats.reference import read_reference
     from memscal.formats.scan import read_scan
 
-    known, data = load_apparatus(artifact), read_scan(scan)
-    wanted = None if expected is None else read_reference(expected)
+    apparatus, data = load_apparatus(artifact), read_scan(scan)
+    stress = None if expected is None else read_reference(expected)
     files = [path for path in (output, *figures) if path is not None]
     prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
+    from memscal.cli.failures import exit_code_of
     from memscal.measurement.restore import restore
+    from memscal.summaries.restoration import tables
 
     with working("Restoring"):
-        found = restore(data, known, expected=wanted)
-        compared = found.comparison or _calculated(found, data)
+        restored = restore(data, apparatus, expected=stress)
+        if stress is None:
+            restored = _beside_calculated(restored)
     with working("Drawing"):
-        ready = _rendered(found, compared, figures)
+        drawn = _rendered(restored, figures)
     if output is not None:
         from memscal.formats.reference import write_reference
 
-        write_reference(found.profile(), output, overwrite=force)
-    if ready:
+        write_reference(restored.profile(), output, overwrite=force)
+    if drawn:
         from memscal.formats.files import atomic_write_bytes
 
-        for path, content in ready.items():
+        for path, content in drawn.items():
             atomic_write_bytes(path, content, overwrite=force)
-    return _tell(found, compared, output, files, as_json)
+    if as_json:
+        written = None if output is None else str(output)
+        emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
+    else:
+        emit_tables(*tables(restored))
+    show_messages(restored.messages)
+    for path in files:
+        message(f"Written: {path}")
+    return exit_code_of(restored.checks)
 
 
-def _calculated(found: Restoration, scan: Scan) -> Comparison | None:
-    """Compare with the frictionless contact; one that has no solution is left out."""
+def _beside_calculated(restored: Restoration) -> Restoration:
+    """Add the comparison with the frictionless contact; one that has no solution is left out."""
     from memscal.errors import MemscalError
     from memscal.mechanics.indent import indent
 
+    scan = restored.scan
     try:
-        return found.compare(indent(scan.film, scan.indenter, load=scan.load))
+        contact = indent(scan.film, scan.indenter, load=scan.load)
+        return replace(restored, comparison=restored.compare(contact))
     except MemscalError as failure:
         note(f"No contact is shown beside the result: {failure.problem}")
-        return None
+        return restored
 
 
-def _rendered(
-    found: Restoration, compared: Comparison | None, figures: tuple[Path, ...]
-) -> dict[Path, bytes]:
+def _rendered(restored: Restoration, figures: tuple[Path, ...]) -> dict[Path, bytes]:
     if not figures:
         return {}
-    from memscal.figures.stress import restoration_figure
     from memscal.figures.style import figure_format, render_figure
 
-    figure = restoration_figure(found, compared)
+    figure = restored.plot()
     return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}
-
-
-def _tell(
-    found: Restoration,
-    compared: Comparison | None,
-    output: Path | None,
-    files: list[Path],
-    as_json: bool,
-) -> int:
-    """Print the results and the messages; return the exit code."""
-    from memscal.cli.failures import exit_code_of
-    from memscal.cli.output import emit_tables
-    from memscal.summaries.stress import restoration_json, restoration_tables
-
-    if as_json:
-        emit_json(restoration_json(found, compared, output))
-    else:
-        emit_tables(*restoration_tables(found, compared))
-    show_messages(found.messages)
-    for path in files:
-        message(f"Written: {path}")
-    return exit_code_of(found.checks)

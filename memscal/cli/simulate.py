@@ -25,7 +25,7 @@ from memscal.cli.options import (
     require_one_kernel,
     si,
 )
-from memscal.cli.output import emit_json, message, note, prove_writable
+from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable
 from memscal.cli.reference import interface_of, interface_options
 
 if TYPE_CHECKING:
@@ -36,10 +36,7 @@ __all__ = [
     "FILES",
     "NAMES",
     "command",
-    "experiment_from",
-    "sphere_options",
-    "tell_experiment",
-    "tell_scan",
+    "number_option",
 ]
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -57,6 +54,14 @@ NAMES = (
 _LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
+def number_option(
+    name: str, unit: str, default: float, about: str, **limits: Any
+) -> Callable[[_Command], _Command]:
+    """Return the option of a number in a unit, whose default is shown."""
+    kind = Quantity(unit, **limits)
+    return click.option(name, type=kind, default=default, show_default=True, help=about)
+
+
 _OPTIONS = (
     click.option(
         "--lubricated-load",
@@ -67,19 +72,13 @@ _OPTIONS = (
         show_default=True,
         help="Sphere: load of the lubricated contacts, in N. May be repeated.",
     ),
-    click.option(
-        "--sphere-radius",
-        type=Quantity("mm"),
-        default=128.8,
-        show_default=True,
-        help="Sphere: radius of curvature, in mm.",
-    ),
-    click.option(
+    number_option("--sphere-radius", "mm", 128.8, "Sphere: radius of curvature, in mm."),
+    number_option(
         "--sphere-radius-uncertainty",
-        type=Quantity("mm", open_low=False),
-        default=0.5,
-        show_default=True,
-        help="Sphere: standard uncertainty (k = 1) of its radius, in mm.",
+        "mm",
+        0.5,
+        "Sphere: standard uncertainty (k = 1) of its radius, in mm.",
+        open_low=False,
     ),
     click.option(
         "--friction",
@@ -105,19 +104,14 @@ _OPTIONS = (
         show_default=True,
         help="Sphere: contacts in a row.",
     ),
-    click.option(
-        "--spacing",
-        type=Quantity("mm"),
-        default=0.5,
-        show_default=True,
-        help="Sphere: distance of neighbouring contacts, in mm.",
-    ),
-    click.option(
+    number_option("--spacing", "mm", 0.5, "Sphere: distance of neighbouring contacts, in mm."),
+    number_option(
         "--load-scatter",
-        type=Quantity("percent", high=10.0, open_low=False),
-        default=2.0,
-        show_default=True,
-        help="Sphere: standard deviation of each contact's own load, in percent.",
+        "percent",
+        2.0,
+        "Sphere: standard deviation of each contact's own load, in percent.",
+        high=10.0,
+        open_low=False,
     ),
     click.option(
         "--record-loads",
@@ -125,12 +119,12 @@ _OPTIONS = (
         help="Sphere: record the load that each contact had, read to 0.2 percent, in place of "
         "the nominal one.",
     ),
-    click.option(
+    number_option(
         "--position-error",
-        type=Quantity("um", open_low=False),
-        default=10.0,
-        show_default=True,
-        help="Sphere: standard deviation of each contact's own position, in um.",
+        "um",
+        10.0,
+        "Sphere: standard deviation of each contact's own position, in um.",
+        open_low=False,
     ),
     click.option(
         "--draw-inputs",
@@ -138,39 +132,37 @@ _OPTIONS = (
         help="Sphere: draw the true film, radii and loads from their uncertainties; the files "
         "state the nominal ones, and the truth beside.",
     ),
-    click.option(
+    number_option(
         "--gain",
-        type=Quantity("ratio"),
-        default=1.0,
-        show_default=True,
-        help="Sphere: a mistake to be found, a factor on the voltages of the sphere's scans only.",
+        "ratio",
+        1.0,
+        "Sphere: a mistake to be found, a factor on the voltages of the sphere's scans only.",
     ),
-    click.option(
+    number_option(
         "--thickness-factor",
-        type=Quantity("ratio"),
-        default=1.0,
-        show_default=True,
-        help="Sphere: a mistake to be found, the film's true thickness over the one stated.",
+        "ratio",
+        1.0,
+        "Sphere: a mistake to be found, the film's true thickness over the one stated.",
     ),
 )
 
 
-def sphere_options(command: _Command) -> _Command:
+def _sphere_options(command: _Command) -> _Command:
     """Add the options of an experiment with a sphere."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
 
 
-def experiment_from(given: Mapping[str, Any]) -> Experiment:
+def _experiment_from(options: Mapping[str, Any]) -> Experiment:
     """Simulate the experiment that the options describe."""
-    film, rod = film_from(given), indenter_from("rod", given)
+    film, rod = film_from(options), indenter_from("rod", options)
     radius = {
-        "radius": given["sphere_radius"],
-        "radius_uncertainty": given["sphere_radius_uncertainty"],
+        "radius": options["sphere_radius"],
+        "radius_uncertainty": options["sphere_radius_uncertainty"],
     }
     sphere = indenter_from("sphere", radius)
-    interface = interface_of(given)
+    interface = interface_of(options)
     from memscal.model.indenter import Rod, Sphere
     from memscal.simulation.experiment import simulate_experiment
 
@@ -180,72 +172,49 @@ def experiment_from(given: Mapping[str, Any]) -> Experiment:
         film=film,
         rod=rod,
         sphere=sphere,
-        kernel=kernel_from(given),
-        conversion_constant=si(given["conversion_constant"], -3),
-        rod_points=given["points"],
-        loads=given["loads"] or _LOADS,
-        lubricated_loads=given["lubricated_loads"],
-        friction=given["friction"],
-        loading=given["loading"],
+        kernel=kernel_from(options),
+        conversion_constant=si(options["conversion_constant"], -3),
+        rod_points=options["points"],
+        loads=options["loads"] or _LOADS,
+        lubricated_loads=options["lubricated_loads"],
+        friction=options["friction"],
+        loading=options["loading"],
         interface=interface,
-        points=given["contacts"],
-        spacing=si(given["spacing"], -3),
-        repeats=given["repeats"],
-        noise=si(given["noise"], -2),
-        load_scatter=si(given["load_scatter"], -2),
-        record_loads=given["record_loads"],
-        load_uncertainty=si(given["load_uncertainty"], -2),
-        position_error=si(given["position_error"], -6),
-        centre=(si(given["centre"], -3), si(given["centre_y"], -3)),
-        baseline=si(given["baseline"], -2),
-        drift=si(given["drift"], -2),
-        state_noise=given["state_noise"],
-        draw_inputs=given["draw_inputs"],
-        gain=given["gain"],
-        thickness_factor=given["thickness_factor"],
-        seed=given["seed"],
+        points=options["contacts"],
+        spacing=si(options["spacing"], -3),
+        repeats=options["repeats"],
+        noise=si(options["noise"], -2),
+        load_scatter=si(options["load_scatter"], -2),
+        record_loads=options["record_loads"],
+        load_uncertainty=si(options["load_uncertainty"], -2),
+        position_error=si(options["position_error"], -6),
+        centre=(si(options["centre"], -3), si(options["centre_y"], -3)),
+        baseline=si(options["baseline"], -2),
+        drift=si(options["drift"], -2),
+        state_noise=options["state_noise"],
+        draw_inputs=options["draw_inputs"],
+        gain=options["gain"],
+        thickness_factor=options["thickness_factor"],
+        seed=options["seed"],
     )
 
 
-def tell_scan(scan: Scan, output: Path, as_json: bool) -> None:
-    """Print the truth of one scan."""
-    if as_json:
-        emit_json({"schema_version": "1", **_described(scan, output)})
-        return
-    from memscal.cli.output import emit_tables
-    from memscal.summaries.table import Table
-
-    rows = [
-        ("kind", scan.kind),
-        ("points", _shape(scan)),
-        *(_entry(*item) for item in dict(scan.synthetic or {}).items()),
-    ]
-    emit_tables(Table("Synthetic scan (calculated, not measured) and its truth", ("", ""), rows))
-
-
-def tell_experiment(scans: Mapping[Path, Scan], as_json: bool) -> None:
-    """Print the truth of an experiment, one column for each scan."""
-    if as_json:
-        described = [_described(scan, path) for path, scan in scans.items()]
-        emit_json({"schema_version": "1", "synthetic": True, "scans": described})
-        return
-    from memscal.cli.output import emit_tables
+def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
+    """Print the truth of scans, one column for each."""
     from memscal.summaries.table import Table
 
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
-    names: list[str] = []
-    for truth in sorted(truths, key=len, reverse=True):
-        names += [name for name in truth if name not in names]
+    names = dict.fromkeys(name for truth in sorted(truths, key=len, reverse=True) for name in truth)
     rows: list[Sequence[str]] = [
         ("kind", *(scan.kind for scan in scans.values())),
-        ("points", *(_shape(scan) for scan in scans.values())),
+        ("points", *(" x ".join(map(str, scan.u_zz.shape)) for scan in scans.values())),
     ]
     for name in names:
         words = next(_entry(name, truth[name])[0] for truth in truths if name in truth)
         values = (_entry(name, truth[name])[1] if name in truth else "-" for truth in truths)
         rows.append((words, *values))
-    head = ("", *(path.name for path in scans))
-    emit_tables(Table("Synthetic experiment (calculated, not measured) and its truth", head, rows))
+    head = ("", *(path.name if len(scans) > 1 else "" for path in scans))
+    emit_tables(Table(f"Synthetic {title} (calculated, not measured) and its truth", head, rows))
 
 
 def _described(scan: Scan, path: Path) -> dict[str, Any]:
@@ -259,12 +228,8 @@ def _described(scan: Scan, path: Path) -> dict[str, Any]:
 
 
 def _standard(value: float | str) -> float | str:
-    """Return what standard JSON can say: a friction that always sticks is ``"inf"``."""
+    """Return a value of standard JSON: infinite friction is ``"inf"``."""
     return "inf" if value == float("inf") else value
-
-
-def _shape(scan: Scan) -> str:
-    return " x ".join(str(n) for n in scan.u_zz.shape)
 
 
 def _entry(name: str, value: float | str) -> tuple[str, str]:
@@ -291,10 +256,6 @@ FILM = {
 
 _ROD_NAMES = ("half_range", "raster")
 """The options that only a rod scan alone has."""
-
-_SHARE = Quantity("percent", open_low=False)
-_SIGNED_SHARE = Quantity("percent", low=-math.inf)
-_POSITION = Quantity("mm", low=-math.inf)
 
 EXAMPLES = """\b
 Examples:
@@ -342,12 +303,8 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 )
 @radius_options(default=0.25, uncertainty=0.0025)
 @film_options(defaults=FILM)
-@click.option(
-    "--half-range",
-    type=Quantity("mm"),
-    default=8.0,
-    show_default=True,
-    help="Rod scan alone: positions run from minus to plus this, in mm.",
+@number_option(
+    "--half-range", "mm", 8.0, "Rod scan alone: positions run from minus to plus this, in mm."
 )
 @click.option(
     "--points",
@@ -364,47 +321,37 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     help="Repeats at each load; with a sphere, of its contacts.",
 )
 @click.option("--raster", is_flag=True, help="Rod scan alone: a square instead of a line.")
-@click.option(
+@number_option(
     "--noise",
-    type=_SHARE,
-    default=0.5,
-    show_default=True,
-    help="Standard deviation of the noise, in percent of the largest signal.",
+    "percent",
+    0.5,
+    "Standard deviation of the noise, in percent of the largest signal.",
+    open_low=False,
 )
-@click.option(
-    "--centre",
-    type=_POSITION,
-    default=0.14,
-    show_default=True,
-    help="Position of the sensor along the scan, in mm.",
+@number_option(
+    "--centre", "mm", 0.14, "Position of the sensor along the scan, in mm.", low=-math.inf
 )
-@click.option(
-    "--centre-y",
-    type=_POSITION,
-    default=0.0,
-    show_default=True,
-    help="Its position across the scan, in mm.",
-)
-@click.option(
+@number_option("--centre-y", "mm", 0.0, "Its position across the scan, in mm.", low=-math.inf)
+@number_option(
     "--baseline",
-    type=_SIGNED_SHARE,
-    default=1.0,
-    show_default=True,
-    help="Offset of the voltage, in percent of the largest signal.",
+    "percent",
+    1.0,
+    "Offset of the voltage, in percent of the largest signal.",
+    low=-math.inf,
 )
-@click.option(
+@number_option(
     "--drift",
-    type=_SIGNED_SHARE,
-    default=0.5,
-    show_default=True,
-    help="Change of the offset across the scan, in percent of the largest signal.",
+    "percent",
+    0.5,
+    "Change of the offset across the scan, in percent of the largest signal.",
+    low=-math.inf,
 )
-@click.option(
+@number_option(
     "--load-uncertainty",
-    type=_SHARE,
-    default=1.0,
-    show_default=True,
-    help="Standard uncertainty to state for the load, in percent.",
+    "percent",
+    1.0,
+    "Standard uncertainty to state for the load, in percent.",
+    open_low=False,
 )
 @click.option(
     "--state-noise/--no-state-noise",
@@ -420,93 +367,102 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     metavar="N",
     help="Seed of the noise.",
 )
-@sphere_options
+@_sphere_options
 @json_option
 @force_option
 @debug_option
-def command(experiment: str, output: Path | None, as_json: bool, force: bool, **given: Any) -> int:
+def command(
+    experiment: str, output: Path | None, as_json: bool, force: bool, **options: Any
+) -> int:
     """Make a synthetic scan, or the scans of an experiment, from a known apparatus function.
 
     The base stress of a frictionless rod on the bonded film, or of a sphere's contacts, is
     convolved with the apparatus function; noise, an offset and a drift are added. Every file is
-    labelled as synthetic and holds its truth. What the options do not say is the paper's.
+    labelled as synthetic and holds its truth. Defaults are the paper's.
     """
-    _check_usage(experiment, given)
+    _check_usage(experiment, options)
     if experiment == "sphere":
-        return _sphere(output or Path("synthetic_experiment"), given, as_json, force)
+        return _sphere(output or Path("synthetic_experiment"), options, as_json, force)
     output = output or Path("synthetic_scan.h5")
     prove_writable([output], force=force)
-    scan = _simulate(given)
+    scan = _simulate(options)
 
     from memscal.formats.scan import write_scan
 
     write_scan(scan, output, overwrite=force)
-    tell_scan(scan, output, as_json)
+    if as_json:
+        emit_json({"schema_version": "1", **_described(scan, output)})
+    else:
+        _print_truth({output: scan}, "scan")
     note("The scan is synthetic: nothing in it was measured.")
     message(f"Written: {output}")
     return DONE
 
 
-def _check_usage(experiment: str, given: Mapping[str, Any]) -> None:
+def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
     """Refuse options that contradict each other, or belong to the other experiment."""
     context = click.get_current_context()
     typed = ParameterSource.COMMANDLINE
     others = NAMES if experiment == "rod" else _ROD_NAMES
     strange = [name for name in others if context.get_parameter_source(name) == typed]
     if strange:
-        options = [
+        names = [
             option.opts[0]
             for option in context.command.params
             if isinstance(option, click.Option) and option.name in strange
         ]
         other = "sphere" if experiment == "rod" else "rod"
-        belongs = "belongs" if len(options) == 1 else "belong"
-        raise click.UsageError(f"{', '.join(options)} {belongs} to --experiment {other}.")
-    require_one_kernel(given)
-    if given["raster"] and max(len(given["loads"]), 1) * given["repeats"] > 1:
+        belongs = "belongs" if len(names) == 1 else "belong"
+        raise click.UsageError(f"{', '.join(names)} {belongs} to --experiment {other}.")
+    require_one_kernel(options)
+    if options["raster"] and max(len(options["loads"]), 1) * options["repeats"] > 1:
         raise click.UsageError("A raster has one repeat at one load.")
     for name in ("loads", "lubricated_loads"):
-        if experiment == "sphere" and len(set(given[name])) < len(given[name]):
+        if experiment == "sphere" and len(set(options[name])) < len(options[name]):
             raise click.UsageError(
                 "A load of the sphere is given twice: give it once, and --repeats."
             )
 
 
-def _sphere(folder: Path, given: Mapping[str, Any], as_json: bool, force: bool) -> int:
+def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool) -> int:
     from memscal.formats.scan import ensure_folder_writable, write_scans
 
     ensure_folder_writable(folder, FILES, overwrite=force)
-    experiment = experiment_from(given)
-    scans = {f"{name}.h5": scan for name, scan in experiment.scans.items()}
-    write_scans(scans, folder, overwrite=force)
-    tell_experiment({folder / name: scan for name, scan in scans.items()}, as_json)
+    experiment = _experiment_from(options)
+    scans = {folder / f"{name}.h5": scan for name, scan in experiment.scans.items()}
+    write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
+    if as_json:
+        described = [_described(scan, path) for path, scan in scans.items()]
+        emit_json({"schema_version": "1", "synthetic": True, "scans": described})
+    else:
+        _print_truth(scans, "experiment")
     note("The scans are synthetic: nothing in them was measured.")
-    message(f"Written: {', '.join(str(folder / name) for name in scans)}")
+    message(f"Written: {', '.join(map(str, scans))}")
     return DONE
 
 
-def _simulate(given: Mapping[str, Any]) -> Scan:
+def _simulate(options: Mapping[str, Any]) -> Scan:
     from memscal.model.indenter import Rod
     from memscal.simulation.rod_scan import simulate
 
-    film, rod = film_from(given), indenter_from("rod", given)
+    film, rod = film_from(options), indenter_from("rod", options)
     assert isinstance(rod, Rod)
-    loads = given["loads"] or (1.0,)
+    loads = options["loads"] or (1.0,)
     return simulate(
         film=film,
         rod=rod,
-        kernel=kernel_from(given),
-        conversion_constant=si(given["conversion_constant"], -3),
+        kernel=kernel_from(options),
+        conversion_constant=si(options["conversion_constant"], -3),
         load=loads[0] if len(loads) == 1 else loads,
-        half_range=si(given["half_range"], -3),
-        points=given["points"],
-        repeats=given["repeats"],
-        raster=given["raster"],
-        noise=si(given["noise"], -2),
-        centre=(si(given["centre"], -3), si(given["centre_y"], -3)),
-        baseline=si(given["baseline"], -2),
-        drift=si(given["drift"], -2),
-        load_uncertainty=si(given["load_uncertainty"], -2),
-        state_noise=given["state_noise"],
-        seed=given["seed"],
+        half_range=si(options["half_range"], -3),
+        points=options["points"],
+        repeats=options["repeats"],
+        raster=options["raster"],
+        noise=si(options["noise"], -2),
+        centre=(si(options["centre"], -3), si(options["centre_y"], -3)),
+        baseline=si(options["baseline"], -2),
+        drift=si(options["drift"], -2),
+        load_uncertainty=si(options["load_uncertainty"], -2),
+        state_noise=options["state_noise"],
+        seed=options["seed"],
     )

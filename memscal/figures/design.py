@@ -1,4 +1,4 @@
-"""What a planned scan would tell: G and its transfer function with their bands, and what helps."""
+"""Figure of a planned scan: expected G, its transfer function, uncertainties along a variation."""
 
 from __future__ import annotations
 
@@ -34,33 +34,11 @@ _CURVES = (
 
 
 def design_figure(planned: Design, vary: str = "step") -> Figure:
-    """Draw what is to be expected of a planned scan.
+    """Draw what is expected of a planned scan.
 
-    Parameters
-    ----------
-    planned : Design
-        From :func:`memscal.design`.
-    vary : str
-        What the third panel varies: ``step``, ``half_range`` or ``repeats``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panel a, G as it would be found, with its band (k = 1), and as the plan assumes it; b, its
-        transfer function, the resolved band shaded; c, relative uncertainties of A and sigma, and
-        their share from noise, against what is varied.
-
-    Raises
-    ------
-    InputError
-        If that cannot be varied.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> figure = design_figure(memscal.design(), vary="repeats")
-    >>> [axes.get_xlabel() for axes in figure.axes]
-    ['radius (mm)', 'wavenumber (rad/mm)', 'repeats']
+    Panel a, G with its band (k = 1), and as the plan assumes it; b, its transfer function, the
+    resolved band shaded; c, relative uncertainties of A and sigma, and those from noise alone,
+    against ``vary``: ``step``, ``half_range`` or ``repeats``.
     """
     if vary not in _AXES:
         raise InputError(
@@ -112,10 +90,10 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
     label, scale = _AXES[vary]
     here = getattr(planned.plan, vary)
     designs = varied_designs(planned, vary, _values(planned, vary))
-    along = np.array([getattr(each.plan, vary) for each in designs]) / scale
+    along = np.array([getattr(varied.plan, vary) for varied in designs]) / scale
     for name, symbol, colour, marker in _CURVES:
-        share = np.array([each.relative_uncertainty(name) for each in designs])
-        noise = [each.budget[name]["noise"] / abs(each.parameters[name]) for each in designs]
+        share = np.array([varied.relative_uncertainty(name) for varied in designs])
+        noise = [varied.budget[name]["noise"] / abs(varied.parameters[name]) for varied in designs]
         shown: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "ms": 3}
         axes.plot(along, 100 * share, label=symbol, **shown)
         axes.plot(along, 100 * np.array(noise), ls="--", mfc="none", **shown)

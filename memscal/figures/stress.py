@@ -1,8 +1,9 @@
-"""Measured stress of several loads: linear beside logarithmic, over three decades."""
+"""Figures of measured stress, of restored stress, and of contacts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from memscal.errors import InputError
 from memscal.figures.style import (
     COLOURS,
     SCATTER_THRESHOLD,
@@ -21,10 +23,11 @@ from memscal.figures.style import (
 )
 from memscal.measurement.restoration import Comparison, Restoration
 from memscal.mechanics.contact import Contact
+from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
 
-__all__ = ["measured_stress_figure", "restoration_figure"]
+__all__ = ["contact_figure", "measured_stress_figure", "restoration_figure"]
 
 _MEASURED_STRESS_EXPANDED = 1.96
 _DECADES = 1e-3
@@ -33,21 +36,12 @@ _LOADS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#0072B2", "#7B
 _SAME_LOAD = 0.05
 
 
-def measured_stress_figure(found: MeasuredStress) -> Figure:
-    """Draw the measured profiles of all loads.
+def measured_stress_figure(measured: MeasuredStress) -> Figure:
+    """Draw the measured profiles of all loads against the distance from the centre.
 
-    Parameters
-    ----------
-    found : MeasuredStress
-        What was measured.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panel a, stress against the distance from the centre; b, the same over three decades.
-        Bars are 95 %; in b, points that are not told from zero are pale and have none.  Lines are
-        the restored stress, blurred by G; ticks at the top mark the radius of the frictionless
-        contact.
+    Panel a linear; b over three decades, where points not distinct from zero are pale and without
+    bars.  Bars are 95 %; lines are the restored stress, blurred by G; ticks at the top mark the
+    radius of the frictionless contact.
     """
     with house_style():
         figure = new_figure(3.6)
@@ -55,34 +49,34 @@ def measured_stress_figure(found: MeasuredStress) -> Figure:
         scales = ("linear scale", "logarithmic scale, three decades")
         for axes, letter, scale in zip(panels, "ab", scales, strict=True):
             axes.set_title(scale, fontsize=8, loc="left")
-            for profile, colour in _coloured(found):
-                _draw(axes, profile, colour, told=axes is panels[1])
+            for profile, colour in _coloured(measured):
+                _draw(axes, profile, colour, logarithmic=axes is panels[1])
             axes.set_xlabel("distance from the centre (mm)")
             axes.set_ylabel(r"measured stress $S_{zz}$ (kPa)")
             axes.set_xlim(left=0.0)
             panel_letter(axes, letter)
         panels[0].axhline(0.0, color="0.8", lw=0.5, zorder=0)
-        top = max(profile.s_zz.max() for profile in found.profiles) / KPA
+        top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
         panels[1].set_yscale("log")
         panels[1].set_ylim(_DECADES * top, 1.6 * top)
         panels[1].yaxis.set_major_formatter("{x:g}")
-        _legend(figure, found)
+        _legend(figure, measured)
     return figure
 
 
-def _coloured(found: MeasuredStress) -> Iterator[tuple[MeasuredProfile, str]]:
+def _coloured(measured: MeasuredStress) -> Iterator[tuple[MeasuredProfile, str]]:
     """Yield each profile with the colour of its load."""
     levels: list[float] = []
-    for load in sorted(profile.load for profile in found.profiles):
+    for load in sorted(profile.load for profile in measured.profiles):
         if not levels or load > levels[-1] * (1 + _SAME_LOAD):
             levels.append(load)
-    for profile in found.profiles:
+    for profile in measured.profiles:
         level = int(np.argmin(np.abs(np.log(np.array(levels) / profile.load))))
         yield profile, _LOADS[level % len(_LOADS)]
 
 
-def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, told: bool) -> None:
-    """Draw a profile; if ``told``, points that are not told from zero are pale, without bars.
+def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: bool) -> None:
+    """Draw a profile; if ``logarithmic``, points not distinct from zero are pale, without bars.
 
     On a logarithmic axis their bars have no lower end.
     """
@@ -95,7 +89,7 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, told: bool) -> N
     }
     axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, **line)
     bars = _MEASURED_STRESS_EXPANDED * profile.s_zz_errors
-    shown = profile.s_zz > bars if told else np.ones(profile.r.size, dtype=np.bool_)
+    shown = profile.s_zz > bars if logarithmic else np.ones(profile.r.size, dtype=np.bool_)
     look: dict[str, Any] = {
         "marker": "s" if lubricated else "o",
         "ls": "none",
@@ -116,14 +110,14 @@ def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, told: bool) -> N
     axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=":" if lubricated else "-")
 
 
-def _legend(figure: Figure, found: MeasuredStress) -> None:
+def _legend(figure: Figure, measured: MeasuredStress) -> None:
     """Name loads by colour and states by mark, once for both panels."""
     handles, seen = [], set()
-    for profile, colour in sorted(_coloured(found), key=lambda pair: pair[0].load):
+    for profile, colour in sorted(_coloured(measured), key=lambda pair: pair[0].load):
         if colour not in seen:
             seen.add(colour)
             handles.append(Line2D([], [], color=colour, lw=2.0, label=f"{profile.load:.3g} N"))
-    for state in dict.fromkeys(profile.lubrication for profile in found.profiles):
+    for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
         lubricated = state == "lubricated"
         handles.append(
             Line2D(
@@ -148,63 +142,57 @@ _RESTORATION_EXPANDED = 2.0
 _LEAST_LIMIT = 3.5
 
 
-def restoration_figure(found: Restoration, compared: Comparison | None = None) -> Figure:
-    """Draw the stress at the base, as restored, as the sensor blurs it, and as calculated.
+def restoration_figure(restored: Restoration, compared: Comparison | None = None) -> Figure:
+    """Draw the stress at the base as restored, as blurred by the sensor, and as calculated.
 
-    Parameters
-    ----------
-    found : Restoration
-        What was restored.
-    compared : Comparison, optional
-        A calculated stress to be shown beside it.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panel a, stress against the distance from the centre; b, residuals against it.
+    Panel a, stress against the distance from the centre; b, residuals against position.
     """
-    compared = found.comparison if compared is None else compared
+    compared = restored.comparison if compared is None else compared
     with house_style():
         figure = new_figure(3.3)
         left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))
-        _draw_stress(left, found, compared)
-        _draw_residuals(right, found)
+        _draw_stress(left, restored, compared)
+        _draw_residuals(right, restored)
         for axes, letter in zip((left, right), "ab", strict=True):
             panel_letter(axes, letter)
     return figure
 
 
-def _draw_stress(axes: Axes, found: Restoration, compared: Comparison | None) -> None:
-    r = found.r / MM
-    stress = found.sigma_zz / KPA
-    band = _RESTORATION_EXPANDED * np.sqrt(np.maximum(np.diag(found.covariance), 0.0)) / KPA
+def _draw_stress(axes: Axes, restored: Restoration, compared: Comparison | None) -> None:
+    r = restored.r / MM
+    stress = restored.sigma_zz / KPA
+    band = _RESTORATION_EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA
     blue = COLOURS["deconvolved"]
     axes.fill_between(r, stress - band, stress + band, color=blue, alpha=0.25, lw=0)
     axes.plot(r, stress, color=blue, label=r"restored $\sigma_{zz}$, ±2u")
-    blurred = found.blurred_stress(found.r) / KPA
+    blurred = restored.blurred_stress(restored.r) / KPA
     axes.plot(r, blurred, color=COLOURS["gaussian"], ls="-.", label=r"blurred again, $G*\sigma$")
     if compared is not None:
-        frictionless = isinstance(compared.stress, Contact)
-        label = "calculated, no friction" if frictionless else "expected"
+        label = "expected"
+        if isinstance(compared.stress, Contact):
+            friction = compared.stress.friction
+            label = f"calculated, {f'friction {friction:.3g}' if friction else 'no friction'}"
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
-    many = found.points.u.size > SCATTER_THRESHOLD
-    size = 1.2 if many else 0.8 * marker_size(found.points.u.size)
-    (points,) = axes.plot(found.distance / MM, found.measured_stress / KPA, ls="none", marker="o")
+    many = restored.points.u.size > SCATTER_THRESHOLD
+    size = 1.2 if many else 0.8 * marker_size(restored.points.u.size)
+    (points,) = axes.plot(
+        restored.distance / MM, restored.measured_stress / KPA, ls="none", marker="o"
+    )
     points.set(color=COLOURS["measured"], ms=size, mfc="none", mew=0.6)
     points.set(label="scan, $S_{zz} = U/A$", rasterized=many)
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set_xlim(0, max(r[-1], float(found.distance.max()) / MM))
+    axes.set_xlim(0, max(r[-1], float(restored.distance.max()) / MM))
     axes.set_xlabel("distance from the centre (mm)")
     axes.set_ylabel("stress at the base (kPa)", labelpad=8)
-    legend_above(axes, columns=2, points=found.points.u.size)
+    legend_above(axes, columns=2, points=restored.points.u.size)
 
 
-def _draw_residuals(axes: Axes, found: Restoration) -> None:
-    """Draw residuals over their noise; what lies beyond the axis stands at its edge."""
-    z = found.residual / found.noise
+def _draw_residuals(axes: Axes, restored: Restoration) -> None:
+    """Draw residuals over their noise; those beyond the axis are drawn at its edge."""
+    z = restored.residual / restored.noise
     limit = max(_LEAST_LIMIT, min(1.1 * float(np.abs(z).max()), 8.0))
     ordinary = np.abs(z) <= limit
-    side = np.where(found.points.free[0, 0], found.points.x, found.points.y) / MM
+    side = np.where(restored.points.free[0, 0], restored.points.x, restored.points.y) / MM
     axes.axhspan(-_RESTORATION_EXPANDED, _RESTORATION_EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     size = marker_size(z.size)
@@ -215,3 +203,106 @@ def _draw_residuals(axes: Axes, found: Restoration) -> None:
     axes.set_ylim(-limit, limit)
     axes.set(xlabel="position (mm)", ylabel="residual / $u$")
     legend_above(axes, columns=1)
+
+
+_MICROMETRE = 1e-6
+#: Radii at which a contact is drawn.
+_RADII = 601
+# A rod's pressure has no largest value: the axis ends at this multiple of its mean.
+_SHOWN_MEANS = 3.0
+# Contacts that the legend names one by one.
+_NAMED = 6
+
+
+def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
+    """Draw one contact, or several such as the states of a loading.
+
+    Panel a, pressure and shear at the interface; b, the same at the base; with several contacts,
+    c, load against depth.
+    """
+    if isinstance(contacts, Contact):
+        contacts = [contacts]
+    if not contacts:
+        raise InputError("There is no contact to draw.")
+    several = len(contacts) > 1
+    with house_style():
+        figure = new_figure(2.9)
+        panels = figure.subplots(1, 3 if several else 2)
+        colours = _shades(len(contacts))
+        _draw_interface(panels[0], contacts, colours)
+        _draw_base(panels[1], contacts, colours)
+        if several:
+            _draw_loading(panels[2], contacts, colours)
+        for axes, letter in zip(panels, "abc", strict=False):
+            panel_letter(axes, letter)
+    return figure
+
+
+def _shades(count: int) -> list[str]:
+    """Return colours that get darker along the path, also in grey."""
+    import matplotlib as mpl
+
+    if count == 1:
+        return [COLOURS["deconvolved"]]
+    shades = mpl.colormaps["viridis_r"](np.linspace(0.15, 1.0, count))
+    return [mpl.colors.to_hex(shade) for shade in shades]
+
+
+def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
+    widest = max(contact.contact_radius for contact in contacts)
+    r = np.linspace(0.0, 1.15 * widest, _RADII)
+    highest = 0.0
+    for i, (contact, colour) in enumerate(zip(contacts, colours, strict=True)):
+        pressure = contact.interface_pressure(r)
+        label = f"{contact.load:.3g} N" if i < _NAMED else None
+        axes.plot(r / MM, pressure / KPA, color=colour, label=label)
+        if contact.friction > 0:
+            axes.plot(r / MM, contact.interface_shear(r) / KPA, color=colour, ls="--")
+        highest = max(highest, _shown_pressure(contact, pressure))
+        _mark_radii(axes, contact, colour)
+    axes.set_ylim(top=1.08 * highest / KPA)
+    axes.plot([], [], color="0.4", marker="|", ms=8, ls="none", label="contact radius")
+    if any(0 < contact.stick_radius < contact.contact_radius for contact in contacts):
+        label = "stick radius"
+        axes.plot([], [], color="0.4", marker="o", ms=3, mfc="none", ls="none", label=label)
+    axes.set_xlim(0, r[-1] / MM)
+    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+    axes.set(xlabel="radius (mm)", ylabel="at the interface (kPa)")
+    legend_above(axes, columns=2)
+
+
+def _shown_pressure(contact: Contact, pressure: FloatArray) -> float:
+    if math.isfinite(contact.max_interface_stress):
+        return float(pressure.max())
+    return _SHOWN_MEANS * contact.load / (math.pi * contact.contact_radius**2)
+
+
+def _mark_radii(axes: Axes, contact: Contact, colour: str) -> None:
+    """Mark the contact radius, and the radius within which the film sticks."""
+    axes.plot(contact.contact_radius / MM, 0.0, marker="|", ms=8, mew=1.2, color=colour)
+    if 0 < contact.stick_radius < contact.contact_radius:
+        axes.plot(contact.stick_radius / MM, 0.0, marker="o", ms=3, mfc="none", color=colour)
+
+
+def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
+    widest = max(contact.contact_radius for contact in contacts)
+    r = np.linspace(0.0, widest + 3 * contacts[0].film.thickness, _RADII)
+    for contact, colour in zip(contacts, colours, strict=True):
+        axes.plot(r / MM, contact.base_stress(r) / KPA, color=colour)
+        axes.plot(r / MM, contact.base_shear(r) / KPA, color=colour, ls="--")
+    axes.plot([], [], color="0.4", label="pressure")
+    axes.plot([], [], color="0.4", ls="--", label="shear, outward")
+    axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
+    axes.set_xlim(0, r[-1] / MM)
+    axes.set(xlabel="radius (mm)", ylabel="at the base (kPa)")
+    legend_above(axes, columns=1)
+
+
+def _draw_loading(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
+    depth = np.array([contact.depth for contact in contacts]) / _MICROMETRE
+    load = np.array([contact.load for contact in contacts])
+    axes.plot(depth, load, color=COLOURS["muted"], lw=0.8)
+    axes.scatter(depth, load, c=list(colours), s=14, zorder=3)
+    axes.set_ylim(bottom=0)
+    axes.set_xlim(left=min(0.0, 1.05 * float(depth.min())))
+    axes.set(xlabel="depth (um)", ylabel="load (N)")

@@ -1,1 +1,1 @@
-"""Measuring with a calibrated sensor: from voltages back to the stress at the film's base."""
+"""Measurement with a calibrated sensor: from voltages to the stress at the film's base."""

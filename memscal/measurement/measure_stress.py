@@ -1,4 +1,4 @@
-"""Contact scans and a calibrated sensor to measured stress: the entry point."""
+"""Measurement of stress from contact scans with a calibrated sensor, with its checks."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
 from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement.measured_profile import (
-    PreparedScan,
-    measured_profile,
-    measured_scan,
-    prepared_scan,
-)
-from memscal.measurement.restoration import Restoration, accept_mismatches, require_covariance
-from memscal.measurement.restore import (
-    failed_calibration_messages,
-    noise_unstated_message,
-    restore_known,
-)
-from memscal.measurement.single_loads import (
     ContactSignal,
+    PreparedScan,
     SingleLoad,
     contact_signal,
+    measured_profile,
+    measured_scan,
     place_of,
+    prepared_scan,
     require_ends,
     require_points,
     single_loads,
+)
+from memscal.measurement.restoration import Restoration
+from memscal.measurement.restore import (
+    accept_mismatches,
+    failed_calibration_messages,
+    noise_unstated_message,
+    require_covariance,
+    restore_known,
 )
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
@@ -55,6 +55,7 @@ from memscal.parallel import single_threaded
 from memscal.version import __version__
 
 __all__ = [
+    "SHARED_SOURCES",
     "check_of_all_forces",
     "checks_of_restoration",
     "joined_stress",
@@ -62,6 +63,9 @@ __all__ = [
     "pooled_force",
     "stress_checks",
 ]
+
+#: Sources of a force's uncertainty that all profiles have in common.
+SHARED_SOURCES = ("apparatus", "film", "position_scale")
 
 _FORCE_LIMIT = 3.0
 #: One check of all profiles together may be stricter than one for each.
@@ -78,9 +82,9 @@ _BLIND = (
     " It does not depend on the shape of G nor on the film's thickness, and tells nothing of them: "
     "a film thickness that is wrong shows as another width of G in the calibration."
 )
-#: Of a restoration's own checks, the force's is made here.
+#: The restoration's check of the force is replaced by that of the profile.
 _REPLACED = "restored_force"
-#: Without a noise that is stated there is nothing to compare the scatter with.
+#: Checks that compare the scatter with a stated noise.
 _OF_STATED_NOISE = ("noise_as_stated", "chi_square")
 
 
@@ -89,16 +93,16 @@ def stress_checks(
 ) -> tuple[QualityCheck, ...]:
     """Return the checks of each profile, numbered from one, then those of all together.
 
-    ``restored``: what :func:`checks_of_restoration` says of each profile.
+    ``restored``: :func:`checks_of_restoration` of each profile.
     """
-    found = [
-        replace(one, name=f"{one.name}_{i + 1}", meaning=f"{profile.label}: {one.meaning}")
-        for i, (profile, own) in enumerate(zip(profiles, restored, strict=True))
-        for one in (_force(profile), *own)
+    checks = [
+        replace(check, name=f"{check.name}_{i + 1}", meaning=f"{profile.label}: {check.meaning}")
+        for i, (profile, others) in enumerate(zip(profiles, restored, strict=True))
+        for check in (_force(profile), *others)
     ]
     if len(profiles) > 1:
-        found.append(check_of_all_forces(profiles))
-    return tuple(found)
+        checks.append(check_of_all_forces(profiles))
+    return tuple(checks)
 
 
 def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
@@ -106,22 +110,20 @@ def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
 
     The load's common uncertainty counts; that of each load of one profile does not.
     """
-    parts = [_relative(profile) for profile in profiles]
-    own = np.array([part["own"] for part in parts])
-    weight = own**-2 / np.sum(own**-2)
+    budgets = [_relative(profile) for profile in profiles]
+    scan = np.array([budget["scan"] for budget in budgets])
+    weight = scan**-2 / np.sum(scan**-2)
     ratio = np.array([profile.force / profile.load for profile in profiles])
-    variance = float(np.sum((weight * own) ** 2))
-    for source in ("apparatus", "film", "position_scale", "load"):
-        variance += float(weight @ [part[source] for part in parts]) ** 2
+    variance = float(np.sum((weight * scan) ** 2))
+    for source in (*SHARED_SOURCES, "load"):
+        variance += float(weight @ [budget[source] for budget in budgets]) ** 2
     return float(weight @ ratio), math.sqrt(variance)
 
 
 def _relative(profile: MeasuredProfile) -> dict[str, float]:
     """Standard uncertainties of force over load, by source."""
     budget = {source: u / profile.load for source, u in profile.force_budget.items()}
-    own = budget.pop("scan")
-    common = profile.load_uncertainty or 0.0
-    return {"own": own, **budget, "load": common / profile.load}
+    return {**budget, "load": (profile.load_uncertainty or 0.0) / profile.load}
 
 
 def checks_of_restoration(restoration: Restoration, *, stated: bool) -> tuple[QualityCheck, ...]:
@@ -130,7 +132,7 @@ def checks_of_restoration(restoration: Restoration, *, stated: bool) -> tuple[Qu
     ``stated``: whether the noise is, or was estimated from the scatter.
     """
     left_out = {_REPLACED} if stated else {_REPLACED, *_OF_STATED_NOISE}
-    return tuple(one for one in restoration.checks if one.name not in left_out)
+    return tuple(check for check in restoration.checks if check.name not in left_out)
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:
@@ -190,8 +192,7 @@ def measure_stress(
     Parameters
     ----------
     scan : Scan or path, or a sequence of them
-        Scans with a sphere or a rod; ``normal_load`` tells the loads of one scan apart, line by
-        line.
+        Scans with a sphere or a rod; ``normal_load`` states the load of each line.
     apparatus : ApparatusFunction or path
         The calibrated sensor.
     override : bool
@@ -222,74 +223,68 @@ def measure_stress(
     >>> abs(profile.force - profile.load) < 3 * profile.force_uncertainty
     True
     """
-    known, scans = opened_apparatus(apparatus), opened_scans(scan)
-    require_covariance(known)
+    sensor, scans = opened_apparatus(apparatus), opened_scans(scan)
+    require_covariance(sensor)
     overridden = tuple(
         text
-        for one in scans
-        for text in accept_mismatches(one, known, place_of(one), override=override)
+        for data in scans
+        for text in accept_mismatches(data, sensor, place_of(data), override=override)
     )
-    origins = tuple(measured_scan(one) for one in scans)
+    origins = tuple(measured_scan(data) for data in scans)
     loads = [
-        _measure(origin, part, known)
-        for origin, one in zip(origins, scans, strict=True)
-        for part in single_loads(one)
+        _measure(origin, single, sensor)
+        for origin, data in zip(origins, scans, strict=True)
+        for single in single_loads(data)
     ]
     profiles = tuple(load.profile for load in loads)
     checks = stress_checks(profiles, [load.checks for load in loads])
     return MeasuredStress(
         profiles=profiles,
         scans=origins,
-        conversion_constant=known.conversion_constant,
-        conversion_constant_uncertainty=known.parameters.uncertainty("conversion_constant"),
+        conversion_constant=sensor.conversion_constant,
+        conversion_constant_uncertainty=sensor.parameters.uncertainty("conversion_constant"),
         checks=checks,
         overridden=overridden,
         process=_process(
-            {"override": bool(override)}, tuple(_messages(loads, known, checks, overridden))
+            {"override": bool(override)}, tuple(_messages(loads, sensor, checks, overridden))
         ),
-        artifact=known.source,
-        artifact_digest=known.content_digest,
+        artifact=sensor.source,
+        artifact_digest=sensor.content_digest,
     )
 
 
-def joined_stress(parts: Sequence[MeasuredStress]) -> MeasuredStress:
-    """Return several measured stresses as one: profiles in their order, checks numbered anew.
-
-    Raises
-    ------
-    InputError
-        If they were measured with different apparatus functions.
-    """
-    first = parts[0]
-    if len(parts) == 1:
+def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
+    """Return measured stresses of one apparatus function as one, checks numbered anew."""
+    first = stresses[0]
+    if len(stresses) == 1:
         return first
-    if len({part.artifact_digest for part in parts}) > 1:
+    if len({stress.artifact_digest for stress in stresses}) > 1:
         raise InputError(
             "The measured stresses are of different apparatus functions: their digests differ.",
             why="What is compared together shares one sensor and its calibration.",
             cure="Measure all of them with one artifact (memscal apply ARTIFACT SCAN...).",
         )
-    profiles = tuple(profile for part in parts for profile in part.profiles)
-    starts = np.cumsum([0, *(len(part.profiles) for part in parts)])
+    profiles = tuple(profile for stress in stresses for profile in stress.profiles)
+    starts = np.cumsum([0, *(len(stress.profiles) for stress in stresses)])
     checks = [
-        replace(one, name=f"{numbered[1]}_{int(numbered[2]) + start}")
-        for part, start in zip(parts, starts, strict=False)
-        for one in part.checks
-        if (numbered := _NUMBERED.fullmatch(one.name))
+        replace(check, name=f"{numbered[1]}_{int(numbered[2]) + start}")
+        for stress, start in zip(stresses, starts, strict=False)
+        for check in stress.checks
+        if (numbered := _NUMBERED.fullmatch(check.name))
     ]
     # What failed is said by the checks, under their new numbers.
     messages = [
-        replace(message, text=f"{_files_of(part)}: {message.text}")
-        for part in parts
-        for message in part.messages
+        replace(message, text=f"{_files_of(stress)}: {message.text}")
+        for stress in stresses
+        for message in stress.messages
         if message.kind != FAILED_CHECK
     ]
     return replace(
         first,
         profiles=profiles,
-        scans=tuple(scan for part in parts for scan in part.scans),
+        scans=tuple(scan for stress in stresses for scan in stress.scans),
         checks=(*checks, check_of_all_forces(profiles)),
-        overridden=tuple(text for part in parts for text in part.overridden),
+        overridden=tuple(text for stress in stresses for text in stress.overridden),
         process=replace(first.process, messages=tuple(dict.fromkeys(messages))),
     )
 
@@ -316,54 +311,54 @@ def _process(configuration: Mapping[str, Any], messages: tuple[Message, ...]) ->
 
 @dataclass(frozen=True, eq=False)
 class _MeasuredLoad:
-    """The profile of one load, and what its restoration says of it."""
+    """The profile of one load, with checks and messages of its restoration."""
 
     profile: MeasuredProfile
     checks: tuple[QualityCheck, ...]
     messages: tuple[Message, ...]
 
 
-def _measure(origin: MeasuredScan, part: SingleLoad, known: ApparatusFunction) -> _MeasuredLoad:
-    signal = contact_signal(part, known)
-    require_points(part, signal)
-    prepared = _prepared(part, known, signal)
+def _measure(origin: MeasuredScan, single: SingleLoad, sensor: ApparatusFunction) -> _MeasuredLoad:
+    signal = contact_signal(single, sensor)
+    require_points(single, signal)
+    prepared = _prepared(single, sensor, signal)
     try:
-        found = restore_known(prepared.scan, known)
+        restored = restore_known(prepared.scan, sensor)
     except (FitError, InputError) as failure:
-        raise _placed(failure, part) from failure
-    require_ends(part, signal, found.centre)
-    profile = measured_profile(origin, part, prepared, found, signal)
-    estimated = prepared.noise_found or found.points.u_errors is None
+        raise _placed(failure, single) from failure
+    require_ends(single, signal, restored.centre)
+    profile = measured_profile(origin, single, prepared, restored, signal)
+    estimated = prepared.noise_estimated or restored.points.u_errors is None
     noise = profile.points["zz"].noise if estimated else None
     return _MeasuredLoad(
         profile=profile,
-        checks=checks_of_restoration(found, stated=not estimated),
-        messages=tuple(_of_profile(part.scan, found, noise)),
+        checks=checks_of_restoration(restored, stated=not estimated),
+        messages=tuple(_of_profile(single.scan, restored, noise)),
     )
 
 
-def _prepared(part: SingleLoad, known: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
+def _prepared(single: SingleLoad, sensor: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
     try:
-        return prepared_scan(part, known, signal)
+        return prepared_scan(single, sensor, signal)
     except (FitError, InputError) as failure:
         # A scan that is too short fails here already, and in less plain words.
-        scan = part.scan
+        scan = single.scan
         if scan.y is None:
             top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
-            require_ends(part, signal, np.full(2, scan.x[top]))
-        raise _placed(failure, part) from failure
+            require_ends(single, signal, np.full(2, scan.x[top]))
+        raise _placed(failure, single) from failure
 
 
-def _placed(failure: FitError | InputError, part: SingleLoad) -> FitError | InputError:
+def _placed(failure: FitError | InputError, single: SingleLoad) -> FitError | InputError:
     """Say in which file and at which load something failed."""
     return type(failure)(
-        f"{place_of(part.scan, part)}: {failure.problem}", why=failure.why, cure=failure.cure
+        f"{place_of(single.scan, single)}: {failure.problem}", why=failure.why, cure=failure.cure
     )
 
 
 def _messages(
     loads: Sequence[_MeasuredLoad],
-    known: ApparatusFunction,
+    sensor: ApparatusFunction,
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
 ) -> Iterator[Message]:
@@ -371,7 +366,7 @@ def _messages(
     yield from failed_check_messages(checks)
     for text in overridden:
         yield Message("overridden", f"Overridden: {text}.", "warning")
-    yield from failed_calibration_messages(known)
+    yield from failed_calibration_messages(sensor)
     # What is true of every profile is said once.
     numbers: dict[Message, list[str]] = {}
     for i, load in enumerate(loads):
@@ -383,8 +378,8 @@ def _messages(
         yield replace(message, text=f"{place}{message.text}")
 
 
-def _of_profile(scan: Scan, found: Restoration, noise: FloatArray | None) -> Iterator[Message]:
-    """Yield what one load should be known for; ``noise``: where it was estimated, in V."""
+def _of_profile(scan: Scan, restored: Restoration, noise: FloatArray | None) -> Iterator[Message]:
+    """Yield what one load should know of; ``noise``: where it was estimated, in V."""
     if noise is not None:
         yield noise_unstated_message(float(noise.min()))
     if scan.normal_load is not None and scan.normal_load_errors is None:
@@ -394,6 +389,6 @@ def _of_profile(scan: Scan, found: Restoration, noise: FloatArray | None) -> Ite
         )
     if not scan.lubrication:
         yield Message("lubrication_unstated", "The scan does not state its lubrication.")
-    for message in found.messages:
+    for message in restored.messages:
         if message.kind not in _SAID_OF_ALL:
             yield message

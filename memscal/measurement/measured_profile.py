@@ -1,19 +1,20 @@
-r"""From the restored stress of one load to its measured profile, with its covariance by source.
+r"""Measured profiles: the lines of each load of a scan, and their profile with its covariance.
 
-The voltages less baseline and drift, over A.  What is uncertain besides their noise: A, the same
-for all; and centre, baseline and drift, with their joint covariance :math:`\Sigma` and the columns
-:math:`J = -[\partial U/\partial c,\ 1,\ \xi]/A`.  Of :math:`J\Sigma J^T` the part that the centre
-explains is its own, the rest the baseline's, so that both are covariances and their sum is exact.
+A measured voltage less baseline and drift, over A.  What is uncertain besides the noise: A, the
+same for all; and centre, baseline and drift, with their joint covariance :math:`\Sigma` and the
+columns :math:`J = -[\partial U/\partial c,\ 1,\ \xi]/A`.  Of :math:`J\Sigma J^T` what the centre
+explains is the centre's, the rest the baseline's: both are covariances and their sum is exact.
 That baseline and centre come from the same voltages is not counted: where the stress has decayed
 it would make the uncertainties a little smaller.
 
 The stress on the axis is the restored one, blurred by G.  An error of A or G changes what is
 restored so that it still meets the voltages: blurred again, nothing is left of an error of G but
-what the scan does not tell, and an error of A is left whole.
+what the scan does not determine, and an error of A is left whole.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -21,21 +22,252 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.apparatus import ApparatusFunction
-from memscal.errors import FitError, InputError
+from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.errors import DomainError, FitError, InputError
 from memscal.estimation.points import TANGENTIAL, ScanPoints, channel_signal, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.measurement.posterior import apparatus_changes, sensor_transfer
-from memscal.measurement.pressure import film_transfer
+from memscal.measurement.posterior import apparatus_changes, film_transfer, sensor_transfer
 from memscal.measurement.restoration import Restoration
 from memscal.measurement.restore import gaussian_pressure
-from memscal.measurement.single_loads import ContactSignal, SingleLoad
+from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
+from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
-__all__ = ["PreparedScan", "measured_profile", "measured_scan", "prepared_scan"]
+__all__ = [
+    "ContactSignal",
+    "PreparedScan",
+    "SingleLoad",
+    "contact_signal",
+    "measured_profile",
+    "measured_scan",
+    "place_of",
+    "prepared_scan",
+    "require_ends",
+    "require_points",
+    "single_loads",
+]
 
-#: Centre and noise are found twice, the second time from what the first one made of the scan.
+#: Lines whose loads differ by less than this are repeats of one load.
+_SAME_LOAD = 0.05
+#: Recorded loads of one line scatter by less than this about their median.
+_SCATTER = 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class SingleLoad:
+    """The lines of a scan that were made at one nominal load, in N.
+
+    ``scan``: their voltages, with the nominal ``load`` and the recorded ``normal_load``;
+    ``lubrication``: ``"dry"``, ``"lubricated"`` or empty.
+    """
+
+    scan: Scan
+    load: float
+    lubrication: str
+
+    @property
+    def label(self) -> str:
+        """Load and lubrication in words, as in ``"0.34 N, dry"``."""
+        return ", ".join(words for words in (f"{self.load:.4g} N", self.lubrication) if words)
+
+
+def single_loads(scan: Scan) -> tuple[SingleLoad, ...]:
+    """Split a scan by load, the smallest first; one that records no loads stays whole.
+
+    Lines (rows of ``u_zz``, or points of one ``repeat``) whose median loads lie within 5 % of
+    each other are repeats of one load; its nominal value is the median of all of their recorded
+    loads.  A line at several loads, or without any, raises an InputError.
+    """
+    if scan.normal_load is None:
+        return (SingleLoad(scan, scan.load, scan.lubrication),)
+    passes = scan.passes
+    if scan.kind != "repeats" and not passes.any():
+        load = _line_load(scan, scan.normal_load, "")
+        return (SingleLoad(replace(scan, load=load), load, scan.lubrication),)
+    rows = [scan.normal_load[passes == i] for i in range(int(passes.max()) + 1)]
+    loads = np.array([_line_load(scan, row, f", line {i + 1}") for i, row in enumerate(rows)])
+    order = np.argsort(loads, kind="stable")
+    starts = np.flatnonzero(np.diff(loads[order]) > _SAME_LOAD * loads[order][:-1]) + 1
+    return tuple(_lines_of(scan, np.sort(group)) for group in np.split(order, starts))
+
+
+def place_of(scan: Scan, single: SingleLoad | None = None) -> str:
+    """Name a scan's file and a load in it, for messages."""
+    name = "The scan" if scan.source is None else scan.source.file_name
+    return name if single is None else f"{name}, {single.label}"
+
+
+def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
+    recorded = loads[np.isfinite(loads)]
+    if not recorded.size:
+        raise InputError(
+            f"{place_of(scan)}{line}: every load is missing (NaN in normal_load).",
+            why="The stress under a curved indenter depends on its load.",
+            cure="State the loads, or leave normal_load out where there is one nominal load only.",
+        )
+    load = float(np.median(recorded))
+    if np.abs(recorded - load).max() > _SCATTER * load:
+        raise InputError(
+            f"{place_of(scan)}{line}: its loads go from {recorded.min():.4g} to "
+            f"{recorded.max():.4g} N.",
+            why="A line is one profile, made at one load; each load has a stress of its own.",
+            cure="Store each load as a line of its own: u_zz with the axes (repeat, x), or points "
+            "with a number in repeat.",
+        )
+    return load
+
+
+def _lines_of(scan: Scan, rows: NDArray[np.intp]) -> SingleLoad:
+    only = scan.only_passes(rows)
+    assert only.normal_load is not None
+    load = float(np.nanmedian(only.normal_load))
+    common = scan.load_uncertainty
+    uncertainty = None if common is None else common * load / scan.load
+    return SingleLoad(
+        replace(only, load=load, load_uncertainty=uncertainty), load, scan.lubrication
+    )
+
+
+_LARGEST_KH = 20.0
+_LOAD_STEP = 0.02
+#: Enough for 1e-4 of the derivative, in half the time that convergence to 1e-4 takes.
+_RINGS = 24
+#: Distances at which the profile is tabulated, out to the scan's width.
+_DISTANCES = 401
+#: What the calculated profile may have left at the ends of a scan, over its maximum.
+_LARGEST_END = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSignal:
+    """The contact at a nominal load as the sensor reports it, without friction and sticking.
+
+    ``r`` (n,): distances from the centre, in m; ``voltage`` and ``by_load`` (2, n): the voltages of
+    both and their derivatives by the logarithm of the load, in V; ``contact_radius`` in m, without
+    friction.
+    """
+
+    r: FloatArray
+    voltage: FloatArray
+    by_load: FloatArray
+    contact_radius: float
+
+    def slope(self, distance: FloatArray, sticking: float = 0.0) -> FloatArray:
+        """Derivative of the voltage by the logarithm of the load, at distances in m, in V.
+
+        ``sticking``: how far from the frictionless contact to the one that sticks.
+        """
+        between = (1 - sticking) * self.by_load[0] + sticking * self.by_load[1]
+        return np.asarray(np.interp(distance, self.r, between))
+
+    def sticking(self, distance: float, voltage: float) -> float:
+        """How far from the frictionless voltage to the sticking one a measured one is, 0 to 1.
+
+        At a distance in m near the axis, where friction raises the stress.
+        """
+        free, stuck = (float(np.interp(distance, self.r, curve)) for curve in self.voltage)
+        return min(max((voltage - free) / (stuck - free), 0.0), 1.0) if stuck > free else 0.0
+
+    def share(self, distance: float) -> float:
+        """Frictionless voltage at a distance (m) over the largest."""
+        free = self.voltage[0]
+        return float(np.interp(distance, self.r, free) / free.max())
+
+
+def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactSignal:
+    """Calculate the contacts of one nominal load, and near it.
+
+    A lubricated contact, and a rod's, is taken as frictionless.  A load beyond the model of the
+    contact raises a DomainError.
+    """
+    scan, load = single.scan, single.load
+    loads = load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
+    slides = single.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
+    try:
+        contacts = [
+            indent(scan.film, scan.indenter, load=loads, friction=friction, rings=_RINGS)
+            for friction in ((0.0,) if slides else (0.0, math.inf))
+        ]
+    except DomainError as failure:
+        raise DomainError(
+            f"{place_of(scan, single)}: {failure.problem}",
+            why="The measured stress is compared with a contact that the model cannot hold for.",
+            cure="Leave that load out; check its unit.",
+        ) from failure
+    width = float(np.hypot(np.ptp(scan.x), 0.0 if scan.y is None else np.ptp(scan.y)))
+    r = np.linspace(0.0, 1.5 * width, _DISTANCES)
+    nodes = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, 3 * width)
+    through = apparatus.conversion_constant * sensor_transfer(apparatus, nodes.k)
+    spectra = [through * contact.base_spectrum(nodes.k) for path in contacts for contact in path]
+    voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T.reshape(-1, loads.size, r.size)
+    # Without friction both are the frictionless contact.
+    below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
+    slope = (above - below) / (2 * _LOAD_STEP)
+    return ContactSignal(r, at, slope, contacts[0][1].contact_radius)
+
+
+def require_points(single: SingleLoad, signal: ContactSignal) -> None:
+    """Refuse a load whose points are all missing (NaN), or over more than a contact's radius."""
+    scan = single.scan
+    complete = np.ones_like(scan.u_zz, dtype=np.bool_)
+    for values in (scan.u_zz, scan.normal_load):
+        if values is not None:
+            complete &= np.isfinite(values)
+    if not complete.any():
+        raise InputError(
+            f"{place_of(scan, single)}: all {complete.size} points are missing (NaN).",
+            why="A load without voltages has no profile.",
+            cure="Check the import, or leave the lines of that load out.",
+        )
+    if scan.y is not None:
+        return
+    order = np.argsort(scan.x)
+    x, measured = scan.x[order], (complete.reshape(-1, scan.x.size).sum(axis=0) > 0)[order]
+    places = np.flatnonzero(measured)
+    missing = np.diff(places) - 1
+    gaps = np.where(missing > 0, np.diff(x[places]), 0.0)
+    if gaps.size and gaps.max() > signal.contact_radius:
+        i = int(np.argmax(gaps))
+        raise InputError(
+            f"{place_of(scan, single)}: {missing[i]} neighbouring points are missing (NaN), from "
+            f"{x[places[i] + 1] * 1e3:.4g} to {x[places[i + 1] - 1] * 1e3:.4g} mm.",
+            why=f"The gap is wider than the contact's radius, {signal.contact_radius * 1e3:.3g} "
+            "mm: the profile within it would be the model's, not measured.",
+            cure="Measure these points again, or leave the lines of that load out.",
+        )
+
+
+def require_ends(single: SingleLoad, signal: ContactSignal, centre: FloatArray) -> None:
+    """Refuse a scan that ends where the calculated profile exceeds 5 % of its maximum.
+
+    The baseline would be undetermined.
+    """
+    scan = single.scan
+    measured = np.isfinite(scan.u_zz)
+    if scan.y is None:
+        x = scan.x[measured.reshape(-1, scan.x.size).any(axis=0)]
+        along = centre[0 if scan.direction == "x" else 1]
+        ends = [abs(float(x.min() - along)), abs(float(x.max() - along))]
+    else:
+        ends = [
+            abs(float(e - c))
+            for a, c in ((scan.x, centre[0]), (scan.y, centre[1]))
+            for e in (a.min(), a.max())
+        ]
+    left = max(signal.share(end) for end in ends)
+    if left > _LARGEST_END:
+        raise FitError(
+            f"{place_of(scan, single)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "
+            f"where the calculated profile still has {left:.0%} of its maximum.",
+            why="The voltage never comes down to the baseline, so that it cannot be told from the "
+            "stress.",
+            cure="Scan farther on that side; to where the profile has decayed.",
+        )
+
+
+#: Centre and noise are estimated twice, the second time from the first one's scan.
 _ROUNDS = 2
 #: Noises that are tried, over the scatter of the residuals.
 _TRIED = np.geomspace(0.02, 2.0, 120)
@@ -46,40 +278,35 @@ class PreparedScan:
     """A scan at one load, and the noise that its voltages have.
 
     ``scan``: voltages for the nominal load, ``u_zz_errors`` with the scatter of the loads;
-    ``electronic``: electronic noise of each voltage, in V, zero where it is left to be found;
-    ``noise_found``: whether it was found here.
+    ``electronic``: electronic noise of each voltage, in V, zero where it is not stated;
+    ``noise_estimated``: whether it was estimated here.
     """
 
     scan: Scan
     electronic: FloatArray
-    noise_found: bool
+    noise_estimated: bool
 
 
 def prepared_scan(
-    part: SingleLoad, apparatus: ApparatusFunction, signal: ContactSignal
+    single: SingleLoad, apparatus: ApparatusFunction, signal: ContactSignal
 ) -> PreparedScan:
-    """Bring every point of a part to its nominal load, and state its noise.
-
-    Raises
-    ------
-    InputError, FitError
-        If the part determines no centre.
-    """
-    scan = part.scan
-    prepared = PreparedScan(_at_nominal(part, np.zeros_like(scan.u_zz)), _stated(scan), False)
+    """Bring every point to its nominal load, and state its noise; there has to be a centre."""
+    scan = single.scan
+    prepared = PreparedScan(_at_nominal(single, np.zeros_like(scan.u_zz)), _stated(scan), False)
     if scan.normal_load is None:
         return prepared
     for _ in range(_ROUNDS):
         points = measured_points(prepared.scan)
         estimate, _ = gaussian_pressure(prepared.scan, apparatus, points)
         slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
-        of_load = _load_noise(part, slope)
-        electronic, found = _stated(scan), False
+        of_load = _load_noise(single, slope)
+        electronic, estimated = _stated(scan), False
         if scan.u_zz_errors is None and of_load.any():
             kept = np.isfinite(prepared.scan.u_zz)
-            electronic, found = np.full_like(slope, _noise_of_load(estimate, of_load[kept])), True
-        level = _at_nominal(part, slope)
-        prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, found)
+            noise = _noise_of_load(estimate, of_load[kept])
+            electronic, estimated = np.full_like(slope, noise), True
+        level = _at_nominal(single, slope)
+        prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, estimated)
     return prepared
 
 
@@ -94,18 +321,18 @@ def _stated(scan: Scan) -> FloatArray:
     return np.zeros_like(scan.u_zz) if scan.u_zz_errors is None else scan.u_zz_errors
 
 
-def _at_nominal(part: SingleLoad, slope: FloatArray) -> Scan:
-    """Return the part at its nominal load; points without a load are missing."""
-    scan = part.scan
+def _at_nominal(single: SingleLoad, slope: FloatArray) -> Scan:
+    """Return the scan at its nominal load; points without a load are missing."""
+    scan = single.scan
     if scan.normal_load is None:
         return scan
-    shift = slope * np.log(scan.normal_load / part.load)
+    shift = slope * np.log(scan.normal_load / single.load)
     return replace(scan, u_zz=scan.u_zz - shift, normal_load=None, normal_load_errors=None)
 
 
-def _load_noise(part: SingleLoad, slope: FloatArray) -> FloatArray:
-    errors = part.scan.normal_load_errors
-    share = 0.0 if errors is None else np.nan_to_num(errors) / part.load
+def _load_noise(single: SingleLoad, slope: FloatArray) -> FloatArray:
+    errors = single.scan.normal_load_errors
+    share = 0.0 if errors is None else np.nan_to_num(errors) / single.load
     return np.abs(slope) * share
 
 
@@ -166,63 +393,65 @@ def measured_scan(scan: Scan) -> MeasuredScan:
 
 def measured_profile(
     scan: MeasuredScan,
-    part: SingleLoad,
+    single: SingleLoad,
     prepared: PreparedScan,
-    found: Restoration,
+    restored: Restoration,
     signal: ContactSignal,
 ) -> MeasuredProfile:
     """Return the measured profile of one load of a scan from its restored stress."""
-    a, estimate = found.apparatus.conversion_constant, found.posterior.estimate
-    noise = found.noise / np.sqrt(estimate.outlier_weight)
-    average, x, y = _averaging(found, noise)
-    level = average @ (found.points.u - _background(found))
-    r = np.hypot(x - found.centre[0], y - found.centre[1])
+    a, estimate = restored.apparatus.conversion_constant, restored.posterior.estimate
+    noise = restored.noise / np.sqrt(estimate.outlier_weight)
+    average, x, y = _averaging(restored, noise)
+    level = average @ (restored.points.u - _background(restored))
+    r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
     average, s_zz = average[order], level[order] / a
-    root = average @ (found.noise_root / a)
-    relative = found.apparatus.parameters.uncertainty("conversion_constant") / a
+    root = average @ (restored.noise_root / a)
+    relative = restored.apparatus.parameters.uncertainty("conversion_constant") / a
     covariances = {
         "noise": root @ root.T,
         "conversion_constant": np.outer(s_zz, s_zz) * relative**2,
-        **_of_place(found, average),
+        **_of_place(restored, average),
     }
-    maximum, budget = _on_axis(found)
+    maximum, budget = _on_axis(restored)
     curve_r = np.linspace(0.0, float(r[order][-1]), _CURVE)
     return MeasuredProfile(
         scan=scan,
-        load=part.load,
-        load_uncertainty=part.scan.load_uncertainty,
+        load=single.load,
+        load_uncertainty=single.scan.load_uncertainty,
         x=x[order],
         y=y[order],
         r=r[order],
         s_zz=s_zz,
         covariances=covariances,
-        force=found.force,
-        force_budget=found.force_budget,
+        force=restored.force,
+        force_budget=restored.force_budget,
         maximum=maximum,
         maximum_budget=budget,
-        centre=found.centre,
-        centre_uncertainty=found.centre_uncertainty,
-        baseline=found.baseline,
-        baseline_uncertainty=found.baseline_uncertainty,
+        centre=restored.centre,
+        centre_uncertainty=restored.centre_uncertainty,
+        baseline=restored.baseline,
+        baseline_uncertainty=restored.baseline_uncertainty,
         contact_radius=signal.contact_radius,
         curve_r=curve_r,
-        curve_s_zz=found.blurred_stress(curve_r),
-        points=_points(part.scan, prepared, found),
+        curve_s_zz=restored.blurred_stress(curve_r),
+        points=_points(single.scan, prepared, restored),
     )
 
 
-def _points(scan: Scan, prepared: PreparedScan, found: Restoration) -> Mapping[str, MeasuredPoints]:
+def _points(
+    scan: Scan, prepared: PreparedScan, restored: Restoration
+) -> Mapping[str, MeasuredPoints]:
     """Return the points of one load by channel, as they were measured."""
     normal = measured_points(scan)
-    weight = found.posterior.estimate.outlier_weight
-    noise = _noise_in_shape(prepared, found)[_kept(scan, "zz")]
+    weight = restored.posterior.estimate.outlier_weight
+    noise = _noise_in_shape(prepared, restored)[_kept(scan, "zz")]
     points = {"zz": _of_channel(scan, normal, noise, weight)}
     for channel in TANGENTIAL:
         try:
             shear = measured_points(scan, channel)
         except (InputError, FitError):
-            # The normal stress does not need it; a comparison of the shear says what is missing.
+            # The normal stress does not need it; a comparison of the shear states what is missing.
             continue
         points[channel] = _of_channel(scan, shear, shear.u_errors, np.ones_like(shear.u))
     return points
@@ -261,28 +490,32 @@ def _kept(scan: Scan, channel: str) -> NDArray[np.bool_]:
     return kept
 
 
-def _averaging(found: Restoration, noise: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _averaging(
+    restored: Restoration, noise: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Matrix (n, points) that averages repeats by their weight, and the n positions."""
-    places = np.stack([found.points.x, found.points.y])
+    places = np.stack([restored.points.x, restored.points.y])
     unique, back = np.unique(places, axis=1, return_inverse=True)
     average = np.zeros((unique.shape[1], noise.size))
     average[back.ravel(), np.arange(noise.size)] = noise**-2
     return average / average.sum(axis=1, keepdims=True), unique[0], unique[1]
 
 
-def _background(found: Restoration) -> FloatArray:
-    drift = found.posterior.state[found.posterior.nodes + int(found.points.free.sum()) :]
-    return np.asarray(found.posterior.estimate.model.drift_columns @ drift)
+def _background(restored: Restoration) -> FloatArray:
+    drift = restored.posterior.state[restored.posterior.nodes + int(restored.points.free.sum()) :]
+    return np.asarray(restored.posterior.estimate.model.drift_columns @ drift)
 
 
-def _of_place(found: Restoration, average: FloatArray) -> Mapping[str, FloatArray]:
+def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatArray]:
     """Covariance that centre, baseline and drift bring, shared out without a rest."""
-    posterior, model = found.posterior, found.posterior.estimate.model
-    nodes, free = posterior.nodes, found.points.free
-    geometry = model.geometry(np.atleast_2d(found.centre))
-    pressure = posterior.state[:nodes] / found.scan.load / film_transfer(found.scan.film, model.k)
+    posterior, model = restored.posterior, restored.posterior.estimate.model
+    nodes, free = posterior.nodes, restored.points.free
+    geometry = model.geometry(np.atleast_2d(restored.centre))
+    pressure = (
+        posterior.state[:nodes] / restored.scan.load / film_transfer(restored.scan.film, model.k)
+    )
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
-    columns = [average @ column / found.apparatus.conversion_constant for column in columns]
+    columns = [average @ column / restored.apparatus.conversion_constant for column in columns]
     sigma, n = posterior.covariance[nodes:, nodes:], int(free.sum())
     carried = np.linalg.solve(sigma[:n, :n], sigma[:n, n:])
     of_centre = columns[0] + columns[1] @ carried.T
@@ -293,9 +526,9 @@ def _of_place(found: Restoration, average: FloatArray) -> Mapping[str, FloatArra
     }
 
 
-def _on_axis(found: Restoration) -> tuple[float, Mapping[str, float]]:
+def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     """Return the blurred stress on the axis and its standard uncertainty by source, in Pa."""
-    posterior, apparatus = found.posterior, found.apparatus
+    posterior, apparatus = restored.posterior, restored.apparatus
     wavenumbers = posterior.estimate.model.reference.wavenumbers
     nodes, k = posterior.nodes, wavenumbers.k
     on_axis = wavenumbers.synthesise(np.eye(nodes), np.zeros(1))[0]
@@ -312,8 +545,8 @@ def _on_axis(found: Restoration) -> tuple[float, Mapping[str, float]]:
     return maximum, {"noise": float(np.sqrt(max(noise, 0.0))), **budget}
 
 
-def _noise_in_shape(prepared: PreparedScan, found: Restoration) -> FloatArray:
-    """Electronic noise of every voltage: where nothing else scatters, what restoration found."""
+def _noise_in_shape(prepared: PreparedScan, restored: Restoration) -> FloatArray:
+    """Electronic noise of every voltage: that of the restoration where only it scatters."""
     if prepared.electronic.any():
         return prepared.electronic
-    return np.full(prepared.scan.u_zz.shape, float(found.noise.min()))
+    return np.full(prepared.scan.u_zz.shape, float(restored.noise.min()))

@@ -1,20 +1,37 @@
 r"""The restored stress as a posterior over shapes of pressure, their departures, and the inputs.
 
-The base stress is :math:`\hat\sigma_{zz}(k) = P\,T(kh)\,\hat p(k)`: whatever presses on the
-film, its own transfer function :math:`T` gives the stress at the base its long tail.  The shapes
-are averaged by their evidence, and their spread counts as uncertainty.
+The base stress is :math:`\hat\sigma_{zz}(k) = P\,T(kh)\,\hat p(k)`: the film's transfer function
+:math:`T` turns a pressure into the stress at the base.  The shapes of pressure are averaged by
+their marginal likelihood, and their spread counts as uncertainty.
 
-Inputs that are wrong act twice.  The scan is read with the wrong :math:`A\,\hat G\,T`, as if its
+A pressure :math:`p(r) \propto (1 - r^2/a^2)^m` of unit force has the transform
+
+.. math::
+
+    \Lambda_m(ka) = \Gamma(m+2)\,(2/ka)^{m+1} J_{m+1}(ka) = {}_0F_1(m+2;\,-k^2a^2/4),
+
+from a flat punch (m = -1/2) over a sphere on a thick film (1/2) to one on a thin film that is
+compressible (1) or not (2), and to a Gaussian (:math:`m \to \infty`).  With the width
+:math:`s = a/\sqrt{2(m+2)}`, half of whose square is the mean square radius of each, the derivative
+is :math:`\partial\Lambda_m/\partial s = -s k^2 \Lambda_{m+1}`.
+
+Friction adds a shear :math:`q(r) = c\,p(r)\,r/2s`, whose transform of order one per newton is
+:math:`c\,ks\,\Lambda_{m+1}/2`.  At the base it counts as the pressure :math:`-(N/T)\,q` with the
+film's transfer functions (:mod:`memscal.mechanics.film_response`).
+
+A wrong input acts twice.  The scan is evaluated with the wrong :math:`A\,\hat G\,T`, as if its
 voltages were wrong by :math:`-\delta(A\hat G T) \otimes p`; and the film turns pressure into
 stress by the wrong :math:`T`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import hyp0f1
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
@@ -25,25 +42,92 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, gauss_newton
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.measurement.pressure import PressureShape, film_transfer, pressure_shapes
+from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.scan import Scan
 
 __all__ = [
     "Posterior",
+    "PressureShape",
     "ShapeFit",
+    "adopted_noise",
     "apparatus_changes",
-    "believed_noise",
+    "film_transfer",
     "fit_shape",
+    "pressure_shapes",
     "reach_of",
     "restore_posterior",
     "sensor_transfer",
 ]
 
+_EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
+#: Shears from none to full stick: spheres of a contact radius from half to twice the thickness.
+_SHEARS_INCOMPRESSIBLE = (0.0, -0.2, -0.4)
+_SHEARS_COMPRESSIBLE = (0.0, 0.1, 0.2)
+#: Above this Poisson's ratio a pressed film flows outward under the indenter.
+_FLOWING = 0.4
+
+
+def film_transfer(film: ElasticFilm, k: FloatArray) -> FloatArray:
+    """Transform of the base's normal stress under a pressure of unit transform."""
+    return base_normal_from_pressure(k * film.thickness, film.poisson_ratio)
+
+
+@dataclass(frozen=True)
+class PressureShape:
+    """A pressure of unit force with its shear, as an equivalent pressure on a film.
+
+    ``exponent``: m, how softly the pressure ends, infinite for a Gaussian; ``shear``: c, outward
+    shear over pressure at the radius of two widths; ``film``: what is pressed.
+    """
+
+    exponent: float
+    shear: float
+    film: ElasticFilm
+
+    def transform(self, k: FloatArray, width: float) -> FloatArray:
+        """Transform at ``k`` (rad/m) for a width (m); one at k = 0."""
+        plain = self._order(0, k, width)
+        if self.shear == 0.0:
+            return plain
+        return np.asarray(plain - 0.5 * self._share(k) * k * width * self._order(1, k, width))
+
+    def widening(self, k: FloatArray, width: float) -> FloatArray:
+        """Derivative of :meth:`transform` by the width, in 1/m."""
+        first = self._order(1, k, width)
+        slope = -width * k**2 * first
+        if self.shear == 0.0:
+            return np.asarray(slope)
+        m = self.exponent
+        ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
+        second = self._order(2, k, width)
+        rise = k * first - ratio * width**2 * k**3 * second
+        return np.asarray(slope - 0.5 * self._share(k) * rise)
+
+    def _order(self, further: int, k: FloatArray, width: float) -> FloatArray:
+        """Return the transform of the exponent m + further, at the radius a of this shape."""
+        if math.isinf(self.exponent):
+            return gaussian_transfer(k, width)
+        square = 2 * (self.exponent + 2) * width**2
+        return np.asarray(hyp0f1(self.exponent + further + 2, -square * k**2 / 4))
+
+    def _share(self, k: FloatArray) -> FloatArray:
+        x, nu = k * self.film.thickness, self.film.poisson_ratio
+        ratio = base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu)
+        return self.shear * ratio
+
+
+def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
+    """Return the shapes that a restoration weighs against each other."""
+    flowing = film.poisson_ratio > _FLOWING
+    shears = _SHEARS_INCOMPRESSIBLE if flowing else _SHEARS_COMPRESSIBLE
+    return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
+
+
 #: A fit diverges if its width is this many times the Gaussian's, or that fraction of it.
 _FARTHEST = 4.0
-#: A pressure narrower than this share of the scan's step is not told from one without width.
+#: A pressure narrower than this share of the scan's step is not distinct from one without width.
 _NARROWEST = 0.2
 #: One of several shapes is nearer to a contact's pressure than a Gaussian is to a sensor's G:
 #: departures are expected to be smaller by this factor.
@@ -64,27 +148,14 @@ class _Basis(DepartureBasis):
 
 @dataclass(frozen=True, eq=False)
 class ShapeFit:
-    """What the scan says of the pressure, for one shape to depart from.
+    """The fit of one shape of pressure and of departures from it.
 
-    A state is the pressure's transform per newton at the model's nodes, then the free coordinates
-    of the centre (m), then baseline and drift (V).
-
-    Parameters
-    ----------
-    shape : PressureShape
-        What was fitted.
-    state : ndarray, shape (s,)
-        Posterior mean.
-    covariance : ndarray, shape (s, s)
-        Expected squared error of the state.
-    gain : ndarray, shape (s, n)
-        Derivative of the state by the voltages.
-    residual : ndarray, shape (n,)
-        Voltages that are not explained, in V.
-    noise : float
-        Noise of a point of weight one that was found: in V, or over the stated uncertainties.
-    log_evidence : float
-        Of the shape and all its departures, up to a constant of the scan.
+    The state is the pressure's transform per newton at the model's nodes, the free coordinates of
+    the centre (m), baseline and drift (V): ``state`` (s,) is its posterior mean, ``covariance``
+    (s, s) its expected squared error, ``gain`` (s, n) its derivative by the voltages.
+    ``residual`` (n,): voltages that are not explained, in V; ``noise`` of a point of weight one,
+    in V, or over the stated uncertainties; ``log_evidence``: log marginal likelihood of the shape
+    with all departures, up to a constant of the scan.
     """
 
     shape: PressureShape
@@ -108,7 +179,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     rows = _state_rows(model.k, basis)
     kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)
     first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
-    growth = believed_noise(start, weighed.noise) / weighed.noise
+    growth = adopted_noise(start, weighed.noise) / weighed.noise
     return ShapeFit(
         shape=shape,
         state=first + rows @ weighed.mean,
@@ -132,14 +203,14 @@ def _fit(
     scale = np.concatenate([[force], widths, drifts])
 
     def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        found = _linearise(shape, model, scaled * scale)
-        misfit = standardised(found.predicted - model.points.u, weights)
-        return misfit, standardised(found.jacobian, weights) * scale
+        fit = _linearise(shape, model, scaled * scale)
+        misfit = standardised(fit.predicted - model.points.u, weights)
+        return misfit, standardised(fit.jacobian, weights) * scale
 
-    found = gauss_newton(linearised, theta / scale, tolerance=1e-9)
-    if found is None or not found[0] > 0 or not 1 / _FARTHEST < found[1] < _FARTHEST:
+    best = gauss_newton(linearised, theta / scale, tolerance=1e-9)
+    if best is None or not best[0] > 0 or not 1 / _FARTHEST < best[1] < _FARTHEST:
         return _linearise(shape, model, theta)
-    return _linearise(shape, model, found * scale)
+    return _linearise(shape, model, best * scale)
 
 
 def _linearise(shape: PressureShape, model: ForwardModel, theta: FloatArray) -> GaussianFit:
@@ -179,9 +250,9 @@ def _log_information(model: ForwardModel, weights: FloatArray, fit: GaussianFit)
     return 2 * float(np.log(np.abs(np.diag(np.linalg.qr(scaled, mode="r")))).sum())
 
 
-def believed_noise(start: ProfileEstimate, found: float) -> float:
-    """Noise of a point of weight one: stated uncertainties are believed until exceeded."""
-    at_least = max(found, NUMERICAL_FLOOR * start.largest_signal)
+def adopted_noise(start: ProfileEstimate, noise: float) -> float:
+    """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
+    at_least = max(noise, NUMERICAL_FLOOR * start.largest_signal)
     return at_least if start.points.u_errors is None else max(at_least, 1.0)
 
 
@@ -198,27 +269,14 @@ _REACH = 1.5
 class Posterior:
     """Base stress, centre and baseline as one state with its covariance.
 
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The best Gaussian pressure, the noise and the outliers.
-    state : ndarray, shape (s,)
-        Transform of the base stress at the model's nodes (N), then free coordinates of the
-        centre (m), then baseline and drift (V).
-    covariances : mapping of str to ndarray, shape (s, s)
-        Their covariance by source; the sources are independent.
-    shifts, changes : mapping of str to ndarray, shape (n, q) and (s, q)
-        What each input's standard uncertainties do to the predicted voltages, in V, and to the
-        state.
-    residual : ndarray, shape (n,)
-        Voltages that are not explained, in V.
-    found_noise : float
-        Noise of a point of weight one that was found: in V, or over the stated uncertainties.
-    shares : mapping of (float, float) to float
-        Posterior probability of each shape, by its exponent and shear.
-    resolved_wavenumber : float
-        Where the transform's standard uncertainty reaches a third of the best Gaussian pressure's,
-        in rad/m.
+    ``estimate``: the best Gaussian pressure, the noise and the outliers; ``state`` (s,):
+    transform of the base stress at the model's nodes (N), free coordinates of the centre (m),
+    baseline and drift (V); ``covariances`` (s, s) by source, which are independent; ``shifts``
+    (n, q) and ``changes`` (s, q): what each input's standard uncertainties do to the predicted
+    voltages, in V, and to the state; ``residual`` (n,): voltages that are not explained, in V;
+    ``found_noise`` of a point of weight one, in V, or over the stated uncertainties; ``shares``:
+    posterior probability of each shape, by its exponent and shear; ``resolved_wavenumber``: where
+    the transform's standard uncertainty reaches a third of the best Gaussian pressure's, in rad/m.
     """
 
     estimate: ProfileEstimate
@@ -238,8 +296,8 @@ class Posterior:
 
     @property
     def noise_ratio(self) -> float:
-        """Noise that is believed over the Gaussian estimate's."""
-        return believed_noise(self.estimate, self.found_noise) / self.estimate.noise_scale
+        """Adopted noise over the Gaussian estimate's."""
+        return adopted_noise(self.estimate, self.found_noise) / self.estimate.noise_scale
 
     @property
     def nodes(self) -> int:
@@ -260,23 +318,16 @@ def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
 def restore_posterior(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
-    """Average the shapes of pressure by their evidence, and propagate the inputs.
+    """Average the shapes of pressure by their marginal likelihood, and propagate the inputs.
 
-    Parameters
-    ----------
-    scan, apparatus
-        What was measured, and with what.
-    estimate : ProfileEstimate
-        The best Gaussian pressure.
-    transfer : ndarray, shape of ``estimate.model.k``
-        Transform of A G, in V/Pa.
+    ``estimate``: the best Gaussian pressure; ``transfer``: transform of A G at its nodes, in V/Pa.
     """
-    found = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.film)]
-    shares = _shares(found)
-    mean = _sum_of(shares, [fit.state for fit in found])
-    gain = _sum_of(shares, [fit.gain for fit in found])
-    within = _sum_of(shares, [fit.covariance for fit in found])
-    apart = np.stack([fit.state - mean for fit in found], axis=1) * np.sqrt(shares)
+    fits = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.film)]
+    shares = _shares(fits)
+    mean = _sum_of(shares, [fit.state for fit in fits])
+    gain = _sum_of(shares, [fit.gain for fit in fits])
+    within = _sum_of(shares, [fit.covariance for fit in fits])
+    apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan.film, model.k)
     scale = np.concatenate([scan.load * film, np.ones(mean.size - nodes)])
@@ -298,20 +349,20 @@ def restore_posterior(
         covariances=covariances,
         shifts=shifts,
         changes=changes,
-        residual=_sum_of(shares, [fit.residual for fit in found]),
-        found_noise=float(np.dot(shares, [fit.noise for fit in found])),
+        residual=_sum_of(shares, [fit.residual for fit in fits]),
+        found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
         shares={
             (fit.shape.exponent, fit.shape.shear): float(p)
-            for fit, p in zip(found, shares, strict=True)
+            for fit, p in zip(fits, shares, strict=True)
         },
         resolved_wavenumber=0.0,
     )
     return replace(posterior, resolved_wavenumber=_resolved(posterior, scan.load * film))
 
 
-def _sum_of(shares: FloatArray, parts: Sequence[FloatArray]) -> FloatArray:
+def _sum_of(shares: FloatArray, arrays: Sequence[FloatArray]) -> FloatArray:
     """Average arrays by their shares."""
-    return np.asarray(sum(share * part for share, part in zip(shares, parts, strict=True)))
+    return np.asarray(sum(share * array for share, array in zip(shares, arrays, strict=True)))
 
 
 def _shares(fits: Sequence[ShapeFit]) -> FloatArray:
@@ -324,9 +375,9 @@ def _shares(fits: Sequence[ShapeFit]) -> FloatArray:
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:
     """Voltages of the pressure through changed references, shape (n, q), in V."""
     model, kernel = estimate.model, state[: estimate.model.k.size]
-    known = model.reference.wavenumbers
+    wavenumbers = model.reference.wavenumbers
     columns = [
-        replace(model, references=(RadialSpectrum(known, change),)).signal(
+        replace(model, references=(RadialSpectrum(wavenumbers, change),)).signal(
             estimate.gaussian.geometry, kernel
         )
         for change in changes.T
@@ -335,19 +386,9 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
 
 
 def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
-    """Return independent changes of the transform of A G by one standard uncertainty.
+    """Return independent changes of the transform of A G by one standard uncertainty, in V/Pa.
 
-    Parameters
-    ----------
-    apparatus : ApparatusFunction
-        The calibrated sensor; A and G are correlated as its artifact says.
-    k : ndarray, shape (n,)
-        Wavenumbers, in rad/m; at zero the change is that of A.
-
-    Returns
-    -------
-    ndarray, shape (n, q)
-        One column for each change, in V/Pa.
+    At ``k`` (n,) in rad/m, shape (n, q): one column for each change; at zero the change of A.
     """
     profile, a = apparatus.radial_profile, apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")

@@ -1,12 +1,11 @@
-"""The stress at the base of the film as a scan tells it, and everything that goes with it."""
+"""Restored stress: the stress at the base of the film that explains a scan, and its comparison."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,177 +13,22 @@ from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
-from memscal.errors import FitError, InputError
+from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.profile import CentreError, ProfileEstimate
-from memscal.measurement.posterior import Posterior, reach_of, sensor_transfer
-from memscal.measurement.pressure import film_transfer
+from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck, chi_square_limit
-from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
+from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "SAME_LOAD",
-    "Comparison",
-    "Expected",
-    "Restoration",
-    "accept_mismatches",
-    "compare_stress",
-    "mismatches",
-    "read_expected",
-    "require_covariance",
-    "require_measurement",
-    "restored_or_explained",
-]
+__all__ = ["SAME_LOAD", "Comparison", "Expected", "Restoration", "compare_stress", "read_expected"]
 
 #: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
 SAME_LOAD = 0.01
-#: Properties of one film agree within this share where no uncertainty is stated ...
-_SAME = {"young_modulus": 0.02, "poisson_ratio": 0.02, "thickness": 0.02}
-#: ... and within this many standard uncertainties of their difference where it is.
-_COVERAGE = 2.0
-_UNITS = {"young_modulus": ("MPa", 1e-6), "poisson_ratio": ("", 1.0), "thickness": ("mm", 1e3)}
-
-
-def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
-    """Refuse a scan and an apparatus function that do not belong together.
-
-    Raises
-    ------
-    InputError
-        If their sensors differ, the artifact's uncertainty is no number, or a
-        curved indenter was pressed at several loads.
-    """
-    _require_same_sensor(scan, apparatus)
-    require_covariance(apparatus)
-    load = scan.normal_load
-    if load is None or isinstance(scan.indenter, Rod):
-        return
-    low, high = float(np.nanmin(load)), float(np.nanmax(load))
-    if high - low > SAME_LOAD * scan.load:
-        raise InputError(
-            f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
-            why=f"The contact of a {scan.indenter.shape} grows with its load: each has a stress of "
-            "its own.",
-            cure="Give the scan of one load.",
-        )
-
-
-def restored_or_explained(estimate: Callable[[], ProfileEstimate]) -> ProfileEstimate:
-    """Return an estimate; where there is none, say so of a stress, not of a calibration.
-
-    Raises
-    ------
-    FitError
-        If the scan does not determine a stress.
-    """
-    try:
-        return estimate()
-    except CentreError:
-        raise
-    except FitError as failure:
-        raise FitError(
-            "The scan determines no stress at the base of the film.",
-            why="Its voltage does not rise clear of noise and baseline as the indenter passes one "
-            "centre, or the scan is too short to tell the profile's tail from the baseline.",
-            cure="Check channel and positions; scan farther; raise the load or average repeats.",
-        ) from failure
-
-
-def _require_same_sensor(scan: Scan, apparatus: ApparatusFunction) -> None:
-    ours, theirs = scan.sensor, apparatus.sensor
-    other_name = bool(ours.name and theirs.name and ours.name != theirs.name)
-    if other_name or ours.channel != theirs.channel:
-        raise InputError(
-            f"The scan is of sensor {ours.name or 'unnamed'} ({ours.channel}), the apparatus "
-            f"function of sensor {theirs.name or 'unnamed'} ({theirs.channel}).",
-            why="An apparatus function belongs to one sensor and channel.",
-            cure="Give the artifact of the scan's sensor; check /entry/instrument/stress_sensor.",
-        )
-
-
-def require_covariance(apparatus: ApparatusFunction) -> None:
-    """Refuse an apparatus function that does not say how well it is known.
-
-    Raises
-    ------
-    InputError
-        If the covariance of G or the uncertainty of A is missing or no number.
-    """
-    profile = apparatus.radial_profile
-    known = (
-        profile.g_covariance.shape == (profile.r.size, profile.r.size)
-        and np.isfinite(profile.g_covariance).all()
-        and np.isfinite(apparatus.parameters.uncertainty("conversion_constant"))
-    )
-    if not known:
-        raise InputError(
-            "The apparatus function does not state the covariance of G, or the uncertainty of A.",
-            why="The restored stress would have no uncertainty that means anything.",
-            cure="Calibrate again with memscal calibrate.",
-        )
-
-
-def mismatches(scan: Scan, apparatus: ApparatusFunction) -> tuple[str, ...]:
-    """Return in words what a scan and an artifact do not have in common."""
-    return (*_sensors(scan, apparatus), *_films(scan.film, apparatus.film))
-
-
-def accept_mismatches(
-    scan: Scan, apparatus: ApparatusFunction, place: str, *, override: bool
-) -> tuple[str, ...]:
-    """Refuse a scan of another sensor, channel or film; or accept it, and return what differs.
-
-    Raises
-    ------
-    InputError
-        If something differs and ``override`` is false, or the artifact is of a tangential channel.
-    """
-    if apparatus.order:
-        raise InputError(
-            f"The artifact is of the tangential channel {apparatus.sensor.channel}, but {place} is "
-            "to be read as normal stress.",
-            why="A shear is no normal stress: this cannot be overridden.",
-            cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
-        )
-    found = mismatches(scan, apparatus)
-    if found and not override:
-        raise InputError(
-            f"{place} does not belong to the artifact: {'; '.join(found)}.",
-            why="An apparatus function holds for one channel of one sensor, as it was calibrated "
-            "under its film.",
-            cure="Give the artifact of this sensor and film. If they are the same under other "
-            "names, override it (override=True; --override on the command line): that is recorded.",
-        )
-    return tuple(f"{place}: {text}" for text in found)
-
-
-def _sensors(scan: Scan, apparatus: ApparatusFunction) -> Iterator[str]:
-    ours, theirs = scan.sensor, apparatus.sensor
-    if ours.name and theirs.name and ours.name != theirs.name:
-        yield f'sensor "{ours.name}" in the scan, "{theirs.name}" in the artifact'
-    if ours.channel != theirs.channel:
-        yield f"channel {ours.channel} in the scan, {theirs.channel} in the artifact"
-
-
-def _films(ours: ElasticFilm, theirs: ElasticFilm) -> Iterator[str]:
-    if ours.name and theirs.name and ours.name != theirs.name:
-        yield f'film "{ours.name}" in the scan, "{theirs.name}" in the artifact'
-    for name, share in _SAME.items():
-        mine, its = getattr(ours, name), getattr(theirs, name)
-        spreads = [getattr(film, f"{name}_uncertainty") or 0.0 for film in (ours, theirs)]
-        allowed = max(share * its, _COVERAGE * math.hypot(*spreads))
-        if abs(mine - its) > allowed:
-            unit, factor = _UNITS[name]
-            values = [f"{value * factor:.4g} {unit}".rstrip() for value in (mine, its)]
-            words = name.replace("_", " ").replace("poisson ratio", "Poisson's ratio")
-            yield f"film {words} {values[0]} in the scan, {values[1]} in the artifact"
-
 
 Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 """A base stress to compare with, or the path of a file that holds one."""
@@ -192,27 +36,19 @@ Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 
 #: Coverage factor of 95 %.
 _EXPANDED = 1.96
-#: Below this share of the largest stress a difference matters to nobody.
+#: Differences below this share of the largest stress are negligible.
 _NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """How a calculated stress agrees with what was measured.
+    """How a calculated stress agrees with a scan and with the stress restored from it.
 
-    Parameters
-    ----------
-    stress : StressProfile or Contact
-        What was calculated.
-    sigma_zz : ndarray, shape (n,)
-        It, at the restoration's radii, in Pa.
-    chi_square, degrees, limit, p_value : float
-        The direct way: reduced chi-square of the scan against the calculated stress convolved with
-        A G, its degrees of freedom, what it exceeds by chance once in a thousand, its p-value.
-    difference : float
-        Largest difference of the restored from the calculated stress, over the largest stress.
-    within : float
-        Share of the radii at which they agree within 1.96 standard uncertainties.
+    ``sigma_zz`` (n,): the calculated ``stress`` at the restoration's radii, in Pa; ``chi_square``:
+    reduced chi-square of the scan against the calculated stress convolved with A G, of so many
+    ``degrees``, with its ``limit`` (exceeded by chance once in a thousand) and ``p_value``;
+    ``difference``: largest difference of the restored from the calculated stress, over the largest
+    stress; ``within``: share of the radii at which they agree within 1.96 standard uncertainties.
     """
 
     stress: StressProfile | Contact
@@ -228,13 +64,7 @@ class Comparison:
 def compare_stress(
     posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
 ) -> Comparison:
-    """Compare a calculated stress, scaled to the scan's load, with scan and restoration.
-
-    Raises
-    ------
-    InputError
-        If the stress of a curved indenter was calculated for another load.
-    """
+    """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
     if not isinstance(scan.indenter, Rod) and abs(stress.load / scan.load - 1) > SAME_LOAD:
         raise InputError(
             f"The expected stress is that of {stress.load:.4g} N, the scan of {scan.load:.4g} N.",
@@ -286,7 +116,7 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     if scan.load_uncertainty is not None:
         share = scan.load_uncertainty / scan.load
         added = np.column_stack([added, share * signal])
-    # A stated noise is taken at its word: raised by a misfit, it would hide it.
+    # The stated noise as it is: raised by a misfit, it would hide it.
     stated = points.u_errors is not None
     root = estimate.noise_root * (1 / estimate.noise_scale if stated else posterior.noise_ratio)
     covariance = root @ root.T + added @ added.T
@@ -312,7 +142,7 @@ def read_expected(expected: Expected) -> StressProfile | Contact:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Restoration:
+class Restoration(Result):
     r"""The stress at the film's base that explains a scan, with its uncertainty.
 
     Parameters
@@ -344,6 +174,9 @@ class Restoration:
     comparison: Comparison | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = ()
+
+    _summary: ClassVar[str] = "restoration"
+    _figure: ClassVar[str] = "stress.restoration_figure"
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
@@ -393,19 +226,18 @@ class Restoration:
     @property
     def force_budget(self) -> Mapping[str, float]:
         """Standard uncertainty of the force by source, in N."""
-        row, n = self._at_zero, self.posterior.nodes
-        parts = self.posterior.covariances.items()
-        variances = {name: float(row @ c[:n, :n] @ row) for name, c in parts}
+        row, n, covariances = self._at_zero, self.posterior.nodes, self.posterior.covariances
+        variances = {name: float(row @ c[:n, :n] @ row) for name, c in covariances.items()}
         return {name: float(np.sqrt(max(v, 0.0))) for name, v in variances.items()}
 
     @property
     def centre(self) -> FloatArray:
-        """Centre (x0, y0) of the sensor, in m; zero where a line does not tell."""
+        """Centre (x0, y0) of the sensor, in m; zero across a line."""
         return self._along_free(self.posterior.state)
 
     @property
     def centre_uncertainty(self) -> FloatArray:
-        """Standard uncertainty of :attr:`centre`, in m; zero where a line does not tell."""
+        """Standard uncertainty of :attr:`centre`, in m; zero across a line."""
         return self._along_free(np.sqrt(np.diag(self.posterior.covariance)))
 
     @property
@@ -461,7 +293,7 @@ class Restoration:
     def chi_square(self) -> float:
         """Sum of the squared residuals over the noise, outliers at their weight.
 
-        A noise that is stated is taken at its word, with what uncertain positions add to it.
+        A stated noise is used as it is, with what uncertain positions add to it.
         """
         estimate = self.posterior.estimate
         stated = self.points.u_errors is not None
@@ -506,21 +338,35 @@ class Restoration:
         )
 
     @property
+    def scalar_covariance(self) -> FloatArray:
+        """Joint covariance of force, stress on the axis, centre and baseline, in SI units.
+
+        Of the centre only the coordinates that the scan determines: shape (4, 4) or (5, 5).
+        """
+        nodes, first_drift = self.posterior.nodes, self._first_drift
+        last = slice(nodes, first_drift + 1)
+        rows = np.zeros((2 + first_drift + 1 - nodes, self.posterior.state.size))
+        rows[0, :nodes], rows[1, :nodes] = self._at_zero, self._synthesis(0.0)
+        rows[2:, last] = np.eye(first_drift + 1 - nodes)
+        return np.asarray(rows @ self.posterior.covariance @ rows.T)
+
+    @property
     def _first_drift(self) -> int:
         return self.posterior.nodes + int(self.points.free.sum())
 
     @property
     def _at_zero(self) -> FloatArray:
         """Row that reads a transform at k = 0: by a parabola in k^2, as :class:`RadialSpectrum`."""
-        known = self.posterior.estimate.model.reference.wavenumbers
-        row = np.zeros(known.k.size)
-        row[:3] = [RadialSpectrum(known, unit).integral for unit in np.eye(3, known.k.size)]
+        wavenumbers = self.posterior.estimate.model.reference.wavenumbers
+        count = wavenumbers.k.size
+        row = np.zeros(count)
+        row[:3] = [RadialSpectrum(wavenumbers, unit).integral for unit in np.eye(3, count)]
         return row
 
     def _along_free(self, values: FloatArray) -> FloatArray:
-        found = np.zeros(2)
-        found[self.points.free[0]] = values[self.posterior.nodes : self._first_drift]
-        return found
+        centre = np.zeros(2)
+        centre[self.points.free[0]] = values[self.posterior.nodes : self._first_drift]
+        return centre
 
     def _synthesis(self, r: ArrayLike) -> FloatArray:
         """Matrix from the transform at the nodes to values at radii."""
@@ -532,5 +378,5 @@ class Restoration:
                 why=f"The stress was restored out to {reach * 1e3:.4g} mm.",
                 cure="Give radii in metres, within 1.5 times the scan's width.",
             )
-        known = self.posterior.estimate.model.reference.wavenumbers
-        return known.synthesise(np.eye(known.k.size), radii)
+        wavenumbers = self.posterior.estimate.model.reference.wavenumbers
+        return wavenumbers.synthesise(np.eye(wavenumbers.k.size), radii)

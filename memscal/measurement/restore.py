@@ -1,7 +1,9 @@
-"""The way back: from a scan and a calibrated sensor to the stress at the base of the film."""
+"""Restoration of the stress at the base of the film from a scan and a calibrated sensor."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import replace
 from os import PathLike
 
@@ -10,19 +12,19 @@ from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
+from memscal.errors import FitError, InputError
 from memscal.estimation.assumptions import ExtraColumns, axisymmetry_test, symmetry_test
 from memscal.estimation.points import ScanPoints, measured_points
-from memscal.estimation.profile import ProfileEstimate, estimate_profile
+from memscal.estimation.profile import CentreError, ProfileEstimate, estimate_profile
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
-from memscal.measurement.posterior import reach_of, restore_posterior, sensor_transfer
-from memscal.measurement.pressure import film_transfer
-from memscal.measurement.restoration import (
-    Expected,
-    Restoration,
-    require_measurement,
-    restored_or_explained,
+from memscal.measurement.posterior import (
+    film_transfer,
+    reach_of,
+    restore_posterior,
+    sensor_transfer,
 )
+from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
     FAILED_CALIBRATION,
@@ -36,41 +38,142 @@ from memscal.model.checks import (
     chi_square_limit,
     failed_check_messages,
 )
+from memscal.model.indenter import Rod
+from memscal.model.records import FILM
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 
 __all__ = [
+    "accept_mismatches",
     "failed_calibration_messages",
     "gaussian_pressure",
     "noise_unstated_message",
+    "require_covariance",
     "restoration_checks",
     "restoration_messages",
     "restore",
     "restore_known",
 ]
 
+#: Properties of one film agree within this share where no uncertainty is stated ...
+_SAME = 0.02
+#: ... and within this many standard uncertainties of their difference where it is.
+_COVERAGE = 2.0
+_COMPARED = ("young_modulus", "poisson_ratio", "thickness")
+
+
+def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
+    """Refuse a scan of another sensor, of several loads of a curved indenter, or without cov(G)."""
+    _require_same_sensor(scan, apparatus)
+    require_covariance(apparatus)
+    load = scan.normal_load
+    if load is None or isinstance(scan.indenter, Rod):
+        return
+    low, high = float(np.nanmin(load)), float(np.nanmax(load))
+    if high - low > SAME_LOAD * scan.load:
+        raise InputError(
+            f"The loads of the scan go from {low:.4g} to {high:.4g} N.",
+            why=f"The contact of a {scan.indenter.shape} grows with its load: each has a stress of "
+            "its own.",
+            cure="Give the scan of one load.",
+        )
+
+
+def _require_same_sensor(scan: Scan, apparatus: ApparatusFunction) -> None:
+    ours, theirs = scan.sensor, apparatus.sensor
+    other_name = bool(ours.name and theirs.name and ours.name != theirs.name)
+    if other_name or ours.channel != theirs.channel:
+        raise InputError(
+            f"The scan is of sensor {ours.name or 'unnamed'} ({ours.channel}), the apparatus "
+            f"function of sensor {theirs.name or 'unnamed'} ({theirs.channel}).",
+            why="An apparatus function belongs to one sensor and channel.",
+            cure="Give the artifact of the scan's sensor; check /entry/instrument/stress_sensor.",
+        )
+
+
+def require_covariance(apparatus: ApparatusFunction) -> None:
+    """Refuse an apparatus function without a covariance of G or an uncertainty of A."""
+    profile = apparatus.radial_profile
+    stated = (
+        profile.g_covariance.shape == (profile.r.size, profile.r.size)
+        and np.isfinite(profile.g_covariance).all()
+        and np.isfinite(apparatus.parameters.uncertainty("conversion_constant"))
+    )
+    if not stated:
+        raise InputError(
+            "The apparatus function does not state the covariance of G, or the uncertainty of A.",
+            why="The restored stress would have no uncertainty that means anything.",
+            cure="Calibrate again with memscal calibrate.",
+        )
+
+
+def accept_mismatches(
+    scan: Scan, apparatus: ApparatusFunction, place: str, *, override: bool
+) -> tuple[str, ...]:
+    """Refuse a scan of another sensor, channel or film; with ``override`` return what differs."""
+    if apparatus.order:
+        raise InputError(
+            f"The artifact is of the tangential channel {apparatus.sensor.channel}, but {place} is "
+            "to be read as normal stress.",
+            why="A shear is no normal stress: this cannot be overridden.",
+            cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
+        )
+    differences = list(_differences(scan, apparatus))
+    if differences and not override:
+        raise InputError(
+            f"{place} does not belong to the artifact: {'; '.join(differences)}.",
+            why="An apparatus function holds for one channel of one sensor, as it was calibrated "
+            "under its film.",
+            cure="Give the artifact of this sensor and film. If they are the same under other "
+            "names, override it (override=True; --override on the command line): that is recorded.",
+        )
+    return tuple(f"{place}: {text}" for text in differences)
+
+
+def _differences(scan: Scan, apparatus: ApparatusFunction) -> Iterator[str]:
+    """Yield in words what a scan and an artifact do not have in common."""
+    for what, quote, ours, theirs in (
+        ("sensor", '"', scan.sensor.name, apparatus.sensor.name),
+        ("channel", "", scan.sensor.channel, apparatus.sensor.channel),
+        ("film", '"', scan.film.name, apparatus.film.name),
+    ):
+        unnamed = what != "channel" and not (ours and theirs)
+        if ours != theirs and not unnamed:
+            yield f"{what} {quote}{ours}{quote} in the scan, {quote}{theirs}{quote} in the artifact"
+    films = scan.film, apparatus.film
+    for quantity in FILM.quantities:
+        if quantity.name not in _COMPARED:
+            continue
+        values = [getattr(film, quantity.name) for film in films]
+        spreads = [getattr(film, f"{quantity.name}_uncertainty") or 0.0 for film in films]
+        allowed = max(_SAME * values[1], _COVERAGE * math.hypot(*spreads))
+        if abs(values[0] - values[1]) > allowed:
+            ours, theirs = (f"{v / quantity.scale:.4g} {quantity.unit}".rstrip() for v in values)
+            words = quantity.name.replace("_", " ").replace("poisson ratio", "Poisson's ratio")
+            yield f"film {words} {ours} in the scan, {theirs} in the artifact"
+
+
 _FORCE_LIMIT = 3.0
 #: What the shapes of pressure themselves leave open of the force, however small the noise.
 _NEGLIGIBLE_FORCE = 0.01
-_SAME_FILM = 0.02
 
 
-def restoration_checks(found: Restoration) -> tuple[QualityCheck, ...]:
+def restoration_checks(restored: Restoration) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
-    checks = [_reconvolution(found), _force(found), _film(found)]
-    checks += _noise(found)
-    checks.append(_symmetry(found))
-    checks.append(_outliers(found))
-    if found.comparison is not None:
-        checks.append(_expected(found))
+    checks = [_reconvolution(restored), _force(restored), _film(restored)]
+    checks += _noise(restored)
+    checks.append(_symmetry(restored))
+    checks.append(_outliers(restored))
+    if restored.comparison is not None:
+        checks.append(_expected(restored))
     return tuple(checks)
 
 
-def _reconvolution(found: Restoration) -> QualityCheck:
-    degrees = found.degrees
+def _reconvolution(restored: Restoration) -> QualityCheck:
+    degrees = restored.degrees
     return check(
         "reconvolution",
-        found.chi_square / degrees,
+        restored.chi_square / degrees,
         chi_square_limit(degrees) / degrees,
         "Reduced chi-square of the scan against the restored stress blurred again by A G. A "
         "failure means that no radial stress at the base of this film explains the scan through "
@@ -78,25 +181,25 @@ def _reconvolution(found: Restoration) -> QualityCheck:
     )
 
 
-def _force(found: Restoration) -> QualityCheck:
-    load = found.scan.load
-    allowed = np.hypot(found.force_uncertainty, found.scan.load_uncertainty or 0.0)
+def _force(restored: Restoration) -> QualityCheck:
+    load = restored.scan.load
+    allowed = np.hypot(restored.force_uncertainty, restored.scan.load_uncertainty or 0.0)
     allowed = float(np.hypot(allowed, _NEGLIGIBLE_FORCE * load))
     return check(
         "restored_force",
-        abs(found.force - load) / allowed,
+        abs(restored.force - load) / allowed,
         _FORCE_LIMIT,
-        f"Difference of the restored stress's total force, {found.force:.4g} N, from the load of "
-        f"{load:.4g} N, in their standard uncertainty. A failure means that A, the load or the "
+        f"Difference of the restored stress's total force, {restored.force:.4g} N, from the load "
+        f"of {load:.4g} N, in their standard uncertainty. A failure means that A, the load or the "
         "unit of one of them is wrong, or that the film's Poisson's ratio, which decides how much "
         "lies beyond the scan, is.",
     )
 
 
-def _film(found: Restoration) -> QualityCheck:
-    ours, theirs = found.scan.film, found.apparatus.film
+def _film(restored: Restoration) -> QualityCheck:
+    ours, theirs = restored.scan.film, restored.apparatus.film
     spread = np.hypot(ours.thickness_uncertainty or 0.0, theirs.thickness_uncertainty or 0.0)
-    limit = max(_SAME_FILM, 2 * float(spread) / theirs.thickness)
+    limit = max(_SAME, 2 * float(spread) / theirs.thickness)
     return check(
         "film_agreement",
         abs(ours.thickness / theirs.thickness - 1),
@@ -107,20 +210,20 @@ def _film(found: Restoration) -> QualityCheck:
     )
 
 
-def _noise(found: Restoration) -> list[QualityCheck]:
-    if found.points.u_errors is None:
+def _noise(restored: Restoration) -> list[QualityCheck]:
+    if restored.points.u_errors is None:
         return []
     checks = [
         check(
             "noise_as_stated",
-            found.posterior.found_noise,
+            restored.posterior.found_noise,
             NOISE_LIMIT,
             "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
             "something besides electronic noise scatters the scan, such as position or load; the "
             "uncertainties have been raised accordingly.",
         )
     ]
-    residuals = residuals_of(found.posterior.estimate)
+    residuals = residuals_of(restored.posterior.estimate)
     if residuals.degrees >= FEWEST_RESIDUALS:
         size = chi_square_test(residuals)
         meaning = (
@@ -133,9 +236,9 @@ def _noise(found: Restoration) -> list[QualityCheck]:
     return checks
 
 
-def _symmetry(found: Restoration) -> QualityCheck:
-    estimate = found.posterior.estimate
-    if found.points.planar:
+def _symmetry(restored: Restoration) -> QualityCheck:
+    estimate = restored.posterior.estimate
+    if restored.points.planar:
         name, uneven = "axisymmetry", axisymmetry_test(estimate)
         meaning = "elliptic columns. A failure means that the contact, or the sensor, is not round."
     else:
@@ -147,24 +250,24 @@ def _symmetry(found: Restoration) -> QualityCheck:
     return _added(name, uneven, meaning)
 
 
-def _added(name: str, found: ExtraColumns, meaning: str) -> QualityCheck:
-    about = f"Fall of chi-square by {found.count} {meaning}"
-    p_value = float(chdtrc(found.count, found.fall))
-    return check(name, found.fall, chi_square_limit(found.count), about, p_value)
+def _added(name: str, extra: ExtraColumns, meaning: str) -> QualityCheck:
+    about = f"Fall of chi-square by {extra.count} {meaning}"
+    p_value = float(chdtrc(extra.count, extra.fall))
+    return check(name, extra.fall, chi_square_limit(extra.count), about, p_value)
 
 
-def _outliers(found: Restoration) -> QualityCheck:
+def _outliers(restored: Restoration) -> QualityCheck:
     return check(
         "outliers",
-        float(np.mean(found.posterior.estimate.outlier_weight < OUTLIER_WEIGHT)),
+        float(np.mean(restored.posterior.estimate.outlier_weight < OUTLIER_WEIGHT)),
         OUTLIER_LIMIT,
         "Share of points whose weight was more than halved. A failure means that the noise is not "
         "what the uncertainties take it for: look at the residuals.",
     )
 
 
-def _expected(found: Restoration) -> QualityCheck:
-    compared = found.comparison
+def _expected(restored: Restoration) -> QualityCheck:
+    compared = restored.comparison
     assert compared is not None
     return check(
         "expected_stress",
@@ -180,33 +283,33 @@ def _expected(found: Restoration) -> QualityCheck:
 
 
 def restoration_messages(
-    found: Restoration, checks: tuple[QualityCheck, ...]
+    restored: Restoration, checks: tuple[QualityCheck, ...]
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, the gravest first."""
-    estimate, points = found.posterior.estimate, found.points
+    estimate, points = restored.posterior.estimate, restored.points
     messages = failed_check_messages(checks)
-    messages += failed_calibration_messages(found.apparatus)
+    messages += failed_calibration_messages(restored.apparatus)
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
         messages.append(Message("missing_points", text))
     messages += [
         Message(
             "outlier",
-            f"Outlier {found.distance[i] * 1e3:.4g} mm from the centre: {points.u[i] * 1e3:.4g} mV "
-            f"instead of {found.predicted[i] * 1e3:.4g} mV.",
+            f"Outlier {restored.distance[i] * 1e3:.4g} mm from the centre: "
+            f"{points.u[i] * 1e3:.4g} mV instead of {restored.predicted[i] * 1e3:.4g} mV.",
         )
         for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]
     ]
     if points.u_errors is None:
-        messages.append(noise_unstated_message(float(found.noise.min())))
-    if not found.apparatus.radial_profile.g_errors.any():
+        messages.append(noise_unstated_message(float(restored.noise.min())))
+    if not restored.apparatus.radial_profile.g_errors.any():
         text = "The artifact states no uncertainty of G: nothing is counted for it."
         messages.append(Message("uncertainty_unstated", text))
-    film = found.scan.film
+    film = restored.scan.film
     unstated = {
         "film thickness": film.thickness_uncertainty,
         "Poisson's ratio": film.poisson_ratio_uncertainty,
-        "load": found.scan.load_uncertainty,
+        "load": restored.scan.load_uncertainty,
     }
     names = [name for name, value in unstated.items() if value is None]
     if names:
@@ -278,48 +381,51 @@ def restore(
     >>> abs(restored.force - 1.0) < 3 * restored.force_uncertainty
     True
     """
-    known, measured = opened_apparatus(apparatus), opened_scan(scan)
-    require_measurement(measured, known)
-    return restore_known(measured, known, expected)
+    sensor, measured = opened_apparatus(apparatus), opened_scan(scan)
+    require_measurement(measured, sensor)
+    return restore_known(measured, sensor, expected)
 
 
-def restore_known(scan: Scan, known: ApparatusFunction, expected: Expected = None) -> Restoration:
-    """Restore a stress from a scan and an apparatus function that were proven to fit together.
-
-    Parameters and errors are those of :func:`restore`.
-    """
+def restore_known(
+    scan: Scan, apparatus: ApparatusFunction, expected: Expected = None
+) -> Restoration:
+    """Restore a stress from a scan and an apparatus function that were proven to fit together."""
     points = measured_points(scan)
-    estimate, transfer = gaussian_pressure(scan, known, points)
+    estimate, transfer = gaussian_pressure(scan, apparatus, points)
     wavenumbers = estimate.model.reference.wavenumbers
-    posterior = restore_posterior(scan, known, estimate, transfer)
+    posterior = restore_posterior(scan, apparatus, estimate, transfer)
     nodes = posterior.nodes
     r = np.linspace(0.0, reach_of(points) / 3, _RADII)
     matrix = wavenumbers.synthesise(np.eye(nodes), r)
-    found = Restoration(
+    restored = Restoration(
         scan=scan,
-        apparatus=known,
+        apparatus=apparatus,
         posterior=posterior,
         r=r,
         sigma_zz=matrix @ posterior.state[:nodes],
         covariance=matrix @ posterior.covariance[:nodes, :nodes] @ matrix.T,
     )
     if expected is not None:
-        found = replace(found, comparison=found.compare(expected))
-    checks = restoration_checks(found)
-    return replace(found, checks=checks, messages=restoration_messages(found, checks))
+        restored = replace(restored, comparison=restored.compare(expected))
+    checks = restoration_checks(restored)
+    return replace(restored, checks=checks, messages=restoration_messages(restored, checks))
 
 
 def gaussian_pressure(
-    scan: Scan, known: ApparatusFunction, points: ScanPoints
+    scan: Scan, apparatus: ApparatusFunction, points: ScanPoints
 ) -> tuple[ProfileEstimate, FloatArray]:
-    """Return the best Gaussian pressure on the film, departures allowed for, and A G's transform.
-
-    Raises
-    ------
-    FitError
-        If the scan does not determine a stress.
-    """
+    """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))
-    transfer = known.conversion_constant * sensor_transfer(known, wavenumbers.k)
+    transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
     through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan.film, wavenumbers.k))
-    return restored_or_explained(lambda: estimate_profile(points, through)), transfer
+    try:
+        return estimate_profile(points, through), transfer
+    except CentreError:
+        raise
+    except FitError as failure:
+        raise FitError(
+            "The scan determines no stress at the base of the film.",
+            why="Its voltage does not rise clear of noise and baseline as the indenter passes one "
+            "centre, or the scan is too short to tell the profile's tail from the baseline.",
+            cure="Check channel and positions; scan farther; raise the load or average repeats.",
+        ) from failure

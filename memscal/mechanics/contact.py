@@ -1,10 +1,11 @@
-"""A solved contact: what stands between indenter and film, and what reaches the base."""
+"""Contact of a rigid indenter with a bonded film: tractions, displacements, stress at the base."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
+from memscal.model.result import Result
 from memscal.model.stress import StressProfile
 
 __all__ = ["Contact", "too_deep"]
@@ -37,8 +39,8 @@ _PRESSURE_SAMPLES = 2001
 _BASE_SAMPLES = 128
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Contact:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Contact(Result):
     r"""A rigid indenter pressed on a bonded film, solved; from :func:`memscal.indent`.
 
     Parameters
@@ -114,6 +116,16 @@ class Contact:
     dissipated_energy: float | None
     interface: Interface = field(default_factory=Interface)
     strain: str = "linear"
+
+    _summary: ClassVar[str] = "contact"
+    _figure: ClassVar[str] = "stress.contact_figure"
+
+    def __repr__(self) -> str:
+        """Return what was pressed, load, depth and radius in place of the field."""
+        return (
+            f"<Contact: {self.indenter.shape}, {self.load:.4g} N, depth {self.depth * 1e6:.4g} um, "
+            f"radius {self.contact_radius * 1e3:.4g} mm, friction {self.friction:.4g}>"
+        )
 
     def base_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the normal stress :math:`\sigma_{zz}` at the base, compression positive.

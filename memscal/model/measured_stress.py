@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
 from memscal.model.provenance import Process, SourceFile
+from memscal.model.result import Result
 from memscal.model.scan import StressSensor
 
 __all__ = ["MeasuredPoints", "MeasuredProfile", "MeasuredScan", "MeasuredStress"]
@@ -127,7 +128,7 @@ class MeasuredProfile:
     maximum_budget : mapping of str to float
         Its standard uncertainty by source, in Pa.
     centre, centre_uncertainty : ndarray, shape (2,)
-        Centre (x0, y0) of the profile, in m; zero where a line does not tell.
+        Centre (x0, y0) of the profile, in m; zero across a line.
     baseline, baseline_uncertainty : float
         Baseline in the middle of the scan, in V.
     contact_radius : float
@@ -216,7 +217,7 @@ class MeasuredProfile:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class MeasuredStress:
+class MeasuredStress(Result):
     """The measured stress of all loads of one or several scans, live or read from its file.
 
     Made by :func:`memscal.measure_stress` or :func:`memscal.read_stress`; the two are equal if one
@@ -251,6 +252,9 @@ class MeasuredStress:
     process: Process
     artifact: SourceFile | None = None
     artifact_digest: str = ""
+
+    _summary: ClassVar[str] = "stress"
+    _figure: ClassVar[str] = "stress.measured_stress_figure"
 
     def __post_init__(self) -> None:
         for name in ("conversion_constant", "conversion_constant_uncertainty"):

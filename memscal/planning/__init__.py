@@ -1,1 +1,1 @@
-"""What a scan that is not made yet would tell: its expected uncertainties, without simulation."""
+"""Planning of a scan: its expected uncertainties, without simulation."""

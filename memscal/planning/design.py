@@ -1,10 +1,11 @@
-"""Design of a calibration: what a scan would tell, and what scan tells what is wanted."""
+"""Design of a calibration: uncertainties to expect of a scan, and the scan for a given one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ WISHES = {
     "fwhm": "fwhm",
     "resolved": "resolved_wavenumber",
 }
-"""What can be wanted, by its short name: three relative uncertainties and a wavenumber."""
+"""Short and full names of what ``want`` may state: relative uncertainties and a wavenumber."""
 
 VARIED = ("step", "half_range", "repeats")
 """What can be varied to reach it."""
@@ -55,26 +56,17 @@ _CURES = {
 
 @dataclass(frozen=True)
 class _Search:
-    """One thing to vary: its least and most, in units of its own, and the plan for each.
-
-    ``name`` and ``unit`` say what a number means to people.
-    """
+    """A number to vary: its name, its least and most count, the plan of a count, and its words."""
 
     name: str
     least: int
     most: int
     plan: Callable[[int], Plan]
-    told: Callable[[Plan], str]
+    words: Callable[[Plan], str]
 
 
 def require_wishes(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
-    """Return the wishes by their full names.
-
-    Raises
-    ------
-    InputError
-        If one is unknown, is no positive number, or nothing is to be varied for them.
-    """
+    """Return the wishes by their full names; refuse unknown ones, and those without ``vary``."""
     named = {}
     for name, value in want.items():
         full = WISHES.get(name, name)
@@ -104,21 +96,8 @@ def least_design(
 ) -> Design:
     """Find the coarsest step, the shortest range or the fewest repeats that reach the wishes.
 
-    Parameters
-    ----------
-    plan : Plan
-        All that is not varied.
-    wishes : mapping of str to float
-        By full name: largest relative uncertainty, or smallest resolved wavenumber in rad/m.
-    vary : str
-        One of :data:`VARIED`.
-    evaluate : callable
-        Returns the design of a plan.
-
-    Raises
-    ------
-    FitError
-        If they cannot be reached, with the best that can, and what stands in the way.
+    ``wishes`` by full name: largest relative uncertainty, or smallest resolved wavenumber in
+    rad/m.  Where they are out of reach, the error states the best design and its limiting source.
     """
     search = _search(plan, vary)
     tried: dict[int, Design | None] = {}
@@ -137,9 +116,9 @@ def least_design(
     while works - fails > 1:
         middle = (works + fails) // 2
         fails, works = (fails, middle) if meets(middle) else (middle, works)
-    found = tried[works]
-    assert found is not None
-    return found
+    least = tried[works]
+    assert least is not None
+    return least
 
 
 def _search(plan: Plan, vary: str) -> _Search:
@@ -191,7 +170,7 @@ def _met(design: Design, name: str, value: float) -> bool:
     return reached >= value if name == "resolved_wavenumber" else reached <= value
 
 
-def _told(name: str, value: float) -> str:
+def _in_words(name: str, value: float) -> str:
     if name == "resolved_wavenumber":
         return f"a resolved wavenumber of {value * 1e-3:.4g} rad/mm"
     short = next(key for key, full in WISHES.items() if full == name)
@@ -199,7 +178,7 @@ def _told(name: str, value: float) -> str:
 
 
 def _out_of_reach(search: _Search, wishes: Mapping[str, float], tried: list[Design]) -> FitError:
-    """Say the best that can be reached, and what stands in the way."""
+    """Return the error with the best that can be reached, and its limiting source."""
     if not tried:
         return FitError(
             f"No {search.name} makes a scan that can be calibrated with.",
@@ -208,10 +187,10 @@ def _out_of_reach(search: _Search, wishes: Mapping[str, float], tried: list[Desi
     name = next(n for n, v in wishes.items() if not _met(tried[-1], n, v))
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
-    told = f"{_told(name, wishes[name])} is out of reach by the {search.name} alone"
+    goal = f"{_in_words(name, wishes[name])} is out of reach by the {search.name} alone"
     problem = (
-        f"{told[0].upper()}{told[1:]}: the best is {_told(name, _reached(best, name))}, with "
-        f"{search.told(best.plan)}."
+        f"{goal[0].upper()}{goal[1:]}: the best is {_in_words(name, _reached(best, name))}, with "
+        f"{search.words(best.plan)}."
     )
     if name == "resolved_wavenumber":
         return _band_ends(best, problem)
@@ -317,7 +296,7 @@ def design(
         unknown.
     FitError
         If the scan would not determine the parameters, or a wish is out of reach: with the best
-        that can be reached, and what stands in the way.
+        that can be reached, and its limiting source.
 
     Examples
     --------
@@ -347,36 +326,17 @@ def design(
         centre=centre,
     )
     evaluated = partial(evaluate, method=method, seed=seed)
-    return evaluated(plan) if vary is None else least_design(plan, wishes, vary, evaluated)
+    planned = evaluated(plan) if vary is None else least_design(plan, wishes, vary, evaluated)
+    return replace(planned, want=dict(want or {}))
 
 
 def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[Design]:
-    """Return the designs with one number of the plan replaced, those that determine anything.
-
-    Parameters
-    ----------
-    planned : Design
-        The design about which to vary.
-    vary : str
-        ``step``, ``half_range`` (m) or ``repeats``.
-    values : sequence of float
-        In place of the plan's own.
-
-    Raises
-    ------
-    InputError
-        If a value is out of range.
-    """
-    found = []
+    """Return the designs with one number of the plan (SI) replaced; unusable plans are left out."""
+    designs = []
     for value in values:
-        given = int(value) if vary == "repeats" else float(value)
+        changes: dict[str, Any] = {vary: int(value) if vary == "repeats" else float(value)}
         try:
-            found.append(evaluate(_with(planned.plan, vary, given), planned.method))
+            designs.append(evaluate(replace(planned.plan, **changes), planned.method))
         except FitError:
             continue
-    return found
-
-
-def _with(plan: Plan, name: str, value: float) -> Plan:
-    changed: dict[str, float] = {name: value}
-    return replace(plan, **changed)  # type: ignore[arg-type]
+    return designs

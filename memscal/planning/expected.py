@@ -1,4 +1,4 @@
-r"""The calibration of a scan that is not made yet: its estimate and covariance, in expectation.
+r"""Expected calibration of a planned scan: its estimate and covariance.
 
 The Gaussian's parameters have the covariance of the inverse Fisher information at the true ones
 (the bound of Cramer and Rao).  Departures are weighed as in :mod:`memscal.estimation.bayesian`,
@@ -9,7 +9,8 @@ the data's own.  Everything after that is the calibration's own code.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from memscal.estimation.reference import (
 )
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, freeze_arrays
+from memscal.model.result import Result
 from memscal.planning.plan import Plan
 
 __all__ = ["Design", "Expected", "evaluate", "expected_calibration"]
@@ -40,26 +42,14 @@ __all__ = ["Design", "Expected", "evaluate", "expected_calibration"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Expected:
-    """What a planned scan would give.
-
-    ``solution``: every step of its calibration; ``results``: parameters, budget and covariances.
-    """
+    """Steps and results (parameters, budget, covariances) of a planned scan's calibration."""
 
     solution: Solution
     results: Results
 
 
 def expected_calibration(plan: Plan, regulariser: Regulariser) -> Expected:
-    """Calibrate the scan that is planned, with expected squares in place of data.
-
-    Raises
-    ------
-    InputError
-        If the rod is wider than the film is thick, or the kernel is no apparatus function.
-    FitError
-        If the scan would have fewer positions than parameters, or would not tell the conversion
-        constant from zero.
-    """
+    """Calibrate the planned scan, with expected squares in place of data."""
     scan = plan.scan()
     require_calibration_rod(scan)
     stress = reference_contact(plan.film, plan.rod, plan.load)
@@ -119,7 +109,7 @@ def _propagated(solution: Solution, effects: Mapping[str, InputEffect]) -> Resul
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design:
+class Design(Result):
     """A planned scan and what it would find, with standard uncertainties (k = 1).
 
     Parameters
@@ -141,6 +131,8 @@ class Design:
         Its transfer function at wavenumbers in rad/m.
     resolved_wavenumber : float
         Up to which the scan would determine G, in rad/m.
+    want : mapping of str to float
+        What the plan was varied to reach, as it was asked for.
     """
 
     plan: Plan
@@ -154,6 +146,10 @@ class Design:
     transfer: FloatArray
     transfer_errors: FloatArray
     resolved_wavenumber: float
+    want: Mapping[str, float] = field(default_factory=dict)
+
+    _summary: ClassVar[str] = "design"
+    _figure: ClassVar[str] = "design.design_figure"
 
     def __post_init__(self) -> None:
         freeze_arrays(self, "r", "g", "g_errors", "k", "transfer", "transfer_errors")
@@ -186,22 +182,7 @@ class Design:
 
 
 def evaluate(plan: Plan, method: str | Regulariser = "evidence", seed: int = 0) -> Design:
-    """Return what to expect of a plan.
-
-    Parameters
-    ----------
-    plan : Plan
-        The scan.
-    method : str or Regulariser
-        How it is evaluated.
-    seed : int
-        Seed of methods that draw random numbers.
-
-    Raises
-    ------
-    InputError, FitError
-        If the plan cannot be calibrated with.
-    """
+    """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
     regulariser = create_regulariser(method, seed=seed) if isinstance(method, str) else method
     expected = expected_calibration(plan, regulariser)
     solution, results = expected.solution, expected.results

@@ -29,38 +29,11 @@ _LARGEST_KH = 20.0
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """A line scan to be made.
+    """A line scan to be made; the attributes are the arguments of :func:`memscal.design`.
 
-    Parameters
-    ----------
-    film, rod
-        What is pressed on what, with the uncertainties that are known of it.
-    kernel : RadialKernel
-        The apparatus function to expect.
-    conversion_constant : float
-        A to expect, in V/Pa.
-    load : float
-        In N.
-    load_uncertainty : float or None
-        Its relative standard uncertainty.
-    step : float
-        Distance of neighbouring positions, in m.
-    half_range : float
-        Positions run from minus to plus this, in m, or to the last whole step within.
-    repeats : int
-        How often the line is scanned.
-    noise : float
-        Standard deviation of a voltage, as a share of the signal with the rod right above the
-        sensor.
-    noise_voltage : float or None
-        The same in V, in place of the share.
-    centre : float
-        Expected position of the sensor along the scan, in m.
-
-    Raises
-    ------
-    InputError
-        If a number is out of range, or the scan would not pass over the sensor.
+    ``load_uncertainty`` and ``noise`` are relative, to the load and to the signal with the rod
+    right above the sensor; ``noise_voltage`` (V) replaces ``noise``.  Positions run from minus to
+    plus ``half_range``, or to the last whole step within.
     """
 
     film: ElasticFilm = PAPER_FILM
@@ -123,13 +96,7 @@ class Plan:
         return self.noise * self.signal if self.noise_voltage is None else self.noise_voltage
 
     def scan(self) -> Scan:
-        """Return the mean of all repeats as it is to be expected: without noise, which is stated.
-
-        Raises
-        ------
-        InputError
-            If the kernel is no apparatus function.
-        """
+        """Return the expected mean of all repeats: without noise, whose size is stated."""
         count = self.positions
         scan = simulate(
             film=self.film,

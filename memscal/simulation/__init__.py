@@ -1,1 +1,1 @@
-"""The virtual laboratory: synthetic scans from a known truth, which is stored with them."""
+"""Simulation: synthetic scans from a known truth, which is stored with them."""

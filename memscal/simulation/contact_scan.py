@@ -44,12 +44,7 @@ _LEAST_SPREAD = 0.02
 class LoadPath:
     """Contacts at several nominal loads, with neighbours where their loads scatter.
 
-    Parameters
-    ----------
-    states : sequence of sequences of Contact
-        At each nominal load one contact, or three, ``spread`` apart in ln P.
-    spread : float
-        Their distance.
+    ``states``: at each nominal load one contact, or three, ``spread`` apart in ln P.
     """
 
     states: Sequence[Sequence[Contact]]
@@ -68,18 +63,10 @@ class LoadPath:
         *,
         order: int = 0,
     ) -> FloatArray:
-        """Return the blurred stress at radii (m), each at its own load, in Pa.
+        """Return the blurred stress near the nominal load ``index``, in Pa, shape of ``radius``.
 
-        Parameters
-        ----------
-        index : int
-            Number of the nominal load.
-        kernel : RadialKernel
-            The apparatus function.
-        radius, ratio : ndarray, shape (n,)
-            Distance from the axis in m, and load relative to the nominal one, of each contact.
-        order : int
-            Zero for the normal stress, one for the shear's radial component.
+        ``radius`` (m) and ``ratio``, load over the nominal one, of each contact; ``order`` one for
+        the shear's radial component.
         """
         values = blurred_stress(self.states[index], kernel, radius, order=order)
         if len(values) == 1:
@@ -158,71 +145,12 @@ def simulate_contacts(
 
     .. math:: U_i = A\,(G \otimes \sigma_{zz}^{P_i})(R_i) + b + d\,\xi_i + n_i
 
-    with an offset b, a linear drift d and Gaussian noise :math:`n_i`; see
-    :mod:`memscal.simulation.contact_scan` for the stress at each load.
-
-    Parameters
-    ----------
-    film, sphere
-        What is pressed on what; the paper's where absent.
-    kernel : RadialKernel, optional
-        The apparatus function G; the paper's Gaussian of 561 um where absent.
-    conversion_constant : float
-        A, in V/Pa.
-    channels, shear_kernel, shear_conversion_constant
-        Whether ``u_xz`` is recorded, too, and its G and A, as of :func:`memscal.simulate`.
-    load : float or sequence of float
-        Nominal loads, in N, each once; each gives ``repeats`` rows of the scan.
-    friction, loading, interface
-        The contact's law, as of :func:`memscal.indent`.
-    points, spacing : int, float
-        Number of contacts in a row, and their distance in m.
-    repeats : int
-        Rows at each load.
-    noise, baseline, drift : float
-        Standard deviation of the noise, offset, and change of the offset across the scan, each
-        as a share of the scan's largest signal: the same voltage at every load.
-    load_scatter : float
-        Relative standard deviation of each contact's own load; stated as ``normal_load_errors``.
-    record_loads : bool
-        Record the load that each contact had, in place of the nominal one; the error that is
-        stated is then that of the reading.
-    load_reading : float
-        Relative standard deviation of the reading of a load that is recorded.
-    load_scale : float
-        Common factor of all true loads against what is stated.
-    load_uncertainty : float, optional
-        Relative standard uncertainty to state for the loads' common error.
-    position_error : float
-        Standard deviation of each contact's own position in m; stated as ``x_errors``.
-    centre : tuple of float
-        Position of the sensor, in m.
-    state_noise : bool
-        Whether the scan states its noise (``u_zz_errors``).
-    lubrication, lubricant : str
-        Stated in the scan; what they do to the contact is to be said by ``friction``.
-    seed : int
-        Seed.  Noise, loads and positions are drawn from streams of their own.
-
-    Returns
-    -------
-    Scan
-        One row for each repeat at each load, with its truth in ``synthetic``: the film, the
-        sphere and the contact's law, ``load_1`` and so on (the true loads without their scatter),
-        the sensor, and the disturbances.
-
-    Raises
-    ------
-    InputError
-        If a number is out of range, or the kernel is no apparatus function.
-    DomainError
-        If a load is beyond what the contact's model holds for.
-
-    Examples
-    --------
-    >>> scan = simulate_contacts(load=[0.34, 1.37], repeats=2, seed=1)
-    >>> scan.u_zz.shape, scan.lubrication, float(scan.normal_load[2, 0])
-    ((4, 33), 'dry', 1.37)
+    with an offset b, a linear drift d and Gaussian noise :math:`n_i`.  The stress at each load is
+    a parabola in ln P through solved contacts.  Arguments are those of
+    :func:`memscal.simulate_experiment`, in SI units, for one scan; ``load``: nominal loads, each
+    of which gives ``repeats`` rows of ``points`` contacts; ``load_scale``: all true loads over the
+    stated ones.  Noise, loads and positions are drawn from separate streams of ``seed``.  The
+    scan's truth is in ``synthetic``, ``load_1`` and so on without scatter.
     """
     loads = _checked_loads(load)
     _require_plausible(points, spacing, repeats, noise, load_scatter, load_reading, seed)
@@ -259,15 +187,15 @@ def simulate_contacts(
     if record_loads:
         stated, unsure = stated * ratio * (1 + load_reading * draws["reading"]), load_reading
     shape = u.shape[1:] if len(u) == 1 else u.shape
-    further: dict[str, FloatArray] = {}
-    known: dict[str, float | str] = {}
+    channel_data: dict[str, FloatArray] = {}
+    shear_truth: dict[str, float | str] = {}
     if shear is not None:
         blurred = [
             path.near(int(j), shear.kernel, away[i], ratio[i], order=1) for i, j in enumerate(row)
         ]
         sheared = np.stack(blurred) * shear.side(along, away)
         disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
-        further, known = shear.recorded(sheared.reshape(shape), x, disturbed)
+        channel_data, shear_truth = shear.recorded(sheared.reshape(shape), x, disturbed)
     return Scan(
         x=x,
         u_zz=u.reshape(shape),
@@ -275,7 +203,7 @@ def simulate_contacts(
         x_errors=np.full(points, position_error) if position_error > 0 else None,
         normal_load=stated.reshape(shape),
         normal_load_errors=(unsure * stated).reshape(shape) if unsure > 0 else None,
-        channels=further,
+        channels=channel_data,
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=sphere,
@@ -303,7 +231,7 @@ def simulate_contacts(
             "drift": drift * largest,
             "noise": noise * largest,
             "seed": float(seed),
-            **known,
+            **shear_truth,
         },
     )
 
@@ -334,20 +262,20 @@ def _draw(rows: int, points: int, seed: int) -> dict[str, FloatArray]:
 
 def _described(interface: Interface) -> dict[str, float | str]:
     """Return the compliance of the interface, by the names of a truth; nothing if it is rigid."""
-    found: dict[str, float | str] = {}
+    law: dict[str, float | str] = {}
     if interface.slip_length > 0:
-        found["slip_length"] = interface.slip_length
+        law["slip_length"] = interface.slip_length
     if interface.normal_law is not None and interface.normal is not None:
-        found |= {name: float(value) for name, value in asdict(interface.normal).items()}
-    return found | ({"interface": interface.description} if found else {})
+        law |= {name: float(value) for name, value in asdict(interface.normal).items()}
+    return law | ({"interface": interface.description} if law else {})
 
 
 def _checked_loads(load: float | Sequence[float]) -> FloatArray:
     loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
     if loads.ndim != 1 or loads.size == 0:
         raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
-    for each in loads:
-        require_positive("load", float(each), "N")
+    for value in loads:
+        require_positive("load", float(value), "N")
     if np.unique(loads).size != loads.size:
         raise InputError(
             f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N.",

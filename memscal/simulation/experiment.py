@@ -28,15 +28,7 @@ __all__ = ["Experiment", "Reality", "drawn", "simulate_experiment"]
 
 @dataclass(frozen=True, kw_only=True)
 class Reality:
-    """The true film, indenters and loads.
-
-    Parameters
-    ----------
-    film, rod, sphere
-        What is pressed on what.
-    rod_load_scale, load_scale : float
-        True loads of the rod, and of the sphere, relative to what is stated.
-    """
+    """The true film and indenters; true loads of rod and sphere relative to the stated ones."""
 
     film: ElasticFilm
     rod: Rod
@@ -46,33 +38,10 @@ class Reality:
 
 
 def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
-    r"""Draw what is really there from what is stated, each with its standard uncertainty.
+    """Draw the true values from the stated ones, normal and independent, by their uncertainties.
 
-    All are normal and independent; a Poisson's ratio :math:`\nu` above 0.5 is reflected to
-    :math:`1 - \nu`, because no film is more than incompressible.  What has no stated uncertainty
-    stays as it is.
-
-    Parameters
-    ----------
-    stated : Reality
-        The nominal values, with their uncertainties.
-    load_uncertainty : float
-        Relative standard uncertainty of each common factor of the loads.
-    seed : int
-        Seed.
-
-    Raises
-    ------
-    InputError
-        If a value is drawn that no film and no indenter has, because its uncertainty is large.
-
-    Examples
-    --------
-    >>> film = ElasticFilm(young_modulus=2e6, poisson_ratio=0.5, thickness=2e-3,
-    ...                    poisson_ratio_uncertainty=0.01)
-    >>> stated = Reality(film=film, rod=Rod(radius=0.25e-3), sphere=Sphere(radius=0.1288))
-    >>> drawn(stated, 0.0, 1).film.poisson_ratio < 0.5, drawn(stated, 0.0, 1).film.thickness
-    (True, 0.002)
+    A Poisson's ratio above 0.5 is reflected at 0.5.  ``load_uncertainty``: relative standard
+    uncertainty of the common factor of the rod's loads, and of that of the sphere's.
     """
     rng = np.random.default_rng(seed)
 
@@ -198,8 +167,9 @@ def simulate_experiment(
     rod_noise : float, optional
         That of the rod scan, where it differs.
     load_scatter, record_loads, load_reading, position_error
-        Errors of each contact of the sphere, relative and in m, and whether its own load is
-        recorded; see :func:`memscal.simulation.contact_scan.simulate_contacts`.
+        Of each contact of the sphere: relative standard deviation of its load; whether that load
+        is recorded in place of the nominal one, and the relative standard deviation of its
+        reading; standard deviation of its position in m.
     load_uncertainty : float, optional
         Relative standard uncertainty of the common error of the rod's load, and of that of all
         loads of the sphere.
@@ -209,7 +179,7 @@ def simulate_experiment(
     state_noise : bool
         Whether the scans state their noise.
     draw_inputs : bool
-        Draw what is really there from the stated uncertainties: modulus, Poisson's ratio
+        Draw the true values from the stated uncertainties: modulus, Poisson's ratio
         (reflected at 0.5) and thickness of the film, the radii, and the common errors of the
         rod's and of the sphere's loads, which are independent.  The files state the nominal
         values, as those of a real experiment do.  Without it the nominal values are the true ones.
@@ -351,7 +321,7 @@ def _with_load(scan: Scan, load: float, reality: Reality) -> Scan:
 def _as_stated(
     scan: Scan, film: ElasticFilm, indenter: Rod | Sphere, truth: Mapping[str, float | str]
 ) -> Scan:
-    """Return the scan with film and indenter as the experimenter believes them to be."""
+    """Return the scan with film and indenter as the files state them."""
     return replace(
         scan, film=film, indenter=indenter, synthetic={**(scan.synthetic or {}), **truth}
     )

@@ -132,8 +132,8 @@ def simulate(
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
     if loads.size == 0:
         raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
-    for each in loads:
-        require_positive("load", float(each), "N")
+    for value in loads:
+        require_positive("load", float(value), "N")
     x = np.linspace(-half_range, half_range, points)
     y = x if raster else np.zeros(1)
     radius = np.hypot.outer(y - centre[1], x - centre[0])
@@ -147,14 +147,14 @@ def simulate(
     u = clean + rng.normal(0.0, noise * largest, clean.shape)
     if not raster and row_loads.size == 1:
         u = u[0]
-    further: dict[str, FloatArray] = {}
-    known: dict[str, float | str] = {}
+    channel_data: dict[str, FloatArray] = {}
+    shear_truth: dict[str, float | str] = {}
     if shear is not None:
         blurred = blurred_stress([contact], shear.kernel, radius, order=1)[0] / contact.load
         sheared = blurred * shear.side(x - centre[0], radius)
         rows = sheared * (loads[0] if raster else row_loads[:, None])
         disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
-        further, known = shear.recorded(rows.reshape(u.shape), x, disturbed)
+        channel_data, shear_truth = shear.recorded(rows.reshape(u.shape), x, disturbed)
     varying = loads.size > 1
     return Scan(
         x=x,
@@ -162,7 +162,7 @@ def simulate(
         u_zz=u,
         u_zz_errors=np.full(u.shape, noise * largest) if state_noise and noise > 0 else None,
         normal_load=np.broadcast_to(row_loads[:, None], u.shape) if varying else None,
-        channels=further,
+        channels=channel_data,
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=rod,
@@ -179,7 +179,7 @@ def simulate(
             "drift": drift * largest,
             "noise": noise * largest,
             "seed": float(seed),
-            **known,
+            **shear_truth,
         },
     )
 

@@ -27,13 +27,7 @@ _REACH = 40.0
 
 
 def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
-    """Return the kernel, or the paper's Gaussian where there is none.
-
-    Raises
-    ------
-    InputError
-        If it is no kernel, or has another integral than 1, which would pass for an error of A.
-    """
+    """Return the kernel, of unit integral, or the paper's Gaussian where there is none."""
     if kernel is None:
         return GaussianMixture()
     if not isinstance(kernel, RadialKernel):
@@ -56,25 +50,10 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
 def blurred_stress(
     contacts: Sequence[Contact], kernel: RadialKernel, radius: FloatArray, *, order: int = 0
 ) -> FloatArray:
-    r"""Return :math:`G \otimes \sigma_{zz}` of several contacts on one film.
+    r"""Return :math:`G \otimes \sigma_{zz}` in Pa of contacts on one film, by Hankel transforms.
 
-    Of order one it is the radial component of the blurred base shear, a vector field.
-
-    Parameters
-    ----------
-    contacts : sequence of Contact
-        Contacts on one film.
-    kernel : RadialKernel
-        The apparatus function G.
-    radius : ndarray, any shape
-        Distances from the contact's axis, in m.
-    order : int
-        Zero for the normal stress, one for the shear.
-
-    Returns
-    -------
-    ndarray, shape (contacts, *radius.shape)
-        The convolution, exact by Hankel transforms, in Pa.
+    Shape (contacts, *radius.shape) at distances ``radius`` (m) from the axis; of order one, the
+    radial component of the blurred base shear.
     """
     nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, float(radius.max()))
     transform = kernel.transform(nodes.k)
@@ -82,7 +61,7 @@ def blurred_stress(
         contact.base_shear_spectrum(nodes.k) if order else contact.base_spectrum(nodes.k)
         for contact in contacts
     ]
-    spectra = np.stack([found * transform for found in transforms], axis=1)
+    spectra = np.stack([stress * transform for stress in transforms], axis=1)
     return np.moveaxis(nodes.synthesise(spectra, radius, order=order), -1, 0)
 
 
@@ -114,12 +93,9 @@ class ShearChannel:
     conversion_constant: float
 
     def side(self, x: FloatArray, away: FloatArray) -> FloatArray:
-        """Cosine of the way from the sensor to the indenter with x; zero on the sensor.
+        """Cosine of the angle between x and the direction to the indenter; zero on the sensor.
 
-        Parameters
-        ----------
-        x, away : ndarray
-            Coordinate along x, and distance, of the indenter from the sensor, in m.
+        ``x``, ``away``: coordinate along x and distance of the indenter from the sensor, in m.
         """
         return np.asarray(np.divide(x, away, out=np.zeros_like(away + x), where=away > 0))
 
@@ -128,15 +104,8 @@ class ShearChannel:
     ) -> tuple[dict[str, FloatArray], dict[str, float | str]]:
         """Return the channel's voltages, and its truth by names that end in ``_xz``.
 
-        Parameters
-        ----------
-        stress : ndarray, shape (..., n)
-            Component of the blurred shear along x, in Pa.
-        x : ndarray, shape (n,)
-            Positions, in m.
-        disturbed : Disturbances
-            As shares of this channel's own largest signal; its noise is drawn from a stream that
-            no other channel uses.
+        ``stress`` (..., n): component of the blurred shear along x, in Pa; ``x`` (n,): positions,
+        in m; ``disturbed``: as shares of this channel's own largest signal.
         """
         clean = self.conversion_constant * stress
         largest = float(np.abs(clean).max())
@@ -158,13 +127,7 @@ class ShearChannel:
 def shear_channel(
     channels: Sequence[str], kernel: RadialKernel | None, conversion_constant: float
 ) -> ShearChannel | None:
-    """Return the tangential channel if it is among the channels of a scan.
-
-    Raises
-    ------
-    InputError
-        If there is another channel, or the kernel is no apparatus function.
-    """
+    """Return the tangential channel if it is among the channels of a scan."""
     if tuple(channels) not in _CHANNELS:
         raise InputError(
             f"The channels are {tuple(channels)}.",

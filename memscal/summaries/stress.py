@@ -1,62 +1,65 @@
-"""Measured stress as the tables and the JSON object that ``memscal apply`` prints."""
+"""Measured stress as tables, mapping and arrays, as ``memscal apply`` prints it."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from memscal.measurement.measure_stress import pooled_force
-from memscal.measurement.restoration import Comparison, Restoration
-from memscal.mechanics.contact import Contact
+from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
 from memscal.model.checks import QualityCheck
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_measured
-from memscal.model.quantities import KPA, MM, MV, PER_MM
+from memscal.model.quantities import KPA, MM, MV, Quantity, by_name
+from memscal.model.records import STRESS_PROFILE
+from memscal.summaries.interop import (
+    correlated_numbers,
+    data_frame,
+    labelled_dataset,
+    quantity_json,
+)
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
 
-__all__ = ["restoration_json", "restoration_tables", "stress_json", "stress_tables"]
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray
+
+__all__ = ["correlated", "dataset", "frame", "mapping", "tables"]
 
 _PER_PASCAL = 1e-3
 """Volts per pascal in mV/Pa."""
+_QUANTITIES = by_name(STRESS_PROFILE.quantities)
+_POINTS = ("r", "x", "y", "s_zz", "s_zz_errors")
+_SCALARS = ("load", "force", "force_uncertainty", "maximum", "maximum_uncertainty", "baseline",
+            "baseline_uncertainty", "contact_radius", "lubrication")  # fmt: skip
 
 
-def stress_json(found: MeasuredStress, output: Path) -> dict[str, Any]:
-    """Return the object that ``apply --json`` prints; its form is part of the contract."""
-    ratio, spread = pooled_force(found.profiles)
+def mapping(stress: MeasuredStress) -> dict[str, Any]:
+    """Return the object of ``apply --json`` without its files; the contract fixes its form."""
+    ratio, spread = pooled_force(stress.profiles)
+    a, u = stress.conversion_constant, stress.conversion_constant_uncertainty
     return {
-        "schema_version": "1",
-        "output": str(output),
-        "conversion_constant": {
-            "value": finite(found.conversion_constant / _PER_PASCAL),
-            "standard_uncertainty": finite(found.conversion_constant_uncertainty / _PER_PASCAL),
-            "unit": "mV/Pa",
-        },
+        "conversion_constant": quantity_json(a / _PER_PASCAL, "mV/Pa", u / _PER_PASCAL),
         "force_over_load": {"value": finite(ratio), "standard_uncertainty": finite(spread)},
-        "profiles": [_profile_json(profile) for profile in found.profiles],
-        "overridden": list(found.overridden),
-        "checks": checks_json(found.checks),
-        "warnings": texts_of(found.messages),
+        "profiles": [_profile_json(profile) for profile in stress.profiles],
+        "overridden": list(stress.overridden),
+        "checks": checks_json(stress.checks),
+        "warnings": texts_of(stress.messages),
     }
 
 
 def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
     source = profile.scan.source
-    quantities = (
-        ("force", profile.force, profile.force_uncertainty, "N"),
-        ("maximum", profile.maximum / KPA, profile.maximum_uncertainty / KPA, "kPa"),
-        ("centre", *_centre(profile), "mm"),
-        ("baseline", profile.baseline / MV, profile.baseline_uncertainty / MV, "mV"),
-    )
+    baseline, baseline_error = profile.baseline / MV, profile.baseline_uncertainty / MV
+    centre, centre_error = _centre(profile)
     return {
         "scan": None if source is None else source.file_name,
-        "load": {"value": finite(profile.load), "unit": "N"},
+        "load": quantity_json(profile.load, "N"),
         "lubrication": profile.lubrication,
-        **{
-            name: {"value": finite(value), "standard_uncertainty": finite(u), "unit": unit}
-            for name, value, u, unit in quantities
-        },
+        "force": quantity_json(profile.force, "N", profile.force_uncertainty),
+        "maximum": quantity_json(profile.maximum / KPA, "kPa", profile.maximum_uncertainty / KPA),
+        "centre": quantity_json(centre, "mm", centre_error),
+        "baseline": quantity_json(baseline, "mV", baseline_error),
         "force_budget": {source: finite(u) for source, u in profile.force_budget.items()},
         "maximum_budget_kpa": {
             source: finite(u / KPA) for source, u in profile.maximum_budget.items()
@@ -70,18 +73,19 @@ def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
     }
 
 
-def stress_tables(found: MeasuredStress) -> list[Table]:
+def tables(stress: MeasuredStress) -> list[Table]:
     """Return the profiles, what holds for all of them, and the quality checks that matter."""
     head = ("", "load", "state", "total force", "maximum of S_zz", "centre", "checks")
     rows, marked = [], set()
-    for i, profile in enumerate(found.profiles):
-        failed = [check.kind for check in _checks_of(found, i) if not check.passed]
+    for i, profile in enumerate(stress.profiles):
+        number = str(i + 1)
+        failed = [c.kind for c in stress.checks if c.profile == number and not c.passed]
         if failed:
             marked.add(i)
         names = ", ".join(name.replace("_", " ") for name in failed)
         rows.append(
             (
-                str(i + 1),
+                number,
                 f"{profile.load:.4g} N",
                 profile.lubrication or "not stated",
                 format_measured(profile.force, profile.force_uncertainty, "N"),
@@ -90,43 +94,34 @@ def stress_tables(found: MeasuredStress) -> list[Table]:
                 f"FAILED: {names}" if failed else "passed",
             )
         )
-    film, indenter = found.scans[0].film, found.scans[0].indenter
+    film, indenter = stress.scans[0].film, stress.scans[0].indenter
     title = (
         f"Stress measured at the base of a {film.thickness / MM:.4g} mm film under a "
         f"{indenter.shape} of radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
     )
-    checks = checks_table(_shown(found))
     return [
         Table(title, head, rows, frozenset(marked)),
-        Table("All profiles", ("", ""), _common(found)),
-        checks,
+        Table("All profiles", ("", ""), _common_rows(stress)),
+        checks_table(_shown_checks(stress)),
     ]
 
 
-def _common(found: MeasuredStress) -> list[tuple[str, str]]:
-    a, u = found.conversion_constant, found.conversion_constant_uncertainty
-    ratio, spread = pooled_force(found.profiles)
-    points = sum(profile.r.size for profile in found.profiles)
+def _common_rows(stress: MeasuredStress) -> list[tuple[str, str]]:
+    a, u = stress.conversion_constant, stress.conversion_constant_uncertainty
+    points = sum(profile.r.size for profile in stress.profiles)
+    farthest = max(float(profile.r[-1]) for profile in stress.profiles)
     return [
         ("conversion constant A", format_measured(a / _PER_PASCAL, u / _PER_PASCAL, "mV/Pa")),
-        ("total force over applied load", format_measured(ratio, spread)),
-        ("points", f"{points}, from the axis to {_farthest(found) / MM:.3g} mm"),
+        ("total force over applied load", format_measured(*pooled_force(stress.profiles))),
+        ("points", f"{points}, from the axis to {farthest / MM:.3g} mm"),
     ]
 
 
-def _farthest(found: MeasuredStress) -> float:
-    return float(max(profile.r[-1] for profile in found.profiles))
-
-
-def _checks_of(found: MeasuredStress, number: int) -> list[QualityCheck]:
-    return [check for check in found.checks if check.profile == str(number + 1)]
-
-
-def _shown(found: MeasuredStress) -> list[QualityCheck]:
+def _shown_checks(stress: MeasuredStress) -> list[QualityCheck]:
     """Return what checks all profiles, the force of each, and what failed."""
     return [
         check
-        for check in found.checks
+        for check in stress.checks
         if check.kind in ("applied_force", "applied_force_all") or not check.passed
     ]
 
@@ -137,119 +132,57 @@ def _centre(profile: MeasuredProfile) -> tuple[float, float]:
     return profile.centre[axis] / MM, profile.centre_uncertainty[axis] / MM
 
 
-_SHOWN_RADII = 9
-_TAIL = 0.01
+def dataset(stress: MeasuredStress) -> xarray.Dataset:
+    """Return the points as (profile, point), NaN beyond the last of a profile, and its numbers."""
+    profiles = stress.profiles
+    shape = (len(profiles), max(profile.r.size for profile in profiles))
+    values: dict[str, Any] = {name: [getattr(p, name) for p in profiles] for name in _SCALARS}
+    for name in _POINTS:
+        values[name] = np.full(shape, np.nan)
+        for row, profile in zip(values[name], profiles, strict=True):
+            row[: profile.r.size] = getattr(profile, name)
+    for i, name in enumerate(("centre", "centre_y")):
+        values[name] = [p.centre[i] for p in profiles]
+        values[f"{name}_uncertainty"] = [p.centre_uncertainty[i] for p in profiles]
+    axes = dict.fromkeys(values, ("profile",)) | dict.fromkeys(_POINTS, ("profile", "point"))
+    return labelled_dataset(_QUANTITIES.values(), values, axes)
 
 
-def _quantities(found: Restoration) -> list[tuple[str, str, float, float, str]]:
-    """Name in JSON, words, value, standard uncertainty and unit of each number."""
-    axis, error = float(found.stress(0.0)), float(found.stress_uncertainty(0.0))
-    rows = [
-        ("force", "total force", found.force, found.force_uncertainty, "N"),
-        ("stress_on_axis", "stress on the axis", axis / KPA, error / KPA, "kPa"),
-    ]
-    named = zip(("centre", "centre_y"), found.points.free[0], strict=True)
-    for i, (name, free) in enumerate(named):
-        if free:
-            words = "centre of the scan" + (" along y" if i else "")
-            value, spread = found.centre[i] / MM, found.centre_uncertainty[i] / MM
-            rows.append((name, words, float(value), float(spread), "mm"))
-    baseline, spread = found.baseline / MV, found.baseline_uncertainty / MV
-    return [*rows, ("baseline", "baseline", baseline, spread, "mV")]
-
-
-def restoration_json(
-    found: Restoration, compared: Comparison | None, output: Path | None
-) -> dict[str, Any]:
-    """Return the object that ``restore --json`` prints; its form is part of the contract."""
-    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
-    return {
-        "schema_version": "1",
-        "output": None if output is None else str(output),
-        "load": {"value": finite(found.scan.load), "unit": "N"},
-        **{
-            name: {"value": finite(value), "standard_uncertainty": finite(u), "unit": unit}
-            for name, _, value, u, unit in _quantities(found)
-        },
-        "force_budget": {k: finite(v) for k, v in found.force_budget.items()},
-        "resolved_wavenumber": {
-            "value": finite(found.resolved_wavenumber / PER_MM),
-            "unit": "rad/mm",
-        },
-        "reconvolution": {
-            "chi2_reduced": finite(found.chi_square / found.degrees),
-            "degrees": finite(found.degrees),
-        },
-        "stress": {
-            "r_mm": [finite(r / MM) for r in found.r],
-            "sigma_zz_kpa": [finite(s / KPA) for s in found.sigma_zz],
-            "sigma_zz_errors_kpa": [finite(u / KPA) for u in errors],
-        },
-        "calculated": None if compared is None else _comparison_json(compared),
-        "checks": checks_json(found.checks),
-        "warnings": texts_of(found.messages),
+def frame(stress: MeasuredStress) -> pd.DataFrame:
+    """Return one row for each point, with the number, load and lubrication of its profile."""
+    sizes = [profile.r.size for profile in stress.profiles]
+    values: dict[str, Any] = {
+        name: np.concatenate([getattr(profile, name) for profile in stress.profiles])
+        for name in _POINTS
     }
+    values["profile"] = np.repeat(np.arange(1, len(sizes) + 1), sizes)
+    for name in ("load", "lubrication"):
+        values[name] = np.repeat([getattr(profile, name) for profile in stress.profiles], sizes)
+    names = ("load", "lubrication", *_POINTS)
+    number = Quantity("profile", "number", "number of the profile")
+    return data_frame((number, *(_QUANTITIES[name] for name in names)), values)
 
 
-def _comparison_json(compared: Comparison) -> dict[str, Any]:
-    return {
-        "origin": _origin(compared),
-        "chi2_reduced": finite(compared.chi_square),
-        "degrees": compared.degrees,
-        "p_value": finite(compared.p_value),
-        "largest_difference": finite(compared.difference),
-        "share_within_95_percent": finite(compared.within),
-    }
+def correlated(stress: MeasuredStress) -> dict[str, Any]:
+    """Return force, maximum, centre and baseline of each profile, numbered from one.
 
-
-def restoration_tables(found: Restoration, compared: Comparison | None) -> list[Table]:
-    """Return the numbers, the stress at a few radii, and the quality checks."""
-    rows = [(words, format_measured(v, u, unit)) for _, words, v, u, unit in _quantities(found)]
-    rows[:0] = [("load", f"{found.scan.load:.4g} N")]
-    rows += [
-        ("resolved up to the wavenumber", f"{found.resolved_wavenumber / PER_MM:.3g} rad/mm"),
-        ("restored stress blurred again", f"χ²/ν = {found.chi_square / found.degrees:.3g}"),
-    ]
-    if compared is not None:
-        rows += [
-            (
-                f"{_origin(compared)}, blurred",
-                f"χ²/ν = {compared.chi_square:.3g}, p = {compared.p_value:.2g}",
-            ),
-            (
-                f"{_origin(compared)}, beside the restored",
-                f"within 95 % bounds at {compared.within:.0%} of radii",
-            ),
-        ]
-    indenter, film = found.scan.indenter, found.scan.film
-    title = (
-        f"Stress at the base of a {film.thickness / MM:.4g} mm film under a {indenter.shape} of "
-        f"radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
-    )
-    checks = checks_table(found.checks)
-    return [Table(title, ("", ""), rows), _stress_table(found, compared), checks]
-
-
-def _stress_table(found: Restoration, compared: Comparison | None) -> Table:
-    """Return the stress from the axis to where it has decayed."""
-    strong = np.abs(found.sigma_zz) > _TAIL * float(np.abs(found.sigma_zz).max())
-    last = float(found.r[np.flatnonzero(strong)[-1]])
-    step = max(round(last / MM / (_SHOWN_RADII - 1) * 4) / 4, 0.05) * MM
-    radii = np.arange(_SHOWN_RADII) * step
-    radii = radii[radii <= found.r[-1]]
-    stress, errors = found.stress(radii) / KPA, found.stress_uncertainty(radii) / KPA
-    head = ["r (mm)", "restored"] + (["calculated"] if compared is not None else [])
-    rows = []
-    for r, s, u in zip(radii, stress, errors, strict=True):
-        row = [f"{r / MM:.4g}", format_measured(float(s), float(u), "kPa")]
-        if compared is not None:
-            row.append(f"{np.interp(r, found.r, compared.sigma_zz) / KPA:.4g} kPa")
-        rows.append(row)
-    return Table("Normal stress at the base, positive in compression", head, rows)
-
-
-def _origin(compared: Comparison) -> str:
-    if isinstance(compared.stress, Contact):
-        return "calculated without friction"
-    source = compared.stress.source
-    return "expected stress" if source is None else f"expected stress ({source.file_name})"
+    Forces are correlated by the sources that profiles share, as in the check of all forces.  No
+    other covariance is known: all other pairs are taken as independent.
+    """
+    names, values, spread = [], [], []
+    for i, profile in enumerate(stress.profiles, start=1):
+        numbers = {
+            "force": (profile.force, profile.force_uncertainty),
+            "maximum": (profile.maximum, profile.maximum_uncertainty),
+            "centre": (profile.centre[profile.axis], profile.centre_uncertainty[profile.axis]),
+            "baseline": (profile.baseline, profile.baseline_uncertainty),
+        }
+        names += [f"{name}_{i}" for name in numbers]
+        values += [float(value) for value, _ in numbers.values()]
+        spread += [float(u) for _, u in numbers.values()]
+    covariance = np.diag(np.square(spread))
+    forces = slice(0, None, len(names) // len(stress.profiles))
+    for source in SHARED_SOURCES:
+        shared = np.array([profile.force_budget.get(source, 0.0) for profile in stress.profiles])
+        covariance[forces, forces] += np.outer(shared, shared) - np.diag(shared**2)
+    return correlated_numbers(names, values, covariance)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import h5py
-import numpy as np
 import pytest
 from helpers.console import Run, names
 from helpers.contacts import contact_scan
@@ -14,7 +13,6 @@ from helpers.spheres import known_apparatus
 
 import memscal
 from memscal.cli.failures import CHECK_FAILED
-from memscal.errors import InputError
 
 LOADS = (0.69, 2.75)
 REFUSED, EXISTS, USAGE = 3, 4, 2
@@ -41,17 +39,6 @@ def lubricated(folder: Path) -> Path:
     return path
 
 
-def test_it_prints_a_line_for_each_load_of_each_scan(
-    run: Run, artifact: Path, dry: Path, lubricated: Path, folder: Path
-) -> None:
-    done = run("apply", artifact, dry, lubricated)
-    assert done.code == 0, done.err
-    for words in ("0.69 N  dry", "2.75 N  dry", "0.69 N  lubricated", "kPa", "applied force all"):
-        assert words in done.out
-    assert "Written: " in done.err
-    assert "dry.stress.h5" in names(folder)
-
-
 def test_the_file_names_its_inputs_and_holds_the_profiles(
     run: Run, artifact: Path, dry: Path, lubricated: Path, folder: Path
 ) -> None:
@@ -67,20 +54,6 @@ def test_the_file_names_its_inputs_and_holds_the_profiles(
     assert [found.scans.index(profile.scan) for profile in found.profiles] == [0, 0, 1]
     assert run("check", "out.h5").code == 0
     assert "memscal-stress" in run("inspect", "out.h5").out
-
-
-def test_json_holds_the_same_numbers(run: Run, artifact: Path, dry: Path) -> None:
-    done = run("apply", artifact, dry, "--json")
-    measured = memscal.measure_stress(memscal.read_scan(dry), artifact)
-    for mine, its in zip(done.json["profiles"], measured.profiles, strict=True):
-        assert mine["force"]["value"] == pytest.approx(its.force)
-        assert mine["maximum"]["standard_uncertainty"] == pytest.approx(
-            its.maximum_uncertainty * 1e-3
-        )
-        np.testing.assert_allclose(mine["stress"]["s_zz_kpa"], its.s_zz * 1e-3)
-        assert mine["scan"] == "dry.h5"
-    assert {c["name"] for c in done.json["checks"]} == {c.name for c in measured.checks}
-    assert done.json["output"] == str(dry.with_name("dry.stress.h5"))
 
 
 def test_a_wrong_gain_fails_the_check_and_the_exit_code_says_so(
@@ -140,10 +113,3 @@ def test_files_of_another_kind_are_refused(run: Run, artifact: Path, dry: Path) 
 def test_a_figure_is_drawn(run: Run, artifact: Path, dry: Path, folder: Path, suffix: str) -> None:
     assert run("apply", artifact, dry, "--figure", f"f.{suffix}").code == 0
     assert (folder / f"f.{suffix}").stat().st_size > 1000
-
-
-def test_python_and_the_command_refuse_alike(artifact: Path) -> None:
-    scan = contact_scan(1, load=LOADS)
-    film = replace(scan.film, thickness=2.1e-3)
-    with pytest.raises(InputError, match="does not belong to the artifact"):
-        memscal.measure_stress(replace(scan, film=film), artifact)

@@ -7,22 +7,6 @@ from pathlib import Path
 import pytest
 from helpers.console import Run, names
 
-import memscal
-
-
-def test_what_is_told_is_what_the_library_finds(run: Run) -> None:
-    told = run("design", "--step", 0.4, "--repeats", 3, "--noise", 0.8, "--json").json
-    planned = memscal.design(step=0.4e-3, repeats=3, noise=0.008)
-    for name, unit in (("conversion_constant", "mV/Pa"), ("gaussian_sigma", "mm"), ("fwhm", "mm")):
-        shown = told["expected"][name]
-        assert shown["unit"] == unit
-        assert shown["value"] == pytest.approx(1e3 * planned.parameters[name])
-        assert shown["uncertainty"] == pytest.approx(1e3 * planned.parameters.uncertainty(name))
-        assert shown["relative_uncertainty"] == pytest.approx(planned.relative_uncertainty(name))
-    assert told["resolved_wavenumber"]["value"] == pytest.approx(planned.resolved_wavenumber * 1e-3)
-    assert (told["plan"]["positions"], told["plan"]["repeats"]) == (41, 3)
-    assert told["planned"] is True
-
 
 def test_options_reach_the_plan(run: Run) -> None:
     film = ["--thickness", 1.5, "--thickness-uncertainty", 0.01, "--poisson-ratio", 0.48]
@@ -34,15 +18,6 @@ def test_options_reach_the_plan(run: Run) -> None:
     assert told["plan"]["load"]["value"] == 0.5
     assert told["expected"]["gaussian_sigma"]["value"] == pytest.approx(0.4, rel=1e-3)
     assert told["expected"]["conversion_constant"]["budget"]["load"] == 0
-
-
-def test_the_table_names_sources_and_says_that_nothing_was_measured(run: Run) -> None:
-    shown = run("design")
-    assert shown.code == 0
-    assert "nothing was measured" in shown.out
-    for text in ("film thickness", "load", "noise", "resolved up to", "Gaussian width sigma"):
-        assert text in shown.out
-    assert "does not scatter" in shown.err
 
 
 def test_a_wish_is_reached(run: Run) -> None:

@@ -11,34 +11,10 @@ from helpers.console import Run, names
 import memscal
 
 
-def test_json_has_one_object_per_load_in_the_contracts_names_and_units(run: Run) -> None:
-    found = run("reference", "rod", "--load", 0.5, "--load", 2, "--json").json
-    first, second = found["solutions"]
-    units = {
-        "load": "N", "depth": "um", "contact_radius": "mm", "stick_radius": "mm",
-        "max_interface_stress": "Pa", "max_base_stress": "Pa", "friction_coefficient": "1",
-        "convergence": "1",
-    }  # fmt: skip
-    assert {name: first[name]["unit"] for name in units} == units
-    assert (first["loading"], first["backend"]) == ("incremental", "hankel")
-    # The model is linear in the load.
-    for name in ("load", "depth", "max_base_stress"):
-        assert second[name]["value"] == pytest.approx(4 * first[name]["value"])
-    assert first["contact_radius"]["value"] == pytest.approx(0.25)
-    assert first["stick_radius"]["value"] == 0
-    assert first["convergence"]["value"] < 1e-5
-
-
 def test_the_papers_rod_has_the_known_stiffness(run: Run) -> None:
     (solution,) = run("reference", "rod", "--json").json["solutions"]
     assert solution["load"]["value"] == 1.0
     assert 1e3 / solution["depth"]["value"] == pytest.approx(1.704, abs=5e-4)
-
-
-def test_the_unbounded_pressure_under_the_edge_is_null_and_explained(run: Run) -> None:
-    found = run("reference", "rod", "--json").json
-    assert found["solutions"][0]["max_interface_stress"]["value"] is None
-    assert any("without bound" in warning for warning in found["warnings"])
 
 
 def test_a_depth_gives_the_load_that_gives_the_depth(run: Run) -> None:
@@ -46,20 +22,6 @@ def test_a_depth_gives_the_load_that_gives_the_depth(run: Run) -> None:
     load = pressed["load"]["value"]
     (loaded,) = run("reference", "rod", "--load", load, "--json").json["solutions"]
     assert loaded["depth"]["value"] == pytest.approx(100)
-
-
-def test_a_sticking_rod_says_so_without_writing_infinity(run: Run) -> None:
-    (solution,) = run("reference", "rod", "--friction", "inf", "--json").json["solutions"]
-    assert solution["sticking"] is True
-    assert solution["friction_coefficient"]["value"] is None
-    assert solution["stick_radius"] == solution["contact_radius"]
-
-
-def test_the_table_shows_every_load(run: Run) -> None:
-    lines = run("reference", "rod", "--load", 0.25, "--load", 0.75).out.splitlines()
-    assert "rod of radius 0.25 mm" in lines[0]
-    assert "frictionless" in lines[0]
-    assert [line.split()[0] for line in lines[3:]] == ["0.25", "0.75"]
 
 
 def test_options_of_the_film_and_the_rod_reach_the_file(run: Run, folder: Path) -> None:
@@ -122,32 +84,6 @@ def test_a_reference_is_not_replaced_unless_forced(run: Run, folder: Path) -> No
 def test_a_depth_beyond_linear_elasticity_is_pointed_out(run: Run) -> None:
     assert "29% of the film's thickness" in run("reference", "rod").err
     assert run("reference", "rod", "--depth", 100).err == ""
-
-
-def test_the_papers_sphere_along_a_loading(run: Run) -> None:
-    loads = ["--load", 0.34, "--load", 1.37, "--load", 2.75]
-    found = run("reference", "sphere", *loads, "--friction", 0.3, "--json").json["solutions"]
-    expected = memscal.indent(
-        memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3),
-        memscal.Sphere(radius=128.8e-3), load=[0.34, 1.37, 2.75], friction=0.3,
-    )  # fmt: skip
-    assert [s["load"]["value"] for s in found] == [0.34, 1.37, 2.75]
-    for solution, contact in zip(found, expected, strict=True):
-        for name, scale in (("depth", 1e6), ("contact_radius", 1e3), ("stick_radius", 1e3)):
-            assert solution[name]["value"] == pytest.approx(getattr(contact, name) * scale)
-        assert solution["max_interface_stress"]["value"] == contact.max_interface_stress
-        assert 0 <= solution["dissipated_energy"]["value"] < solution["work"]["value"]
-
-
-def test_a_sphere_s_table_has_its_radii_and_its_largest_stresses(run: Run) -> None:
-    done = run("reference", "sphere", "--load", 1.37, "--friction", 0.3)
-    title, head, _, row = done.out.splitlines()
-    assert title.startswith("A sphere of radius 128.8 mm on a film of 2 mm")
-    assert "friction 0.3, incremental loading (hankel)" in title
-    assert "stick radius (mm)" in head
-    numbers = [float(cell) for cell in row.split()[:3]]
-    assert numbers == pytest.approx([1.37, 30.66, 2.832], rel=1e-3)
-    assert done.err == ""
 
 
 def test_a_rough_interface_is_named(run: Run) -> None:

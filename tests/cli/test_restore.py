@@ -30,24 +30,6 @@ def sphere(folder: Path) -> Path:
     return path
 
 
-def test_it_prints_force_stress_and_checks(run: Run, artifact: Path, sphere: Path) -> None:
-    done = run("restore", artifact, sphere)
-    assert done.code == 0, done.err
-    for words in ("total force", "stress on the axis", "restored force", "calculated", "kPa"):
-        assert words in done.out
-    assert names(artifact.parent) == ["sensor.apparatus.h5", "sphere.h5"]
-
-
-def test_json_holds_the_same_numbers(run: Run, artifact: Path, sphere: Path) -> None:
-    done = run("restore", artifact, sphere, "--json")
-    found = memscal.restore(memscal.read_scan(sphere), artifact)
-    assert done.json["force"]["value"] == pytest.approx(found.force)
-    assert done.json["force"]["standard_uncertainty"] == pytest.approx(found.force_uncertainty)
-    np.testing.assert_allclose(done.json["stress"]["sigma_zz_kpa"], found.sigma_zz * 1e-3)
-    assert {check["name"] for check in done.json["checks"]} == {c.name for c in found.checks}
-    assert done.json["calculated"]["origin"] == "calculated without friction"
-
-
 def test_the_file_is_a_reference_with_uncertainties(
     run: Run, artifact: Path, sphere: Path, folder: Path
 ) -> None:

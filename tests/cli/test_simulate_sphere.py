@@ -129,7 +129,7 @@ def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path) -> None
     done = subprocess.run(
         [*command, "--repeats", "40", "--load-scatter", "0"], cwd=folder, capture_output=True,
         text=True, check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (36_000, 36_000)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (42_000, 42_000)),
     )  # fmt: skip
     assert done.returncode == 4, done.stderr
     assert "sphere" in done.stderr

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.lines import Line2D
 
 from memscal.errors import InputError
-from memscal.figures.contact import contact_figure
+from memscal.figures.stress import contact_figure
 from memscal.figures.style import render_figure
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 
 import memscal
 from memscal.figures.stress import measured_stress_figure
-from memscal.figures.style import render_figure
 from memscal.model.measured_stress import MeasuredStress
 
 
@@ -79,7 +78,3 @@ def test_the_legend_names_loads_and_states(found: MeasuredStress) -> None:
     assert words[:2] == ["0.34 N", "2.75 N"]
     assert any("dry" in word for word in words)
     assert any("lubricated" in word for word in words)
-
-
-def test_it_renders(found: MeasuredStress) -> None:
-    assert render_figure(measured_stress_figure(found), "png").startswith(b"\x89PNG")

@@ -10,7 +10,6 @@ from helpers.spheres import known_apparatus, pressed, sphere_scan
 
 import memscal
 from memscal.figures.stress import restoration_figure
-from memscal.figures.style import render_figure
 from memscal.measurement.restoration import Restoration
 
 
@@ -55,9 +54,3 @@ def test_residuals_beyond_the_axis_stand_at_its_edge(found: Restoration) -> None
     shown = np.concatenate(drawn)
     assert shown.size == scan.x.size
     assert np.all((shown > low) & (shown < high))
-
-
-def test_it_renders_without_a_comparison(found: Restoration) -> None:
-    figure = restoration_figure(replace(found, comparison=None))
-    assert not any("calculated" in label for label in lines(figure.axes[0]))
-    assert render_figure(figure, "png").startswith(b"\x89PNG")

@@ -15,9 +15,8 @@ import memscal
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.measurement.measure_stress import joined_stress
-from memscal.measurement.measured_profile import prepared_scan
+from memscal.measurement.measured_profile import contact_signal, prepared_scan, single_loads
 from memscal.measurement.restore import restore_known
-from memscal.measurement.single_loads import contact_signal, single_loads
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.provenance import SourceFile
 from memscal.model.scan import Scan, StressSensor

@@ -10,7 +10,7 @@ from helpers.scans import EXACT_FILM
 from scipy.special import jv
 
 from memscal.axisymmetry.hankel import gauss_between
-from memscal.measurement.pressure import PressureShape, film_transfer, pressure_shapes
+from memscal.measurement.posterior import PressureShape, film_transfer, pressure_shapes
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 
 K = np.linspace(0.0, 6e3, 41)

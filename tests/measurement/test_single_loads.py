@@ -10,7 +10,7 @@ from helpers.builders import make_scan
 from helpers.contacts import LOADS, contact_scan
 
 from memscal.errors import InputError
-from memscal.measurement.single_loads import single_loads
+from memscal.measurement.measured_profile import single_loads
 from memscal.model.provenance import SourceFile
 
 

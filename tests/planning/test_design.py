@@ -177,12 +177,6 @@ def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
     )
 
 
-def test_a_design_says_what_it_is(paper: Design) -> None:
-    assert repr(paper).startswith("<Design of 65 positions every 0.25 mm, 1 repeat: u(A)/A = ")
-    with pytest.raises(InputError, match="no parameter"):
-        paper.relative_uncertainty("colour")
-
-
 @pytest.mark.parametrize(
     ("want", "vary"),
     [

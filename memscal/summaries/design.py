@@ -1,0 +1,160 @@
+"""A planned scan as tables, mapping and arrays, as ``memscal design`` prints it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity
+from memscal.model.records import RADIAL, TRANSFER
+from memscal.planning.expected import Design
+from memscal.summaries.interop import (
+    correlated_numbers,
+    data_frame,
+    labelled_dataset,
+    quantity_json,
+)
+from memscal.summaries.table import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray
+
+__all__ = ["correlated", "dataset", "frame", "mapping", "tables"]
+
+#: Words and symbol of the parameters that are shown.
+_SHOWN = {
+    "conversion_constant": ("conversion constant A", "A"),
+    "gaussian_sigma": ("Gaussian width sigma", "sigma"),
+    "fwhm": ("full width at half maximum", "FWHM"),
+}
+#: Contributions below this share of the largest are shown as zero.
+_NEGLIGIBLE = 5e-3
+_WORDS = {
+    "regularisation": "what the film hides of G",
+    "window": "what the window hides of G",
+    "thickness": "film thickness",
+    "poisson_ratio": "Poisson's ratio",
+    "young_modulus": "Young's modulus",
+}
+_QUANTITIES = (
+    *RADIAL.quantities[:3],
+    *TRANSFER.quantities[:1],
+    Quantity("transfer", "dimensionless", "transfer function of G", axes=("k",)),
+    Quantity("transfer_errors", "dimensionless", "standard uncertainty of it", axes=("k",)),
+)
+
+
+def tables(planned: Design) -> list[Table]:
+    """Return the plan, the expected parameters, and the sources of their uncertainties."""
+    plan = planned.plan
+    noise = f"{plan.point_noise / MV:.3g} mV ({plan.point_noise / plan.signal * 100:.3g} %)"
+    rows = [
+        ("positions", f"{plan.positions}, every {plan.step / MM:.4g} mm"),
+        ("half range", f"{plan.half_range / MM:.4g} mm"),
+        ("repeats", f"{plan.repeats}"),
+        ("load", f"{plan.load:.4g} N"),
+        ("largest signal", f"{plan.signal / MV:.4g} mV"),
+        ("noise of a voltage", noise),
+    ]
+    title = f"A planned scan (nothing was measured), for method {planned.method}"
+    head = ("", "value", "uncertainty", "relative")
+    expected = "Expected, with standard uncertainties (k = 1)"
+    return [
+        Table(title, ("", ""), rows),
+        Table(expected, head, _expected_rows(planned)),
+        _contributions_table(planned),
+    ]
+
+
+def _expected_rows(planned: Design) -> list[tuple[str, str, str, str]]:
+    rows = []
+    for name, (words, _) in _SHOWN.items():
+        shown, share = ESTIMATED[name], planned.relative_uncertainty(name)
+        value = f"{planned.parameters[name] / shown.scale:.4g} {shown.unit}"
+        error = f"{planned.parameters.uncertainty(name) / shown.scale:.2g}"
+        rows.append((words, value, error, _percent(share)))
+    g, u = planned.g[0] / PER_MM2, planned.g_errors[0] / PER_MM2
+    rows.append(("G at the axis", f"{g:.4g} 1/mm^2", f"{u:.2g}", _percent(u / abs(g))))
+    band = planned.resolved_wavenumber / PER_MM
+    detail = f"detail of {2 * math.pi / band:.3g} mm"
+    rows.append(("resolved up to", f"{band:.4g} rad/mm", detail, ""))
+    return rows
+
+
+def _percent(share: float) -> str:
+    return f"{share * 100:.3g} %"
+
+
+def _contributions_table(planned: Design) -> Table:
+    """Return the share of each source in the uncertainties of A and both widths."""
+    shares = {
+        name: {s: u / abs(planned.parameters[name]) for s, u in planned.budget[name].items()}
+        for name in _SHOWN
+    }
+    largest = {name: max(contributions.values()) for name, contributions in shares.items()}
+    rows = []
+    for source in shares["conversion_constant"]:
+        cells = [_cell(shares[name].get(source, 0.0), largest[name]) for name in shares]
+        if any(cell != "0" for cell in cells):
+            rows.append([_WORDS.get(source, source.replace("_", " ")), *cells])
+    head = ("source", *(symbol for _, symbol in _SHOWN.values()))
+    return Table("Contributions, in percent", head, rows)
+
+
+def _cell(share: float, largest: float) -> str:
+    return f"{share * 100:.2g}" if share > _NEGLIGIBLE * largest else "0"
+
+
+def mapping(planned: Design) -> dict[str, Any]:
+    """Return the object of ``design --json``; the contract fixes its form."""
+    plan = planned.plan
+    return {
+        "planned": True,
+        "method": planned.method,
+        "plan": {
+            "positions": plan.positions,
+            "step": quantity_json(plan.step / MM, "mm"),
+            "half_range": quantity_json(plan.half_range / MM, "mm"),
+            "repeats": plan.repeats,
+            "load": quantity_json(plan.load, "N"),
+            "largest_signal": quantity_json(plan.signal / MV, "mV"),
+            "noise": quantity_json(plan.point_noise / MV, "mV"),
+        },
+        "wanted_si": dict(planned.want),
+        "expected": {name: _expected_json(planned, name) for name in _SHOWN},
+        "g_at_axis": {
+            **quantity_json(planned.g[0] / PER_MM2, "1/mm^2"),
+            "uncertainty": float(planned.g_errors[0] / PER_MM2),
+        },
+        "resolved_wavenumber": quantity_json(planned.resolved_wavenumber / PER_MM, "rad/mm"),
+    }
+
+
+def _expected_json(planned: Design, name: str) -> dict[str, Any]:
+    shown = ESTIMATED[name]
+    return {
+        **quantity_json(planned.parameters[name] / shown.scale, shown.unit),
+        "uncertainty": planned.parameters.uncertainty(name) / shown.scale,
+        "relative_uncertainty": planned.relative_uncertainty(name),
+        "budget": {source: u / shown.scale for source, u in planned.budget[name].items()},
+    }
+
+
+def dataset(planned: Design) -> xarray.Dataset:
+    """Return G along r and its transfer function along k, with standard uncertainties."""
+    values = {quantity.name: getattr(planned, quantity.name) for quantity in _QUANTITIES}
+    return labelled_dataset(_QUANTITIES, values)
+
+
+def frame(planned: Design) -> pd.DataFrame:
+    """Return one row for each radius at which G is expected."""
+    return data_frame(
+        _QUANTITIES[:3], {name: getattr(planned, name) for name in ("r", "g", "g_errors")}
+    )
+
+
+def correlated(planned: Design) -> dict[str, Any]:
+    """Return the expected parameters with their joint covariance."""
+    parameters = planned.parameters
+    return correlated_numbers(parameters.names, parameters.values, parameters.covariance)

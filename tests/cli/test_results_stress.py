@@ -1,0 +1,137 @@
+"""Measured and restored stress, contacts and designs show themselves as the commands print them."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.console import Run
+from helpers.contacts import contact_scan
+from helpers.spheres import known_apparatus, pressed, sphere_scan
+
+import memscal
+from memscal.errors import InputError
+
+LOADS = (0.69, 2.75)
+
+
+@pytest.fixture(scope="module")
+def apparatus() -> memscal.ApparatusFunction:
+    return known_apparatus(conversion_uncertainty=0.01, width_uncertainty=0.01)
+
+
+@pytest.fixture(scope="module")
+def stress(apparatus: memscal.ApparatusFunction) -> memscal.MeasuredStress:
+    return memscal.measure_stress(contact_scan(1, load=LOADS), apparatus)
+
+
+@pytest.fixture(scope="module")
+def restored(apparatus: memscal.ApparatusFunction) -> memscal.Restoration:
+    return memscal.restore(sphere_scan(pressed(), seed=5), apparatus, expected=pressed())
+
+
+@pytest.fixture(scope="module")
+def contact() -> memscal.Contact:
+    return pressed(1.0, 0.3)
+
+
+@pytest.fixture(scope="module")
+def planned() -> memscal.Design:
+    return memscal.design(noise=0.01, want={"sigma": 0.028}, vary="repeats")
+
+
+@pytest.mark.parametrize("name", ["stress", "restored", "contact", "planned"])
+def test_text_mapping_notebook_figure_and_arrays(name: str, request: pytest.FixtureRequest) -> None:
+    result = request.getfixturevalue(name)
+    assert str(result) == result.summary()
+    assert "\n" not in repr(result)
+    assert len(repr(result)) < 200
+    assert json.loads(json.dumps(result.to_dict(), allow_nan=False)) == result.to_dict()
+    assert result._repr_html_().startswith("<table>")
+    assert result.plot().axes
+    assert all(variable.attrs for variable in result.to_xarray().variables.values())
+    assert len(result.to_dataframe()) > 10
+
+
+def test_the_commands_print_the_results(
+    run: Run, folder: Path, apparatus: memscal.ApparatusFunction, contact: memscal.Contact
+) -> None:
+    scan = contact_scan(1, load=LOADS)
+    apparatus.save(folder / "a.h5")
+    memscal.write_scan(scan, folder / "scan.h5")
+    shown = run("apply", "a.h5", "scan.h5")
+    assert shown.out.rstrip() == str(memscal.read_stress(folder / "scan.stress.h5"))
+    told = run("apply", "a.h5", "scan.h5", "--json", "--force").json
+    assert (told.pop("schema_version"), told.pop("output")) == ("1", "scan.stress.h5")
+    assert told == memscal.read_stress(folder / "scan.stress.h5").to_dict()
+    assert run("design", "--step", 0.5).out.rstrip() == str(memscal.design(step=0.5e-3))
+    assert run("reference", "sphere", "--friction", 0.3).out.rstrip() == str(
+        memscal.indent(contact.film, memscal.Sphere(radius=0.1288), load=1.0, friction=0.3)
+    )
+
+
+def test_a_contact_with_friction_is_not_called_frictionless(
+    restored: memscal.Restoration, contact: memscal.Contact
+) -> None:
+    assert restored.to_dict()["calculated"]["origin"] == "calculated without friction"
+    apparatus, scan = restored.apparatus, restored.scan
+    rubbed = memscal.restore(scan, apparatus, expected=contact).to_dict()["calculated"]
+    assert rubbed["origin"] == "calculated with friction 0.3"
+
+
+def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.MeasuredStress) -> None:
+    arrays, table = stress.to_xarray(), stress.to_dataframe()
+    assert arrays.s_zz.dims == ("profile", "point")
+    assert (arrays.s_zz.attrs["units"], arrays.r.attrs["units"]) == ("Pa", "m")
+    second = stress.profiles[1]
+    np.testing.assert_allclose(arrays.s_zz[1, : second.r.size], second.s_zz)
+    rows = table[table["profile"] == 2]
+    np.testing.assert_allclose(rows["s_zz (kPa)"], second.s_zz / 1e3)
+    np.testing.assert_allclose(rows["r (mm)"], second.r / 1e-3)
+    assert len(table) == sum(profile.r.size for profile in stress.profiles)
+
+
+def test_forces_of_one_sensor_are_correlated(stress: memscal.MeasuredStress) -> None:
+    numbers = stress.ufloats()
+    first, second = stress.profiles
+    assert numbers["force_1"].nominal_value == first.force
+    assert numbers["force_1"].std_dev == pytest.approx(first.force_uncertainty)
+    assert numbers["maximum_2"].std_dev == pytest.approx(second.maximum_uncertainty)
+    total = numbers["force_1"] + numbers["force_2"]
+    assert total.std_dev > math.hypot(first.force_uncertainty, second.force_uncertainty)
+    assert total.std_dev < first.force_uncertainty + second.force_uncertainty
+
+
+def test_the_numbers_of_a_restoration_have_their_joint_covariance(
+    restored: memscal.Restoration,
+) -> None:
+    numbers = restored.ufloats()
+    assert list(numbers) == ["force", "stress_on_axis", "centre", "baseline"]
+    assert numbers["force"].nominal_value == pytest.approx(restored.force)
+    assert numbers["force"].std_dev == pytest.approx(restored.force_uncertainty)
+    assert numbers["stress_on_axis"].std_dev == pytest.approx(restored.stress_uncertainty(0.0))
+    assert numbers["centre"].nominal_value == pytest.approx(restored.centre[0])
+    assert numbers["baseline"].std_dev == pytest.approx(restored.baseline_uncertainty)
+    total = numbers["force"] + 1e3 * numbers["baseline"]
+    apart = math.hypot(restored.force_uncertainty, 1e3 * restored.baseline_uncertainty)
+    # A higher baseline is a smaller force.
+    assert total.std_dev < apart
+
+
+def test_a_design_says_what_it_was_varied_to_reach(planned: memscal.Design) -> None:
+    assert planned.to_dict()["wanted_si"] == {"sigma": 0.028}
+    sigma = planned.ufloats()["gaussian_sigma"]
+    assert sigma.std_dev / sigma.nominal_value == pytest.approx(
+        planned.relative_uncertainty("gaussian_sigma")
+    )
+
+
+def test_a_contact_has_no_uncertainty(contact: memscal.Contact) -> None:
+    with pytest.raises(InputError, match="no such form"):
+        contact.ufloats()
+    table = contact.to_dataframe()
+    assert table["sigma_zz (kPa)"].max() == pytest.approx(contact.max_base_stress / 1e3)
+    assert contact.to_dict()["depth"] == {"value": pytest.approx(contact.depth * 1e6), "unit": "um"}
