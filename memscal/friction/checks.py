@@ -56,7 +56,8 @@ def _profile(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
         chi_square_limit(best.degrees) / best.degrees,
         f"Reduced chi-square of {_place(loads[0].profile)} against the friction coefficient "
         "that explains it best. A failure means that no calculated contact does: noise or scatter "
-        "larger than stated, another shape of contact, or a film, gain or load that is not as stated.",
+        "larger than stated, another shape of contact, or a film, gain or load that is not as "
+        "stated.",
         best.p_value,
     )
 
