@@ -25,7 +25,6 @@ from memscal.cli.output import (
 
 if TYPE_CHECKING:
     from memscal.friction.results import FrictionComparison
-    from memscal.model.provenance import SourceFile
     from memscal.model.stress import StressProfile
 
 __all__ = [
@@ -50,26 +49,16 @@ def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> lis
     """
     tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
     of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
-    found = [*of_each, "maxima", "effective-friction", "likelihood"]
-    return [*found, "interface"] if interface else found
+    stems = [*of_each, "maxima", "effective-friction", "likelihood"]
+    return [*stems, "interface"] if interface else stems
 
 
 @dataclass(frozen=True)
 class FigureFiles:
-    """Which figures are wanted, and where.
+    """Files of the figures: of the one that shows all at a glance, and of all others in a folder.
 
-    Parameters
-    ----------
-    single : tuple of Path
-        Files of the figure that shows all at a glance.
-    folder : Path or None
-        Folder of all others.
-    suffix : str
-        Their format: ``png``, ``svg`` or ``pdf``.
-    lubrications : tuple of str
-        Of the scans that are compared.
-    interface : bool
-        Whether laws of the interface are compared.
+    ``suffix`` is the others' format; of the scans' lubrications, and of laws of the interface where
+    they are compared, each has figures of its own.
     """
 
     single: tuple[Path, ...]
@@ -92,15 +81,7 @@ class FigureFiles:
         return [*self.single, *self.in_folder.values()]
 
     def prove(self, *, force: bool, inputs: Sequence[Path]) -> None:
-        """Prove that all can be written; a folder that is not there yet is made at the end.
-
-        Raises
-        ------
-        click.UsageError
-            If two have one name, or the folder is a file.
-        OutputError
-            If one cannot be written.
-        """
+        """Prove that all can be written; a folder that is not there yet is made at the end."""
         if self.folder is not None and not self.folder.is_dir():
             if self.folder.exists():
                 raise click.UsageError(f"--figures names a folder, but {self.folder} is a file.")
@@ -108,32 +89,26 @@ class FigureFiles:
         else:
             prove_writable(self.paths, force=force, inputs=inputs)
 
-    def rendered(self, found: FrictionComparison) -> dict[Path, bytes]:
+    def rendered(self, comparison: FrictionComparison) -> dict[Path, bytes]:
         """Return the content of each file."""
         if not self.paths:
             return {}
-        from memscal.figures.friction import comparison_figure, comparison_figures
+        from memscal.figures.friction import comparison_figures
         from memscal.figures.style import figure_format, render_figure
 
         ready: dict[Path, bytes] = {}
         if self.single:
-            figure = comparison_figure(found)
+            figure = comparison.plot()
             for path in self.single:
                 ready[path] = render_figure(figure, figure_format(path.suffix))
         if self.folder is not None:
             named = self.in_folder
-            for stem, draw in comparison_figures(found).items():
+            for stem, draw in comparison_figures(comparison).items():
                 ready[named[stem]] = render_figure(draw(), self.suffix)
         return ready
 
     def write(self, ready: dict[Path, bytes], *, force: bool) -> None:
-        """Write what was rendered.
-
-        Raises
-        ------
-        OutputError
-            If a file cannot be written.
-        """
+        """Write what was rendered."""
         from memscal.formats.files import atomic_write_bytes
 
         if self.folder is not None:
@@ -174,13 +149,7 @@ def cache_options(command: _Command) -> _Command:
 
 
 def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
-    """Return the folder that the options name; ``None`` for no cache.
-
-    Raises
-    ------
-    click.UsageError
-        If both options are given, or the folder is a file.
-    """
+    """Return the folder that the options name; ``None`` for no cache."""
     if no_cache and cache is not None:
         raise click.UsageError("Give --cache or --no-cache, not both.")
     if cache is not None and cache.exists() and not cache.is_dir():
@@ -316,24 +285,25 @@ def command(
     kept = cache_from(cache, no_cache)
 
     from memscal.apparatus import load_apparatus
+    from memscal.cli.failures import exit_code_of
     from memscal.formats.opened import opened_contacts
-    from memscal.friction.compare import scans_of
+    from memscal.formats.reference import read_reference
+    from memscal.friction.compare import compare, scans_of
+    from memscal.summaries.comparison import failures
 
-    known, data = load_apparatus(artifact), opened_contacts(scans)
-    tables = _read_references(references)
+    apparatus, data = load_apparatus(artifact), opened_contacts(scans)
+    profiles = [read_reference(path) for path in references]
     lubrications = tuple(dict.fromkeys(scan.lubrication for scan in scans_of(data)))
     files = FigureFiles(single, folder, figure_format, lubrications, interface)
     files.prove(force=force, inputs=[artifact, *scans, *references])
 
-    from memscal.friction.compare import compare
-
     with working("Comparing with calculated contacts"):
-        found = compare(
+        comparison = compare(
             data,
-            known,
+            apparatus,
             friction=_coefficients(friction),
             loading=loadings or ("incremental", "total"),
-            references=tables or None,
+            references=profiles or None,
             macroscopic=macroscopic,
             macroscopic_uncertainty=macroscopic_uncertainty,
             interface=interface,
@@ -342,17 +312,21 @@ def command(
             workers=_workers(),
         )
     with working("Drawing"):
-        ready = files.rendered(found)
+        ready = files.rendered(comparison)
     files.write(ready, force=force)
-    _tell(found, artifact, tables, files.paths, as_json)
+    _show(comparison, artifact, profiles, files.paths, as_json)
     for path in files.paths:
         message(f"Written: {path}")
-    return _judged(found)
+    failed = [
+        f"{kind} {' '.join(check.profile for check in checks)}".strip()
+        for kind, checks in failures(comparison.checks).items()
+    ]
+    return exit_code_of(comparison.checks, failed)
 
 
-def _coefficients(given: tuple[float, ...]) -> tuple[float, ...] | None:
+def _coefficients(friction: tuple[float, ...]) -> tuple[float, ...] | None:
     """Return coefficients in their order, from none to full stick; ``None`` for the usual ones."""
-    return tuple(sorted({0.0, *given, math.inf})) if given else None
+    return tuple(sorted({0.0, *friction, math.inf})) if friction else None
 
 
 def _workers() -> int:
@@ -389,47 +363,29 @@ def _check_usage(
         )
 
 
-def _read_references(paths: tuple[Path, ...]) -> list[StressProfile]:
-    from memscal.formats.reference import read_reference
-
-    return [read_reference(path) for path in paths]
-
-
-def _source(path: Path) -> SourceFile:
-    """Return the artifact's name and the SHA-256 of its bytes."""
-    import hashlib
-
-    from memscal.formats.files import read_bytes
-    from memscal.model.provenance import SourceFile
-
-    return SourceFile(path.name, hashlib.sha256(read_bytes(path)).hexdigest())
-
-
-def _tell(
-    found: FrictionComparison,
+def _show(
+    comparison: FrictionComparison,
     artifact: Path,
     references: list[StressProfile],
-    files: list[Path],
+    figures: list[Path],
     as_json: bool,
 ) -> None:
     """Print the results and the messages."""
+    import hashlib
+
     from memscal.cli.output import emit_tables
-    from memscal.summaries.comparison import comparison_json, comparison_notes, comparison_tables
+    from memscal.formats.files import read_bytes
+    from memscal.model.provenance import SourceFile
+    from memscal.summaries.comparison import file_json, notes, tables
 
     if as_json:
-        sources = [profile.source for profile in references]
-        emit_json(comparison_json(found, _source(artifact), sources, files))
+        source = SourceFile(artifact.name, hashlib.sha256(read_bytes(artifact)).hexdigest())
+        files = {
+            "artifact": file_json(source),
+            "references": [file_json(profile.source) for profile in references],
+            "figures": [str(path) for path in figures],
+        }
+        emit_json(comparison.to_dict() | files)
     else:
-        emit_tables(*comparison_tables(found))
-    show_messages(comparison_notes(found))
-
-
-def _judged(found: FrictionComparison) -> int:
-    from memscal.cli.failures import exit_code_of
-    from memscal.summaries.comparison import failures
-
-    named = [
-        f"{kind} {' '.join(check.profile for check in failed)}".strip()
-        for kind, failed in failures(found.checks).items()
-    ]
-    return exit_code_of(found.checks, named)
+        emit_tables(*tables(comparison))
+    show_messages(notes(comparison))

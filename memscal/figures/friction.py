@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,7 +34,13 @@ from memscal.figures.friction_scale import (
 )
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
 from memscal.friction.family import FRICTION_SCALE
-from memscal.friction.results import FrictionComparison, InterfaceComparison, LawComparison
+from memscal.friction.results import (
+    FrictionComparison,
+    ImpliedFriction,
+    InterfaceComparison,
+    LawComparison,
+    LoadComparison,
+)
 from memscal.model.arrays import FloatArray
 
 __all__ = [
@@ -53,68 +59,48 @@ _TICKS = (0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, np.inf)
 _COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
 
 
-def interface_figure(found: FrictionComparison) -> Figure:
-    """Draw what laws of the interface explain.
+def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
+    """Draw what laws of the interface explain, of a comparison with friction or of the laws alone.
 
-    Parameters
-    ----------
-    found : FrictionComparison
-        What was compared, with an interface.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panel a, profile likelihood of the length over which the interface yields; b, evidence of
-        each law over that of the best; c, where dry scans were measured, the coefficient that the
-        slip length means at each load, beside that which was found there.
-
-    Raises
-    ------
-    InputError
-        If no interface was compared.
+    Panel a, profile likelihood of the length over which the interface yields; b, evidence of each
+    law over that of the best; c, where dry scans were measured, the coefficient that the slip
+    length means at each load, beside that which was measured there.
     """
-    if found.interface is None:
+    laws = comparison if isinstance(comparison, InterfaceComparison) else comparison.interface
+    loads: Sequence[LoadComparison] = ()
+    if isinstance(comparison, FrictionComparison):
+        loads = comparison.loads[comparison.loadings[0]]
+    if laws is None:
         raise InputError(
             "There is no law of the interface to draw.",
             cure="Compare with interface=True and a macroscopic friction coefficient.",
         )
-    parts = _parts(found.interface)
     with house_style():
         figure = new_figure(3.0)
-        implied = found.interface.tangential
-        widths = (1.0, 1.0, 1.0) if implied is not None and implied.implied is not None else (1, 1)
-        panels = figure.subplots(1, len(widths), width_ratios=widths)
-        _draw_lengths(panels[0], parts)
-        _draw_evidence(panels[1], parts)
-        if implied is not None and len(widths) == 3:
-            _draw_implied(panels[2], found, implied)
+        slip = laws.tangential
+        implied = None if slip is None else slip.implied
+        panels = figure.subplots(1, 2 if implied is None else 3)
+        _draw_lengths(panels[0], laws.by_direction)
+        _draw_evidence(panels[1], laws.by_direction)
+        if slip is not None and implied is not None:
+            measured = [load for load in loads if load.lubrication == slip.lubrication]
+            _draw_implied(panels[2], implied, measured)
         for axes, letter in zip(panels, "abc", strict=False):
             panel_letter(axes, letter)
     return figure
 
 
-def _parts(found: InterfaceComparison) -> dict[str, LawComparison]:
-    both = {"tangential": found.tangential, "normal": found.normal}
-    return {name: part for name, part in both.items() if part is not None}
-
-
 def length_position(length: ArrayLike) -> FloatArray:
-    r"""Return where a length (m) stands on an axis from 0 to infinity: 3 um in its middle.
-
-    Examples
-    --------
-    >>> length_position([0.0, 3e-6, np.inf])
-    array([0. , 0.5, 1. ])
-    """
+    """Return where a length (m) stands on an axis from 0 to infinity: 3 um in its middle."""
     return friction_position(FRICTION_SCALE * np.asarray(length, dtype=np.float64) / _MIDDLE)
 
 
-def _draw_lengths(axes: Axes, parts: dict[str, LawComparison]) -> None:
-    for direction, part in parts.items():
-        rise = np.asarray(part.length.deviance) - float(np.min(part.length.deviance))
-        label = f"{direction}, {lubricated_words(part.lubrication)}"
+def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
+    for direction, compared in by_direction.items():
+        rise = np.asarray(compared.length.chi_square) - float(np.min(compared.length.chi_square))
+        label = f"{direction}, {lubricated_words(compared.lubrication)}"
         colour = COLOURS[_COLOURS[direction]]
-        axes.plot(length_position(part.length.values), rise, color=colour, label=label)
+        axes.plot(length_position(compared.length.values), rise, color=colour, label=label)
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
     axes.xaxis.set_ticks(list(length_position(np.array(_TICKS) * _UM)), names)
@@ -123,12 +109,12 @@ def _draw_lengths(axes: Axes, parts: dict[str, LawComparison]) -> None:
     legend_above(axes, columns=1)
 
 
-def _draw_evidence(axes: Axes, parts: dict[str, LawComparison]) -> None:
+def _draw_evidence(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     """Draw the logarithm of each law's evidence, below that of the best of its kind."""
     names, height = [], 0
-    for direction, part in parts.items():
-        best = max(law.log_evidence for law in part.laws)
-        for law in part.laws:
+    for direction, compared in by_direction.items():
+        best = max(law.log_evidence for law in compared.laws)
+        for law in compared.laws:
             below = law.log_evidence - best
             axes.plot([below, 0.0], [height, height], color="0.8", lw=0.8, zorder=1)
             axes.plot([below], [height], "o", color=COLOURS[_COLOURS[direction]], ms=5)
@@ -146,25 +132,20 @@ def _folded(name: str, width: int = 22) -> str:
     return "\n".join(textwrap.wrap(name, width))
 
 
-def _draw_implied(axes: Axes, found: FrictionComparison, part: LawComparison) -> None:
-    implied = part.implied
-    if implied is None:
-        return
+def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadComparison]) -> None:
     low, best, high = friction_position(np.sort(implied.friction, axis=1)).T
     blue = COLOURS["deconvolved"]
     axes.fill_between(implied.loads, low, high, color=blue, alpha=0.25, lw=0)
     axes.plot(implied.loads, best, color=blue, label="what the slip length means")
-    loads = next(iter(found.loads.values()))
-    of_it = [one for one in loads if one.lubrication == part.lubrication]
-    for i, one in enumerate(of_it):
-        reading = one.by_profile
+    for i, at_load in enumerate(measured):
+        reading = at_load.by_profile
         top = np.inf if reading.interval.high is None else reading.interval.high
         ends = friction_position([reading.interval.low, top])
         label = "found at each load" if i == 0 else "_found"
-        axes.plot([one.load] * 2, ends, color=COLOURS["measured"], lw=1.0, label=label)
+        axes.plot([at_load.load] * 2, ends, color=COLOURS["measured"], lw=1.0, label=label)
         if reading.value is not None:
             place = friction_position([reading.value])
-            axes.plot([one.load], place, "o", color=COLOURS["measured"], ms=4)
+            axes.plot([at_load.load], place, "o", color=COLOURS["measured"], ms=4)
     friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
@@ -177,26 +158,18 @@ _APART = 0.045
 _ROOM = 0.22
 
 
-def maxima_figure(found: FrictionComparison) -> Figure:
-    """Draw S_max/p0_max against the load, as Figure 5 of the paper.
+def maxima_figure(comparison: FrictionComparison) -> Figure:
+    """Draw S_max/p0_max against the load, a panel for each definition of the loading.
 
-    Parameters
-    ----------
-    found : FrictionComparison
-        What was compared.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A panel for each definition of the loading: measured ratios with standard uncertainties,
-        dry and lubricated, and curves of p_max/p0_max for several friction coefficients.
+    Measured ratios with standard uncertainties, dry and lubricated, and curves of p_max/p0_max for
+    several friction coefficients, as Figure 5 of the paper.
     """
     with house_style():
         figure = new_figure(3.4)
-        count = len(found.loadings)
+        count = len(comparison.loadings)
         panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
-        for axes, loading in zip(panels, found.loadings, strict=True):
-            draw_maxima(axes, found, loading)
+        for axes, loading in zip(panels, comparison.loadings, strict=True):
+            draw_maxima(axes, comparison, loading)
         for axes, letter in zip(panels, "abc", strict=False):
             panel_letter(axes, letter)
         for axes in panels[1:]:
@@ -204,18 +177,18 @@ def maxima_figure(found: FrictionComparison) -> Figure:
     return figure
 
 
-def draw_maxima(axes: Axes, found: FrictionComparison, loading: str | None = None) -> None:
+def draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str | None = None) -> None:
     """Draw the ratios of one definition of the loading, and the calculated curves."""
-    loading = main_loading(found, loading)
-    loads, curves = _curves(found, loading)
+    loading = main_loading(comparison, loading)
+    loads, curves = _curves(comparison, loading)
     ends = []
-    for mu in _shown(found.friction):
-        curve = curves[:, int(np.flatnonzero(found.friction == mu)[0])]
+    for mu in _shown(comparison.friction):
+        curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
         (line,) = axes.plot(loads, curve, color=friction_colours(mu)[0], lw=0.9)
         line.set_gid(f"mu={mu:g}")
         ends.append((float(curve[-1]), mu))
-    for lubrication in dict.fromkeys(one.lubrication for one in found.loads[loading]):
-        _draw_ratios(axes, found, loading, lubrication)
+    for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
+        _draw_ratios(axes, comparison, loading, lubrication)
     _make_room(axes, float(loads[0]), float(loads[-1]))
     _name_ends(axes, float(loads[-1]), ends)
     axes.set_xlabel("load (N)")
@@ -227,25 +200,31 @@ def draw_maxima(axes: Axes, found: FrictionComparison, loading: str | None = Non
 
 def _shown(friction: FloatArray) -> list[float]:
     """Return coefficients to draw: the usual ones that were calculated, and the ends."""
-    wanted = {float(mu) for mu in friction if mu in _SHOWN} | {float(friction[0])}
-    return sorted(wanted | {float(friction[-1])})
+    shown = {float(mu) for mu in friction if mu in _SHOWN} | {float(friction[0])}
+    return sorted(shown | {float(friction[-1])})
 
 
-def _curves(found: FrictionComparison, loading: str) -> tuple[FloatArray, FloatArray]:
+def _curves(comparison: FrictionComparison, loading: str) -> tuple[FloatArray, FloatArray]:
     """Return loads, increasing, and the calculated maxima over the frictionless ones there."""
-    by_load = {one.load: one.p_max / one.p0_max for one in found.loads[loading]}
+    by_load = {
+        at_load.load: at_load.p_max / at_load.p0_max for at_load in comparison.loads[loading]
+    }
     loads = sorted(by_load)
     return np.array(loads), np.array([by_load[load] for load in loads])
 
 
-def _draw_ratios(axes: Axes, found: FrictionComparison, loading: str, lubrication: str) -> None:
-    of_it = [one for one in found.loads[loading] if one.lubrication == lubrication]
+def _draw_ratios(
+    axes: Axes, comparison: FrictionComparison, loading: str, lubrication: str
+) -> None:
+    measured = [
+        at_load for at_load in comparison.loads[loading] if at_load.lubrication == lubrication
+    ]
     marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
     black = COLOURS["measured"]
     axes.errorbar(
-        [one.load for one in of_it],
-        [one.ratio for one in of_it],
-        [one.ratio_uncertainty for one in of_it],
+        [at_load.load for at_load in measured],
+        [at_load.ratio for at_load in measured],
+        [at_load.ratio_uncertainty for at_load in measured],
         fmt=marker, color=black, mfc=black if filled else "white", ms=4, mew=0.8,
         elinewidth=0.8, capsize=2, label=lubricated_words(lubrication), zorder=3,
     )  # fmt: skip
@@ -285,77 +264,51 @@ def _group_name(group: list[float]) -> str:
 
 
 def comparison_figure(
-    found: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
+    comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
 ) -> Figure:
-    """Draw what a comparison found on one page.
+    """Draw a comparison on one page; by default of the first lubrication and loading.
 
-    Parameters
-    ----------
-    found : FrictionComparison
-        What was compared.
-    lubrication : str, optional
-        Whose profiles to draw: of the first one measured by default.
-    loading : str, optional
-        Definition of the loading: the first one compared by default.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panel a, measured profiles between no friction and full stick; b, measured maxima over
-        frictionless ones against the load; c, residuals against the frictionless profiles; d, the
-        effective friction coefficient against the load.
-
-    Raises
-    ------
-    InputError
-        If nothing was measured or compared so.
+    Panel a, measured profiles between no friction and full stick; b, measured maxima over
+    frictionless ones against the load; c, residuals against the frictionless profiles; d, the
+    effective friction coefficient against the load.
     """
-    loading = main_loading(found, loading)
-    loads = chosen(found, loading, lubrication)
+    loading = main_loading(comparison, loading)
+    loads = chosen(comparison, loading, lubrication)
     with house_style():
         figure = new_figure(5.6)
         panels = figure.subplots(2, 2)
-        draw_profiles(panels[0, 0], found, loads)
-        draw_maxima(panels[0, 1], found, loading)
-        draw_residuals(panels[1, 0], found, loads, 0)
+        draw_profiles(panels[0, 0], comparison, loads)
+        draw_maxima(panels[0, 1], comparison, loading)
+        draw_residuals(panels[1, 0], comparison, loads, 0)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
-        draw_effective(panels[1, 1], found, loads[0].lubrication, loading)
+        draw_effective(panels[1, 1], comparison, loads[0].lubrication, loading)
         legend_above(panels[1, 1], columns=2)
         for axes, letter in zip(panels.flat, "abcd", strict=True):
             panel_letter(axes, letter)
     return figure
 
 
-def comparison_figures(found: FrictionComparison) -> Mapping[str, Callable[[], Figure]]:
-    """Return what draws each figure of a comparison, by the stem of its file's name.
+def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws each figure of a comparison when called, by the stem of its file's name.
 
-    Parameters
-    ----------
-    found : FrictionComparison
-        What was compared.
-
-    Returns
-    -------
-    mapping of str to callable
-        ``profiles-dry`` and ``friction-set-dry`` (one for each lubrication), ``maxima``,
-        ``effective-friction`` and ``likelihood``, and ``interface`` where one was compared; each
-        draws when it is called.
+    ``profiles-dry`` and ``friction-set-dry`` (one for each lubrication), ``maxima``,
+    ``effective-friction`` and ``likelihood``, and ``interface`` where one was compared.
     """
     figures: dict[str, Callable[[], Figure]] = {}
-    measured = (profile.lubrication for profile in found.measured.profiles)
+    measured = (profile.lubrication for profile in comparison.measured.profiles)
     for lubrication in dict.fromkeys(measured):
         tail = f"-{lubrication}" if lubrication else ""
-        figures[f"profiles{tail}"] = _of(profile_figure, found, lubrication)
-        figures[f"friction-set{tail}"] = _of(friction_set_figure, found, lubrication)
-    figures["maxima"] = lambda: maxima_figure(found)
-    figures["effective-friction"] = lambda: effective_friction_figure(found)
-    figures["likelihood"] = lambda: likelihood_figure(found)
-    if found.interface is not None:
-        figures["interface"] = lambda: interface_figure(found)
+        figures[f"profiles{tail}"] = _of(profile_figure, comparison, lubrication)
+        figures[f"friction-set{tail}"] = _of(friction_set_figure, comparison, lubrication)
+    figures["maxima"] = lambda: maxima_figure(comparison)
+    figures["effective-friction"] = lambda: effective_friction_figure(comparison)
+    figures["likelihood"] = lambda: likelihood_figure(comparison)
+    if comparison.interface is not None:
+        figures["interface"] = lambda: interface_figure(comparison)
     return figures
 
 
 def _of(
-    draw: Callable[..., Figure], found: FrictionComparison, lubrication: str
+    draw: Callable[..., Figure], comparison: FrictionComparison, lubrication: str
 ) -> Callable[[], Figure]:
-    return lambda: draw(found, lubrication=lubrication)
+    return lambda: draw(comparison, lubrication=lubrication)

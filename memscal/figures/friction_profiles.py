@@ -36,40 +36,23 @@ _MOST_LOADS = 4
 
 
 def profile_figure(
-    found: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
+    comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
 ) -> Figure:
     """Draw measured profiles between no friction and full stick, as Figure 3 of the paper.
 
-    Parameters
-    ----------
-    found : FrictionComparison
-        What was compared.
-    lubrication : str, optional
-        ``"dry"``, ``"lubricated"`` or ``""``: the first one measured by default.
-    loading : str, optional
-        Definition of the loading: the first one compared by default.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panels a and b, stress against the distance from the centre, on a linear and on a
-        logarithmic scale, with standard uncertainties; c and d, residuals against the frictionless
-        profile and against that of the largest coefficient, over them.
-
-    Raises
-    ------
-    InputError
-        If nothing was measured or compared so.
+    By default of the first lubrication and loading.  Panels a and b, stress against the distance
+    from the centre, on a linear and on a logarithmic scale, with standard uncertainties; c and d,
+    residuals against the frictionless profile and that of the largest coefficient, over them.
     """
-    loading = main_loading(found, loading)
-    loads = chosen(found, loading, lubrication)
+    loading = main_loading(comparison, loading)
+    loads = chosen(comparison, loading, lubrication)
     with house_style():
         figure = new_figure(4.6)
         panels = figure.subplots(2, 2, height_ratios=(2.2, 1), sharex=True)
-        draw_profiles(panels[0, 0], found, loads)
-        draw_profiles(panels[0, 1], found, loads, logarithmic=True)
+        draw_profiles(panels[0, 0], comparison, loads)
+        draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
         for axes, index in zip(panels[1], (0, -1), strict=True):
-            draw_residuals(axes, found, loads, index)
+            draw_residuals(axes, comparison, loads, index)
         share_limits(panels[1])
         for axes, letter in zip(panels.flat, "abcd", strict=True):
             panel_letter(axes, letter)
@@ -78,40 +61,40 @@ def profile_figure(
 
 def draw_profiles(
     axes: Axes,
-    found: FrictionComparison,
+    comparison: FrictionComparison,
     loads: Sequence[LoadComparison],
     *,
     logarithmic: bool = False,
 ) -> None:
     """Draw measured points with their uncertainties, and the calculated limits through them."""
-    looks = load_looks(found)
-    for one in loads:
-        colour, name = looks[one.load]
-        r = np.linspace(0.0, one.profile.r[-1], _FINE)
-        limits = on_axis(one.profile.r, one.calculated[[0, -1]], r) / KPA
+    looks = load_looks(comparison)
+    for at_load in loads:
+        colour, name = looks[at_load.load]
+        r = np.linspace(0.0, at_load.profile.r[-1], _FINE)
+        limits = on_axis(at_load.profile.r, at_load.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
         axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
-        draw_points(axes, one, colour, "" if logarithmic else name, logarithmic)
+        draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
-        top = max(float(one.profile.s_zz.max()) for one in loads) / KPA
+        top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
         axes.set_yscale("log")
         axes.set_ylim(top * 10**-_DECADES, 2.0 * top)
         for ls, index in (("-", 0), ("--", -1)):
-            label = rf"$G*\sigma_{{zz}}$, $\mu$ = {friction_name(found.friction[index])}"
+            label = rf"$G*\sigma_{{zz}}$, $\mu$ = {friction_name(comparison.friction[index])}"
             axes.plot([], [], color="0.3", lw=1.0, ls=ls, label=label)
     else:
         axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-        axes.set_xlim(0, max(float(one.profile.r[-1]) for one in loads) / MM)
-        _say_what(axes, found, loads[0])
+        axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
+        _say_what(axes, comparison, loads[0])
     axes.set_ylabel("stress at the base (kPa)")
     legend_above(axes, columns=4 if not logarithmic else 2)
 
 
-def _say_what(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
+def _say_what(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     """Say inside the frame, where no data are, which scan and which curves these are."""
-    ends = [friction_name(found.friction[i]) for i in (0, -1)]
-    lines = [lubricated_words(one.lubrication)]
-    lines += [f"{one.loading} loading"] if one.loading else []
+    ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
+    lines = [lubricated_words(at_load.lubrication)]
+    lines += [f"{at_load.loading} loading"] if at_load.loading else []
     lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
     axes.annotate(
         "\n".join(lines), (0.97, 0.95), xycoords="axes fraction", ha="right", va="top", fontsize=7
@@ -119,56 +102,41 @@ def _say_what(axes: Axes, found: FrictionComparison, one: LoadComparison) -> Non
 
 
 def draw_residuals(
-    axes: Axes, found: FrictionComparison, loads: Sequence[LoadComparison], index: int
+    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], index: int
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
     axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    looks = load_looks(found)
-    for one in loads:
-        colour, _ = looks[one.load]
-        z = (one.profile.s_zz - one.calculated[index]) / one.profile.s_zz_errors
-        marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
-        (points,) = axes.plot(one.profile.r / MM, z, marker, color=colour, ms=2.5, mew=0.6)
+    looks = load_looks(comparison)
+    for at_load in loads:
+        colour, _ = looks[at_load.load]
+        z = (at_load.profile.s_zz - at_load.calculated[index]) / at_load.profile.s_zz_errors
+        marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
+        (points,) = axes.plot(at_load.profile.r / MM, z, marker, color=colour, ms=2.5, mew=0.6)
         points.set_markerfacecolor(colour if filled else "white")
     axes.set_xlabel("distance from the centre (mm)")
-    axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(found.friction[index])}}})/u$")
+    axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(comparison.friction[index])}}})/u$")
 
 
 def friction_set_figure(
-    found: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
+    comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
 ) -> Figure:
     """Draw profiles beside those of a set of friction coefficients, as Figure 4 of the paper.
 
-    Parameters
-    ----------
-    found, lubrication, loading
-        As for :func:`profile_figure`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A column for each load (four at most, from the smallest to the largest).  Top, stress near
-        the centre for several coefficients; middle, the same less the frictionless profile, in
-        percent of its maximum;
-        bottom, residuals against the calculated coefficient of least chi-square, over their
-        standard uncertainties.
-
-    Raises
-    ------
-    InputError
-        If nothing was measured or compared so.
+    A column for each load (four at most, from the smallest to the largest).  Top, stress near the
+    centre for several coefficients; middle, the same less the frictionless profile, in percent of
+    its maximum; bottom, residuals against the calculated coefficient of least chi-square.
     """
-    loading = main_loading(found, loading)
-    loads = _spread(chosen(found, loading, lubrication))
+    loading = main_loading(comparison, loading)
+    loads = _spread(chosen(comparison, loading, lubrication))
     with house_style():
         figure = new_figure(5.0)
         rows = (1.5, 1.5, 1.0)
         panels = figure.subplots(3, len(loads), height_ratios=rows, sharex="col", squeeze=False)
-        for column, one in zip(panels.T, loads, strict=True):
-            _draw_set(column[0], found, one)
-            _draw_differences(column[1], found, one)
-            _draw_best(column[2], found, one)
+        for column, at_load in zip(panels.T, loads, strict=True):
+            _draw_set(column[0], comparison, at_load)
+            _draw_differences(column[1], comparison, at_load)
+            _draw_best(column[2], comparison, at_load)
         share_limits(panels[2])
         _share_differences(panels[1])
         words = ("stress (kPa)", "beyond frictionless\n(% of its maximum)", "residual / $u$")
@@ -176,7 +144,7 @@ def friction_set_figure(
             axes.set_ylabel(label)
         figure.align_ylabels(panels[:, 0])
         figure.supxlabel("distance from the centre (mm)", fontsize=8)
-        _legend_of_friction(figure, found, loads[0].lubrication, loading)
+        _legend_of_friction(figure, comparison, loads[0].lubrication, loading)
     return figure
 
 
@@ -186,56 +154,56 @@ def _spread(loads: Sequence[LoadComparison]) -> list[LoadComparison]:
     return [loads[i] for i in np.unique(np.linspace(0, len(loads) - 1, count).round().astype(int))]
 
 
-def _shown_indices(found: FrictionComparison) -> list[int]:
+def _shown_indices(comparison: FrictionComparison) -> list[int]:
     """Return indices of the coefficients to draw: some of them, the ends always."""
-    wanted = {int(np.argmin(np.abs(found.friction - mu))) for mu in _SHOWN if np.isfinite(mu)}
-    return sorted(wanted | {0, found.friction.size - 1})
+    names = {int(np.argmin(np.abs(comparison.friction - mu))) for mu in _SHOWN if np.isfinite(mu)}
+    return sorted(names | {0, comparison.friction.size - 1})
 
 
-def _core(one: LoadComparison) -> float:
+def _core(at_load: LoadComparison) -> float:
     """Return the radius within which the frictionless profile exceeds a twentieth of its top."""
-    strong = one.calculated[0] > 0.05 * one.calculated[0].max()
-    return float(one.profile.r[np.flatnonzero(strong)[-1]])
+    strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
+    return float(at_load.profile.r[np.flatnonzero(strong)[-1]])
 
 
-def _draw_set(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
-    axes.set_title(f"{one.load:.3g} N", fontsize=8)
-    r = np.linspace(0.0, _core(one), _FINE)
-    for i in _shown_indices(found):
-        curve = on_axis(one.profile.r, one.calculated[[i]], r)[0]
-        axes.plot(r / MM, curve / KPA, color=friction_colours(found.friction[i])[0], lw=0.9)
-    draw_points(axes, one, COLOURS["measured"], "", False)
+def _draw_set(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
+    axes.set_title(f"{at_load.load:.3g} N", fontsize=8)
+    r = np.linspace(0.0, _core(at_load), _FINE)
+    for i in _shown_indices(comparison):
+        curve = on_axis(at_load.profile.r, at_load.calculated[[i]], r)[0]
+        axes.plot(r / MM, curve / KPA, color=friction_colours(comparison.friction[i])[0], lw=0.9)
+    draw_points(axes, at_load, COLOURS["measured"], "", False)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
     axes.set_ylim(bottom=0)
 
 
-def _draw_differences(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
+def _draw_differences(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     """Draw what friction adds to the frictionless stress, in percent of its maximum."""
-    unit = one.p0_max / 100
-    r = np.linspace(0.0, _core(one), _FINE)
-    for i in _shown_indices(found):
-        change = (one.calculated[i] - one.calculated[0])[None, :]
-        colour = friction_colours(found.friction[i])[0]
-        axes.plot(r / MM, on_axis(one.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
+    unit = at_load.p0_max / 100
+    r = np.linspace(0.0, _core(at_load), _FINE)
+    for i in _shown_indices(comparison):
+        change = (at_load.calculated[i] - at_load.calculated[0])[None, :]
+        colour = friction_colours(comparison.friction[i])[0]
+        axes.plot(r / MM, on_axis(at_load.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
     draw_errorbar(
         axes,
-        one.profile.r / MM,
-        (one.profile.s_zz - one.calculated[0]) / unit,
-        one.profile.s_zz_errors / unit,
-        one,
+        at_load.profile.r / MM,
+        (at_load.profile.s_zz - at_load.calculated[0]) / unit,
+        at_load.profile.s_zz_errors / unit,
+        at_load,
         colour=COLOURS["measured"],
     )
 
 
-def _draw_best(axes: Axes, found: FrictionComparison, one: LoadComparison) -> None:
-    best = int(np.argmin(one.chi_square))
-    z = (one.profile.s_zz - one.calculated[best]) / one.profile.s_zz_errors
+def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
+    best = int(np.argmin(at_load.chi_square))
+    z = (at_load.profile.s_zz - at_load.calculated[best]) / at_load.profile.s_zz_errors
     axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+    marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
     black = COLOURS["measured"]
     axes.plot(
-        one.profile.r / MM,
+        at_load.profile.r / MM,
         z,
         marker,
         color=black,
@@ -243,7 +211,7 @@ def _draw_best(axes: Axes, found: FrictionComparison, one: LoadComparison) -> No
         mew=0.6,
         mfc=black if filled else "white",
     )
-    label = rf"least $\chi^2$: $\mu$ = {friction_name(found.friction[best])}"
+    label = rf"least $\chi^2$: $\mu$ = {friction_name(comparison.friction[best])}"
     axes.annotate(
         label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7
     )  # fmt: skip
@@ -257,14 +225,14 @@ def _share_differences(panels: Sequence[Axes]) -> None:
 
 
 def _legend_of_friction(
-    figure: Figure, found: FrictionComparison, lubrication: str, loading: str
+    figure: Figure, comparison: FrictionComparison, lubrication: str, loading: str
 ) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=friction_colours(found.friction[i])[0], lw=1.2,
-               label=rf"$\mu$ = {friction_name(found.friction[i])}")
-        for i in _shown_indices(found)
+        Line2D([], [], color=friction_colours(comparison.friction[i])[0], lw=1.2,
+               label=rf"$\mu$ = {friction_name(comparison.friction[i])}")
+        for i in _shown_indices(comparison)
     ]  # fmt: skip
     marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
     point = Line2D(

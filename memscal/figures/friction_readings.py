@@ -20,7 +20,7 @@ from memscal.figures.friction_scale import (
     main_loading,
 )
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
-from memscal.friction.results import EffectiveFriction, FrictionComparison
+from memscal.friction.results import BoundedEstimate, FrictionComparison
 
 __all__ = [
     "draw_effective",
@@ -43,46 +43,38 @@ _HIGHEST = 12.0
 _ENTRIES = 7
 
 
-def effective_friction_figure(found: FrictionComparison) -> Figure:
+def effective_friction_figure(comparison: FrictionComparison) -> Figure:
     """Draw the effective friction coefficient against the load.
 
-    Parameters
-    ----------
-    found : FrictionComparison
-        What was compared.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A row for each lubrication, a panel for each definition of the loading: the coefficient by
-        the maximum and by the whole profile with intervals (arrows where one side is open), the
-        interval of all loads together as a band, and the macroscopic coefficient.
+    A row for each lubrication, a panel for each definition of the loading: the coefficient by the
+    maximum and by the whole profile with intervals (arrows where one side is open), the interval of
+    all loads together as a band, and the macroscopic coefficient.
     """
-    return _panels(found, draw_effective, 2.7)
+    return _panels(comparison, draw_effective, 2.7)
 
 
 def draw_effective(
     axes: Axes,
-    found: FrictionComparison,
+    comparison: FrictionComparison,
     lubrication: str | None = None,
     loading: str | None = None,
 ) -> None:
     """Draw both readings of each load, the joint interval, and the macroscopic coefficient."""
-    loading = main_loading(found, loading)
-    loads = chosen(found, loading, lubrication)
+    loading = main_loading(comparison, loading)
+    loads = chosen(comparison, loading, lubrication)
     span = loads[-1].load - loads[0].load or loads[0].load
     for name, (words, colour, side) in _READINGS.items():
-        for i, one in enumerate(loads):
+        for i, at_load in enumerate(loads):
             _draw_reading(
                 axes,
-                getattr(one, name),
-                one.load + side * _ASIDE * span,
+                getattr(at_load, name),
+                at_load.load + side * _ASIDE * span,
                 COLOURS[colour],
                 words if i == 0 else "",
-                LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""]),
+                LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""]),
             )
-    _draw_joint(axes, found.joint[loads[0].lubrication][loading])
-    _draw_macroscopic(axes, found.macroscopic)
+    _draw_joint(axes, comparison.joint[loads[0].lubrication][loading])
+    _draw_macroscopic(axes, comparison.macroscopic)
     friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
     axes.set_xlim(0, loads[-1].load + 0.08 * span)
     axes.set_xlabel("load (N)")
@@ -90,7 +82,7 @@ def draw_effective(
 
 def _draw_reading(
     axes: Axes,
-    reading: EffectiveFriction,
+    reading: BoundedEstimate,
     x: float,
     colour: str,
     label: str,
@@ -115,7 +107,7 @@ def _draw_reading(
         axes.plot([], [], marker[0], color=colour, ms=4, ls="-", lw=1.0, label=label)
 
 
-def _draw_joint(axes: Axes, joint: EffectiveFriction) -> None:
+def _draw_joint(axes: Axes, joint: BoundedEstimate) -> None:
     high = math.inf if joint.interval.high is None else joint.interval.high
     low, top = friction_position([joint.interval.low, high])
     axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
@@ -123,10 +115,10 @@ def _draw_joint(axes: Axes, joint: EffectiveFriction) -> None:
         axes.axhline(float(friction_position(joint.value)), color=COLOURS["reference"], lw=0.8)
 
 
-def _draw_macroscopic(axes: Axes, given: tuple[float, float | None] | None) -> None:
-    if given is None:
+def _draw_macroscopic(axes: Axes, macroscopic: tuple[float, float | None] | None) -> None:
+    if macroscopic is None:
         return
-    value, u = given
+    value, u = macroscopic
     place = float(friction_position(value))
     axes.axhline(place, color=COLOURS["muted"], lw=0.8, ls="--", label="macroscopic")
     if u:
@@ -135,20 +127,20 @@ def _draw_macroscopic(axes: Axes, given: tuple[float, float | None] | None) -> N
 
 
 def _panels(
-    found: FrictionComparison,
+    comparison: FrictionComparison,
     draw: Callable[[Axes, FrictionComparison, str, str], None],
     height: float,
 ) -> Figure:
     """Draw a row of ``height`` inches for each lubrication, a panel for each loading."""
-    lubrications = list(found.joint)
+    lubrications = list(comparison.joint)
     with house_style():
         figure = new_figure(0.6 + height * len(lubrications))
         panels = figure.subplots(
-            len(lubrications), len(found.loadings), sharex=True, sharey=True, squeeze=False
+            len(lubrications), len(comparison.loadings), sharex=True, sharey=True, squeeze=False
         )
         for row, lubrication in zip(panels, lubrications, strict=True):
-            for axes, loading in zip(row, found.loadings, strict=True):
-                draw(axes, found, lubrication, loading)
+            for axes, loading in zip(row, comparison.loadings, strict=True):
+                draw(axes, comparison, lubrication, loading)
                 _name_panel(axes, lubrication, loading)
         for axes, letter in zip(panels.flat, "abcdef", strict=False):
             panel_letter(axes, letter)
@@ -178,37 +170,28 @@ def _newtons(label: str) -> float:
     return float(label.removesuffix(" N"))
 
 
-def likelihood_figure(found: FrictionComparison) -> Figure:
+def likelihood_figure(comparison: FrictionComparison) -> Figure:
     """Draw the profile likelihoods of the effective friction coefficient.
 
-    Parameters
-    ----------
-    found : FrictionComparison
-        What was compared.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A row for each lubrication, a panel for each definition of the loading: chi-square above
-        its least value against the coefficient, of each load's profile and of all together, with
-        the levels that bound 68.3 % and 95 %.
+    Chi-square above its least value against the coefficient, of each load's profile and of all
+    together, with the levels that bound 68.3 % and 95 %.
     """
-    return _panels(found, draw_likelihood, 2.4)
+    return _panels(comparison, draw_likelihood, 2.4)
 
 
 def draw_likelihood(
     axes: Axes,
-    found: FrictionComparison,
+    comparison: FrictionComparison,
     lubrication: str | None = None,
     loading: str | None = None,
 ) -> None:
     """Draw chi-square above its least value of each load and of all loads together."""
-    loading = main_loading(found, loading)
-    loads = chosen(found, loading, lubrication)
-    looks = load_looks(found)
-    for one in loads:
-        _draw_curve(axes, one.by_profile, *looks[one.load], 1.0)
-    joint = found.joint[loads[0].lubrication][loading]
+    loading = main_loading(comparison, loading)
+    loads = chosen(comparison, loading, lubrication)
+    looks = load_looks(comparison)
+    for at_load in loads:
+        _draw_curve(axes, at_load.by_profile, *looks[at_load.load], 1.0)
+    joint = comparison.joint[loads[0].lubrication][loading]
     _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
     draw_levels(axes)
     friction_axis(axes, "x", r"effective friction coefficient $\mu_e$")
@@ -227,7 +210,7 @@ def draw_levels(axes: Axes) -> None:
 
 
 def _draw_curve(
-    axes: Axes, reading: EffectiveFriction, colour: str, label: str, width: float
+    axes: Axes, reading: BoundedEstimate, colour: str, label: str, width: float
 ) -> None:
     rise = np.asarray(reading.chi_square) - float(np.min(reading.chi_square))
     axes.plot(friction_position(reading.values), rise, color=colour, lw=width, label=label)

@@ -43,15 +43,7 @@ LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
 
 
 def friction_position(friction: ArrayLike) -> FloatArray:
-    r"""Return where a friction coefficient stands on an axis from 0 to infinity.
-
-    .. math:: t = \frac{\mu}{\mu + 0.3}
-
-    Examples
-    --------
-    >>> friction_position([0.0, 0.3, np.inf])
-    array([0. , 0.5, 1. ])
-    """
+    """Return where a friction coefficient stands on an axis from 0 to infinity: mu/(mu + 0.3)."""
     mu = np.asarray(friction, dtype=np.float64)
     finite = np.isfinite(mu)
     bounded = np.where(finite, mu, 0.0)
@@ -81,7 +73,7 @@ def friction_colours(friction: ArrayLike) -> list[str]:
     return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
 
 
-def load_looks(found: FrictionComparison) -> dict[float, tuple[str, str]]:
+def load_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
     """Return colour and name of each load: darker as it grows, also in grey, alike in all panels.
 
     Loads within 5 % of each other, such as those of recorded repeats, look alike.
@@ -89,7 +81,7 @@ def load_looks(found: FrictionComparison) -> dict[float, tuple[str, str]]:
     import matplotlib as mpl
 
     groups: list[list[float]] = []
-    for load in sorted({one.load for of_it in found.loads.values() for one in of_it}):
+    for load in sorted({profile.load for profile in comparison.measured.profiles}):
         if groups and load <= _ALIKE * groups[-1][0]:
             groups[-1].append(load)
         else:
@@ -111,60 +103,38 @@ def lubricated_words(lubrication: str) -> str:
     return lubrication or "lubrication not stated"
 
 
-def main_loading(found: FrictionComparison, loading: str | None) -> str:
-    """Return the definition of the loading to draw: the first one unless another is named.
-
-    Raises
-    ------
-    InputError
-        If that was not compared.
-    """
+def main_loading(comparison: FrictionComparison, loading: str | None) -> str:
+    """Return the definition of the loading to draw: the first one unless another is named."""
     if loading is None:
-        return found.loadings[0]
-    if loading not in found.loads:
+        return comparison.loadings[0]
+    if loading not in comparison.loads:
         raise InputError(
             f"The loading {loading!r} was not compared.",
-            cure=f"There is {', '.join(repr(name) for name in found.loadings)}.",
+            cure=f"There is {', '.join(repr(name) for name in comparison.loadings)}.",
         )
     return loading
 
 
 def chosen(
-    found: FrictionComparison, loading: str, lubrication: str | None
+    comparison: FrictionComparison, loading: str, lubrication: str | None
 ) -> list[LoadComparison]:
-    """Return the loads of one lubrication, increasing; the first one measured by default.
-
-    Raises
-    ------
-    InputError
-        If nothing was measured so.
-    """
-    measured = [one.lubrication for one in found.loads[loading]]
-    wanted = measured[0] if lubrication is None else lubrication
-    if wanted not in measured:
+    """Return the loads of one lubrication, increasing; the first one measured by default."""
+    measured = [at_load.lubrication for at_load in comparison.loads[loading]]
+    state = measured[0] if lubrication is None else lubrication
+    if state not in measured:
         raise InputError(
-            f"No profile is {lubricated_words(wanted)!r}.",
+            f"No profile is {lubricated_words(state)!r}.",
             cure=f"There is {', '.join(sorted({lubricated_words(name) for name in measured}))}.",
         )
-    of_it = [one for one in found.loads[loading] if one.lubrication == wanted]
-    return sorted(of_it, key=lambda one: one.load)
+    loads = [at_load for at_load in comparison.loads[loading] if at_load.lubrication == state]
+    return sorted(loads, key=lambda at_load: at_load.load)
 
 
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
-    """Return smooth even profiles at fine radii, through their values at measured ones.
+    """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones.
 
-    Parameters
-    ----------
-    r : ndarray, shape (n,)
-        Radii in m, not negative, increasing; those closer than a micrometre count as one.
-    values : ndarray, shape (m, n)
-        Profiles there.
-    fine : ndarray, shape (k,)
-        Radii within those of ``r``, or between the axis and the first.
-
-    Returns
-    -------
-    ndarray, shape (m, k)
+    Radii closer than a micrometre count as one; the fine ones lie within the others, or between the
+    axis and the first.
     """
     from scipy.interpolate import CubicSpline
 
@@ -193,19 +163,20 @@ _LEAST_LIMIT = 3.5
 
 
 def draw_points(
-    axes: Axes, one: LoadComparison, colour: str, label: str, logarithmic: bool
+    axes: Axes, at_load: LoadComparison, colour: str, label: str, logarithmic: bool
 ) -> None:
     """Draw the measured points.
 
     On a logarithmic scale those that are not above 0 are left out, and those that are less than
     twice their uncertainty are pale: they say no more than that the stress has decayed.
     """
-    r, s, u = (np.asarray(v) for v in (one.profile.r, one.profile.s_zz, one.profile.s_zz_errors))
+    profile = at_load.profile
+    r, s, u = (np.asarray(v) for v in (profile.r, profile.s_zz, profile.s_zz_errors))
     clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
     for shown, strength in ((clear, 1.0), (~clear & (s > 0), _PALE)):
         if shown.any():
             draw_errorbar(
-                axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA, one,
+                axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA, at_load,
                 colour=colour, label=label, strength=strength,
             )  # fmt: skip
 
@@ -215,14 +186,14 @@ def draw_errorbar(
     x: FloatArray,
     y: FloatArray,
     u: FloatArray,
-    one: LoadComparison,
+    at_load: LoadComparison,
     *,
     colour: str,
     label: str = "",
     strength: float = 1.0,
 ) -> None:
     """Draw points with their standard uncertainties, in the marker of their lubrication."""
-    marker, filled = LUBRICATIONS.get(one.lubrication, LUBRICATIONS[""])
+    marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
     style: dict[str, Any] = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
     face = colour if filled else "white"
     style |= {"label": label or "_points", "alpha": None if strength == 1.0 else strength}

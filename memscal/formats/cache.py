@@ -15,7 +15,6 @@ import json
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +22,14 @@ import numpy as np
 
 from memscal.errors import FormatError, MemscalError, OutputError
 from memscal.formats.files import atomic_write_bytes
-from memscal.formats.hdf5.reader import SafeFile, open_hdf5
+from memscal.formats.hdf5.reader import open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, tree_to_bytes
 from memscal.formats.values import altered, require_schema
 from memscal.model.arrays import FloatArray
 
 __all__ = [
     "CONTACT_TABLE_SCHEMA",
-    "ContactTable",
+    "CacheFolder",
     "clear_contact_tables",
     "find_contact_table",
     "keep_contact_table",
@@ -39,56 +38,29 @@ __all__ = [
 
 CONTACT_TABLE_SCHEMA = "memscal-contact-table"
 
+CacheFolder = str | os.PathLike[str] | None
+"""A folder in which calculated contacts are kept; ``None`` keeps none."""
+
 #: A folder grows no further than this.
 _MOST_BYTES = 64 * 2**20
 _MOST_ENTRIES = 512
 _ENTRY = re.compile(r"[0-9a-f]{64}\.h5")
 _KEY = re.compile(r"[0-9a-f]{64}")
-_ARRAYS = {
-    "spectra": ("N", ("value", "load", "k")),
-    "by_load": ("N", ("value", "load", "k")),
-    "depth": ("m", ("value", "load")),
-    "contact_radius": ("m", ("value", "load")),
+_TRANSFORM = ("N", ("value", "load", "k"))
+#: Units and axes of arrays that are not transforms in N.
+_OTHERS = {
+    "value": ("1", ("value",)),
+    "load": ("N", ("load",)),
+    "k": ("rad/m", ("k",)),
+    "depths": ("m", ("value", "load")),
+    "contact_radii": ("m", ("value", "load")),
     "convergence": ("1", ("value", "load")),
 }
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ContactTable:
-    """Transforms of base stresses over M values of a parameter, L loads and K wavenumbers.
-
-    Parameters
-    ----------
-    value : ndarray, shape (M,)
-        Values of the parameter; ``inf`` is allowed.
-    load : ndarray, shape (L,)
-        Loads in N.
-    k : ndarray, shape (K,)
-        Wavenumbers in rad/m.
-    spectra, by_load : ndarray, shape (M, L, K)
-        Transforms in N, and their derivatives by the logarithm of the load.
-    changes : mapping of str to ndarray, shape (M, L, K)
-        Changes by one standard uncertainty of each source, in N.
-    depth, contact_radius, convergence : ndarray, shape (M, L)
-        Depths and radii in m, and relative changes under refinement.
-    """
-
-    value: FloatArray
-    load: FloatArray
-    k: FloatArray
-    spectra: FloatArray
-    by_load: FloatArray
-    changes: Mapping[str, FloatArray]
-    depth: FloatArray
-    contact_radius: FloatArray
-    convergence: FloatArray
 
 
 def table_key(content: Mapping[str, Any]) -> str:
     """Return the SHA-256 of what a table depends on, in plain values that JSON can say.
 
-    Examples
-    --------
     >>> table_key({"load": 0.34}) == table_key({"load": 0.34000000000000002})
     True
     """
@@ -96,15 +68,25 @@ def table_key(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def keep_contact_table(folder: str | os.PathLike[str], key: str, table: ContactTable) -> bool:
-    """Write a table into a folder under its key, and remove the oldest beyond the folder's limit.
+def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, FloatArray]) -> bool:
+    """Write arrays into a folder under their key, and remove the oldest beyond its limit.
 
-    Returns
-    -------
-    bool
-        Whether it was written: a full or read-only disk costs time in the next run, no more.
+    They are ``value`` (M,), ``load`` (L,) and ``k`` (K,), ``depths``, ``contact_radii`` and
+    ``convergence`` (M, L), and transforms (M, L, K) in N.  Whether they were written is returned:
+    a full or read-only disk costs time in the next run, no more.
     """
-    data = tree_to_bytes(file_tree(CONTACT_TABLE_SCHEMA, _entry(key, table)))
+    if folder is None:
+        return False
+    children: dict[str, Node] = {
+        name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
+    }
+    contacts = Group("NXdata", children, {"signal": "spectra", "axes": _TRANSFORM[1]})
+    entry = Group(
+        "NXentry",
+        {"contacts": contacts, "key": key, "arrays": " ".join(arrays)},
+        {"default": "contacts"},
+    )
+    data = tree_to_bytes(file_tree(CONTACT_TABLE_SCHEMA, entry))
     try:
         os.makedirs(folder, exist_ok=True)
         atomic_write_bytes(_path(folder, key), data, overwrite=True)
@@ -114,20 +96,25 @@ def keep_contact_table(folder: str | os.PathLike[str], key: str, table: ContactT
     return True
 
 
-def find_contact_table(folder: str | os.PathLike[str], key: str) -> ContactTable | None:
-    """Return the table that was kept under a key; ``None`` where there is none that is sound."""
+def find_contact_table(folder: CacheFolder, key: str) -> dict[str, FloatArray] | None:
+    """Return the arrays that were kept under a key; ``None`` where none of them are sound."""
+    if folder is None:
+        return None
     path = _path(folder, key)
     try:
         with open_hdf5(path) as file:
             require_schema(file, CONTACT_TABLE_SCHEMA)
             if altered(file) or file.text("/entry/key") != key:
                 return None
-            table = _table(file)
+            arrays = {
+                name: np.asarray(file.array(f"/entry/contacts/{name}"), dtype=np.float64)
+                for name in file.text("/entry/arrays").split()
+            }
     except MemscalError:
         return None
     with contextlib.suppress(OSError):
         os.utime(path)
-    return table
+    return arrays
 
 
 def clear_contact_tables(folder: str | os.PathLike[str]) -> int:
@@ -141,47 +128,15 @@ def _path(folder: str | os.PathLike[str], key: str) -> Path:
     return Path(folder) / f"{key}.h5"
 
 
-def _entry(key: str, table: ContactTable) -> Group:
-    children: dict[str, Node] = {
-        "value": Number(table.value, "1", ("value",)),
-        "load": Number(table.load, "N", ("load",)),
-        "k": Number(table.k, "rad/m", ("k",)),
-    }
-    for name, (units, axes) in _ARRAYS.items():
-        children[name] = Number(getattr(table, name), units, axes)
-    for source, change in table.changes.items():
-        children[f"by_{source}"] = Number(change, "N", ("value", "load", "k"))
-    contacts = Group("NXdata", children, {"signal": "spectra", "axes": _ARRAYS["spectra"][1]})
-    return Group(
-        "NXentry",
-        {"contacts": contacts, "key": key, "sources": " ".join(table.changes)},
-        {"default": "contacts"},
-    )
-
-
-def _table(file: SafeFile) -> ContactTable:
-    def array(name: str) -> FloatArray:
-        return np.asarray(file.array(f"/entry/contacts/{name}"), dtype=np.float64)
-
-    sources = file.text("/entry/sources").split()
-    return ContactTable(
-        value=array("value"),
-        load=array("load"),
-        k=array("k"),
-        changes={source: array(f"by_{source}") for source in sources},
-        **{name: array(name) for name in _ARRAYS},
-    )
-
-
 def _entries(folder: str | os.PathLike[str]) -> list[tuple[Path, os.stat_result]]:
     """Return the tables of a folder, the one used longest ago first."""
-    found = []
-    with contextlib.suppress(OSError), os.scandir(folder) as listed:
-        for item in listed:
+    entries = []
+    with contextlib.suppress(OSError), os.scandir(folder) as items:
+        for item in items:
             with contextlib.suppress(OSError):
                 if _ENTRY.fullmatch(item.name) and item.is_file(follow_symlinks=False):
-                    found.append((Path(item.path), item.stat(follow_symlinks=False)))
-    return sorted(found, key=lambda entry: (entry[1].st_mtime_ns, entry[0].name))
+                    entries.append((Path(item.path), item.stat(follow_symlinks=False)))
+    return sorted(entries, key=lambda entry: (entry[1].st_mtime_ns, entry[0].name))
 
 
 def _prune(folder: str | os.PathLike[str]) -> None:

@@ -1,9 +1,9 @@
-"""Base stresses of a sphere on a film under Amontons friction, along the friction coefficient."""
+"""Families of base stresses of a sphere on a film, along friction coefficient or length."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.friction.family import FRICTION_SCALE, ProfileFamily
-from memscal.friction.paths import STRONGER, CacheFolder, FamilySetup, parameter_values
+from memscal.formats.cache import CacheFolder
+from memscal.friction.family import (
+    FRICTION_SCALE,
+    STRONGER,
+    FamilySetup,
+    ProfileFamily,
+    parameter_values,
+)
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
@@ -26,7 +32,6 @@ __all__ = [
     "SLIP_LENGTHS",
     "LawFamilies",
     "amontons_family",
-    "at_loads",
     "elasto_plastic_family",
     "normal_compliance_family",
 ]
@@ -47,44 +52,13 @@ def amontons_family(
     workers: int = 1,
     order: int = 0,
 ) -> ProfileFamily:
-    r"""Return the base stresses of a sphere on a film for a range of friction coefficients.
+    """Return the base stresses of a sphere on a film for a range of friction coefficients.
 
-    Parameters
-    ----------
-    film : ElasticFilm
-        The film; its stated uncertainties become ``changes`` of the family.
-    indenter : Sphere
-        The sphere.
-    loads : array_like, shape (L,)
-        Loads in N.
-    friction : sequence of float
-        Amontons' coefficients, increasing from 0 or above; the last may be ``inf``.
-    loading : str
-        ``"incremental"`` or ``"total"``: see :func:`memscal.indent`.
-    reach : float
-        Largest distance from the axis at which stresses will be asked for, in m.
-    cache : path, optional
-        Folder in which families are kept from one run to the next; without it nothing is written.
-    workers : int
-        Processes that share the work; the result is the same to rounding.
-    order : int
-        Zero for the normal stress at the base; one for its shear, which a tangential channel sees.
+    ``loads`` (L,) are in N; the coefficients increase from 0 or above, the last may be ``inf``;
+    ``loading`` is ``"incremental"`` or ``"total"`` (see :func:`memscal.indent`); ``reach`` (m) is
+    the largest distance from the axis at which stresses will be asked for.  ``order`` is zero for
+    the normal stress at the base, one for its shear.  Stated uncertainties become ``changes``.
 
-    Returns
-    -------
-    ProfileFamily
-
-    Raises
-    ------
-    InputError
-        If the indenter is no sphere, or an argument makes no sense.
-    DomainError
-        If a load lies outside what the model holds for.
-    ConvergenceError
-        If a contact does not settle.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> from memscal.model.indenter import Sphere
     >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
@@ -134,45 +108,11 @@ def elasto_plastic_family(
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ProfileFamily:
-    r"""Return the base stresses for a range of slip lengths at a given friction coefficient.
+    r"""Return the base stresses for a range of slip lengths (m) at a given friction coefficient.
 
     The interface yields elastically before it slips: :math:`q = -\mu p\,e/\ell` for
-    :math:`|e| \le \ell` (see :class:`memscal.Interface`).  Loading is incremental.
-
-    Parameters
-    ----------
-    film, indenter, loads, reach, cache, workers
-        As for :func:`memscal.friction.calculated.amontons_family`.
-    friction : float
-        The macroscopic coefficient :math:`\mu`, positive and finite.
-    slip_lengths : sequence of float
-        Slip lengths :math:`\ell` in m, increasing.  0 is the rigid interface at that friction;
-        ``inf`` bears no shear, as the contact without friction.
-
-    Returns
-    -------
-    ProfileFamily
-        Its values are the slip lengths.
-
-    Raises
-    ------
-    InputError, DomainError, ConvergenceError
-        As there; and if the friction is not positive and finite.
-
-    Examples
-    --------
-    The softer the interface, the nearer to the contact without friction:
-
-    >>> import numpy as np
-    >>> from memscal.model.indenter import Sphere
-    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    >>> family = elasto_plastic_family(
-    ...     film, Sphere(radius=128.8e-3), [0.34], friction=1.6, reach=8e-3,
-    ...     slip_lengths=[0, 6e-6, math.inf],
-    ... )
-    >>> maxima = family.wavenumbers.synthesise(family.spectra[:, 0].T, np.array(0.0))
-    >>> (maxima / 1e3).round(1)
-    array([30.9, 29.9, 27.7])
+    :math:`|e| \le \ell` (see :class:`memscal.Interface`).  Loading is incremental.  A slip length
+    of 0 is the rigid interface at that friction; ``inf`` bears no shear.
     """
     setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
     values = parameter_values("slip lengths", slip_lengths)
@@ -211,42 +151,12 @@ def normal_compliance_family(
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ProfileFamily:
-    r"""Return the base stresses without friction for a range of normal compliances.
+    r"""Return the base stresses without friction for a range of lengths (m) of a normal law.
 
-    Parameters
-    ----------
-    film, indenter, loads, reach, cache, workers
-        As for :func:`memscal.friction.calculated.amontons_family`.
-    lengths : sequence of float, optional
-        The law's length in m, increasing and finite; 0 is the rigid interface.  By default up to
-        eight times the film's roughness (2 um where it states none).
-    law : str
-        ``"exponential"``: :math:`p = p_1 e^{-d/\lambda}`, with the length :math:`\lambda`.  The
-        pressure :math:`p_1` only shifts the depth: the base stress does not depend on it.
-        ``"greenwood-tripp"``: asperities with the length :math:`\sigma`, their roughness; fixed
-        are :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.
-
-    Returns
-    -------
-    ProfileFamily
-        Its values are the lengths.
-
-    Raises
-    ------
-    InputError, DomainError, ConvergenceError
-        As there; and if a length is not finite or the law is unknown.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from memscal.model.indenter import Sphere
-    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    >>> family = normal_compliance_family(
-    ...     film, Sphere(radius=128.8e-3), [0.34], lengths=[0, 2e-6], reach=8e-3
-    ... )
-    >>> maxima = family.wavenumbers.synthesise(family.spectra[:, 0].T, np.array(0.0))
-    >>> (maxima / 1e3).round(1)
-    array([27.7, 25.5])
+    ``"exponential"``: :math:`p = p_1 e^{-d/\lambda}` with the length :math:`\lambda`; the pressure
+    :math:`p_1` only shifts the depth.  ``"greenwood-tripp"``: asperities of the roughness
+    :math:`\sigma`, with :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.  Lengths go
+    up to eight times the film's roughness (2 um where it states none) by default.
     """
     setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
     if law not in ("exponential", "greenwood-tripp"):
@@ -310,15 +220,7 @@ _NEAR = 0.01
 
 
 class LawFamilies:
-    """Families of calculated contacts of what was measured, each at its profiles' loads.
-
-    Parameters
-    ----------
-    profiles : sequence of MeasuredProfile
-        Measured loads of one sphere on one film.
-    cache, workers
-        As for :func:`memscal.friction.calculated.amontons_family`.
-    """
+    """Families of calculated contacts of what was measured, each at its profiles' loads."""
 
     def __init__(
         self, profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
@@ -330,90 +232,93 @@ class LawFamilies:
         self.cache, self.workers = cache, workers
 
     def rigid(
-        self, profiles: Sequence[MeasuredProfile], known: ProfileFamily | None
+        self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
     ) -> ProfileFamily:
-        """Return incremental contacts of Amontons' law: those that are known, where they do."""
-        if known is not None and known.values[0] == 0 and math.isinf(known.values[-1]):
-            found = at_loads(known, _loads(profiles))
-            if found is not None:
-                return found
-        made = amontons_family(self.film, self.indenter, _distinct(profiles), **self._how)
-        return _required(at_loads(made, _loads(profiles)))
+        """Return incremental contacts of Amontons' law, from no friction to full stick."""
+        if calculated is not None and not (
+            calculated.values[0] == 0 and math.isinf(calculated.values[-1])
+        ):
+            calculated = None
+
+        def family() -> ProfileFamily:
+            return amontons_family(self.film, self.indenter, _distinct(profiles), **self._how)
+
+        return _at_loads(profiles, calculated, family)
 
     def slipping(
         self,
         profiles: Sequence[MeasuredProfile],
         friction: float,
         uncertainty: float | None,
-        known: ProfileFamily | None,
+        calculated: ProfileFamily | None,
     ) -> ProfileFamily:
         """Return contacts of the elasto-plastic law at a macroscopic coefficient.
 
         The difference to those at one standard uncertainty more is the change named
         ``"macroscopic_friction"``.
         """
-        loads = _loads(profiles)
-        found = None if known is None else at_loads(known, loads)
-        if found is not None:
-            return found
 
-        def family(film: ElasticFilm, mu: float) -> ProfileFamily:
+        def at(film: ElasticFilm, mu: float) -> ProfileFamily:
             return elasto_plastic_family(
                 film, self.indenter, _distinct(profiles), friction=mu, **self._how
             )
 
-        made = family(self.film, friction)
-        if uncertainty is not None:
-            # Only its stresses are wanted: without uncertainties it takes a third of the time.
+        def family() -> ProfileFamily:
+            made = at(self.film, friction)
+            if uncertainty is None:
+                return made
+            # Only its stresses count: without uncertainties it takes a third of the time.
             bare = replace(
                 self.film,
                 young_modulus_uncertainty=None,
                 thickness_uncertainty=None,
                 poisson_ratio_uncertainty=None,
             )
-            change = family(bare, friction + uncertainty).spectra - made.spectra
-            made = replace(made, changes={**made.changes, "macroscopic_friction": change})
-        return _required(at_loads(made, loads))
+            change = at(bare, friction + uncertainty).spectra - made.spectra
+            return replace(made, changes={**made.changes, "macroscopic_friction": change})
+
+        return _at_loads(profiles, calculated, family)
 
     def yielding(
-        self, profiles: Sequence[MeasuredProfile], known: ProfileFamily | None
+        self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
     ) -> ProfileFamily:
         """Return contacts without friction that yield normally."""
-        found = None if known is None else at_loads(known, _loads(profiles))
-        if found is not None:
-            return found
-        made = normal_compliance_family(self.film, self.indenter, _distinct(profiles), **self._how)
-        return _required(at_loads(made, _loads(profiles)))
+
+        def family() -> ProfileFamily:
+            return normal_compliance_family(
+                self.film, self.indenter, _distinct(profiles), **self._how
+            )
+
+        return _at_loads(profiles, calculated, family)
 
     @property
     def _how(self) -> dict[str, Any]:
         return {"reach": self.reach, "cache": self.cache, "workers": self.workers}
 
 
-def at_loads(family: ProfileFamily, loads: FloatArray) -> ProfileFamily | None:
-    """Return a family at the nearest of its loads; ``None`` where one is not near enough.
+def _at_loads(
+    profiles: Sequence[MeasuredProfile],
+    calculated: ProfileFamily | None,
+    calculate: Callable[[], ProfileFamily],
+) -> ProfileFamily:
+    """Return a family at the nearest of its loads; calculate it where one is not near enough.
 
     What is left of a difference is in the points' own loads, to first order.
     """
-    apart = np.abs(np.log(np.divide.outer(loads, family.loads)))
-    if np.any(apart.min(axis=1) > _NEAR):
-        return None
-    return family.only(apart.argmin(axis=1).tolist())
+    loads = np.array([profile.load for profile in profiles])
 
+    def apart(family: ProfileFamily) -> FloatArray:
+        return np.asarray(np.abs(np.log(np.divide.outer(loads, family.loads))))
 
-def _required(family: ProfileFamily | None) -> ProfileFamily:
-    assert family is not None
-    return family
-
-
-def _loads(profiles: Sequence[MeasuredProfile]) -> FloatArray:
-    return np.array([profile.load for profile in profiles])
+    if calculated is None or np.any(apart(calculated).min(axis=1) > _NEAR):
+        calculated = calculate()
+    return calculated.only(apart(calculated).argmin(axis=1).tolist())
 
 
 def _distinct(profiles: Sequence[MeasuredProfile]) -> FloatArray:
     """Return the loads that are not near to a smaller one."""
-    found: list[float] = []
+    loads: list[float] = []
     for load in sorted(profile.load for profile in profiles):
-        if not found or math.log(load / found[-1]) > _NEAR:
-            found.append(load)
-    return np.array(found)
+        if not loads or math.log(load / loads[-1]) > _NEAR:
+            loads.append(load)
+    return np.array(loads)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.special import chdtrc
 
 from memscal.friction.family import ProfileFamily
-from memscal.friction.results import EffectiveFriction, LoadComparison
+from memscal.friction.results import BoundedEstimate, LoadComparison
 from memscal.model.checks import (
     Message,
     QualityCheck,
@@ -17,10 +17,10 @@ from memscal.model.checks import (
     chi_square_limit,
     failed_check_messages,
 )
-from memscal.model.measured_stress import MeasuredStress
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
 
-__all__ = ["SYNTHETIC_SCANS", "comparison_checks", "comparison_messages"]
+__all__ = ["comparison_checks", "comparison_messages", "in_words", "synthetic_messages"]
 
 #: Share of points that may lie outside of what friction can explain, beyond those of chance.
 _OUTSIDE = 0.15
@@ -28,7 +28,7 @@ _OUTSIDE = 0.15
 
 def comparison_checks(
     loads: Mapping[str, Sequence[LoadComparison]],
-    joint: Mapping[str, Mapping[str, EffectiveFriction]],
+    joint: Mapping[str, Mapping[str, BoundedEstimate]],
 ) -> tuple[QualityCheck, ...]:
     """Return the checks of every load, numbered from one, and those of all loads together.
 
@@ -44,36 +44,37 @@ def comparison_checks(
     return tuple(checks)
 
 
-def _best(found: Sequence[EffectiveFriction]) -> EffectiveFriction:
-    return min(found, key=lambda one: one.least)
+def _best(estimates: Iterable[BoundedEstimate]) -> BoundedEstimate:
+    return min(estimates, key=lambda estimate: estimate.least)
 
 
-def _profile(number: int, found: Sequence[LoadComparison]) -> QualityCheck:
-    best = _best([one.by_profile for one in found])
+def _profile(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
+    best = _best(load.by_profile for load in loads)
     return check(
         f"profile_chi_square_{number}",
         best.least / best.degrees,
         chi_square_limit(best.degrees) / best.degrees,
-        f"Reduced chi-square of {_place(found[0])} against the friction coefficient that explains "
-        "it best. A failure means that no calculated contact does: noise or scatter larger than "
-        "stated, another shape of contact, or a film, gain or load that is not as stated.",
+        f"Reduced chi-square of {_place(loads[0].profile)} against the friction coefficient "
+        "that explains it best. A failure means that no calculated contact does: noise or scatter "
+        "larger than stated, another shape of contact, or a film, gain or load that is not as "
+        "stated.",
         best.p_value,
     )
 
 
-def _bracketing(number: int, found: Sequence[LoadComparison]) -> QualityCheck:
+def _bracketing(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
     return check(
         f"bracketing_{number}",
-        1 - max(one.bracketed for one in found),
+        1 - max(load.bracketed for load in loads),
         _OUTSIDE,
-        f"Share of the points of {_place(found[0])} that lie outside of what no friction and full "
-        "stick give, by more than 1.96 standard uncertainties. A failure means that friction "
-        "alone does not explain the stress.",
+        f"Share of the points of {_place(loads[0].profile)} that lie outside of what no friction "
+        "and full stick give, by more than 1.96 standard uncertainties. A failure means that "
+        "friction alone does not explain the stress.",
     )
 
 
-def _together(lubrication: str, by_loading: Mapping[str, EffectiveFriction]) -> QualityCheck:
-    best = _best(list(by_loading.values()))
+def _together(lubrication: str, by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
+    best = _best(by_loading.values())
     suffix = f"_{lubrication}" if lubrication else ""
     return check(
         f"joint_chi_square{suffix}",
@@ -86,9 +87,9 @@ def _together(lubrication: str, by_loading: Mapping[str, EffectiveFriction]) -> 
     )
 
 
-def _frictionless(by_loading: Mapping[str, EffectiveFriction]) -> QualityCheck:
+def _frictionless(by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
     # The first of the values is no friction.
-    rises = [float(one.chi_square[0]) - one.least for one in by_loading.values()]
+    rises = [float(joint.chi_square[0]) - joint.least for joint in by_loading.values()]
     least = max(min(rises), 0.0)
     return check(
         "lubricated_frictionless",
@@ -102,12 +103,10 @@ def _frictionless(by_loading: Mapping[str, EffectiveFriction]) -> QualityCheck:
     )
 
 
-def _place(found: LoadComparison) -> str:
-    words = f"the {found.lubrication} load" if found.lubrication else "the load"
-    return f"{words} of {np.format_float_positional(found.load, precision=3, trim='-')} N"
+def _place(profile: MeasuredProfile) -> str:
+    words = f"the {profile.lubrication} load" if profile.lubrication else "the load"
+    return f"{words} of {np.format_float_positional(profile.load, precision=3, trim='-')} N"
 
-
-SYNTHETIC_SCANS = Message("synthetic", "The scans are synthetic: nothing here was measured.")
 
 #: Calculated contacts that are less certain than this share of their stress are named.
 _COARSE = 2e-3
@@ -118,31 +117,29 @@ _EXPANDED = 1.96
 def comparison_messages(
     measured: MeasuredStress,
     families: Mapping[str, ProfileFamily],
-    joint: Mapping[str, Mapping[str, EffectiveFriction]],
+    joint: Mapping[str, Mapping[str, BoundedEstimate]],
     checks: tuple[QualityCheck, ...],
     macroscopic: tuple[float, float | None] | None,
 ) -> tuple[Message, ...]:
-    """Return the messages that accompany a comparison, the gravest first.
-
-    Those of the measured stress are among them.
-    """
-    own = [
+    """Return the messages of a comparison and of its measured stress, the gravest first."""
+    messages = [
         *failed_check_messages(checks),
-        *_synthetic(measured),
+        *synthetic_messages(measured),
         *_loadings(joint),
         *_against_macroscopic(joint, macroscopic),
         *_calculated(families),
         *_unstated(measured),
     ]
-    return tuple(dict.fromkeys([*own, *measured.messages]))
+    return tuple(dict.fromkeys([*messages, *measured.messages]))
 
 
-def _synthetic(measured: MeasuredStress) -> Iterator[Message]:
+def synthetic_messages(measured: MeasuredStress) -> Iterator[Message]:
+    """Say where the scans are synthetic."""
     if any(scan.synthetic for scan in measured.scans):
-        yield SYNTHETIC_SCANS
+        yield Message("synthetic", "The scans are synthetic: nothing here was measured.")
 
 
-def _loadings(joint: Mapping[str, Mapping[str, EffectiveFriction]]) -> Iterator[Message]:
+def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Message]:
     for lubrication, by_loading in joint.items():
         if not {"incremental", "total"} <= by_loading.keys():
             continue
@@ -168,7 +165,7 @@ def _loadings(joint: Mapping[str, Mapping[str, EffectiveFriction]]) -> Iterator[
 
 
 def _against_macroscopic(
-    joint: Mapping[str, Mapping[str, EffectiveFriction]],
+    joint: Mapping[str, Mapping[str, BoundedEstimate]],
     macroscopic: tuple[float, float | None] | None,
 ) -> Iterator[Message]:
     if macroscopic is None:
@@ -178,8 +175,8 @@ def _against_macroscopic(
     for lubrication, by_loading in joint.items():
         if lubrication == "lubricated":
             continue
-        for loading, found in by_loading.items():
-            low, high = found.interval.low, found.interval.high
+        for loading, joint_estimate in by_loading.items():
+            low, high = joint_estimate.interval.low, joint_estimate.interval.high
             if value + spread < low:
                 verdict = "is larger than the macroscopic one"
             elif high is not None and value - spread > high:
@@ -197,12 +194,12 @@ def _against_macroscopic(
 
 def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
     for loading, family in families.items():
-        known = family.convergence[np.isfinite(family.convergence)]
-        if known.size and float(known.max()) > _COARSE:
+        worst = float(np.nanmax(family.convergence, initial=0.0))
+        if worst > _COARSE:
             words = f" ({loading} loading)" if loading else ""
             yield Message(
                 "convergence",
-                f"The calculated contacts{words} have converged to {float(known.max()):.1%} of "
+                f"The calculated contacts{words} have converged to {worst:.1%} of "
                 "their stress only.",
             )
         yield from (Message("calculated", text) for text in family.notes)
@@ -229,12 +226,12 @@ def _unstated(measured: MeasuredStress) -> Iterator[Message]:
         )
 
 
-def in_words(found: EffectiveFriction) -> str:
+def in_words(estimate: BoundedEstimate) -> str:
     """Return a coefficient with its interval, or its bound, in words."""
-    low, high = found.interval.low, found.interval.high
+    low, high = estimate.interval.low, estimate.interval.high
     if high is None or math.isinf(high):
         return f"at least {format_bound(low, upper=False)}" if low > 0 else "no bound"
     above = format_bound(high, upper=True)
-    if found.value is None or low == 0:
+    if estimate.value is None or low == 0:
         return f"at most {above}"
-    return f"{found.value:.2g} ({format_bound(low, upper=False)} to {above})"
+    return f"{estimate.value:.2g} ({format_bound(low, upper=False)} to {above})"

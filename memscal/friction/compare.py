@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
 
 import numpy as np
@@ -12,24 +12,31 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
+from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction.calculated import FRICTIONS, amontons_family
-from memscal.friction.checks import SYNTHETIC_SCANS, comparison_checks, comparison_messages
-from memscal.friction.effective import Confrontation, confront, load_comparison, with_loading
+from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
+from memscal.friction.effective import (
+    Confrontation,
+    confront,
+    dry_against_lubricated,
+    load_comparison,
+    lubricated_pairs,
+    with_loading,
+)
 from memscal.friction.external import external_family
 from memscal.friction.family import ProfileFamily
-from memscal.friction.lubrication import dry_against_lubricated, lubricated_pairs
+from memscal.friction.likelihood import load_points, sensor_of
 from memscal.friction.model_comparison import compare_interface
-from memscal.friction.paths import CacheFolder, require_sphere
-from memscal.friction.prediction import LoadPoints, load_points, members_of, sensor_of
 from memscal.friction.results import (
+    BoundedEstimate,
     DryAgainstLubricated,
-    EffectiveFriction,
     FrictionComparison,
     LoadComparison,
+    ShearComparison,
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
-from memscal.model.arrays import FloatArray, require_non_negative
+from memscal.model.arrays import require_non_negative
 from memscal.model.checks import Message
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
@@ -60,16 +67,16 @@ def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredS
 
 def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
     """Refuse what is no scan of a sphere's contacts, or not all on one film with one sphere."""
-    for one in scans:
-        place = one.source.file_name if one.source else "The scan"
-        if not isinstance(one.indenter, Sphere):
+    for scan in scans:
+        place = scan.source.file_name if scan.source else "The scan"
+        if not isinstance(scan.indenter, Sphere):
             raise InputError(
-                f"{place} was made with a {one.indenter.shape}, not with a sphere.",
+                f"{place} was made with a {scan.indenter.shape}, not with a sphere.",
                 why="The stress under a rod barely depends on friction, and its contact does not "
                 "grow: a rod scan calibrates a sensor.",
                 cure="Give the scans of a sphere's contacts; calibrate with the rod scan.",
             )
-        if (one.film, one.indenter) != (scans[0].film, scans[0].indenter):
+        if (scan.film, scan.indenter) != (scans[0].film, scans[0].indenter):
             raise InputError(
                 f"{place} states another film or sphere than the first scan.",
                 why="Scans that are compared together share the calculated contacts.",
@@ -80,13 +87,7 @@ def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
 def same_apparatus(
     measured: MeasuredStress, apparatus: ApparatusFunction, *, override: bool
 ) -> MeasuredStress:
-    """Refuse another apparatus function than that of a measured stress; or record it.
-
-    Raises
-    ------
-    InputError
-        If their content digests differ and ``override`` is false.
-    """
+    """Refuse another apparatus function than that of a measured stress; or record it."""
     if measured.artifact_digest == apparatus.content_digest:
         return measured
     name = f" ({measured.artifact.file_name})" if measured.artifact else ""
@@ -100,8 +101,7 @@ def same_apparatus(
             cure="Give its artifact, or measure again with memscal apply. To go on all the same, "
             "override it (override=True; --override on the command line): that is recorded.",
         )
-    told = Message("overridden", f"Overridden: {text}.", "warning")
-    messages = (*measured.messages, told)
+    messages = (*measured.messages, Message("overridden", f"Overridden: {text}.", "warning"))
     return replace(
         measured,
         overridden=(*measured.overridden, text),
@@ -200,30 +200,42 @@ def compare(
     ...     friction=0.1, loads=[0.69], lubricated_loads=[0.69], seed=1
     ... )
     >>> apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
-    >>> found = compare(made.dry, apparatus, friction=(0, 0.1, 0.3, math.inf), loading="total")
-    >>> found.joint["dry"]["total"].interval.low < 0.1
+    >>> comparison = compare(made.dry, apparatus, friction=(0, 0.1, 0.3, math.inf), loading="total")
+    >>> comparison.joint["dry"]["total"].interval.low < 0.1
     True
     """
-    opened, known = opened_contacts(contacts), opened_apparatus(apparatus)
+    opened, sensor = opened_contacts(contacts), opened_apparatus(apparatus)
     require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
-    measured = _measured(opened, known, override)
-    loadings = (loading,) if isinstance(loading, str) else tuple(loading)
-    families = _families(measured, friction, loadings, references, cache, workers)
-    given = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
-    found = compare_measured(measured, known, families, macroscopic=given)
+    measured = _measured(opened, sensor, override)
+    if references is None:
+        families = _families(measured, friction, loading, cache, workers)
+    else:
+        scan = measured.scans[0]
+        family = external_family(
+            references,
+            np.unique(measured.loads),
+            reach=_reach(measured),
+            film=scan.film,
+            indenter=scan.indenter,
+            cache=cache,
+            workers=workers,
+        )
+        families = {family.loading: family}
+    sliding = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
+    comparison = compare_measured(measured, sensor, families, macroscopic=sliding)
     if not interface:
-        return found
+        return comparison
     assert macroscopic is not None
     laws = compare_interface(
         measured.profiles,
-        known,
+        sensor,
         macroscopic=macroscopic,
         macroscopic_uncertainty=macroscopic_uncertainty,
         amontons=families.get("incremental") if references is None else None,
         cache=cache,
         workers=workers,
     )
-    return replace(found, interface=laws, messages=(*found.messages, *laws.messages))
+    return replace(comparison, interface=laws, messages=(*comparison.messages, *laws.messages))
 
 
 def _measured(
@@ -234,15 +246,15 @@ def _measured(
     scans = [item for item in contacts if isinstance(item, Scan)]
     if len(scans) == len(contacts):
         return measure_stress(scans, apparatus, override=override)
-    parts = []
+    stresses = []
     for item in contacts:
         if isinstance(item, Scan):
-            parts.append(measure_stress(item, apparatus, override=override))
+            stresses.append(measure_stress(item, apparatus, override=override))
             continue
         for profile in item.profiles:
             load_points(profile)  # refuses a file without points before anything is calculated
-        parts.append(same_apparatus(item, apparatus, override=override))
-    return joined_stress(parts)
+        stresses.append(same_apparatus(item, apparatus, override=override))
+    return joined_stress(stresses)
 
 
 def compare_measured(
@@ -252,20 +264,16 @@ def compare_measured(
     *,
     macroscopic: tuple[float, float | None] | None = None,
 ) -> FrictionComparison:
-    """Compare measured stress with families that were calculated, by definition of the loading.
+    """Compare measured stress with families, by definition of the loading.
 
-    Parameters are those of :func:`compare`; the families' loads hold every measured one.
+    The families' loads hold every measured one.
     """
-    points = [load_points(profile) for profile in measured.profiles]
-    confronted = {
-        name: _confronted(measured, apparatus, family, points) for name, family in families.items()
-    }
+    confronted = _confronted(measured, apparatus, families)
     loads = {
-        name: tuple(load_comparison(p, one, i) for i, p in enumerate(measured.profiles))
-        for name, one in confronted.items()
+        name: tuple(load_comparison(p, of_family, i) for i, p in enumerate(measured.profiles))
+        for name, of_family in confronted.items()
     }
-    joint = _joint(measured, confronted)
-    loads, joint = _loading_counted(loads, joint)
+    loads, joint = _loading_counted(loads, _joint(measured, confronted))
     checks = (*measured.checks, *comparison_checks(loads, joint))
     return FrictionComparison(
         measured=measured,
@@ -279,87 +287,83 @@ def compare_measured(
     )
 
 
+def _reach(measured: MeasuredStress) -> float:
+    """Return how far from the axis stresses are calculated, in m: whole millimetres."""
+    return math.ceil(_REACH * max(scan.width for scan in measured.scans) / _MM) * _MM
+
+
 def _families(
     measured: MeasuredStress,
     friction: Sequence[float] | None,
-    loadings: Sequence[str],
-    references: Sequence[StressProfile] | None,
+    loading: str | Sequence[str],
     cache: CacheFolder,
     workers: int,
+    order: int = 0,
 ) -> dict[str, ProfileFamily]:
     """Return the calculated profiles at every load that was measured, by loading."""
     scan = measured.scans[0]
-    loads = np.unique(measured.loads)
-    # In whole millimetres.
-    reach = math.ceil(_REACH * max(one.width for one in measured.scans) / _MM) * _MM
-    assert isinstance(scan.indenter, Sphere)
-    if references is not None:
-        given = external_family(
-            references,
-            loads,
-            reach=reach,
-            film=scan.film,
-            indenter=scan.indenter,
-            cache=cache,
-            workers=workers,
-        )
-        return {given.loading: given}
     values = FRICTIONS if friction is None else tuple(float(mu) for mu in friction)
     if len(values) < 2:
         raise InputError(
             "One friction coefficient is nothing to choose from.",
             cure="Give several, such as 0, 0.1, 0.3 and infinity.",
         )
+    loadings = (loading,) if isinstance(loading, str) else tuple(dict.fromkeys(loading))
     if not loadings:
         raise InputError('No loading was given: "incremental", "total", or both.')
     return {
         name: amontons_family(
             scan.film,
             scan.indenter,
-            loads,
+            np.unique(measured.loads),
             friction=values,
             loading=name,
-            reach=reach,
+            reach=_reach(measured),
             cache=cache,
             workers=workers,
+            order=order,
         )
-        for name in dict.fromkeys(loadings)
+        for name in loadings
     }
 
 
 def _confronted(
     measured: MeasuredStress,
     apparatus: ApparatusFunction,
-    family: ProfileFamily,
-    points: Sequence[LoadPoints],
-) -> Confrontation:
-    sensor = sensor_of(apparatus, family, float(max(p.radius.max() for p in points)))
-    return confront(family, sensor, points, _load_indices(measured, family.loads))
-
-
-def _load_indices(measured: MeasuredStress, loads: FloatArray) -> list[int]:
-    return [int(np.abs(loads - profile.load).argmin()) for profile in measured.profiles]
+    families: Mapping[str, ProfileFamily],
+    channel: str = "zz",
+) -> dict[str, Confrontation]:
+    """Hold the points of every profile against each family."""
+    points = [load_points(profile, channel) for profile in measured.profiles]
+    reach = float(max(of_load.radius.max() for of_load in points))
+    return {
+        name: confront(
+            family,
+            sensor_of(apparatus, family, reach),
+            points,
+            [int(np.abs(family.loads - profile.load).argmin()) for profile in measured.profiles],
+        )
+        for name, family in families.items()
+    }
 
 
 def _joint(
     measured: MeasuredStress, confronted: Mapping[str, Confrontation]
-) -> dict[str, dict[str, EffectiveFriction]]:
+) -> dict[str, dict[str, BoundedEstimate]]:
     """Return the coefficient of all loads together, for each state of lubrication."""
-    kinds = dict.fromkeys(profile.lubrication for profile in measured.profiles)
-    chosen = {
-        kind: [i for i, p in enumerate(measured.profiles) if p.lubrication == kind]
-        for kind in kinds
-    }
+    by_lubrication: dict[str, list[int]] = {}
+    for i, profile in enumerate(measured.profiles):
+        by_lubrication.setdefault(profile.lubrication, []).append(i)
     return {
-        kind: {name: one.effective(indices) for name, one in confronted.items()}
-        for kind, indices in chosen.items()
+        lubrication: {name: of_all.effective(indices) for name, of_all in confronted.items()}
+        for lubrication, indices in by_lubrication.items()
     }
 
 
 def _loading_counted(
     loads: Mapping[str, tuple[LoadComparison, ...]],
-    joint: Mapping[str, Mapping[str, EffectiveFriction]],
-) -> tuple[dict[str, tuple[LoadComparison, ...]], dict[str, dict[str, EffectiveFriction]]]:
+    joint: Mapping[str, Mapping[str, BoundedEstimate]],
+) -> tuple[dict[str, tuple[LoadComparison, ...]], dict[str, dict[str, BoundedEstimate]]]:
     """Add to every budget what the other definition of the loading would have given."""
     names = tuple(loads)
     if len(names) != 2:
@@ -384,8 +388,8 @@ def _loading_counted(
 
 
 def _pairs(measured: MeasuredStress, confronted: Confrontation) -> tuple[DryAgainstLubricated, ...]:
-    frictionless = members_of(confronted.family, confronted.family.values[:1])
-    found = [
+    frictionless = confronted.family.at(confronted.family.values[:1])
+    pairs = (
         dry_against_lubricated(
             (measured.profiles[i], measured.profiles[j]),
             (confronted.points[i], confronted.points[j]),
@@ -395,36 +399,8 @@ def _pairs(measured: MeasuredStress, confronted: Confrontation) -> tuple[DryAgai
             measured.conversion_constant_uncertainty / measured.conversion_constant,
         )
         for i, j in lubricated_pairs(measured.profiles)
-    ]
-    return tuple(one for one in found if one is not None)
-
-
-@dataclass(frozen=True, eq=False)
-class ShearComparison:
-    """The friction that explains the shear at the base of a film.
-
-    Parameters
-    ----------
-    measured : MeasuredStress
-        The normal channel of the same scans: loads and centres.
-    apparatus : ApparatusFunction
-        The tangential channel.
-    friction : ndarray, shape (m,)
-        Friction coefficients of the calculated contacts.
-    loads : mapping of str to tuple of EffectiveFriction
-        One for each measured profile, in their order, by definition of the loading.
-    joint : mapping of str to mapping of str to EffectiveFriction
-        One for all loads together, by lubrication and definition of the loading.
-    messages : tuple of Message
-        What a user should know.
-    """
-
-    measured: MeasuredStress
-    apparatus: ApparatusFunction
-    friction: FloatArray
-    loads: Mapping[str, tuple[EffectiveFriction, ...]]
-    joint: Mapping[str, Mapping[str, EffectiveFriction]]
-    messages: tuple[Message, ...]
+    )
+    return tuple(pair for pair in pairs if pair is not None)
 
 
 @single_threaded()
@@ -480,51 +456,29 @@ def compare_shear(
     ...     for channel in ("zz", "xz")
     ... )
     >>> measured = memscal.measure_stress(made.dry, normal)
-    >>> found = compare_shear(measured, shear, friction=(0, 0.1, 0.3, math.inf), loading="total")
-    >>> found.joint["dry"]["total"].interval.low < 0.15
+    >>> comparison = compare_shear(
+    ...     measured, shear, friction=(0, 0.1, 0.3, math.inf), loading="total"
+    ... )
+    >>> comparison.joint["dry"]["total"].interval.low < 0.15
     True
     """
-    known, measured = opened_apparatus(apparatus), opened_stress(measured)
+    sensor, measured = opened_apparatus(apparatus), opened_stress(measured)
     require_contacts(measured.scans)
-    scan = measured.scans[0]
-    _require_tangential(known, scan)
-    points = [load_points(profile, known.sensor.channel) for profile in measured.profiles]
-    loads = np.unique(measured.loads)
-    reach = _REACH * max(one.width for one in measured.scans)
-    names = (loading,) if isinstance(loading, str) else tuple(dict.fromkeys(loading))
-    if not names:
-        raise InputError('No loading was given: "incremental", "total", or both.')
-    confronted = {}
-    for name in names:
-        family = amontons_family(
-            scan.film,
-            require_sphere(scan.indenter),
-            loads,
-            friction=friction,
-            loading=name,
-            reach=reach,
-            cache=cache,
-            workers=workers,
-            order=1,
-        )
-        sensor = sensor_of(known, family, max(float(each.radius.max()) for each in points))
-        index = [int(np.abs(loads - profile.load).argmin()) for profile in measured.profiles]
-        confronted[name] = confront(family, sensor, points, index)
-    kinds = [profile.lubrication for profile in measured.profiles]
-    chosen = {kind: [i for i, own in enumerate(kinds) if own == kind] for kind in kinds}
+    _require_tangential(sensor, measured.scans[0])
+    channel = sensor.sensor.channel
+    families = _families(measured, friction, loading, cache, workers, order=1)
+    confronted = _confronted(measured, sensor, families, channel)
+    note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
     return ShearComparison(
         measured=measured,
-        apparatus=known,
-        friction=np.asarray(friction, dtype=np.float64),
+        apparatus=sensor,
+        friction=next(iter(families.values())).values,
         loads={
-            name: tuple(one.effective([i]) for i in range(len(points)))
-            for name, one in confronted.items()
+            name: tuple(of_family.effective([i]) for i in range(len(measured.profiles)))
+            for name, of_family in confronted.items()
         },
-        joint={
-            kind: {name: one.effective(indices) for name, one in confronted.items()}
-            for kind, indices in chosen.items()
-        },
-        messages=tuple(_messages(scan, known)),
+        joint=_joint(measured, confronted),
+        messages=(Message("experimental", note), *synthetic_messages(measured)),
     )
 
 
@@ -543,13 +497,3 @@ def _require_tangential(apparatus: ApparatusFunction, scan: MeasuredScan) -> Non
             why="An apparatus function belongs to one sensor.",
             cure="Give the artifact of the scan's sensor.",
         )
-
-
-def _messages(scan: MeasuredScan, apparatus: ApparatusFunction) -> Iterator[Message]:
-    channel = apparatus.sensor.channel
-    yield Message(
-        "experimental",
-        f"Channel {channel} is experimental: comparisons were tested on synthetic scans only.",
-    )
-    if scan.synthetic:
-        yield SYNTHETIC_SCANS

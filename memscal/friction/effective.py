@@ -1,4 +1,4 @@
-"""The effective friction coefficient, by the whole profile and by its maximum."""
+"""The effective friction coefficient, by whole profiles, their maxima, and dry less lubricated."""
 
 from __future__ import annotations
 
@@ -8,19 +8,25 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
 
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import Likelihood, likelihood
-from memscal.friction.prediction import (
+from memscal.friction.likelihood import (
+    Likelihood,
     LoadPoints,
-    Members,
+    Predicted,
     Sensor,
-    members_of,
+    likelihood,
+    points_at,
     predict,
-    single_point,
 )
-from memscal.friction.results import EffectiveFriction, Interval, LoadComparison
+from memscal.friction.results import (
+    BoundedEstimate,
+    DryAgainstLubricated,
+    Interval,
+    LoadComparison,
+)
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_bound
 
@@ -29,14 +35,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Confrontation",
-    "Profiled",
     "bracketed_share",
     "confront",
+    "dry_against_lubricated",
     "fine_values",
+    "friction_reason",
     "load_comparison",
-    "profiled",
-    "random_uncertainty",
-    "reason_of",
+    "lubricated_pairs",
+    "profile_estimate",
     "with_loading",
 ]
 
@@ -49,22 +55,8 @@ def bracketed_share(
 ) -> float:
     """Return the share of points between the extremes of a family, within 1.96 u.
 
-    Where the profiles of different friction cross, away from the axis, the larger of the two
-    extremes is above.
-
-    Parameters
-    ----------
-    measured, errors : ndarray, shape (n,)
-        Measured stress and its standard uncertainty, in Pa.
-    calculated, calculated_errors : ndarray, shape (m, n)
-        Calculated stress of each member, the extremes first and last, and its standard
-        uncertainty, in Pa.
-
-    Examples
-    --------
-    >>> calculated = np.array([[10.0, 5.0], [12.0, 4.0]])
-    >>> bracketed_share(np.array([13.0, 8.0]), np.ones(2), calculated, np.zeros((2, 2)))
-    0.5
+    Stresses (n,) against calculated ones (m, n), in Pa.  Where the profiles of different friction
+    cross, away from the axis, the larger of the two extremes is above.
     """
     ends, end_errors = calculated[[0, -1]], calculated_errors[[0, -1]]
     allowed = _EXPANDED * np.hypot(errors, end_errors)
@@ -79,84 +71,46 @@ _ONE_SIGMA = 0.6827
 _STEPS = 40
 
 
-@dataclass(frozen=True)
-class Profiled:
-    """What a profile likelihood says.
-
-    Parameters
-    ----------
-    best : float
-        Value of least chi-square; at an end it may be ``inf``.
-    least : float
-        Least chi-square.
-    interval, narrow : Interval
-        At the level that was asked for, and at 68.3 %.
-    open_low, open_high : bool
-        Whether the interval reaches the first and the last value.
-    """
-
-    best: float
-    least: float
-    interval: Interval
-    narrow: Interval
-    open_low: bool
-    open_high: bool
-
-    @property
-    def standard_uncertainty(self) -> float | None:
-        """Half of the interval of 68.3 %; ``None`` where an end is open."""
-        if self.narrow.high is None or self.narrow.low <= 0:
-            return None
-        return (self.narrow.high - self.narrow.low) / 2
-
-
-def profiled(
+def profile_estimate(
+    values: FloatArray,
     coordinates: FloatArray,
     chi_square: FloatArray,
     value_at: Callable[[float], float],
     *,
+    reason: Callable[[Interval], str],
+    two_sided: bool = False,
     level: float = LEVEL,
-) -> Profiled:
-    """Return best value and intervals of chi-square along a bounded coordinate.
+    unit: str = "",
+) -> BoundedEstimate:
+    """Return best value and interval of chi-square (m,) along an increasing bounded coordinate.
 
-    Parameters
-    ----------
-    coordinates : ndarray, shape (m,)
-        Increasing, fine enough for a cubic spline.
-    chi_square : ndarray, shape (m,)
-        Least chi-square over everything else.
-    value_at : callable
-        Takes a coordinate to the parameter's value.
-    level : float
-        Coverage of the interval.
-
-    Examples
-    --------
-    >>> t = np.linspace(0, 1, 101)
-    >>> found = profiled(t, ((t - 0.4) / 0.1) ** 2, lambda t: t)
-    >>> print(f"{found.best:.2f}, {found.interval.low:.3f} to {found.interval.high:.3f}")
-    0.40, 0.204 to 0.596
+    The coordinates are fine enough for a cubic spline; ``value_at`` takes one to the parameter's
+    value.  There is a value where the interval has an upper end (with ``two_sided`` both ends);
+    elsewhere ``reason`` says why not.
     """
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(coordinates, chi_square)
     best = _minimum(spline, coordinates, chi_square)
     least = float(spline(best))
-    first, last = float(coordinates[0]), float(coordinates[-1])
 
-    def interval(at: float) -> tuple[Interval, bool, bool]:
+    def interval(at: float) -> Interval:
         rise = float(chdtri(1, 1 - at))
         inside = np.append(coordinates[chi_square - least <= rise], best)
         low = _crossing(spline, coordinates, float(inside.min()), -1, least + rise)
         high = _crossing(spline, coordinates, float(inside.max()), 1, least + rise)
-        bounds = Interval(
+        return Interval(
             0.0 if low is None else value_at(low), None if high is None else value_at(high), at
         )
-        return bounds, low is None, high is None
 
-    wide, open_low, open_high = interval(level)
-    end = best if first < best < last else (first if best <= first else last)
-    return Profiled(value_at(end), least, wide, interval(_ONE_SIGMA)[0], open_low, open_high)
+    wide, narrow = interval(level), interval(_ONE_SIGMA)
+    if wide.high is None or (two_sided and not wide.two_sided):
+        value = spread = None
+    else:
+        value = value_at(float(np.clip(best, coordinates[0], coordinates[-1])))
+        closed = narrow.high is not None and narrow.low > 0
+        spread = (narrow.high - narrow.low) / 2 if closed and narrow.high is not None else None
+    return BoundedEstimate(value, spread, wide, reason(wide), values, chi_square, least, unit=unit)
 
 
 def _minimum(spline: Any, coordinates: FloatArray, chi_square: FloatArray) -> float:
@@ -185,30 +139,23 @@ def _crossing(
     return (inside + outside) / 2
 
 
-def reason_of(found: Profiled, last: float, what: str = "friction coefficient") -> str:
-    """Say in words why a profile likelihood gives no value; empty where it gives one.
+def friction_reason(interval: Interval, last: float) -> str:
+    """Say why there is no friction coefficient; empty where there is one.
 
-    Parameters
-    ----------
-    found : Profiled
-        What the likelihood says.
-    last : float
-        Last value that was calculated; ``inf`` is full stick.
-    what : str
-        Name of the parameter.
+    ``last`` is the last coefficient that was calculated; ``inf`` is full stick.
     """
-    if not found.open_high:
+    if interval.high is not None:
         return ""
     end = "full stick" if np.isinf(last) else f"{last:.3g}, the last one calculated,"
-    if found.open_low:
+    if interval.low <= 0:
         return (
-            f"The {what} is not identifiable: no friction and {end} agree with the data "
-            "equally well."
+            f"The friction coefficient is not identifiable: no friction and {end} agree with the "
+            "data equally well."
         )
-    bound = format_bound(found.interval.low, upper=False)
+    bound = format_bound(interval.low, upper=False)
     return (
-        f"The {what} is not identifiable above {bound}: every larger one, {end} included, agrees "
-        "with the data as well. This is a lower bound."
+        f"The friction coefficient is not identifiable above {bound}: every larger one, {end} "
+        "included, agrees with the data as well. This is a lower bound."
     )
 
 
@@ -222,72 +169,56 @@ _SYSTEMATIC = {"conversion_constant", "apparatus", "film", "position_scale", "lo
 class Confrontation:
     """Measured loads against a family: chi-square of each along the family's parameter.
 
-    Parameters
-    ----------
-    family, sensor
-        What was calculated, and what the sensor makes of it.
-    members : Members
-        The family at fine values.
-    points : tuple of LoadPoints
-        What was measured.
-    loads : tuple of int
-        The family's load of each of them.
-    whole : Likelihood
-        Of all loads along the fine values.
+    ``members`` is the family at fine values; ``loads`` the family's load of each of ``points``;
+    ``whole`` the likelihood of all loads along the fine values.
     """
 
     family: ProfileFamily
     sensor: Sensor
-    members: Members
+    members: ProfileFamily
     points: tuple[LoadPoints, ...]
     loads: tuple[int, ...]
     whole: Likelihood
 
-    def effective(self, chosen: Sequence[int]) -> EffectiveFriction:
+    def effective(self, chosen: Sequence[int]) -> BoundedEstimate:
         """Return the coefficient that explains some of the loads together, by their profiles."""
         points = [self.points[i] for i in chosen]
         loads = [self.loads[i] for i in chosen]
         return self._effective(self.whole.only(chosen), points, loads)
 
-    def effective_of_maximum(self, profile: MeasuredProfile, index: int) -> EffectiveFriction:
+    def effective_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
         """Return the coefficient that explains the measured maximum of one load."""
         a = self.sensor.conversion_constant
-        points = [
-            single_point(
-                a * profile.maximum,
-                a * random_uncertainty(profile.maximum_budget),
-                self.points[index],
-            )
-        ]
+        noise = a * random_uncertainty(profile.maximum_budget)
+        points = [points_at(np.zeros(1), self.points[index], a * profile.maximum, noise)]
         loads = [self.loads[index]]
         along = likelihood(points, self.sensor, self.members, loads)
         return self._effective(along, points, loads)
 
     def at(self, values: FloatArray, index: int) -> FloatArray:
         """Return chi-square of one load at values that are among the fine ones."""
-        where = np.searchsorted(self.members.coordinates, self._coordinates(values) - 1e-12)
+        coordinates = np.array([self.family.coordinate(float(value)) for value in values])
+        where = np.searchsorted(self.members.coordinates, coordinates - 1e-12)
         return self.whole.only([index]).chi_square[where]
-
-    def _coordinates(self, values: FloatArray) -> FloatArray:
-        return np.array([self.family.coordinate(float(value)) for value in values])
 
     def _effective(
         self, along: Likelihood, points: Sequence[LoadPoints], loads: Sequence[int]
-    ) -> EffectiveFriction:
-        found = profiled(along.coordinates, along.chi_square, self.family.value_at)
-        value = None if found.open_high else found.best
+    ) -> BoundedEstimate:
+        estimate = profile_estimate(
+            along.values,
+            along.coordinates,
+            along.chi_square,
+            self.family.value_at,
+            reason=lambda interval: friction_reason(interval, float(self.family.values[-1])),
+        )
         degrees = max(along.degrees - 1, 0)
-        return EffectiveFriction(
-            value=value,
-            standard_uncertainty=None if value is None else found.standard_uncertainty,
-            interval=found.interval,
-            reason=reason_of(found, float(self.family.values[-1])),
-            budget={} if value is None else self._budget(value, points, loads),
-            values=along.values,
-            chi_square=along.chi_square,
+        least = max(estimate.least, 0.0)
+        return replace(
+            estimate,
+            least=least,
+            budget={} if estimate.value is None else self._budget(estimate.value, points, loads),
             degrees=degrees,
-            least=max(found.least, 0.0),
-            p_value=float(chdtrc(max(degrees, 1), max(found.least, 0.0))),
+            p_value=float(chdtrc(max(degrees, 1), least)),
         )
 
     def _budget(
@@ -297,17 +228,16 @@ class Confrontation:
         t, scale = self.family.coordinate(value), self.family.scale
         if t >= 1:
             return {}
-        here = members_of(self.family, np.array([value]))
-        along = likelihood(points, self.sensor, here, loads)
+        along = likelihood(points, self.sensor, self.family.at(value), loads)
         stretch = scale / (1 - t) ** 2
-        return {source: stretch * part for source, part in along.budget(0).items()}
+        return {source: stretch * share for source, share in along.budget(0).items()}
 
 
 def confront(
     family: ProfileFamily, sensor: Sensor, points: Sequence[LoadPoints], loads: Sequence[int]
 ) -> Confrontation:
     """Hold measured loads against a family."""
-    members = members_of(family, fine_values(family))
+    members = family.at(fine_values(family))
     return Confrontation(
         family=family,
         sensor=sensor,
@@ -320,51 +250,40 @@ def confront(
 
 def fine_values(family: ProfileFamily) -> FloatArray:
     """Return values along a family, even in its bounded coordinate, its own among them."""
-    own = family.coordinates
-    even = np.linspace(own[0], own[-1], _FINE)
-    apart = np.abs(np.subtract.outer(even, own)).min(axis=1) > 0.2 * (even[1] - even[0])
+    known = family.coordinates
+    even = np.linspace(known[0], known[-1], _FINE)
+    apart = np.abs(np.subtract.outer(even, known)).min(axis=1) > 0.2 * (even[1] - even[0])
     # The family's own values are kept as they are, not as their coordinates give them back.
-    between = [family.value_at(float(t)) for t in even[apart]]
-    return np.sort(np.concatenate([family.values, between]))
+    return np.sort(np.concatenate([family.values, family.values_at(even[apart])]))
 
 
 def random_uncertainty(budget: Mapping[str, float]) -> float:
     """Return what noise, centre and baseline add to a measured maximum."""
-    return math.hypot(*(part for source, part in budget.items() if source not in _SYSTEMATIC))
+    return math.hypot(*(u for source, u in budget.items() if source not in _SYSTEMATIC))
 
 
-def with_loading(found: EffectiveFriction, other: EffectiveFriction | None) -> EffectiveFriction:
+def with_loading(estimate: BoundedEstimate, other: BoundedEstimate | None) -> BoundedEstimate:
     r"""Add to a budget what the other definition of the loading would have given.
 
     The truth lies anywhere between the two: a rectangle of their difference, whose standard
     uncertainty is :math:`|\Delta| / \sqrt{12}`.
     """
-    if found.value is None or other is None or other.value is None:
-        return found
-    apart = abs(found.value - other.value) / math.sqrt(12)
-    return replace(found, budget={**found.budget, "loading": apart})
+    if estimate.value is None or other is None or other.value is None:
+        return estimate
+    apart = abs(estimate.value - other.value) / math.sqrt(12)
+    return replace(estimate, budget={**estimate.budget, "loading": apart})
 
 
 def load_comparison(
     profile: MeasuredProfile, confronted: Confrontation, index: int
 ) -> LoadComparison:
-    """Compare a measured load with every calculated profile of a family.
-
-    Parameters
-    ----------
-    profile : MeasuredProfile
-        What was measured.
-    confronted : Confrontation
-        All measured loads against the family.
-    index : int
-        Which of them this one is.
-    """
+    """Compare a measured load, by its index, with every calculated profile of a family."""
     family, load = confronted.family, confronted.loads[index]
-    own = members_of(family, family.values)
-    calculated, errors = _blurred(confronted.sensor, own, load, profile.r, confronted.points[index])
-    top, top_errors = _blurred(confronted.sensor, own, load, np.zeros(1), confronted.points[index])
+    points = confronted.points[index]
+    calculated, errors = _blurred(confronted.sensor, family, load, profile.r, points)
+    top, top_errors = _blurred(confronted.sensor, family, load, np.zeros(1), points)
     chi_square = confronted.at(family.values, index)
-    degrees = confronted.points[index].degrees
+    degrees = points.degrees
     ratio = profile.maximum / float(top[0, 0])
     return LoadComparison(
         profile=profile,
@@ -374,7 +293,7 @@ def load_comparison(
         p0_max=float(top[0, 0]),
         p0_max_uncertainty=float(top_errors[0, 0]),
         ratio=ratio,
-        ratio_uncertainty=_ratio_uncertainty(profile, confronted, own, index) * ratio,
+        ratio_uncertainty=_ratio_uncertainty(profile, confronted, index) * ratio,
         calculated=calculated,
         calculated_errors=errors,
         p_max=top[:, 0],
@@ -388,43 +307,155 @@ def load_comparison(
 
 
 def _blurred(
-    sensor: Sensor, members: Members, load: int, r: FloatArray, like: LoadPoints
+    sensor: Sensor, members: ProfileFamily, load: int, r: FloatArray, like: LoadPoints
 ) -> tuple[FloatArray, FloatArray]:
     """Return G convolved with the base stress of each member at radii, and its uncertainty.
 
     That of A is not counted: it is the measured stress's.
     """
-    places = _places(r, like)
-    found = predict(places, sensor.of_shape, members, load)
-    parts = [np.sum(column**2, axis=-1) for column in found.columns.values()]
-    variance = np.sum(parts, axis=0) if parts else np.zeros_like(found.signal)
+    predicted = predict(points_at(r, like), sensor.of_shape, members, load)
+    variance = np.zeros_like(predicted.signal)
+    for column in predicted.columns.values():
+        variance = variance + np.sum(column**2, axis=-1)
     a = sensor.conversion_constant
-    return found.signal / a, np.sqrt(variance) / a
+    return predicted.signal / a, np.sqrt(variance) / a
 
 
-def _places(r: FloatArray, like: LoadPoints) -> LoadPoints:
-    """Return radii as points of the nominal load, with the uncertainties of others."""
-    nothing = np.zeros(r.size)
-    return LoadPoints(
-        u=nothing,
-        offset=r,
-        log_load=nothing,
-        noise=nothing,
-        load_errors=nothing,
-        x_errors=nothing,
-        flat=np.zeros((r.size, 0)),
-        free_centre=False,
-        load_share=like.load_share,
-        position_share=like.position_share,
+def _ratio_uncertainty(profile: MeasuredProfile, confronted: Confrontation, index: int) -> float:
+    """Relative uncertainty of measured over frictionless maximum: A and G err together."""
+    axis = points_at(np.zeros(1), confronted.points[index])
+    top = predict(axis, confronted.sensor, confronted.family, confronted.loads[index])
+    norms = [float(np.linalg.norm(column[0, 0])) for column in top.columns.values()]
+    systematic = float(np.linalg.norm(norms)) / float(top.signal[0, 0])
+    return float(np.hypot(systematic, random_uncertainty(profile.maximum_budget) / profile.maximum))
+
+
+#: Loads that differ by less than this share are one.
+_SAME_LOAD = 0.05
+#: Places that are nearer than this share of a step are one.
+_CLOSE = 0.25
+_FEWEST_PLACES = 6
+
+
+def lubricated_pairs(profiles: Sequence[MeasuredProfile]) -> list[tuple[int, int]]:
+    """Return the indices of dry and lubricated profiles of one load."""
+    kinds = [profile.lubrication for profile in profiles]
+    return [
+        (i, j)
+        for i, dry in enumerate(profiles)
+        for j, wet in enumerate(profiles)
+        if (kinds[i], kinds[j]) == ("dry", "lubricated")
+        and abs(dry.load / wet.load - 1) < _SAME_LOAD
+    ]
+
+
+def dry_against_lubricated(
+    profiles: tuple[MeasuredProfile, MeasuredProfile],
+    points: tuple[LoadPoints, LoadPoints],
+    sensor: Sensor,
+    frictionless: ProfileFamily,
+    loads: tuple[int, int],
+    conversion_share: float,
+) -> DryAgainstLubricated | None:
+    """Compare the dry and the lubricated profile of one load, without A.
+
+    The difference of the voltages at the same places is held against none.  An error of A scales
+    a difference that is small, an error of G or of the film changes both alike: what is left is
+    noise, the scatter of the loads, and each scan's own baseline, drift and centre.  ``None`` is
+    returned where the scans have too few places in common.  ``frictionless``, the calculated
+    contact without friction, says how voltages change with load and place where those of the two
+    scans differ; ``loads`` are its loads of the two, and ``conversion_share`` is the relative
+    standard uncertainty of A.
+    """
+    sides = [of_load.averaged() for of_load in points]
+    kept = _common(sides[0].offset, sides[1].offset)
+    if kept[0].size < _FEWEST_PLACES:
+        return None
+    predicted = [
+        predict(side, sensor, frictionless, load) for side, load in zip(sides, loads, strict=True)
+    ]
+    # What the frictionless contact says of other places and loads is taken off both.
+    dry, wet = (
+        (side.u - of_side.signal[0])[places]
+        for side, of_side, places in zip(sides, predicted, kept, strict=True)
+    )
+    covariance = sum(
+        _covariance(side, of_side)[np.ix_(places, places)]
+        for side, of_side, places in zip(sides, predicted, kept, strict=True)
+    )
+    flat = np.column_stack([sides[0].flat, predicted[0].slope[0] * sides[0].side])[kept[0]]
+    chi_square = _chi_square(dry - wet, np.asarray(covariance), flat)
+    degrees = kept[0].size - flat.shape[1]
+    difference, errors = _difference(profiles, sides, predicted, kept, sensor, conversion_share)
+    top = profiles[0].maximum - profiles[1].maximum
+    u_top = float(
+        np.hypot(
+            conversion_share * top,
+            math.hypot(*(random_uncertainty(profile.maximum_budget) for profile in profiles)),
+        )
+    )
+    return DryAgainstLubricated(
+        load=profiles[0].load,
+        r=sides[0].radius[kept[0]],
+        difference=difference,
+        difference_errors=errors,
+        chi_square=chi_square,
+        degrees=degrees,
+        p_value=float(chdtrc(degrees, chi_square)),
+        maximum=top,
+        maximum_uncertainty=u_top,
+        relative=top / profiles[1].maximum,
+        relative_uncertainty=u_top / profiles[1].maximum,
     )
 
 
-def _ratio_uncertainty(
-    profile: MeasuredProfile, confronted: Confrontation, members: Members, index: int
-) -> float:
-    """Relative uncertainty of measured over frictionless maximum: A and G err together."""
-    top = single_point(0.0, 0.0, confronted.points[index])
-    found = predict(top, confronted.sensor, members, confronted.loads[index])
-    parts = [float(np.linalg.norm(column[0, 0])) for column in found.columns.values()]
-    systematic = float(np.linalg.norm(parts)) / float(found.signal[0, 0])
-    return float(np.hypot(systematic, random_uncertainty(profile.maximum_budget) / profile.maximum))
+def _common(dry: FloatArray, wet: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the indices of places that both scans measured, a quarter of a step apart at most."""
+    nearest = np.abs(np.subtract.outer(dry, wet)).argmin(axis=1)
+    step = float(np.median(np.diff(dry))) if dry.size > 1 else 0.0
+    close = np.abs(dry - wet[nearest]) < _CLOSE * step
+    first, where = np.unique(nearest[close], return_index=True)
+    return close.nonzero()[0][where], first
+
+
+def _covariance(points: LoadPoints, predicted: Predicted) -> FloatArray:
+    """Covariance of the voltages, without what both scans share, in V^2."""
+    noise = np.outer(points.noise, points.noise)
+    noise = np.diag(np.diag(noise)) if points.correlation is None else noise * points.correlation
+    scatter = (predicted.by_load[0] * points.load_errors) ** 2
+    moved = (predicted.slope[0] * points.x_errors) ** 2
+    return np.asarray(noise + np.diag(scatter + moved))
+
+
+def _chi_square(values: FloatArray, covariance: FloatArray, flat: FloatArray) -> float:
+    root = np.linalg.cholesky(covariance)
+    basis = np.linalg.qr(np.linalg.solve(root, flat))[0]
+    left = np.linalg.solve(root, values)
+    left = left - basis @ (basis.T @ left)
+    return float(left @ left)
+
+
+def _difference(
+    profiles: tuple[MeasuredProfile, MeasuredProfile],
+    sides: Sequence[LoadPoints],
+    predicted: Sequence[Predicted],
+    kept: tuple[NDArray[np.intp], NDArray[np.intp]],
+    sensor: Sensor,
+    conversion_share: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return dry minus lubricated stress at the dry scan's places, and its uncertainty, in Pa."""
+    orders = [np.argsort(profile.x) for profile in profiles]
+    stresses = [
+        profile.s_zz[order][places]
+        for profile, order, places in zip(profiles, orders, kept, strict=True)
+    ]
+    farther = sides[0].radius[kept[0]] - sides[1].radius[kept[1]]
+    heavier = math.log(profiles[0].load / profiles[1].load)
+    moved = predicted[1].slope[0][kept[1]] * farther + predicted[1].by_load[0][kept[1]] * heavier
+    difference = stresses[0] - stresses[1] - moved / sensor.conversion_constant
+    variance = (conversion_share * difference) ** 2
+    for profile, order, places in zip(profiles, orders, kept, strict=True):
+        for source, covariance in profile.covariances.items():
+            if source != "conversion_constant":
+                variance = variance + np.diag(covariance)[order][places]
+    return difference, np.sqrt(variance)

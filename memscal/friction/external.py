@@ -10,9 +10,14 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
+from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import FRICTION_SCALE, ProfileFamily
-from memscal.friction.paths import CacheFolder, base_wavenumbers, require_loads
+from memscal.friction.family import (
+    FRICTION_SCALE,
+    ProfileFamily,
+    base_wavenumbers,
+    require_loads,
+)
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
@@ -40,65 +45,33 @@ def external_family(
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ProfileFamily:
-    """Return the base stresses of tables that were calculated elsewhere.
+    """Return the base stresses of tables that were calculated elsewhere, by friction coefficient.
 
-    Parameters
-    ----------
-    profiles : sequence of StressProfile
-        One table for each load and friction coefficient (see :func:`memscal.read_reference`).
-        A load within 1 % of one that is wanted serves it, its stress scaled in proportion.
-    loads : array_like, shape (L,)
-        Loads of the scan, in N.
-    reach : float
-        Largest distance from the axis at which stresses will be asked for, in m.
-    film, indenter : ElasticFilm and Sphere, optional
-        What was pressed on what; by default as the first table states it.  Contacts of the two
-        are solved at the tables' friction coefficients, and their sensitivities taken over; where
-        they are not known there are none, and the stress counts as proportional to the load.
-    cache, workers
-        As for :func:`memscal.friction.calculated.amontons_family`, for those contacts.
-
-    Returns
-    -------
-    ProfileFamily
-        Its values are the friction coefficients of the tables.
-
-    Raises
-    ------
-    InputError
-        If a table lacks its friction coefficient, ends before its stress has decayed or does
-        not carry its load; if tables contradict each other, or the grid of loads and friction
-        coefficients has a gap.
-
-    Examples
-    --------
-    >>> from memscal.mechanics.indent import indent
-    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    >>> contact = indent(film, Sphere(radius=128.8e-3), load=0.34, friction=0.1)
-    >>> family = external_family([contact.profile()], [0.342], reach=8e-3)
-    >>> family.values, round(float(family.spectra[0, 0, 0]), 2)
-    (array([0.1]), 0.34)
+    One table for each load and coefficient: a load within 1 % of one that is asked for serves it,
+    its stress scaled in proportion.  Film and sphere, by default as the first table states them,
+    are solved at the tables' coefficients and their sensitivities taken over; where they are not
+    known there are none, and the stress counts as proportional to the load.
     """
-    wanted = require_loads(loads)
+    nominal = require_loads(loads)
     tables = [_checked(profile, reach) for profile in profiles]
     if not tables:
         raise InputError("No table of a calculated stress was given.")
     loading = _common_loading(tables)
     frictions = np.array(sorted({_friction(profile) for profile in tables}))
-    grid = _grid(tables, frictions, wanted)
+    grid = _grid(tables, frictions, nominal)
     film = film or next((p.film for p in tables if p.film is not None), None)
     indenter = indenter or next((p.indenter for p in tables if p.indenter is not None), None)
     # Where no film is known, the tables' own spacing says how fine their stress can be.
     nodes = base_wavenumbers(film.thickness if film is not None else _finest(tables), reach)
     spectra = np.array([[_transform(cell, nodes.k) for cell in row] for row in grid])
-    spectra *= (wanted / np.array([[cell.load for cell in row] for row in grid]))[:, :, None]
+    spectra *= (nominal / np.array([[cell.load for cell in row] for row in grid]))[:, :, None]
     by_load, changes = spectra, {}
     notes = "No film and sphere are known: the stress counts as proportional to the load."
     if film is not None and isinstance(indenter, Sphere):
         ours = amontons_family(
             film,
             indenter,
-            wanted,
+            nominal,
             friction=[float(mu) for mu in frictions],
             loading=loading or "incremental",
             reach=reach,
@@ -113,7 +86,7 @@ def external_family(
         name="external",
         loading=loading,
         wavenumbers=nodes,
-        loads=wanted,
+        loads=nominal,
         values=frictions,
         scale=FRICTION_SCALE,
         spectra=spectra,
@@ -140,10 +113,10 @@ def _grid(
         ]
         grid.append([cell for cell in row if cell is not None])
     if missing:
-        known = sorted({profile.load for profile in tables})
+        stated = sorted({profile.load for profile in tables})
         raise InputError(
             f"No table was given for {_listed(missing)}.",
-            why=f"The tables are for {', '.join(f'{load:g}' for load in known)} N; a load must be "
+            why=f"The tables are for {', '.join(f'{load:g}' for load in stated)} N; a load must be "
             f"within {_SAME_LOAD:.0%} of one of them, because a sphere's stress is not "
             "proportional to its load.",
             cure="Calculate the missing ones, or leave out the friction coefficients or loads "
@@ -198,14 +171,14 @@ def _checked(profile: StressProfile, reach: float) -> StressProfile:
 
 
 def _common_loading(tables: Sequence[StressProfile]) -> str:
-    found = {p.loading for p in tables if p.loading and _friction(p) > 0}
-    if len(found) > 1:
+    loadings = {p.loading for p in tables if p.loading and _friction(p) > 0}
+    if len(loadings) > 1:
         raise InputError(
             "Some of the tables are for incremental loading and some for total loading.",
             why="A family holds one loading.",
             cure="Give the tables of one loading at a time.",
         )
-    return found.pop() if found else ""
+    return loadings.pop() if loadings else ""
 
 
 def _friction(profile: StressProfile) -> float:

@@ -1,4 +1,4 @@
-r"""Calculated base stresses along one parameter of the interface, at each load of a scan.
+r"""Families of calculated base stresses: along one parameter of the interface, at each load.
 
 A family holds the transforms :math:`\hat\sigma(k; P, \theta)` of the base stress of contacts that
 were solved at a few values of one parameter :math:`\theta`: the friction coefficient, or a length
@@ -13,29 +13,43 @@ interpolant must not ring there.
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, freeze_arrays, require_positive
+from memscal.errors import ConvergenceError, DomainError, InputError, MemscalError
+from memscal.formats.cache import (
+    CacheFolder,
+    find_contact_table,
+    keep_contact_table,
+    table_key,
+)
+from memscal.mechanics.contact import Contact
+from memscal.mechanics.indent import indent
+from memscal.mechanics.interface import Interface
+from memscal.model.arrays import FloatArray, finite_vector, freeze_arrays, require_positive
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Sphere
+from memscal.model.indenter import Indenter, Sphere
+from memscal.parallel import require_workers, worker_pool
+from memscal.version import __version__
 
 __all__ = [
     "FRICTION_SCALE",
-    "FamilyMember",
-    "LogDerivatives",
+    "STRONGER",
+    "FamilySetup",
     "ProfileFamily",
+    "base_wavenumbers",
     "bounded",
-    "poisson_ratios",
-    "scaled_changes",
+    "parameter_values",
+    "require_loads",
 ]
 
 FRICTION_SCALE = 0.3
@@ -46,100 +60,24 @@ _ROUNDING = 1e-9
 
 
 def bounded(value: float, scale: float) -> float:
-    """Return the bounded coordinate of a value: 1 where it is infinite.
-
-    Examples
-    --------
-    >>> bounded(0.3, 0.3), bounded(math.inf, 0.3)
-    (0.5, 1.0)
-    """
+    """Return the bounded coordinate of a value: 1 where it is infinite."""
     return 1.0 if math.isinf(value) else value / (value + scale)
 
 
 @dataclass(frozen=True, eq=False)
-class FamilyMember:
-    """Base-stress transforms of one member of a family, at L loads and K wavenumbers.
-
-    Parameters
-    ----------
-    value : float
-        The parameter of the member.
-    loads : ndarray, shape (L,)
-        Loads in N.
-    spectra : ndarray, shape (L, K)
-        Transforms of the base stress, in N.
-    by_load : ndarray, shape (L, K)
-        Their derivatives by the logarithm of the load, in N.
-    changes : mapping of str to ndarray, shape (L, K)
-        Their changes by one standard uncertainty of each source, in N.
-    by_coordinate : ndarray, shape (L, K)
-        Their derivatives by the bounded coordinate, in N.
-    """
-
-    value: float
-    loads: FloatArray
-    spectra: FloatArray
-    by_load: FloatArray
-    changes: Mapping[str, FloatArray]
-    by_coordinate: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class ProfileFamily:
-    r"""Base-stress transforms of contacts along one parameter, at each load.
+    r"""Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers.
 
-    Parameters
-    ----------
-    name : str
-        ``"amontons"``, ``"elasto-plastic"``, ``"normal-compliance"`` or ``"external"``.
-    loading : str
-        ``"incremental"`` or ``"total"``; ``""`` where it is unknown or makes no difference.
-    wavenumbers : Wavenumbers
-        Nodes k, shape (K,).
-    loads : ndarray, shape (L,)
-        Loads in N, in the order in which they were asked for.
-    values : ndarray, shape (M,)
-        Values of the parameter, increasing from 0 or above; the last may be ``inf``.  A friction
-        coefficient, or a length in m.
-    scale : float
-        :math:`\theta_0` of the bounded coordinate, in the unit of ``values``.
-    spectra : ndarray, shape (M, L, K)
-        Transforms :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, in N.
-    by_load : ndarray, shape (M, L, K)
-        Their derivatives by the logarithm of the load, in N.
-    changes : mapping of str to ndarray, shape (M, L, K)
-        Their change by one standard uncertainty of ``"young_modulus"``, ``"thickness"``,
-        ``"poisson_ratio"`` and ``"indenter_radius"``: only of those whose uncertainty is stated.
-    depths, contact_radii : ndarray, shape (M, L)
-        Indentation depths and contact radii in m; NaN where they are not known.
-    convergence : ndarray, shape (M, L)
-        Largest change under refinement, relative to the largest stress; NaN where not known.
-    notes : tuple of str
-        What was assumed, in words.
-    order : int
-        Zero for the normal stress; one for the shear, whose transforms are
-        :math:`2\pi\int\tau\,J_1(kr)\,r\,dr`.
-
-    Raises
-    ------
-    InputError
-        If the shapes disagree, the values do not increase, or the scale is not positive.
-
-    Examples
-    --------
-    >>> from memscal.friction.calculated import amontons_family
-    >>> from memscal.model.film import ElasticFilm
-    >>> from memscal.model.indenter import Sphere
-    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    >>> family = amontons_family(
-    ...     film, Sphere(radius=128.8e-3), [0.34], friction=(0.0, 0.2, 0.4), reach=8e-3
-    ... )
-    >>> member = family.at(0.1)
-    >>> stress = family.wavenumbers.synthesise(member.spectra[0], np.array(0.0))
-    >>> print(f"{stress / 1e3:.0f} kPa on the axis")
-    30 kPa on the axis
-    >>> round(family.value_at(family.coordinate(0.1)), 9)
-    0.1
+    ``name`` is ``"amontons"``, ``"elasto-plastic"``, ``"normal-compliance"`` or ``"external"``;
+    ``loading`` ``"incremental"``, ``"total"``, or ``""`` where it is unknown or changes nothing.
+    ``loads`` (L,) are in N; ``values`` (M,), increasing from 0 or above up to ``inf``, and
+    ``scale`` (:math:`\theta_0`) are friction coefficients or lengths in m.  In N and of shape
+    (M, L, K): ``spectra``, the transforms :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` (with
+    ``order`` one :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the shear); ``by_load``, their
+    derivatives by the logarithm of the load; ``changes``, by one standard uncertainty of each
+    source that states one.  ``depths``, ``contact_radii`` (m) and ``convergence`` (largest
+    relative change under refinement) are of shape (M, L), NaN where unknown.  ``notes`` say what
+    was assumed.  ``slopes`` are those of a selection by :meth:`at`, whose values have any order.
     """
 
     name: str
@@ -156,17 +94,19 @@ class ProfileFamily:
     convergence: FloatArray
     notes: tuple[str, ...] = field(default=())
     order: int = 0
+    slopes: FloatArray | None = None
 
     def __post_init__(self) -> None:
         arrays = ("loads", "values", "spectra", "by_load")
         freeze_arrays(self, *arrays, "depths", "contact_radii", "convergence")
-        kept = {source: np.array(change) for source, change in self.changes.items()}
-        for change in kept.values():
+        changes = {source: np.array(change) for source, change in self.changes.items()}
+        for change in changes.values():
             change.setflags(write=False)
-        object.__setattr__(self, "changes", MappingProxyType(kept))
+        object.__setattr__(self, "changes", MappingProxyType(changes))
         require_positive("scale of a profile family", self.scale)
         self._require_shapes()
-        if np.any(np.isnan(self.values)) or self.values[0] < 0 or np.any(np.diff(self.values) <= 0):
+        falling = self.slopes is None and np.any(np.diff(self.values) <= 0)
+        if np.any(np.isnan(self.values)) or self.values.min() < 0 or falling:
             raise InputError(
                 f"The values of a profile family are {', '.join(f'{v:g}' for v in self.values)}.",
                 why="They increase strictly, from 0 or above.",
@@ -176,7 +116,7 @@ class ProfileFamily:
     def _require_shapes(self) -> None:
         table = (self.values.size, self.loads.size)
         whole = (*table, self.wavenumbers.k.size)
-        wanted: dict[str, tuple[FloatArray, tuple[int, ...]]] = {
+        shapes: dict[str, tuple[FloatArray, tuple[int, ...]]] = {
             "spectra": (self.spectra, whole),
             "by_load": (self.by_load, whole),
             **{f"changes[{name!r}]": (c, whole) for name, c in self.changes.items()},
@@ -184,7 +124,7 @@ class ProfileFamily:
             "contact_radii": (self.contact_radii, table),
             "convergence": (self.convergence, table),
         }
-        for name, (array, shape) in wanted.items():
+        for name, (array, shape) in shapes.items():
             if array.shape != shape:
                 raise InputError(
                     f"{name} of a profile family has shape {array.shape}, not {shape}."
@@ -195,56 +135,62 @@ class ProfileFamily:
         state = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return state | {"changes": dict(self.changes)}
 
-    @property
+    @cached_property
     def coordinates(self) -> FloatArray:
         """Bounded coordinates of the values, shape (M,)."""
         return np.array([self.coordinate(float(value)) for value in self.values])
 
-    def coordinate(self, value: float) -> float:
-        r"""Return the bounded coordinate :math:`t = \theta/(\theta + \theta_0)` of a value.
+    @cached_property
+    def by_coordinate(self) -> FloatArray:
+        """Derivatives of the spectra by the bounded coordinate, shape (M, L, K), in N."""
+        return self._interpolated(self.coordinates, 1)[:, 0] if self.slopes is None else self.slopes
 
-        Raises
-        ------
-        InputError
-            If the value is negative or not a number.
-        """
+    def coordinate(self, value: float) -> float:
+        r"""Return the bounded coordinate :math:`t = \theta/(\theta + \theta_0)` of a value."""
         if math.isnan(value) or value < 0:
             raise InputError(f"A {self.name} family has no value {value:g}: it is not negative.")
         return bounded(value, self.scale)
 
     def value_at(self, coordinate: float) -> float:
-        """Return the value at a bounded coordinate: the inverse of :meth:`coordinate`.
-
-        Raises
-        ------
-        InputError
-            If the coordinate does not lie from 0 to 1.
-        """
+        """Return the value at a bounded coordinate: the inverse of :meth:`coordinate`."""
         if not 0 <= coordinate <= 1:
             raise InputError(f"A bounded coordinate is {coordinate:g}, but it lies from 0 to 1.")
         return math.inf if coordinate == 1 else self.scale * coordinate / (1 - coordinate)
 
-    def at(self, value: float) -> FamilyMember:
-        """Return the member at any value between the first and the last.
+    def values_at(self, coordinates: Iterable[float]) -> FloatArray:
+        """Return the values at several bounded coordinates."""
+        return np.array([self.value_at(float(t)) for t in coordinates])
 
-        Raises
-        ------
-        InputError
-            If the family does not reach the value.
-        """
-        known, t = self.coordinates, self.coordinate(value)
-        if not known[0] - _ROUNDING <= t <= known[-1] + _ROUNDING:
+    def at(self, values: ArrayLike) -> ProfileFamily:
+        """Return the members at one or several values, in any order; none is extrapolated."""
+        chosen = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        known = self.coordinates
+        t = np.array([self.coordinate(float(value)) for value in chosen])
+        outside = (t < known[0] - _ROUNDING) | (t > known[-1] + _ROUNDING)
+        if outside.any():
             raise InputError(
                 f"A {self.name} family from {self.values[0]:g} to {self.values[-1]:g} does not "
-                f"reach {value:g}.",
+                f"reach {chosen[outside][0]:g}.",
                 why="It is interpolated, not extrapolated.",
                 cure="Calculate it with a value beyond.",
             )
-        t = min(max(t, known[0]), known[-1])
-        found = self._interpolant(t)
-        slope = self._slope(t)[0]
-        changes = dict(zip(self.changes, found[2:], strict=True))
-        return FamilyMember(float(value), self.loads, found[0], found[1], changes, slope)
+        t = np.clip(t, known[0], known[-1])
+        arrays = self._interpolated(t)
+
+        def linear(table: FloatArray) -> FloatArray:
+            return np.stack([np.interp(t, known, column) for column in table.T], axis=1)
+
+        return replace(
+            self,
+            values=chosen,
+            spectra=arrays[:, 0],
+            by_load=arrays[:, 1],
+            changes={source: arrays[:, 2 + i] for i, source in enumerate(self.changes)},
+            depths=linear(self.depths),
+            contact_radii=linear(self.contact_radii),
+            convergence=linear(self.convergence),
+            slopes=self._interpolated(t, 1)[:, 0],
+        )
 
     def only(self, loads_index: int | Sequence[int]) -> ProfileFamily:
         """Return the family at one or several of its loads, by index, in the order given."""
@@ -258,87 +204,49 @@ class ProfileFamily:
             depths=self.depths[:, chosen],
             contact_radii=self.contact_radii[:, chosen],
             convergence=self.convergence[:, chosen],
+            slopes=None if self.slopes is None else self.slopes[:, chosen],
         )
 
     @cached_property
-    def _stack(self) -> FloatArray:
-        """Everything that is interpolated, shape (M, 2 + sources, L, K)."""
-        return np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
-
-    @cached_property
     def _pieces(self) -> Any:
+        """Interpolant of spectra, derivatives and changes, shape (2 + sources, L, K)."""
         from scipy.interpolate import PchipInterpolator
 
-        return PchipInterpolator(self.coordinates, self._stack, axis=0)
+        stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
+        return PchipInterpolator(self.coordinates, stack, axis=0)
 
-    def _interpolant(self, t: float) -> FloatArray:
-        return self._stack[0] if self.values.size == 1 else np.asarray(self._pieces(t))
-
-    def _slope(self, t: float) -> FloatArray:
-        if self.values.size == 1:
-            return np.zeros_like(self._stack[0])
-        return np.asarray(self._pieces(t, 1))
+    def _interpolated(self, t: FloatArray, derivative: int = 0) -> FloatArray:
+        """Return spectra, derivatives and changes at coordinates (V,): (V, 2 + sources, L, K)."""
+        if self.values.size > 1:
+            return np.asarray(self._pieces(t, derivative))
+        stack = np.stack([self.spectra, self.by_load, *self.changes.values()], axis=1)
+        return np.repeat(stack * (not derivative), t.size, axis=0)
 
 
 #: Smaller steps of Poisson's ratio would show the rings' placing beside the change.
 _SMALLEST_STEP = 0.01
 
 
-@dataclass(frozen=True, eq=False)
-class LogDerivatives:
-    """Transforms and their derivatives by logarithms, arrays of one shape, in N.
+def _scaled_changes(
+    film: ElasticFilm,
+    indenter: Sphere,
+    spectra: FloatArray,
+    *,
+    load: FloatArray,
+    wavenumber: FloatArray,
+    length: FloatArray,
+    strength: FloatArray,
+) -> dict[str, FloatArray]:
+    """Return the changes by one stated standard uncertainty that the contact's scales give.
 
-    Parameters
-    ----------
-    spectra : ndarray
-        The transforms.
-    load, wavenumber : ndarray
-        Derivatives by load and wavenumber.
-    length, strength : ndarray
-        Derivatives by the length over which the interface yields and by the strength of its law;
-        zero for a rigid interface.
+    The keywords are derivatives by logarithms: of the load, the wavenumber, and of length and
+    strength of the interface's law, which are zero for a rigid one.
     """
-
-    spectra: FloatArray
-    load: FloatArray
-    wavenumber: FloatArray
-    length: FloatArray
-    strength: FloatArray
-
-
-def scaled_changes(
-    film: ElasticFilm, indenter: Sphere, by: LogDerivatives
-) -> Mapping[str, FloatArray]:
-    """Return the changes by one standard uncertainty that follow from the scales of a contact.
-
-    Parameters
-    ----------
-    film, indenter
-        Their stated uncertainties count; what is not stated is left out.
-    by : LogDerivatives
-        Transforms and what is known of their derivatives.
-
-    Returns
-    -------
-    mapping of str to ndarray, in N
-        ``"young_modulus"``, ``"thickness"`` and ``"indenter_radius"``, as far as stated.
-
-    Examples
-    --------
-    A transform that is in proportion to the load does not depend on Young's modulus:
-
-    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3,
-    ...                    young_modulus_uncertainty=2.2e5)
-    >>> one, nothing = np.ones(3), np.zeros(3)
-    >>> by = LogDerivatives(one, load=one, wavenumber=nothing, length=nothing, strength=nothing)
-    >>> scaled_changes(film, Sphere(radius=0.1288), by)
-    {'young_modulus': array([0., 0., 0.])}
-    """
-    stiffer = by.spectra - by.load
+    stiffer = spectra - load
     derivatives = {
         "young_modulus": stiffer,
-        "thickness": 3 * stiffer + by.wavenumber - 2 * by.length - by.strength,
-        "indenter_radius": -stiffer + by.length + by.strength,
+        "thickness": 3 * stiffer + wavenumber - 2 * length - strength,
+        "indenter_radius": -stiffer + length + strength,
     }
     stated = {
         "young_modulus": (film.young_modulus, film.young_modulus_uncertainty),
@@ -352,13 +260,340 @@ def scaled_changes(
     }
 
 
-def poisson_ratios(film: ElasticFilm) -> tuple[float, float] | None:
-    """Return the two Poisson's ratios whose difference shows its influence.
+def _poisson_ratios(film: ElasticFilm) -> tuple[float, float] | None:
+    """Return two Poisson's ratios whose difference shows its influence; ``None`` if it is exact.
 
-    ``None`` where its uncertainty is not stated or zero.  An incompressible film is at the end of
-    the range: the difference is then one-sided.
+    An incompressible film is at the end of the range: the difference is then one-sided.
     """
     if not (u := film.poisson_ratio_uncertainty):
         return None
     step = max(u, _SMALLEST_STEP)
     return min(film.poisson_ratio + step, 0.5), max(film.poisson_ratio - step, 0.0)
+
+
+#: Neighbours of each load on the path, relative to it: their difference is its derivative.
+_NEIGHBOURS = (0.98, 1.02)
+#: Rings from the axis to the largest contact; more crowd at the edges.  Three times as many change
+#: the base stress by less than 1e-4 of its maximum between rigid surfaces, and by less than 7e-4
+#: where the interface yields.
+_RINGS_OF_A_RIGID_CONTACT = 56
+_RINGS_OF_A_COMPLIANT_CONTACT = 72
+#: Tried in turn where the statuses of the rings do not settle: a film that sticks at once may find
+#: no edge between two rings, and does between others.
+_OTHER_RINGS = (80, 64, 48, 112)
+#: Relative step of the derivative by the wavenumber.
+_STRETCH = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadingPath:
+    """A loading of one film with one interface, looked at at ``loads`` (N, in any order).
+
+    ``derivatives``: whether those by load and wavenumber are needed; ``order``: zero for the
+    normal stress at the base, one for the shear.
+    """
+
+    film: ElasticFilm
+    indenter: Sphere
+    loads: tuple[float, ...]
+    friction: float = 0.0
+    loading: str = "incremental"
+    interface: Interface = field(default_factory=Interface)
+    derivatives: bool = True
+    order: int = 0
+
+
+def solve_paths(
+    paths: Sequence[LoadingPath], k: FloatArray, *, workers: int
+) -> list[dict[str, FloatArray]]:
+    """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes.
+
+    ``spectra`` (L, K) in N with ``by_load`` and ``by_wavenumber``, derivatives by the logarithms
+    (zero where not needed), and ``depths``, ``contact_radii``, ``convergence`` (L,).  Each path is
+    solved by itself: the result does not depend on the number of processes.
+    """
+    several = min(workers, len(paths))
+    if several < 2:
+        return [_solve(path, k) for path in paths]
+    with worker_pool(several) as pool:
+        return list(pool.map(_solve, paths, [k] * len(paths)))
+
+
+def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
+    count = len(path.loads)
+    factors = np.array([1.0, *_NEIGHBOURS] if path.derivatives else [1.0])
+    visited = np.multiply.outer(factors, np.array(path.loads))
+    order = np.argsort(visited, axis=None, kind="stable")
+    solved = _contacts(path, visited.ravel()[order])
+    contacts = [solved[place] for place in np.argsort(order)]
+    nominal = contacts[:count]
+    spectra = np.array([_spectrum(path, contact, k) for contact in nominal])
+    by_load = by_wavenumber = np.zeros_like(spectra)
+    if path.derivatives:
+        lower, upper = (
+            np.array([_spectrum(path, contact, k) for contact in contacts[first:][:count]])
+            for first in (count, 2 * count)
+        )
+        # By P d/dP and not by the logarithm's own step: the force is then met exactly.
+        by_load = (upper - lower) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
+        above, below = (
+            np.array([_spectrum(path, contact, k * stretch) for contact in nominal])
+            for stretch in (1 + _STRETCH, 1 - _STRETCH)
+        )
+        by_wavenumber = (above - below) / (2 * _STRETCH)
+    return {
+        "spectra": spectra,
+        "by_load": by_load,
+        "by_wavenumber": by_wavenumber,
+        "depths": np.array([contact.depth for contact in nominal]),
+        "contact_radii": np.array([contact.contact_radius for contact in nominal]),
+        "convergence": np.array([contact.convergence for contact in nominal]),
+    }
+
+
+def _spectrum(path: LoadingPath, contact: Contact, k: FloatArray) -> FloatArray:
+    return contact.base_shear_spectrum(k) if path.order else contact.base_spectrum(k)
+
+
+def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
+    """Solve the contacts; an error names the loads and the interface that it was about."""
+    rigid = path.interface.rigid
+    usual = _RINGS_OF_A_RIGID_CONTACT if rigid else _RINGS_OF_A_COMPLIANT_CONTACT
+    counts = (usual, *_OTHER_RINGS)
+    for rings in counts:
+        try:
+            return indent(
+                path.film,
+                path.indenter,
+                load=loads,
+                friction=path.friction,
+                # Without friction the way makes no difference, and the solution is remembered.
+                loading=path.loading if path.friction > 0 else "incremental",
+                interface=path.interface,
+                rings=rings,
+            )
+        except ConvergenceError as error:
+            if rings == counts[-1]:
+                raise _named(path, error) from error
+        except DomainError as error:
+            raise _named(path, error) from error
+    raise AssertionError("one of the attempts returns or raises")
+
+
+def _named(path: LoadingPath, error: DomainError | ConvergenceError) -> MemscalError:
+    """Return the error with what it was about."""
+    problem = (
+        f"The contact of a sphere of radius {path.indenter.radius * 1e3:.4g} mm with a film of "
+        f"{path.film.thickness * 1e3:.4g} mm cannot be calculated up to {max(path.loads):g} N "
+        f"(friction {path.friction:g}, {path.loading} loading): {error.problem}"
+    )
+    return type(error)(problem, why=error.why, cure=error.cure)
+
+
+#: Raised where the same request gives other numbers within one version.
+_REVISION = 2
+
+
+def _family_key(
+    paths: Sequence[LoadingPath], values: FloatArray, scale: float, k: FloatArray
+) -> str:
+    """Return the SHA-256 of all that a family's numbers depend on: not of the film's name."""
+    requests = [asdict(path) | {"law": type(path.interface.normal).__name__} for path in paths]
+    for request in requests:
+        request["film"].pop("name")
+    return table_key(
+        {
+            "version": __version__,
+            "revision": _REVISION,
+            "paths": requests,
+            "values": values.tolist(),
+            "scale": scale,
+            "k": hashlib.sha256(k.tobytes()).hexdigest(),
+        }
+    )
+
+
+#: Factor by which the law of an interface is made stronger to see what that changes.
+STRONGER = 1.2
+#: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
+_LARGEST_KH = 20.0
+#: How the arrays of changes are named in a kept file.
+_CHANGE = "change_"
+
+
+@dataclass(frozen=True, eq=False)
+class FamilySetup:
+    """What all members of a family share: contact, loads (N), wavenumbers, cache and workers."""
+
+    film: ElasticFilm
+    indenter: Sphere
+    loads: FloatArray
+    wavenumbers: Wavenumbers
+    cache: CacheFolder
+    workers: int
+    order: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        film: ElasticFilm,
+        indenter: Indenter,
+        loads: ArrayLike,
+        *,
+        reach: float,
+        cache: CacheFolder,
+        workers: int,
+        order: int = 0,
+    ) -> FamilySetup:
+        """Check what was asked for: a sphere, positive loads and reach (m), a number of workers."""
+        require_workers(workers)
+        if not isinstance(indenter, Sphere):
+            raise InputError(
+                f"Profiles were asked for under a {indenter.shape}, but a sphere is needed.",
+                why="Friction shows under an indenter whose contact grows with the load.",
+                cure="Give the sphere of the contact scan.",
+            )
+        nodes = base_wavenumbers(film.thickness, reach)
+        return cls(film, indenter, require_loads(loads), nodes, cache, workers, order)
+
+    def path(
+        self, *, friction: float, loading: str = "incremental", interface: Interface | None = None
+    ) -> LoadingPath:
+        """Return the loading path of one member."""
+        return LoadingPath(
+            film=self.film,
+            indenter=self.indenter,
+            loads=tuple(float(load) for load in self.loads),
+            friction=friction,
+            loading=loading,
+            interface=interface or Interface(),
+            order=self.order,
+        )
+
+    def family(
+        self,
+        paths: Sequence[LoadingPath],
+        *,
+        name: str,
+        loading: str,
+        values: FloatArray,
+        scale: float,
+        a_length: bool = False,
+        stronger: Sequence[LoadingPath] | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> ProfileFamily:
+        """Return the family of some paths, as it was kept or calculated now.
+
+        ``a_length`` says whether its values are lengths; ``stronger`` are the paths with an
+        interface that is stronger by ``STRONGER``, where that makes a difference.
+        """
+        k = self.wavenumbers.k
+        key = _family_key(paths, values, scale, k)
+        arrays = find_contact_table(self.cache, key)
+        if arrays is None:
+            arrays = self._calculated(paths, stronger, (values, scale) if a_length else None)
+            axes = {"value": values, "load": self.loads, "k": k}
+            keep_contact_table(self.cache, key, axes | arrays)
+        fixed = ("spectra", "by_load", "depths", "contact_radii", "convergence")
+        return ProfileFamily(
+            name=name,
+            loading=loading,
+            wavenumbers=self.wavenumbers,
+            loads=self.loads,
+            values=values,
+            scale=scale,
+            changes={
+                name.removeprefix(_CHANGE): array
+                for name, array in arrays.items()
+                if name.startswith(_CHANGE)
+            },
+            notes=notes,
+            order=self.order,
+            **{name: arrays[name] for name in fixed},
+        )
+
+    def _calculated(
+        self,
+        paths: Sequence[LoadingPath],
+        stronger: Sequence[LoadingPath] | None,
+        lengths: tuple[FloatArray, float] | None,
+    ) -> dict[str, FloatArray]:
+        """Solve the paths and derive what follows from them: the arrays that are kept."""
+        film, sphere = self.film, self.indenter
+        ratios = _poisson_ratios(film)
+        # The strength of an interface counts beside a length of film or sphere alone.
+        uncertain = film.thickness_uncertainty or sphere.radius_uncertainty
+        nominal, strong, *sides = self._solved(paths, (uncertain and stronger) or paths, ratios)
+        spectra = nominal["spectra"]
+        changes = _scaled_changes(
+            film,
+            sphere,
+            spectra,
+            load=nominal["by_load"],
+            wavenumber=nominal.pop("by_wavenumber"),
+            length=np.zeros_like(spectra) if lengths is None else _by_log_value(spectra, *lengths),
+            strength=(strong["spectra"] - spectra) / math.log(STRONGER),
+        )
+        if ratios is not None:
+            share = (film.poisson_ratio_uncertainty or 0.0) / (ratios[0] - ratios[1])
+            changes["poisson_ratio"] = (sides[0]["spectra"] - sides[1]["spectra"]) * share
+        return nominal | {f"{_CHANGE}{source}": change for source, change in changes.items()}
+
+    def _solved(
+        self,
+        paths: Sequence[LoadingPath],
+        stronger: Sequence[LoadingPath],
+        ratios: tuple[float, float] | None,
+    ) -> list[dict[str, FloatArray]]:
+        """Solve the paths, the stronger ones and those of other Poisson's ratios, each once."""
+        groups = [list(paths)]
+        groups.append([p if p in paths else replace(p, derivatives=False) for p in stronger])
+        for nu in ratios or ():
+            film = replace(self.film, poisson_ratio=nu)
+            nominal = nu == self.film.poisson_ratio
+            groups.append([replace(path, film=film, derivatives=nominal) for path in paths])
+        distinct = list(dict.fromkeys(path for group in groups for path in group))
+        arrays = solve_paths(distinct, self.wavenumbers.k, workers=self.workers)
+        solved = dict(zip(distinct, arrays, strict=True))
+        return [
+            {name: np.stack([solved[path][name] for path in group]) for name in arrays[0]}
+            for group in groups
+        ]
+
+
+def base_wavenumbers(thickness: float, reach: float) -> Wavenumbers:
+    """Return nodes for all that reaches the base of a film, seen out to ``reach`` (m)."""
+    require_positive("reach", reach, "m")
+    return Wavenumbers.covering(_LARGEST_KH / thickness, reach)
+
+
+def require_loads(loads: ArrayLike) -> FloatArray:
+    """Return loads (N) as an array; refuse none, and what is not finite and positive."""
+    checked = finite_vector("loads", np.atleast_1d(np.asarray(loads, dtype=np.float64)))
+    for load in checked:
+        require_positive("load", float(load), "N")
+    return checked
+
+
+def parameter_values(what: str, values: Sequence[float]) -> FloatArray:
+    """Return the values of a parameter; refuse what does not increase from 0 or above."""
+    checked = np.asarray(values, dtype=np.float64)
+    if checked.ndim != 1 or checked.size == 0 or np.any(np.isnan(checked)) or np.any(checked < 0):
+        raise InputError(f"The {what} are {values!r}, but they are a list, none of them negative.")
+    if np.any(np.diff(checked) <= 0):
+        raise InputError(
+            f"The {what} {', '.join(f'{value:g}' for value in checked)} do not increase.",
+            cure="Sort them, and give each once.",
+        )
+    return checked
+
+
+def _by_log_value(spectra: FloatArray, values: FloatArray, scale: float) -> FloatArray:
+    r"""Return :math:`t(1-t)\,\partial/\partial t`: the derivatives by the value's logarithm."""
+    if values.size == 1:
+        return np.zeros_like(spectra)
+    from scipy.interpolate import PchipInterpolator
+
+    t = np.array([bounded(float(value), scale) for value in values])
+    slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
+    return np.asarray((t * (1 - t))[:, None, None] * slopes)

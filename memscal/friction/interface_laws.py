@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.friction.effective import profiled
+from memscal.friction.effective import profile_estimate
 from memscal.friction.family import ProfileFamily
-from memscal.friction.likelihood import likelihood
+from memscal.friction.likelihood import LoadPoints, Sensor, likelihood
 from memscal.friction.marginal_likelihood import (
     Prior,
     Tables,
@@ -18,8 +18,7 @@ from memscal.friction.marginal_likelihood import (
     evidence_of_one,
     log_likelihood,
 )
-from memscal.friction.prediction import LoadPoints, Sensor, members_of
-from memscal.friction.results import ImpliedFriction, InterfaceLaw, InterfaceLength
+from memscal.friction.results import BoundedEstimate, ImpliedFriction, InterfaceLaw, Interval
 from memscal.model.arrays import FloatArray
 
 __all__ = [
@@ -46,10 +45,7 @@ _SETTLED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Measured points of several loads, the sensor, and the calculated contacts at these loads.
-
-    ``family`` holds the loads of ``points``, in their order.
-    """
+    """Measured points, the sensor, and the contacts calculated at their loads, in their order."""
 
     points: Sequence[LoadPoints]
     sensor: Sensor
@@ -62,25 +58,15 @@ class Measured:
 
     def tables(self, values: FloatArray) -> Tables:
         """Return what the loads tell at values of the family's parameter."""
-        members = members_of(self.family, values)
         loads = range(len(self.points))
-        return likelihood(self.points, self.sensor, members, loads).tables()
+        return likelihood(self.points, self.sensor, self.family.at(values), loads).tables()
 
 
 @dataclass(frozen=True, eq=False)
 class LawCurve:
-    """The likelihood of a law along its parameter.
+    """The likelihood of a law along its parameter, at M values.
 
-    Parameters
-    ----------
-    values, coordinates : ndarray, shape (M,)
-        The parameter, increasing, and its bounded coordinate.
-    edges : ndarray, shape (M + 1,)
-        Values between which each of them stands for all others.
-    tables : Tables
-        What the loads tell there, of shape (M, 1).
-    log_likelihood, chi_square : ndarray, shape (M,)
-        Of all of them together.
+    Between ``edges`` (M + 1,) each value stands for all others; ``tables`` are of shape (M, 1).
     """
 
     values: FloatArray
@@ -110,16 +96,7 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     """Return the likelihood along a family's parameter, of all loads or of one by its index.
 
     Nodes are even in the bounded coordinate, with more of them where the likelihood is not
-    negligible.
-
-    Parameters
-    ----------
-    measured : Measured
-        Points, sensor and calculated contacts.
-    load : int, optional
-        The load; all of them, with one parameter, by default.
-    also : iterable of float
-        Values of the parameter that are nodes too.
+    negligible; ``also`` are values that are nodes too.
     """
     family = measured.family
     first, last = family.coordinates[0], family.coordinates[-1]
@@ -135,15 +112,15 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     both = np.concatenate([coarse, fine])
     order = np.argsort(both)
     tables = Tables(
-        *(np.concatenate(pair)[order] for pair in zip(rough.parts, close.parts, strict=True))
+        *(np.concatenate(pair)[order] for pair in zip(rough.arrays, close.arrays, strict=True))
     )
     t = both[order]
     logs, chi_square = log_likelihood(tables)
     middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
     return LawCurve(
-        values=np.array([family.value_at(float(one)) for one in t]),
+        values=family.values_at(t),
         coordinates=t,
-        edges=np.array([family.value_at(float(one)) for one in middles]),
+        edges=family.values_at(middles),
         tables=tables,
         log_likelihood=logs[:, 0],
         chi_square=chi_square[:, 0],
@@ -151,59 +128,45 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
 
 
 def _tables(measured: Measured, coordinates: FloatArray) -> Tables:
-    values = [measured.family.value_at(float(t)) for t in coordinates]
-    return measured.tables(np.array(values))
+    return measured.tables(measured.family.values_at(coordinates))
 
 
 def _group(tables: Tables, load: int | None) -> Tables:
     return tables.together() if load is None else tables.group(load)
 
 
-def one_of_all(name: str, found: LawCurve, prior: Prior, degrees: int) -> InterfaceLaw:
-    """Return the law with one parameter for all loads.
-
-    Parameters
-    ----------
-    name : str
-        The law.
-    found : LawCurve
-        Its likelihood.
-    prior : Prior
-        Of its parameter.
-    degrees : int
-        Points less flat nuisances.
-    """
-    best = found.best
+def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> InterfaceLaw:
+    """Return the law with one parameter for all loads; degrees are points less nuisances."""
+    best = along.best
     return _law(
         name,
-        (float(found.values[best]),),
-        found.log_evidence(prior),
+        (float(along.values[best]),),
+        along.log_evidence(prior),
         0.0,
-        float(found.log_likelihood[best]),
-        float(found.chi_square[best]),
+        float(along.log_likelihood[best]),
+        float(along.chi_square[best]),
         degrees - 1,
     )
 
 
-def of_one_value(name: str, found: LawCurve, index: int, degrees: int) -> InterfaceLaw:
+def of_one_value(name: str, along: LawCurve, index: int, degrees: int) -> InterfaceLaw:
     """Return the law that leaves nothing free, by the index of its parameter in a curve."""
-    top, least = float(found.log_likelihood[index]), float(found.chi_square[index])
+    top, least = float(along.log_likelihood[index]), float(along.chi_square[index])
     return _law(name, (), top, 0.0, top, least, degrees)
 
 
-def one_of_each(name: str, found: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
+def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter of each load; arguments as for :func:`one_of_all`."""
-    kept = [_where_it_matters(one) for one in found]
-    tables = [part[0] for part in kept]
-    weights = [prior.weights(one.edges)[part[1]] for one, part in zip(found, kept, strict=True)]
+    tables, near = zip(*(_where_it_matters(along) for along in curves), strict=True)
+    weights = [prior.weights(along.edges)[nodes] for along, nodes in zip(curves, near, strict=True)]
     evidence = evidence_of_each(tables, weights)
     start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
     chosen, top, chi_square = _best_of_each(tables, start)
     best = tuple(
-        float(one.values[part[1]][place])
-        for one, part, place in zip(found, kept, chosen, strict=True)
+        float(along.values[nodes][place])
+        for along, nodes, place in zip(curves, near, chosen, strict=True)
     )
-    return _law(name, best, evidence.log, evidence.error, top, chi_square, degrees - len(found))
+    return _law(name, best, evidence.log, evidence.error, top, chi_square, degrees - len(curves))
 
 
 def _law(
@@ -221,10 +184,10 @@ def _law(
     return InterfaceLaw(name, best, log_evidence, top, error, least, degrees, p_value)
 
 
-def _where_it_matters(found: LawCurve) -> tuple[Tables, FloatArray]:
+def _where_it_matters(along: LawCurve) -> tuple[Tables, FloatArray]:
     """Leave out the nodes that one load alone excludes."""
-    near = 2 * (found.log_likelihood.max() - found.log_likelihood) < _EXCLUDED
-    return Tables(*(part[near] for part in found.tables.parts)), near
+    near = 2 * (along.log_likelihood.max() - along.log_likelihood) < _EXCLUDED
+    return Tables(*(array[near] for array in along.tables.arrays)), near
 
 
 def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int], float, float]:
@@ -234,12 +197,12 @@ def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int]
         before = top
         for j, table in enumerate(tables):
             others = [
-                tuple(part[chosen[i]] for part in other.parts)
+                tuple(array[chosen[i]] for array in other.arrays)
                 for i, other in enumerate(tables)
                 if i != j
             ]
-            sums = [np.sum(parts, axis=0) for parts in zip(*others, strict=True)] or [0.0] * 4
-            both = Tables(*(p + s for p, s in zip(table.parts, sums, strict=True)))
+            sums = [np.sum(arrays, axis=0) for arrays in zip(*others, strict=True)] or [0.0] * 4
+            both = Tables(*(a + s for a, s in zip(table.arrays, sums, strict=True)))
             logs, squares = log_likelihood(both)
             chosen[j] = int(np.argmax(logs[:, 0]))
             top, chi_square = float(logs[chosen[j], 0]), float(squares[chosen[j], 0])
@@ -254,45 +217,30 @@ _STICK = 2e-4
 
 
 def implied_friction(
-    rigid: Measured, slipping: Measured, length: InterfaceLength, friction: float
+    rigid: Measured, slipping: Measured, length: BoundedEstimate, friction: float
 ) -> ImpliedFriction:
-    r"""Return what a slip length, and the ends of its interval, mean at each load.
+    """Return what a slip length, and the ends of its interval, mean at each load.
 
-    Parameters
-    ----------
-    rigid, slipping : Measured
-        Contacts of Amontons' law along its coefficient, and of the elasto-plastic one along the
-        slip length.
-    length : InterfaceLength
-        The slip length.
-    friction : float
-        Macroscopic friction coefficient.
-
-    Returns
-    -------
-    ImpliedFriction
-        Effective coefficients as the paper reads them: from the largest stress behind G.
+    Effective coefficients are read as from the maximum: from the largest stress behind G.
     """
     order = np.argsort(rigid.family.loads, kind="stable")
     high = math.inf if length.interval.high is None else length.interval.high
     lengths = np.array([length.interval.low, length.best, high])
     t = np.linspace(rigid.family.coordinates[0], rigid.family.coordinates[-1], _NODES)
-    values = np.array([rigid.family.value_at(float(one)) for one in t])
-    curves = _maxima(rigid.sensor, rigid, values)
-    wanted = _maxima(slipping.sensor, slipping, lengths)
-    found = [[_read(values, curves[:, load], top) for top in wanted[:, load]] for load in order]
+    values = rigid.family.values_at(t)
+    curves, maxima = _maxima(rigid, values), _maxima(slipping, lengths)
+    implied = [[_read(values, curves[:, load], top) for top in maxima[:, load]] for load in order]
     family = slipping.family
-    best = family.coordinate(length.best)
-    radii = np.array([np.interp(best, family.coordinates, r) for r in family.contact_radii.T])
+    radii = family.at(length.best).contact_radii[0]
     pressures = (family.loads / (np.pi * radii**2))[order]
     with np.errstate(divide="ignore"):
         stiffnesses = friction * pressures[:, None] / lengths
-    return ImpliedFriction(family.loads[order], np.array(found), pressures, stiffnesses)
+    return ImpliedFriction(family.loads[order], np.array(implied), pressures, stiffnesses)
 
 
-def _maxima(sensor: Sensor, measured: Measured, values: FloatArray) -> FloatArray:
+def _maxima(measured: Measured, values: FloatArray) -> FloatArray:
     """Return stresses on the axis behind G, times A, shape (V, L)."""
-    spectra = members_of(measured.family, values).spectra
+    sensor, spectra = measured.sensor, measured.family.at(values).spectra
     return np.asarray(spectra @ (sensor.transfer * sensor.wavenumbers.weights))
 
 
@@ -312,34 +260,23 @@ def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
 _UM = 1e-6
 
 
-def interface_length(found: LawCurve, family: ProfileFamily, what: str) -> InterfaceLength:
-    """Return a length by profile likelihood, one-sided where the data give only a bound.
-
-    Parameters
-    ----------
-    found : LawCurve
-        The likelihood along the length.
-    family : ProfileFamily
-        The contacts that were calculated.
-    what : str
-        Name of the length, for the reason.
-    """
-    curve = profiled(found.coordinates, found.deviance, family.value_at)
-    known = not curve.open_low and not curve.open_high
-    return InterfaceLength(
-        value=curve.best if known else None,
-        standard_uncertainty=curve.standard_uncertainty if known else None,
-        interval=curve.interval,
-        reason=_reason(what, curve.interval.low, curve.interval.high, family),
-        values=found.values,
-        deviance=found.deviance,
+def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> BoundedEstimate:
+    """Return a length by profile likelihood, one-sided where the data give only a bound."""
+    return profile_estimate(
+        along.values,
+        along.coordinates,
+        along.deviance,
+        family.value_at,
+        reason=lambda interval: _length_reason(what, interval, float(family.values[-1])),
+        two_sided=True,
+        unit="m",
     )
 
 
-def _reason(what: str, low: float, high: float | None, family: ProfileFamily) -> str:
+def _length_reason(what: str, interval: Interval, last: float) -> str:
+    low, high = interval.low, interval.high
     if low > 0 and high is not None:
         return ""
-    last = float(family.values[-1])
     end = (
         "one that bears no shear"
         if math.isinf(last)

@@ -1,12 +1,20 @@
-r"""The likelihood of calculated contacts: chi-square with everything that is uncertain beside them.
+r"""The likelihood of calculated contacts: what a sensor reads of them, and chi-square.
 
-The voltages of one load are :math:`u = f(\theta) + F\beta + D(\theta)\xi + n`, with flat nuisances
-:math:`\beta` of its own (baseline, drift, centre), systematic ones :math:`\xi` of unit variance
-that all loads share (A G, film, sphere, balance, stage), and noise :math:`n` of covariance
+At a distance R from the centre, and for a load :math:`P` about the nominal :math:`P_j`, a sensor
+reads
+
+.. math:: u = A\,(G \otimes \sigma)(R) + A\,\frac{\partial (G \otimes \sigma)}{\partial \ln P}
+    \ln\frac{P}{P_j}.
+
+Of a tangential channel it is the component of a vector field, by transforms of order one, and
+changes its sign with the side of the centre.  The voltages of one load are
+:math:`u = f(\theta) + F\beta + D(\theta)\xi + n`, with flat nuisance parameters :math:`\beta` of
+its own (baseline, drift, centre), systematic ones :math:`\xi` of unit variance that all loads
+share (A G, film, sphere, balance, stage), and noise :math:`n` of covariance
 
 .. math:: N = n_\mathrm{el}^2 + (A\,S'\,u(P_{ij})/P_j)^2 + (A\,\partial S/\partial R\;u(x))^2 .
 
-Chi-square is the least over all nuisances,
+Chi-square is the least over all nuisance parameters,
 
 .. math:: \chi^2(\theta) = \rho^T C^{-1} \rho, \qquad C = N + D D^T,
 
@@ -17,37 +25,319 @@ in proportion to the stress that is calculated, not to the one that was measured
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import j0, j1
 
+from memscal.apparatus import ApparatusFunction
+from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
+from memscal.errors import InputError
+from memscal.friction.family import ProfileFamily
 from memscal.friction.marginal_likelihood import Tables
-from memscal.friction.prediction import LoadPoints, Members, Predicted, Sensor, predict
+from memscal.measurement.posterior import apparatus_changes, sensor_transfer
 from memscal.model.arrays import FloatArray
+from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = ["Likelihood", "Standardised", "likelihood", "standardise"]
+__all__ = [
+    "Likelihood",
+    "LoadPoints",
+    "Predicted",
+    "Sensor",
+    "Standardised",
+    "likelihood",
+    "load_points",
+    "points_at",
+    "predict",
+    "sensor_of",
+    "standardise",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPoints:
+    """Voltages ``u`` (n,), in V, of one load of one scan, and what is known about each.
+
+    ``offset``: position from the centre along the scan, in m; ``log_load``: logarithm of the
+    point's load over the nominal one; ``noise``: standard deviation in V, larger for outliers;
+    ``load_errors`` (relative) and ``x_errors`` (m): independent standard uncertainties; ``flat``
+    (n, d): baseline and drift, of unknown size; ``free_centre``: whether the centre is to be found;
+    ``load_share``, ``position_share``: relative standard uncertainty of all loads, and of the
+    stage's scale; ``correlation`` (n, n): of the electronic noise.
+    """
+
+    u: FloatArray
+    offset: FloatArray
+    log_load: FloatArray
+    noise: FloatArray
+    load_errors: FloatArray
+    x_errors: FloatArray
+    flat: FloatArray
+    free_centre: bool = True
+    load_share: float = 0.0
+    position_share: float = 0.0
+    correlation: FloatArray | None = None
+
+    @property
+    def radius(self) -> FloatArray:
+        """Distance from the centre, in m."""
+        return np.abs(self.offset)
+
+    @property
+    def side(self) -> FloatArray:
+        """Change of the distance for a shift of the centre: one, minus one, or zero."""
+        return -np.sign(self.offset)
+
+    @property
+    def degrees(self) -> int:
+        """Points less flat parameters."""
+        return int(self.u.size - self.flat.shape[1]) - int(self.free_centre)
+
+    def averaged(self) -> LoadPoints:
+        """Return the mean of the repeats at each position, sorted by position."""
+        places, back = np.unique(np.round(self.offset, 12), return_inverse=True)
+        mean = np.zeros((places.size, self.u.size))
+        mean[back, np.arange(self.u.size)] = 1.0
+        mean /= mean.sum(axis=1, keepdims=True)
+        inner = np.eye(self.u.size) if self.correlation is None else self.correlation
+        covariance = mean @ (np.outer(self.noise, self.noise) * inner) @ mean.T
+        noise = np.sqrt(np.diag(covariance))
+        return replace(
+            self,
+            u=mean @ self.u,
+            offset=places,
+            log_load=mean @ self.log_load,
+            noise=noise,
+            load_errors=np.sqrt(mean**2 @ self.load_errors**2),
+            # The stage errs alike in every repeat.
+            x_errors=mean @ self.x_errors,
+            flat=mean @ self.flat,
+            correlation=None if self.correlation is None else covariance / np.outer(noise, noise),
+        )
+
+
+def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
+    """Return the points of a measured profile, with the noise that is stated, or was estimated.
+
+    A stated noise is taken at its word: raised by a misfit, it would hide it.
+    """
+    points = profile.points.get(channel)
+    if points is None:
+        raise _missing(profile, channel)
+    if points.noise is None:
+        raise InputError(
+            f"{profile.label}: u_{channel} is there, but not its noise, u_{channel}_errors.",
+            why="Contacts are told apart by a chi-square.",
+            cure=f"State the electronic noise of u_{channel}.",
+        )
+    position = (points.x, points.y)[profile.axis]
+    return LoadPoints(
+        u=points.u,
+        offset=position - float(profile.centre[profile.axis]),
+        log_load=np.log(points.load / profile.load),
+        noise=np.asarray(points.noise / np.sqrt(points.weight)),
+        load_errors=points.load_errors / profile.load,
+        x_errors=points.x_errors,
+        flat=np.stack([np.ones_like(position), _unit_range(position)], axis=1),
+        load_share=(profile.load_uncertainty or 0.0) / profile.load,
+        position_share=profile.scan.position_scale_uncertainty or 0.0,
+        correlation=points.correlation,
+    )
+
+
+def _missing(profile: MeasuredProfile, channel: str) -> InputError:
+    """Say why a profile holds no points of a channel."""
+    if not profile.points:
+        return InputError(
+            f"{profile.label}: the measured stress holds no measured points.",
+            why="Its file is of version 1.0, which kept the profiles alone.",
+            cure="Make it again with memscal apply, or give the scans.",
+        )
+    return InputError(
+        f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",
+        why="The scan has none, or it does not change, or the scan does not run along "
+        f"{channel[0]}: across it the shear is zero.",
+        cure=f"Give a line scan along {channel[0]} through the sensor, with u_{channel}.",
+    )
+
+
+def points_at(
+    offset: FloatArray, like: LoadPoints, u: float = 0.0, noise: float = 0.0
+) -> LoadPoints:
+    """Return points of the nominal load at places (n,), with the load's uncertainties of others."""
+    nothing = np.zeros(offset.size)
+    return LoadPoints(
+        u=nothing + u,
+        offset=offset,
+        log_load=nothing,
+        noise=nothing + noise,
+        load_errors=nothing,
+        x_errors=nothing,
+        flat=np.zeros((offset.size, 0)),
+        free_centre=False,
+        load_share=like.load_share,
+        position_share=like.position_share,
+    )
+
+
+def _unit_range(position: FloatArray) -> FloatArray:
+    middle = (position.max() + position.min()) / 2
+    return np.asarray((position - middle) / (np.ptp(position) / 2))
+
+
+#: Directions in which A G changes the signal by less than this share of its worst are dropped.
+_UNFELT = 1e-4
+#: Radii at which that is judged.
+_RADII = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A sensor at the nodes of a family.
+
+    ``transfer`` (K,): transform of A G, in V/Pa; ``changes`` (K, q): its independent changes by
+    one standard uncertainty; ``conversion_constant``: A, in V/Pa; ``order``: zero, or one of a
+    tangential channel.
+    """
+
+    wavenumbers: Wavenumbers
+    transfer: FloatArray
+    changes: FloatArray
+    conversion_constant: float
+    order: int = 0
+
+    @property
+    def of_shape(self) -> Sensor:
+        """The sensor with the changes of A G that those of G alone bring: its integral stays."""
+        of_conversion = [RadialSpectrum(self.wavenumbers, c).integral for c in self.changes.T]
+        scaled = np.outer(self.transfer, of_conversion) / self.conversion_constant
+        return replace(self, changes=self.changes - scaled.reshape(self.changes.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Voltages of the n points of one load at V values of a family's parameter, shape (V, n).
+
+    ``signal`` is A G convolved with the base stress at the point's load, in V; ``by_load``,
+    ``by_coordinate`` and ``slope`` its derivatives by the logarithm of the load, the bounded
+    coordinate and the distance from the centre (V/m); ``columns`` (V, n, q) its changes by one
+    standard uncertainty of each systematic source, in V.
+    """
+
+    signal: FloatArray
+    by_load: FloatArray
+    by_coordinate: FloatArray
+    slope: FloatArray
+    columns: Mapping[str, FloatArray]
+
+
+def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float) -> Sensor:
+    """Return a sensor at a family's nodes, with the changes of A G that its stresses feel.
+
+    Any rotation of independent changes is another set of them: one is taken in which few matter.
+    """
+    nodes = family.wavenumbers
+    middle = family.spectra[family.values.size // 2]
+    changes = apparatus_changes(apparatus, nodes.k)
+    bessel = j1 if family.order else j0
+    kernel = bessel(np.multiply.outer(np.linspace(0.0, reach, _RADII), nodes.k)) * nodes.weights
+    largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
+    shapes = middle / largest[:, None]
+    felt = np.concatenate([(kernel * row) @ changes for row in shapes])
+    if changes.shape[1]:
+        _, sizes, axes = np.linalg.svd(felt, full_matrices=False)
+        changes = changes @ axes[sizes > _UNFELT * sizes[0]].T
+    a = apparatus.conversion_constant
+    return Sensor(nodes, a * sensor_transfer(apparatus, nodes.k), changes, a, family.order)
+
+
+def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: int) -> Predicted:
+    """Return what the sensor reads of members at the points of one load, by the load's index."""
+    bessel = _Bessel(points.radius, sensor.wavenumbers)
+    if sensor.order:
+        bessel = _VectorBessel(points.radius, sensor.wavenumbers, np.sign(points.offset))
+    spectra, transfer = members.spectra[:, load], sensor.transfer
+    by_load = bessel.values(transfer * members.by_load[:, load])
+    slope = bessel.slopes(transfer * spectra)
+    felt = [bessel.values(change * spectra) for change in sensor.changes.T]
+    columns = {"apparatus": np.stack(felt, axis=-1)} if felt else {}
+    for source, change in members.changes.items():
+        columns[source] = bessel.values(transfer * change[:, load])[..., None]
+    columns["load"] = (points.load_share * by_load)[..., None]
+    columns["position_scale"] = (points.position_share * points.radius * slope)[..., None]
+    return Predicted(
+        signal=bessel.values(transfer * spectra) + by_load * points.log_load,
+        by_load=by_load,
+        by_coordinate=bessel.values(transfer * members.by_coordinate[:, load]),
+        slope=slope,
+        columns={source: column for source, column in columns.items() if column.any()},
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Bessel:
+    """Inverse transforms at distances (n,) in m, and their slopes; repeats share theirs."""
+
+    radius: FloatArray
+    wavenumbers: Wavenumbers
+
+    def values(self, spectra: FloatArray) -> FloatArray:
+        """Values of transforms (V, K) at the distances, shape (V, n)."""
+        return np.asarray((spectra @ self._even.T)[:, self._unique[1]])
+
+    def slopes(self, spectra: FloatArray) -> FloatArray:
+        """Their derivatives by the distance, shape (V, n)."""
+        return np.asarray((spectra @ self._odd.T)[:, self._unique[1]])
+
+    @cached_property
+    def _unique(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        return np.unique(self.radius, return_inverse=True)
+
+    @cached_property
+    def _even(self) -> FloatArray:
+        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
+        return np.asarray(j0(phase) * self.wavenumbers.weights)
+
+    @cached_property
+    def _odd(self) -> FloatArray:
+        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
+        return np.asarray(-j1(phase) * self.wavenumbers.weights * self.wavenumbers.k)
+
+
+@dataclass(frozen=True, eq=False)
+class _VectorBessel(_Bessel):
+    """The same of a vector's component, of order one; ``sign`` (n,): the side of the centre."""
+
+    sign: FloatArray
+
+    def values(self, spectra: FloatArray) -> FloatArray:
+        return np.asarray(self.sign * super().values(spectra))
+
+    def slopes(self, spectra: FloatArray) -> FloatArray:
+        return np.asarray(self.sign * super().slopes(spectra))
+
+    @cached_property
+    def _even(self) -> FloatArray:
+        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
+        return np.asarray(j1(phase) * self.wavenumbers.weights)
+
+    @cached_property
+    def _odd(self) -> FloatArray:
+        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
+        turn = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
+        return np.asarray((j0(phase) - turn) * self.wavenumbers.weights * self.wavenumbers.k)
 
 
 @dataclass(frozen=True, eq=False)
 class Standardised:
     """One load at V values of the parameter, its noise independent and of unit variance.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (V, n)
-        Measured less calculated voltage, flat nuisances projected out.
-    slope : ndarray, shape (V, n)
-        Derivative of what is calculated by the bounded coordinate, likewise.
-    columns : mapping of str to ndarray, shape (V, n, q)
-        Systematic changes by source, likewise.
-    noises : mapping of str to ndarray, shape (V, n, n) or (V, n)
-        Roots of the covariances of the kinds of noise, in these units; of shape (V, n) where
-        they are diagonal.
-    volume : ndarray, shape (V,)
-        Logarithm of the determinants of N and of the flat nuisances' information.
-    degrees : int
-        Points less flat parameters.
+    ``residual`` (V, n): measured less calculated voltage, flat nuisances projected out; ``slope``
+    (V, n) and ``columns`` (V, n, q): derivative by the bounded coordinate and systematic changes,
+    likewise; ``noises``: roots (V, n, n) of the covariances of the kinds of noise, (V, n) where
+    they are diagonal; ``volume`` (V,): log-determinants of N and of the flat information.
     """
 
     residual: FloatArray
@@ -58,18 +348,18 @@ class Standardised:
     degrees: int
 
 
-def standardise(points: LoadPoints, found: Predicted) -> Standardised:
+def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
     """Divide by the noise, and project out what is flat."""
     kinds = {
-        "noise": np.broadcast_to(points.noise, found.signal.shape),
-        "load_scatter": np.abs(found.by_load) * points.load_errors,
-        "position": np.abs(found.slope) * points.x_errors,
+        "noise": np.broadcast_to(points.noise, predicted.signal.shape),
+        "load_scatter": np.abs(predicted.by_load) * points.load_errors,
+        "position": np.abs(predicted.slope) * points.x_errors,
     }
     kinds = {name: kind for name, kind in kinds.items() if kind.any()}
     whitener = _whitener(points, kinds)
-    flat = np.broadcast_to(points.flat, (*found.signal.shape, points.flat.shape[1]))
+    flat = np.broadcast_to(points.flat, (*predicted.signal.shape, points.flat.shape[1]))
     if points.free_centre:
-        flat = np.concatenate([flat, (found.slope * points.side)[..., None]], axis=-1)
+        flat = np.concatenate([flat, (predicted.slope * points.side)[..., None]], axis=-1)
     basis, triangle = np.linalg.qr(_times(whitener, flat))
 
     def projected(values: FloatArray) -> FloatArray:
@@ -79,9 +369,9 @@ def standardise(points: LoadPoints, found: Predicted) -> Standardised:
 
     diagonal = np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))
     return Standardised(
-        residual=projected(points.u - found.signal),
-        slope=projected(found.by_coordinate),
-        columns={source: projected(column) for source, column in found.columns.items()},
+        residual=projected(points.u - predicted.signal),
+        slope=projected(predicted.by_coordinate),
+        columns={source: projected(column) for source, column in predicted.columns.items()},
         noises={name: _scaled(whitener, points, name, kind) for name, kind in kinds.items()},
         volume=2 * np.log(diagonal).sum(axis=-1) - 2 * _log_determinant(whitener),
         degrees=points.degrees,
@@ -118,39 +408,31 @@ def _log_determinant(whitener: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Chi-square of one load or several along V values of one parameter.
-
-    Parameters
-    ----------
-    values, coordinates : ndarray, shape (V,)
-        The parameter, and its bounded coordinate.
-    parts : tuple of Standardised
-        The loads.
-    """
+    """Chi-square of one load or several along V values of one parameter."""
 
     values: FloatArray
     coordinates: FloatArray
-    parts: tuple[Standardised, ...]
+    loads: tuple[Standardised, ...]
 
     def only(self, chosen: Sequence[int]) -> Likelihood:
         """Return the likelihood of some of the loads."""
-        return Likelihood(self.values, self.coordinates, tuple(self.parts[i] for i in chosen))
+        return Likelihood(self.values, self.coordinates, tuple(self.loads[i] for i in chosen))
 
     @property
     def degrees(self) -> int:
         """Points less flat parameters; the parameter itself is not counted."""
-        return sum(part.degrees for part in self.parts)
+        return sum(load.degrees for load in self.loads)
 
     @cached_property
     def chi_square(self) -> FloatArray:
         """Least chi-square over all nuisances, shape (V,)."""
-        residual = self._joined([part.residual for part in self.parts])
+        residual = self._joined([load.residual for load in self.loads])
         return np.asarray(np.einsum("vn,vn->v", residual, self._inverse_times(residual)))
 
     @cached_property
     def information(self) -> FloatArray:
         """Inverse variance of the bounded coordinate that the likelihood's slope tells, (V,)."""
-        slope = self._joined([part.slope for part in self.parts])
+        slope = self._joined([load.slope for load in self.loads])
         return np.asarray(np.einsum("vn,vn->v", slope, self._inverse_times(slope)))
 
     def budget(self, index: int) -> dict[str, float]:
@@ -159,72 +441,71 @@ class Likelihood:
         The gain by which the best coordinate follows the voltages, times what each source does to
         them: the squares add up to the variance.
         """
-        slope = self._joined([part.slope for part in self.parts])
+        slope = self._joined([load.slope for load in self.loads])
         information = float(self.information[index])
         if not information > 0:
             return {}
         gain = self._inverse_times(slope)[index] / information
-        parts: dict[str, float] = {}
-        pieces = np.split(gain, np.cumsum([p.residual.shape[1] for p in self.parts])[:-1])
-        for piece, part in zip(pieces, self.parts, strict=True):
-            for name, root in part.noises.items():
-                each = root[index] * piece if root.ndim == 2 else root[index].T @ piece
-                parts[name] = float(np.hypot(parts.get(name, 0.0), np.linalg.norm(each)))
+        shares: dict[str, float] = {}
+        pieces = np.split(gain, np.cumsum([load.residual.shape[1] for load in self.loads])[:-1])
+        for piece, load in zip(pieces, self.loads, strict=True):
+            for name, root in load.noises.items():
+                share = root[index] * piece if root.ndim == 2 else root[index].T @ piece
+                shares[name] = float(np.hypot(shares.get(name, 0.0), np.linalg.norm(share)))
         for source, columns in self._columns.items():
-            parts[source] = float(np.linalg.norm(gain @ columns[index]))
-        return parts
+            shares[source] = float(np.linalg.norm(gain @ columns[index]))
+        return shares
 
     def tables(self) -> Tables:
         """Return what each load tells, as the evidence of laws of the interface is made of."""
-        widths = {source: c.shape[-1] for source, c in self._columns.items()}
-        each = [self._whole(part, widths) for part in self.parts]
+        columns = [self._all_columns(load) for load in self.loads]
+        pulls = [
+            np.einsum("vnq,vn->vq", column, load.residual)
+            for column, load in zip(columns, self.loads, strict=True)
+        ]
         return Tables(
-            squares=np.stack([np.sum(p.residual**2, axis=-1) for p in self.parts], axis=1),
-            pulls=np.stack(
-                [
-                    np.einsum("vnq,vn->vq", d, p.residual)
-                    for d, p in zip(each, self.parts, strict=True)
-                ],
-                axis=1,
-            ),
-            grips=np.stack([np.swapaxes(d, -1, -2) @ d for d in each], axis=1),
-            volumes=np.stack([part.volume for part in self.parts], axis=1),
+            squares=np.stack([np.sum(load.residual**2, axis=-1) for load in self.loads], axis=1),
+            pulls=np.stack(pulls, axis=1),
+            grips=np.stack([np.swapaxes(column, -1, -2) @ column for column in columns], axis=1),
+            volumes=np.stack([load.volume for load in self.loads], axis=1),
         )
 
     @cached_property
+    def _widths(self) -> dict[str, int]:
+        """Number of systematic columns of each source."""
+        widths: dict[str, int] = {}
+        for load in self.loads:
+            for source, columns in load.columns.items():
+                widths.setdefault(source, columns.shape[-1])
+        return widths
+
+    def _columns_of(self, load: Standardised, source: str) -> FloatArray:
+        """Return the columns of a source, zero where the load does not know it."""
+        nothing = np.zeros((*load.residual.shape, self._widths[source]))
+        return load.columns.get(source, nothing)
+
+    def _all_columns(self, load: Standardised) -> FloatArray:
+        columns = [self._columns_of(load, source) for source in self._widths]
+        return np.concatenate([np.zeros((*load.residual.shape, 0)), *columns], axis=-1)
+
+    @cached_property
     def _columns(self) -> dict[str, FloatArray]:
-        """Systematic columns over all points, zero in a load that does not know a source."""
-        sources = dict.fromkeys(source for part in self.parts for source in part.columns)
-        widths = {
-            source: next(p.columns[source].shape[-1] for p in self.parts if source in p.columns)
-            for source in sources
-        }
+        """Systematic columns over all points by source."""
         return {
-            source: np.concatenate([self._of(part, source, width) for part in self.parts], axis=1)
-            for source, width in widths.items()
+            source: self._joined([self._columns_of(load, source) for load in self.loads])
+            for source in self._widths
         }
 
     @staticmethod
-    def _of(part: Standardised, source: str, width: int) -> FloatArray:
-        known = part.columns.get(source)
-        return np.zeros((*part.residual.shape, width)) if known is None else known
-
-    def _whole(self, part: Standardised, widths: Mapping[str, int]) -> FloatArray:
-        columns = [self._of(part, source, width) for source, width in widths.items()]
-        nothing = np.zeros((*part.residual.shape, 0))
-        return np.concatenate([nothing, *columns], axis=-1)
-
-    @staticmethod
-    def _joined(parts: Sequence[FloatArray]) -> FloatArray:
-        return np.concatenate(parts, axis=1)
+    def _joined(arrays: Sequence[FloatArray]) -> FloatArray:
+        return np.concatenate(arrays, axis=1)
 
     @cached_property
     def _systematic(self) -> tuple[FloatArray, FloatArray]:
         """Columns of all sources, shape (V, n, q), and the inverse of 1 + D^T D."""
-        nothing = np.zeros((*self._joined([part.residual for part in self.parts]).shape, 0))
-        columns = np.concatenate([nothing, *self._columns.values()], axis=-1)
+        columns = self._joined([self._all_columns(load) for load in self.loads])
         grip = np.swapaxes(columns, -1, -2) @ columns
-        return columns, np.linalg.inv(grip + np.eye(columns.shape[-1]))
+        return columns, np.asarray(np.linalg.inv(grip + np.eye(columns.shape[-1])), np.float64)
 
     def _inverse_times(self, values: FloatArray) -> FloatArray:
         """C^-1 times vectors (V, n), by Woodbury's identity."""
@@ -234,21 +515,11 @@ class Likelihood:
 
 
 def likelihood(
-    points: Sequence[LoadPoints], sensor: Sensor, members: Members, loads: Sequence[int]
+    points: Sequence[LoadPoints], sensor: Sensor, members: ProfileFamily, loads: Sequence[int]
 ) -> Likelihood:
-    """Return the likelihood of loads, each with the index of its load in the family.
-
-    Parameters
-    ----------
-    points : sequence of LoadPoints
-        What was measured.
-    sensor, members
-        With what, against what.
-    loads : sequence of int
-        The family's load of each of them.
-    """
-    parts = [
-        standardise(each, predict(each, sensor, members, load))
-        for each, load in zip(points, loads, strict=True)
+    """Return the likelihood of loads, each with the index of its load in the family."""
+    standardised = [
+        standardise(of_load, predict(of_load, sensor, members, load))
+        for of_load, load in zip(points, loads, strict=True)
     ]
-    return Likelihood(members.values, members.coordinates, tuple(parts))
+    return Likelihood(members.values, members.coordinates, tuple(standardised))

@@ -55,16 +55,8 @@ _UNFELT = 1e-2
 class Tables:
     r"""What J groups tell at M values of a parameter, nuisances of their own integrated.
 
-    Parameters
-    ----------
-    squares : ndarray, shape (M, J)
-        :math:`\rho^T Q \rho`.
-    pulls : ndarray, shape (M, J, q)
-        :math:`D^T Q \rho`.
-    grips : ndarray, shape (M, J, q, q)
-        :math:`D^T Q D`.
-    volumes : ndarray, shape (M, J)
-        :math:`\ln\det N + \ln\det F^T N^{-1} F`.
+    ``squares`` (M, J): :math:`\rho^T Q \rho`; ``pulls`` (M, J, q): :math:`D^T Q \rho`; ``grips``
+    (M, J, q, q): :math:`D^T Q D`; ``volumes`` (M, J): :math:`\ln\det N + \ln\det F^T N^{-1} F`.
     """
 
     squares: FloatArray
@@ -74,15 +66,15 @@ class Tables:
 
     def together(self) -> Tables:
         """Return the groups as one, of shape (M, 1): one parameter for all of them."""
-        return Tables(*(np.sum(part, axis=1, keepdims=True) for part in self.parts))
+        return Tables(*(np.sum(array, axis=1, keepdims=True) for array in self.arrays))
 
     def group(self, index: int | Sequence[int]) -> Tables:
         """Return some of the groups, as one."""
         chosen = np.atleast_1d(np.asarray(index, dtype=np.intp))
-        return Tables(*(part[:, chosen] for part in self.parts)).together()
+        return Tables(*(array[:, chosen] for array in self.arrays)).together()
 
     @property
-    def parts(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Squares, pulls, grips and volumes."""
         return self.squares, self.pulls, self.grips, self.volumes
 
@@ -98,23 +90,11 @@ class Evidence:
 def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
     """Return the logarithm of the likelihood, and chi-square, of each entry of tables.
 
-    Parameters
-    ----------
-    tables : Tables
-        Of any leading shape.
-
-    Returns
-    -------
-    log_likelihood, chi_square : ndarray
-        Of the leading shape.
-
-    Examples
-    --------
     One datum of unit noise at a distance of 2, with a systematic of three times the noise:
 
     >>> tables = Tables(np.array([[4.0]]), np.array([[[6.0]]]), np.array([[[[9.0]]]]),
     ...                 np.array([[0.0]]))
-    >>> [round(part.item(), 6) for part in log_likelihood(tables)]
+    >>> [round(array.item(), 6) for array in log_likelihood(tables)]
     [-1.351293, 0.4]
     """
     squares, q = tables.squares, tables.pulls.shape[-1]
@@ -131,45 +111,21 @@ def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
 
 
 def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> Evidence:
-    """Return the evidence of a law with one parameter.
+    """Return the evidence of a law with one parameter, from the nodes of its prior.
 
-    Parameters
-    ----------
-    log_likelihoods : ndarray, shape (M,)
-        At the nodes of the prior.
-    weights : ndarray, shape (M,)
-        The prior's share of each node, of which the sum is at most 1.
-
-    Examples
-    --------
-    >>> nodes = np.linspace(-8, 8, 161)
-    >>> found = evidence_of_one(-(nodes**2) / 2, np.full(161, 0.1 / 16))
-    >>> bool(np.isclose(found.log, np.log(np.sqrt(2 * np.pi) / 16)))
-    True
+    ``weights`` (M,): the prior's share of each node, of which the sum is at most 1.
     """
     with np.errstate(divide="ignore"):
         return Evidence(float(_log_sum(log_likelihoods + np.log(weights))))
 
 
 def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) -> Evidence:
-    """Return the evidence of a law with one parameter of each load.
+    """Return the evidence of a law with one parameter of each load, on its nodes and their weights.
 
     The loads are taken one after the other.  Given the parameters of those before, the next one
     is known at all nodes of its prior; it is drawn from that, and the mean over the draws of the
     product of what each load had been expected to be is the evidence.  The draws are the points
     of a Sobol sequence, so that the result is the same each time.
-
-    Parameters
-    ----------
-    tables : sequence of Tables, each of one group
-        Of each load, at its own nodes.
-    weights : sequence of ndarray
-        The prior's share of each of its nodes.
-
-    Raises
-    ------
-    InputError
-        If there is no load, or not one prior for each.
     """
     from scipy.stats.qmc import Sobol
 
@@ -181,14 +137,14 @@ def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) ->
     # Without scrambling the first point is 0: it is moved into the middle of its cell.
     draws = Sobol(steps, scramble=False).random(_PATHS) + 0.5 / _PATHS if steps else None
     paths = _PATHS if steps else 1
-    known = Tables(
+    taken = Tables(
         np.zeros(paths), np.zeros((paths, size)), np.zeros((paths, size, size)), np.zeros(paths)
     )
     logs, before = np.zeros(paths), np.zeros(paths)
     for step, (table, weight) in enumerate(zip(tables, weights, strict=True)):
-        one = Tables(*(part[None, :, 0] for part in table.parts))
+        added = Tables(*(array[None, :, 0] for array in table.arrays))
         both = Tables(
-            *(old[:, None] + new for old, new in zip(known.parts, one.parts, strict=True))
+            *(old[:, None] + new for old, new in zip(taken.arrays, added.arrays, strict=True))
         )
         with np.errstate(divide="ignore"):
             joint = log_likelihood(both)[0] + np.log(weight)
@@ -199,8 +155,8 @@ def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) ->
         cumulated = np.cumsum(np.exp(joint - expected[:, None]), axis=1)
         drawn = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
         drawn = np.minimum(drawn, weight.size - 1)
-        known = Tables(*(part[np.arange(paths), drawn] for part in both.parts))
-        before = log_likelihood(known)[0]
+        taken = Tables(*(array[np.arange(paths), drawn] for array in both.arrays))
+        before = log_likelihood(taken)[0]
     mean = float(_log_sum(logs) - np.log(paths))
     spread = np.std(np.exp(logs - mean)) / np.sqrt(paths)
     return Evidence(mean, float(spread))
@@ -230,15 +186,7 @@ def _compressed(tables: Sequence[Tables]) -> list[Tables]:
 
 @dataclass(frozen=True)
 class Prior:
-    """A prior of one parameter that is not negative.
-
-    Parameters
-    ----------
-    words : str
-        The prior in words, with its range.
-    below : callable
-        Share of the prior below each of several values, infinity included.
-    """
+    """A prior of a parameter that is not negative: its range in words, its share below values."""
 
     words: str
     below: Callable[[FloatArray], FloatArray]
@@ -249,30 +197,17 @@ class Prior:
 
 
 def bounded_prior(scale: float, words: str) -> Prior:
-    """Return the prior that is uniform in the bounded coordinate about a ``scale``.
-
-    Examples
-    --------
-    >>> bounded_prior(0.3, "mu").below(np.array([0.0, 0.3, np.inf]))
-    array([0. , 0.5, 1. ])
-    """
+    """Return the prior that is uniform in the bounded coordinate about a ``scale``."""
 
     def below(values: FloatArray) -> FloatArray:
-        known = np.isfinite(values)
-        finite = np.where(known, values, 0.0)
-        return np.where(known, finite / (finite + scale), 1.0)
+        finite = np.where(np.isfinite(values), values, 0.0)
+        return np.where(np.isfinite(values), finite / (finite + scale), 1.0)
 
     return Prior(words, below)
 
 
 def log_uniform_prior(low: float, high: float, words: str) -> Prior:
-    """Return the prior that gives each decade from ``low`` to ``high`` the same share.
-
-    Examples
-    --------
-    >>> log_uniform_prior(0.1, 10.0, "mu").below(np.array([0.0, 1.0, np.inf]))
-    array([0. , 0.5, 1. ])
-    """
+    """Return the prior that gives each decade from ``low`` to ``high`` the same share."""
 
     def below(values: FloatArray) -> FloatArray:
         return np.asarray(np.log(np.clip(values, low, high) / low) / math.log(high / low))
@@ -281,11 +216,5 @@ def log_uniform_prior(low: float, high: float, words: str) -> Prior:
 
 
 def uniform_prior(high: float, words: str) -> Prior:
-    """Return the prior that is uniform from 0 to ``high``.
-
-    Examples
-    --------
-    >>> uniform_prior(2.0, "mu").below(np.array([0.0, 1.0, np.inf]))
-    array([0. , 0.5, 1. ])
-    """
+    """Return the prior that is uniform from 0 to ``high``."""
     return Prior(words, lambda values: np.asarray(np.clip(values, 0.0, high) / high))

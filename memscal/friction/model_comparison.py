@@ -24,6 +24,7 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
+from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import LawFamilies
 from memscal.friction.family import ProfileFamily
 from memscal.friction.interface_laws import (
@@ -36,14 +37,13 @@ from memscal.friction.interface_laws import (
     one_of_all,
     one_of_each,
 )
+from memscal.friction.likelihood import load_points, sensor_of
 from memscal.friction.marginal_likelihood import (
     Prior,
     bounded_prior,
     log_uniform_prior,
     uniform_prior,
 )
-from memscal.friction.paths import CacheFolder
-from memscal.friction.prediction import LoadPoints, load_points, sensor_of
 from memscal.friction.results import (
     BayesFactor,
     InterfaceComparison,
@@ -57,12 +57,7 @@ from memscal.model.checks import Message
 if TYPE_CHECKING:
     from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = [
-    "InterfaceComparison",
-    "compare_interface",
-    "weigh_normal_compliance",
-    "weigh_slip_length",
-]
+__all__ = ["compare_interface", "weigh_normal_compliance", "weigh_slip_length"]
 
 #: Slip lengths that are thought possible: of the order of the roughness of surfaces that touch.
 _SLIP_LENGTHS = (1e-7, 1e-4)
@@ -80,31 +75,19 @@ def weigh_slip_length(
 ) -> LawComparison:
     """Weigh a slip length against effective coefficients of a rigid interface.
 
-    Parameters
-    ----------
-    rigid, slipping : Measured
-        The same points and sensor, with contacts of Amontons' law along its coefficient and with
-        those of the elasto-plastic law along the slip length.
-    macroscopic : float
-        The latter's friction coefficient.
-    lubrication : str
-        Of the points, to be recorded.
-
-    Returns
-    -------
-    LawComparison
-        The laws: one coefficient, one for each load (where there are several), a slip length.
+    The same points and sensor with contacts of Amontons' law along its coefficient, and with those
+    of the elasto-plastic law along the slip length.
     """
     of_friction = bounded_prior(rigid.family.scale, f"uniform in mu/(mu + {rigid.family.scale:g})")
     of_length = _log_prior("slip length", *_SLIP_LENGTHS)
-    one = curve(rigid)
+    of_all = curve(rigid)
     along = curve(slipping, also=np.geomspace(*_WIDEST, _DECADES))
     degrees = rigid.degrees
-    laws = [one_of_all("effective Amontons, one coefficient", one, of_friction, degrees)]
+    laws = [one_of_all("effective Amontons, one coefficient", of_all, of_friction, degrees)]
     if len(rigid.points) > 1:
-        each = [curve(rigid, load=j) for j in range(len(rigid.points))]
+        of_each = [curve(rigid, load=j) for j in range(len(rigid.points))]
         laws.append(
-            one_of_each("effective Amontons, one for each load", each, of_friction, degrees)
+            one_of_each("effective Amontons, one for each load", of_each, of_friction, degrees)
         )
     name = f"elasto-plastic at {macroscopic:g}, slip length"
     laws.append(one_of_all(name, along, of_length, degrees))
@@ -115,7 +98,7 @@ def weigh_slip_length(
         laws=tuple(laws),
         factors=_factors(laws),
         length=length,
-        priors=_other_priors(one, along, of_friction, of_length, slipping.family.scale),
+        priors=_other_priors(of_all, along, of_friction, of_length, slipping.family.scale),
         implied=implied_friction(rigid, slipping, length, macroscopic),
     )
 
@@ -123,15 +106,7 @@ def weigh_slip_length(
 def weigh_normal_compliance(
     measured: Measured, *, lubrication: str = "lubricated"
 ) -> LawComparison:
-    """Weigh a normal compliance against a rigid interface, both without friction.
-
-    Parameters
-    ----------
-    measured : Measured
-        Points, sensor, and contacts along the length of a normal law, from 0.
-    lubrication : str
-        Of the points, to be recorded.
-    """
+    """Weigh a normal compliance against a rigid interface, both without friction."""
     largest = float(measured.family.values[-1])
     low, high = (share * largest for share in _NORMAL_SHARES)
     prior = _log_prior("length", low, high)
@@ -139,17 +114,17 @@ def weigh_normal_compliance(
         _log_prior("length", low / 10, high),
         uniform_prior(high, f"length uniform up to {high / _UM:.3g} um"),
     )
-    found = curve(measured, also=np.geomspace(low / 10, high, _DECADES))
-    rigid = of_one_value("rigid, frictionless", found, 0, measured.degrees)
-    yielding = one_of_all("normal compliance, length", found, prior, measured.degrees)
+    along = curve(measured, also=np.geomspace(low / 10, high, _DECADES))
+    rigid = of_one_value("rigid, frictionless", along, 0, measured.degrees)
+    yielding = one_of_all("normal compliance, length", along, prior, measured.degrees)
     return LawComparison(
         lubrication=lubrication,
         loads=measured.family.loads,
         laws=(rigid, yielding),
         factors=_factors([rigid, yielding]),
-        length=interface_length(found, measured.family, "length of the normal law"),
+        length=interface_length(along, measured.family, "length of the normal law"),
         priors=tuple(
-            PriorChoice(p.words, found.log_evidence(p) - rigid.log_evidence)
+            PriorChoice(p.words, along.log_evidence(p) - rigid.log_evidence)
             for p in (prior, *others)
         ),
     )
@@ -172,10 +147,10 @@ def _other_priors(
     pairs.append((of_length, log_uniform_prior(0.01, 10, "coefficient log-uniform, 0.01 to 10")))
     return tuple(
         PriorChoice(
-            (of_one if of_mu is of_friction else of_mu).words,
-            slipping.log_evidence(of_one) - rigid.log_evidence(of_mu),
+            (of_slip if of_mu is of_friction else of_mu).words,
+            slipping.log_evidence(of_slip) - rigid.log_evidence(of_mu),
         )
-        for of_one, of_mu in pairs
+        for of_slip, of_mu in pairs
     )
 
 
@@ -206,38 +181,14 @@ def compare_interface(
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> InterfaceComparison:
-    r"""Weigh laws of the interface by all loads together.
+    """Weigh laws of the interface by all loads together.
 
-    Parameters
-    ----------
-    profiles : sequence of MeasuredProfile
-        Measured loads of one sphere on one film; those that do not state their lubrication count
-        as dry.
-    apparatus : ApparatusFunction
-        The calibrated sensor.
-    macroscopic : float
-        Friction coefficient at which the indenter slides, measured otherwise.
-    macroscopic_uncertainty : float, optional
-        Its standard uncertainty.  The difference of contacts at :math:`\mu` and :math:`\mu + u`
-        becomes one of the systematic changes of the fit.
-    amontons, slipping, yielding : ProfileFamily, optional
-        Calculated contacts, if they are known: of Amontons' law, incremental, from 0 to ``inf``;
-        of the elasto-plastic law at the macroscopic coefficient, with its uncertainty among the
-        changes; and without friction and normally compliant.  Each is calculated where it is not
-        given, or has no load within 1 % of a measured one.
-    cache, workers
-        As for :func:`memscal.friction.calculated.amontons_family`.
-
-    Returns
-    -------
-    InterfaceComparison
-
-    Raises
-    ------
-    InputError
-        If there is no profile, or the macroscopic coefficient or its uncertainty makes no sense.
-    DomainError, ConvergenceError
-        If a contact cannot be calculated.
+    The macroscopic coefficient is that at which the indenter slides, measured otherwise; the
+    difference of contacts at it and at one standard uncertainty more becomes a systematic change.
+    Families that are given must hold a load within 1 % of each measured one, or are calculated:
+    ``amontons`` (incremental, from 0 to ``inf``), ``slipping`` (elasto-plastic at the macroscopic
+    coefficient, with its uncertainty among the changes), ``yielding`` (normally compliant).
+    Scans that do not state their lubrication count as dry.
     """
     if not profiles:
         raise InputError("No measured profile is there to compare laws of the interface with.")
@@ -269,16 +220,13 @@ def _measured(
     profiles: Sequence[MeasuredProfile], apparatus: ApparatusFunction, family: ProfileFamily
 ) -> Measured:
     reach = max(float(profile.r[-1]) for profile in profiles)
-    points = [
-        _about(load_points(profile), math.log(profile.load / load))
-        for profile, load in zip(profiles, family.loads, strict=True)
-    ]
+    points = []
+    for profile, load in zip(profiles, family.loads, strict=True):
+        of_load = load_points(profile)
+        # Loads count from that of the calculated contact.
+        shifted = of_load.log_load + math.log(profile.load / load)
+        points.append(replace(of_load, log_load=shifted))
     return Measured(points, sensor_of(apparatus, family, reach), family)
-
-
-def _about(points: LoadPoints, shift: float) -> LoadPoints:
-    """Count the loads of points from that of the calculated contact."""
-    return replace(points, log_load=points.log_load + shift)
 
 
 def _messages(
@@ -301,14 +249,14 @@ def _messages(
         yield Message(
             "one_load", "One load cannot tell a slip length from a smaller friction coefficient."
         )
-    for part in (tangential, normal):
-        if part is None:
+    for compared in (tangential, normal):
+        if compared is None:
             continue
-        best = max(part.laws, key=lambda law: law.p_value)
+        best = max(compared.laws, key=lambda law: law.p_value)
         if best.p_value < _MISFIT:
             yield Message(
                 "misfit",
-                f"No law of the {part.lubrication or 'dry'} interface explains the data: the best "
-                f"one's chi-square, {best.least:.0f} of {best.degrees} degrees of freedom, has "
-                f"p = {best.p_value:.1g}. Their Bayes factors compare laws that are all wrong.",
+                f"No law of the {compared.lubrication or 'dry'} interface explains the data: the "
+                f"best one's chi-square, {best.least:.0f} of {best.degrees} degrees of freedom, "
+                f"has p = {best.p_value:.1g}. Their Bayes factors compare laws that are all wrong.",
             )

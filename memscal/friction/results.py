@@ -1,58 +1,66 @@
-"""What a comparison of measured with calculated stress finds: friction, loads, agreement."""
+"""Records of what a comparison of measured with calculated stress gives."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck
+from memscal.model.notation import format_bound
+from memscal.model.result import Result
 
 if TYPE_CHECKING:
+    from memscal.apparatus import ApparatusFunction
     from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 __all__ = [
     "BayesFactor",
+    "BoundedEstimate",
     "DryAgainstLubricated",
-    "EffectiveFriction",
     "FrictionComparison",
     "ImpliedFriction",
     "InterfaceComparison",
     "InterfaceLaw",
-    "InterfaceLength",
     "Interval",
     "LawComparison",
     "LoadComparison",
     "PriorChoice",
+    "ShearComparison",
+    "percent",
 ]
+
+_UM = 1e-6
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, with the space of ISO 80000: ``95 %``."""
+    return f"{100 * share:.3g} %"
 
 
 @dataclass(frozen=True)
 class Interval:
     """A confidence interval of a parameter that is not negative and may have no upper end.
 
-    Parameters
-    ----------
-    low : float
-        Lower end; 0 where the data do not exclude it.
-    high : float or None
-        Upper end; ``None`` where the data exclude no large value, infinity included.
-    level : float
-        Coverage.
+    ``low`` is 0 where the data do not exclude it, ``high`` ``None`` where they exclude no large
+    value.
 
-    Examples
-    --------
-    >>> Interval(0.12, None).holds(float("inf")), Interval(0.12, 0.3).holds(0.1)
-    (True, False)
+    >>> print(Interval(0.12, None))
+    [0.12, ∞] (95 %)
     """
 
     low: float
     high: float | None
     level: float = 0.95
+
+    def __str__(self) -> str:
+        """Return both ends and the level."""
+        high = "∞" if self.high is None else f"{self.high:.3g}"
+        return f"[{self.low:.3g}, {high}] ({percent(self.level)})"
 
     @property
     def two_sided(self) -> bool:
@@ -64,80 +72,90 @@ class Interval:
         return self.low <= value and (self.high is None or value <= self.high)
 
 
-@dataclass(frozen=True, eq=False)
-class EffectiveFriction:
-    """An effective friction coefficient by profile likelihood: never a bare number.
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundedEstimate:
+    r"""A friction coefficient or a length (``unit`` m) by profile likelihood, with its interval.
 
-    Parameters
-    ----------
-    value : float or None
-        Coefficient of least chi-square; ``None`` where the data give no more than a bound.
-    standard_uncertainty : float or None
-        Half of the interval of 68.3 %; ``None`` where that has an open end.
-    interval : Interval
-        Values that the data do not exclude.
-    reason : str
-        Why there is no value, in words; empty where there is one.
-    budget : mapping of str to float
-        Contribution of each source to the standard uncertainty; empty where there is no value.
-        ``loading``: what the choice of the loading's definition adds.
-    values, chi_square : ndarray, shape (m,)
-        The profile likelihood: chi-square along coefficients that end in ``inf``.
-    degrees : int
-        Degrees of freedom of chi-square at its least value; 0 of a reading of one datum.
-    least : float
-        Least chi-square.
-    p_value : float
-        Chance of such a misfit, or a larger one, if the best coefficient holds.
+    ``value`` is that of least chi-square, ``None`` where the data give no more than a bound, for
+    the ``reason`` in words; ``standard_uncertainty`` half of the interval of 68.3 %, ``None`` where
+    that has an open end.  ``interval`` holds what the data do not exclude.  ``chi_square`` (m,)
+    along ``values`` (m,), which may end in ``inf``, is of a length :math:`-2\ln p(u | \theta)` up
+    to a constant; ``least``, ``degrees`` (0 of one datum) and ``p_value`` are of its least value.
+    ``budget``: contribution of each source to the standard uncertainty; ``loading`` is that of the
+    loading's definition.  Printed, it is the value with its interval, or the bound, rounded
+    outward.
+
+    >>> nothing = np.zeros(1)
+    >>> print(BoundedEstimate(0.2134, None, Interval(0.171, 0.262), "", nothing, nothing, 0.0))
+    0.21 [0.17, 0.26]
+    >>> print(BoundedEstimate(None, None, Interval(0.2433, None), "", nothing, nothing, 0.0))
+    above 0.24 (95 %)
     """
 
     value: float | None
     standard_uncertainty: float | None
     interval: Interval
     reason: str
-    budget: Mapping[str, float]
     values: FloatArray
     chi_square: FloatArray
-    degrees: int
     least: float
-    p_value: float
+    budget: Mapping[str, float] = field(default_factory=dict)
+    degrees: int = 0
+    p_value: float = 1.0
+    unit: str = ""
 
     @property
     def best(self) -> float:
-        """Coefficient of least chi-square, ``inf`` included: to draw, not to report."""
+        """Value of least chi-square, ``inf`` included: to draw, not to report."""
         return float(self.values[np.argmin(self.chi_square)]) if self.value is None else self.value
+
+    def __str__(self) -> str:
+        """Return the value with its interval, or the bound that is left of it."""
+        scale, tail = (_UM, " um") if self.unit else (1.0, "")
+        low, level = self.interval.low / scale, percent(self.interval.level)
+        value = None if self.value is None else self.value / scale
+        if self.interval.high is None:
+            if low <= 0:
+                return "not identifiable"
+            bound = format_bound(low, upper=False)
+            if value is None:
+                return f"above {bound}{tail} ({level})"
+            return f"{value:.2g} [{bound}, ∞]{tail}"
+        high = self.interval.high / scale
+        if low <= 0 and (value is None or value <= 0):
+            return f"below {format_bound(high, upper=True)}{tail} ({level})"
+        if value is None:
+            ends = f"{format_bound(low, upper=False)}, {format_bound(high, upper=True)}"
+            return f"[{ends}]{tail} ({level})"
+        return f"{_rounded(value, low, high)}{tail}"
+
+    def __repr__(self) -> str:
+        """Return the text in place of the likelihood's arrays."""
+        return f"<{type(self).__name__}: {self}>"
+
+
+def _rounded(value: float, low: float, high: float) -> str:
+    """Return a value and its interval, with the digits that its closer end deserves.
+
+    Two digits of the distance to it if that begins with 1 or 2, one otherwise.
+    """
+    sides = [side for side in (value - low, high - value) if side > 0]
+    places = max(0, -math.floor(math.log10(min(sides) / 3))) if sides else 3
+    ends = (f"{end:.{places}f}" if end > 0 else "0" for end in (low, high))
+    return f"{value:.{places}f} [{', '.join(ends)}]"
 
 
 @dataclass(frozen=True, eq=False)
 class LoadComparison:
     """One load of one scan against calculated profiles of one definition of the loading.
 
-    Parameters
-    ----------
-    profile : MeasuredProfile
-        What was measured.
-    loading : str
-        ``"incremental"`` or ``"total"``; ``""`` for profiles from elsewhere.
-    s_max, s_max_uncertainty : float
-        Measured stress on the axis, in Pa.
-    p0_max, p0_max_uncertainty : float
-        Calculated frictionless maximum of G convolved with the base stress, in Pa.
-    ratio, ratio_uncertainty : float
-        ``s_max / p0_max``; the errors of A and G count together.
-    calculated, calculated_errors : ndarray, shape (m, n)
-        G convolved with the base stress at the profile's n radii for each of the m coefficients,
-        and the standard uncertainty that G, film, indenter and common load bring, in Pa.
-    p_max : ndarray, shape (m,)
-        Maxima of the calculated profiles, in Pa.
-    chi_square, p_values : ndarray, shape (m,)
-        Of the scan against each of them, and the chance of it or a larger one.
-    degrees : int
-        Degrees of freedom.
-    bracketed : float
-        Share of the points that lie between no friction and full stick within 1.96 standard
-        uncertainties.
-    by_maximum, by_profile : EffectiveFriction
-        The effective friction coefficient by the two readings.
+    Measured stress on the axis ``s_max`` and calculated frictionless maximum of G convolved with
+    the base stress ``p0_max``, in Pa; in the uncertainty of their ``ratio`` errors of A and G count
+    together.  ``calculated`` (m, n): G convolved with the base stress at the profile's n radii for
+    each of the m coefficients, with what G, film, indenter and common load leave uncertain, in Pa;
+    ``p_max`` (m,): maxima.  ``chi_square`` (m,) is that of the scan against each; ``bracketed`` the
+    share of points between no friction and full stick within 1.96 standard uncertainties.
+    ``by_maximum`` and ``by_profile`` are the two readings of the effective friction coefficient.
     """
 
     profile: MeasuredProfile
@@ -155,8 +173,8 @@ class LoadComparison:
     p_values: FloatArray
     degrees: int
     bracketed: float
-    by_maximum: EffectiveFriction
-    by_profile: EffectiveFriction
+    by_maximum: BoundedEstimate
+    by_profile: BoundedEstimate
 
     @property
     def load(self) -> float:
@@ -173,20 +191,9 @@ class LoadComparison:
 class DryAgainstLubricated:
     """The difference of dry and lubricated stress at one load: A and G nearly cancel.
 
-    Parameters
-    ----------
-    load : float
-        The dry scan's nominal load, in N.
-    r : ndarray, shape (n,)
-        Distances from the centre at which the two are compared, in m.
-    difference, difference_errors : ndarray, shape (n,)
-        Dry minus lubricated S_zz, with its standard uncertainty, in Pa.
-    chi_square, degrees, p_value : float
-        Of the difference against none.
-    maximum, maximum_uncertainty : float
-        Difference of the stresses on the axis, in Pa.
-    relative, relative_uncertainty : float
-        That, over the lubricated stress on the axis.
+    ``load`` is the dry scan's nominal one, in N; ``difference`` (n,) is dry minus lubricated S_zz
+    at distances ``r`` (m) from the centre, ``maximum`` that of the stresses on the axis, in Pa,
+    ``relative`` that over the lubricated one; chi-square is that of the difference against none.
     """
 
     load: float
@@ -202,52 +209,40 @@ class DryAgainstLubricated:
     relative_uncertainty: float
 
 
+def _joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
+    """Return the coefficients of all loads together on one line."""
+    return "; ".join(
+        f"{lubrication or 'not stated'}, {loading or 'given'}: {estimate}"
+        for lubrication, by_loading in joint.items()
+        for loading, estimate in by_loading.items()
+    )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class FrictionComparison:
+class FrictionComparison(Result):
     """Measured stress against calculated contacts, with the friction that explains it.
 
-    Parameters
-    ----------
-    measured : MeasuredStress
-        What was measured: profiles of every load of every scan.
-    friction : ndarray, shape (m,)
-        Friction coefficients of the calculated profiles, increasing; the last may be ``inf``.
-    loads : mapping of str to tuple of LoadComparison
-        One for each measured profile, in their order, by definition of the loading.
-    joint : mapping of str to mapping of str to EffectiveFriction
-        One coefficient for all loads together, by lubrication and definition of the loading.
-    dry_against_lubricated : tuple of DryAgainstLubricated
-        One for each load at which both were measured.
-    interface : InterfaceComparison or None
-        Laws of the interface against effective friction, where they were asked for.
-    macroscopic : (float, float or None) or None
-        Friction coefficient measured otherwise, and its standard uncertainty.
-    checks : tuple of QualityCheck
-        Quality checks.
-    messages : tuple of Message
-        What a user should know.
+    Printed, it is the tables of ``memscal compare``.
     """
 
     measured: MeasuredStress
     friction: FloatArray
     loads: Mapping[str, tuple[LoadComparison, ...]]
-    joint: Mapping[str, Mapping[str, EffectiveFriction]]
+    joint: Mapping[str, Mapping[str, BoundedEstimate]]
     dry_against_lubricated: tuple[DryAgainstLubricated, ...] = ()
     interface: InterfaceComparison | None = None
     macroscopic: tuple[float, float | None] | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = field(default=())
 
+    _summary: ClassVar[str] = "comparison"
+    _figure: ClassVar[str] = "friction.comparison_figure"
+
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        of_each = [
-            f"{lubrication or 'not stated'}, {loading or 'given'}: {_in_words(found)}"
-            for lubrication, by_loading in self.joint.items()
-            for loading, found in by_loading.items()
-        ]
         failed = [check.name for check in self.checks if not check.passed]
         state = f"failed: {', '.join(failed)}" if failed else "all checks passed"
-        return f"<FrictionComparison: {'; '.join(of_each)}; {state}>"
+        return f"<FrictionComparison: {_joint_text(self.joint)}; {state}>"
 
     @property
     def passed(self) -> bool:
@@ -260,10 +255,27 @@ class FrictionComparison:
         return tuple(self.loads)
 
 
-def _in_words(found: EffectiveFriction) -> str:
-    low, high = found.interval.low, found.interval.high
-    within = f"{low:.2g} to {'infinity' if high is None else f'{high:.2g}'}"
-    return within if found.value is None else f"{found.value:.2g} ({within})"
+@dataclass(frozen=True, eq=False, repr=False)
+class ShearComparison(Result):
+    """The friction that explains the shear at the base of a film."""
+
+    measured: MeasuredStress
+    apparatus: ApparatusFunction
+    friction: FloatArray
+    loads: Mapping[str, tuple[BoundedEstimate, ...]]
+    joint: Mapping[str, Mapping[str, BoundedEstimate]]
+    messages: tuple[Message, ...]
+
+    _summary: ClassVar[str] = "comparison"
+
+    def __repr__(self) -> str:
+        """Return the coefficients of all loads together."""
+        return f"<ShearComparison: {_joint_text(self.joint)}>"
+
+    @property
+    def loadings(self) -> tuple[str, ...]:
+        """Definitions of the loading that were compared."""
+        return tuple(self.loads)
 
 
 #: Steps of twice the natural logarithm of a Bayes factor, in words.
@@ -279,26 +291,11 @@ _WORDS = (
 class InterfaceLaw:
     r"""One law of the interface, weighed over all loads together.
 
-    Parameters
-    ----------
-    name : str
-        The law and what is free in it.
-    best : tuple of float
-        Its free parameters where the likelihood is largest: friction coefficients, of one load
-        each if there are several, or a length in m.  Empty where nothing is free.
-    log_evidence : float
-        Natural logarithm of the likelihood averaged over the prior,
-        :math:`\ln \int p(u | \theta)\,\pi(\theta)\,d\theta`, up to a constant of the scans.
-    log_likelihood : float
-        Largest :math:`\ln p(u | \theta)`, up to the same constant.
-    numerical_error : float
-        Standard uncertainty of ``log_evidence`` as an integral; 0 where it is negligible.
-    least : float
-        Least chi-square.
-    degrees : int
-        Degrees of freedom of it.
-    p_value : float
-        Chance of such a misfit, or a larger one, if the law holds with ``best``.
+    ``best`` are its free parameters at the largest likelihood (coefficients, of each load if there
+    are several, or a length in m).  ``log_evidence``,
+    :math:`\ln \int p(u | \theta)\,\pi(\theta)\,d\theta`, and ``log_likelihood``, the largest
+    :math:`\ln p(u | \theta)`, share a constant of the scans; ``numerical_error`` is the standard
+    uncertainty of the integral.  ``least``, ``degrees`` and ``p_value`` are of chi-square at best.
     """
 
     name: str
@@ -318,17 +315,10 @@ class InterfaceLaw:
 
 @dataclass(frozen=True)
 class BayesFactor:
-    r"""How much more the data speak for one law than for another.
+    r"""How much more the data speak for one law than for another, by names of the laws.
 
-    Parameters
-    ----------
-    favoured, against : str
-        Names of the two laws, the one of larger evidence first.
-    log_factor : float
-        :math:`\ln B = \ln p(u | \text{favoured}) - \ln p(u | \text{against})`, not negative.
+    :math:`\ln B = \ln p(u | \text{favoured}) - \ln p(u | \text{against})` is not negative.
 
-    Examples
-    --------
     >>> factor = BayesFactor("elasto-plastic", "Amontons", 4.0)
     >>> print(f"{factor.value:.0f}: {factor.words}")
     55: strong
@@ -351,15 +341,9 @@ class BayesFactor:
 
 @dataclass(frozen=True)
 class PriorChoice:
-    """The Bayes factor under another prior: it depends on the range that was thought possible.
+    """The logarithm of the yielding law's Bayes factor over the rigid one under another prior.
 
-    Parameters
-    ----------
-    prior : str
-        The prior, in words with its range.
-    log_factor : float
-        Logarithm of the evidence of the law that yields over that of the rigid one, under it;
-        negative where the data speak for the rigid one.
+    It is negative where the data speak for the rigid law; ``prior`` is in words with its range.
     """
 
     prior: str
@@ -367,56 +351,13 @@ class PriorChoice:
 
 
 @dataclass(frozen=True, eq=False)
-class InterfaceLength:
-    r"""A length over which the interface yields, by profile likelihood: never a bare number.
-
-    Parameters
-    ----------
-    value : float or None
-        Length of largest likelihood, in m; ``None`` where the data give no more than a bound.
-    standard_uncertainty : float or None
-        Half of the interval of 68.3 %, in m; ``None`` where that has an open end.
-    interval : Interval
-        Lengths that the data do not exclude, in m; from 0 where a rigid interface is one of them.
-    reason : str
-        Why there is no value, in words; empty where there is one.
-    values, deviance : ndarray, shape (m,)
-        The profile likelihood: lengths in m, and :math:`-2\ln p(u | \theta)` along them, up to a
-        constant: chi-square with the determinant of its covariance.
-    """
-
-    value: float | None
-    standard_uncertainty: float | None
-    interval: Interval
-    reason: str
-    values: FloatArray
-    deviance: FloatArray
-
-    @property
-    def best(self) -> float:
-        """Length of largest likelihood in m, ``inf`` included: to draw, not to report."""
-        if self.value is not None:
-            return self.value
-        return float(self.values[self.deviance.argmin()])
-
-
-@dataclass(frozen=True, eq=False)
 class ImpliedFriction:
-    r"""What the fitted law with a slip length means at each load.
+    r"""What the fitted slip length means at each of ``loads`` (l,), in N, increasing.
 
-    Parameters
-    ----------
-    loads : ndarray, shape (l,)
-        Loads in N, increasing.
-    friction : ndarray, shape (l, 3)
-        Coefficient of Amontons' law that gives the same stress on the axis, through the sensor,
-        as the slip length's lower end, best value and upper end do, in that order.  ``inf`` where
-        full stick is not more than that.
-    pressures : ndarray, shape (l,)
-        Mean pressures over the contact, :math:`\bar p = P/\pi a^2`, in Pa.
-    stiffnesses : ndarray, shape (l, 3)
-        Tangential stiffness of the interface at the mean pressure, :math:`\mu\bar p/\ell`, in
-        Pa/m, for the same three slip lengths; ``inf`` of a rigid interface.
+    ``friction`` (l, 3): Amontons' coefficients that give the same stress on the axis, through the
+    sensor, as lower end, best value and upper end of the slip length; ``inf`` where full stick is
+    not more than that.  ``pressures`` (l,): :math:`\bar p = P/\pi a^2` in Pa.  ``stiffnesses``
+    (l, 3): :math:`\mu\bar p/\ell` in Pa/m for the three; ``inf`` of a rigid interface.
     """
 
     loads: FloatArray
@@ -427,31 +368,18 @@ class ImpliedFriction:
 
 @dataclass(frozen=True, eq=False)
 class LawComparison:
-    """Laws of the interface over all loads of one lubrication.
+    """Laws of the interface over all ``loads`` (l,), in N, of one lubrication.
 
-    Parameters
-    ----------
-    lubrication : str
-        ``"dry"``, ``"lubricated"``, or ``""`` where it is not stated.
-    loads : ndarray, shape (l,)
-        Nominal loads of the scans that were used, in N.
-    laws : tuple of InterfaceLaw
-        The laws; the last one yields.
-    factors : tuple of BayesFactor
-        The law that yields and each of the others.
-    length : InterfaceLength
-        The length over which it yields: a slip length, or that of the normal law.
-    priors : tuple of PriorChoice
-        The Bayes factor of the last law and the first under other priors.
-    implied : ImpliedFriction or None
-        What a slip length means at each load; ``None`` of a normal law.
+    The last of ``laws`` yields over ``length``; ``factors`` weigh it against each of the others,
+    ``priors`` against the first under other priors.  ``implied`` says what a slip length means at
+    each load; it is ``None`` of a normal law.
     """
 
     lubrication: str
     loads: FloatArray
     laws: tuple[InterfaceLaw, ...]
     factors: tuple[BayesFactor, ...]
-    length: InterfaceLength
+    length: BoundedEstimate
     priors: tuple[PriorChoice, ...]
     implied: ImpliedFriction | None = None
 
@@ -462,26 +390,31 @@ class LawComparison:
         return 2 * (self.laws[-1].log_evidence - others) >= _WORDS[0][0]
 
 
-@dataclass(frozen=True, eq=False)
-class InterfaceComparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class InterfaceComparison(Result):
     """Laws of the interface against an effective friction coefficient, by evidence.
 
-    Parameters
-    ----------
-    macroscopic : (float, float or None)
-        Friction coefficient at which the interface slips, measured otherwise, and its standard
-        uncertainty, which is one of the fit's.
-    tangential : LawComparison or None
-        From dry scans: one effective coefficient, one for each load, and the elasto-plastic law
-        with a slip length, in that order; ``None`` without dry scans.
-    normal : LawComparison or None
-        From lubricated scans: a rigid frictionless interface, and one that yields normally, in
-        that order; ``None`` without lubricated scans.
-    messages : tuple of Message
-        What a user should know.
+    ``macroscopic`` is the coefficient at which the interface slips and its standard uncertainty.
+    ``tangential``, of dry scans: one effective coefficient, one for each load, and the
+    elasto-plastic law with a slip length; ``normal``, of lubricated scans: a rigid frictionless
+    interface, and one that yields normally; ``None`` without such scans.
     """
 
     macroscopic: tuple[float, float | None]
     tangential: LawComparison | None
     normal: LawComparison | None
     messages: tuple[Message, ...] = field(default=())
+
+    _summary: ClassVar[str] = "interface_laws"
+    _figure: ClassVar[str] = "friction.interface_figure"
+
+    def __repr__(self) -> str:
+        """Return the length of each law that yields."""
+        lengths = (f"{name}: {laws.length}" for name, laws in self.by_direction.items())
+        return f"<InterfaceComparison: {'; '.join(lengths)}>"
+
+    @property
+    def by_direction(self) -> dict[str, LawComparison]:
+        """What was compared, by the direction in which the interface yields."""
+        both = {"tangential": self.tangential, "normal": self.normal}
+        return {name: laws for name, laws in both.items() if laws is not None}

@@ -1,76 +1,145 @@
-"""A comparison of measured with calculated stress as tables for people."""
+"""Comparisons of measured with calculated stress, as tables, JSON, data frames and notes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, pairwise
-from pathlib import Path
-from typing import Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import (
+    BoundedEstimate,
     DryAgainstLubricated,
-    EffectiveFriction,
     FrictionComparison,
     LoadComparison,
+    ShearComparison,
+    percent,
 )
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FAILED_CHECK, Message, QualityCheck, failed_check_messages
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import KPA, MM
-from memscal.summaries.interface_laws import (
-    bounded_text,
-    friction_name,
-    interface_json,
-    interface_tables,
-    percent,
-)
+from memscal.summaries import interface_laws
+from memscal.summaries.interface_laws import friction_name
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
 
-__all__ = ["comparison_json", "comparison_notes", "comparison_tables", "failures", "which"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from memscal.model.measured_stress import MeasuredProfile
+
+__all__ = ["failures", "file_json", "frame", "mapping", "notes", "tables"]
 
 
-def comparison_json(
-    found: FrictionComparison,
-    artifact: SourceFile,
-    references: Sequence[SourceFile | None] = (),
-    files: Sequence[Path] = (),
-) -> dict[str, Any]:
-    """Return the object that ``compare --json`` prints; its form is part of the contract.
+def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
+    """Return what ``compare --json`` prints but for the files that it was given and wrote.
 
     A friction coefficient of infinity is ``null``, with ``"sticking": true``; an interval's open
     end is ``null``.
     """
+    scans = [
+        file_json(scan.source) | {"lubrication": scan.lubrication}
+        for scan in comparison.measured.scans
+    ]
+    joint = [
+        {"lubrication": lubrication, "loading": loading, **_estimate(estimate)}
+        for lubrication, loading, estimate in _joint(comparison)
+    ]
+    if isinstance(comparison, ShearComparison):
+        loads = [
+            {
+                "lubrication": profile.lubrication,
+                "load": {"value": finite(profile.load), "unit": "N"},
+                "by_loading": {
+                    loading or "given": _estimate(estimates[i])
+                    for loading, estimates in comparison.loads.items()
+                },
+            }
+            for i, profile in enumerate(comparison.measured.profiles)
+        ]
+        return {
+            "schema_version": "1",
+            "scans": scans,
+            "loads": loads,
+            "joint": joint,
+            "warnings": texts_of(comparison.messages),
+        }
+    laws, sliding = comparison.interface, comparison.macroscopic
+    first = comparison.loads[comparison.loadings[0]]
     return {
         "schema_version": "1",
-        "artifact": _file(artifact),
-        "scans": [
-            _file(scan.source) | {"lubrication": scan.lubrication} for scan in found.measured.scans
-        ],
-        "references": [_file(source) for source in references],
-        "figures": [str(path) for path in files],
-        "loads": [
-            _load(i, found, next(iter(found.loads.values()))[i])
-            for i in range(len(found.measured.profiles))
-        ],
-        "joint": [
-            {"lubrication": lubrication, "loading": loading, **_reading(joint)}
-            for lubrication, by_loading in found.joint.items()
-            for loading, joint in by_loading.items()
-        ],
-        "dry_against_lubricated": [_difference(one) for one in found.dry_against_lubricated],
-        "interface": None if found.interface is None else interface_json(found.interface),
-        "macroscopic": None if found.macroscopic is None else _quantity(*found.macroscopic, "1"),
-        "checks": checks_json(found.checks),
-        "overridden": list(found.measured.overridden),
-        "warnings": texts_of(found.messages),
+        "scans": scans,
+        "loads": [_load(i, comparison, load) for i, load in enumerate(first)],
+        "joint": joint,
+        "dry_against_lubricated": [_difference(pair) for pair in comparison.dry_against_lubricated],
+        "interface": None if laws is None else interface_laws.mapping(laws),
+        "macroscopic": None if sliding is None else _quantity(*sliding, "1"),
+        "checks": checks_json(comparison.checks),
+        "overridden": list(comparison.measured.overridden),
+        "warnings": texts_of(comparison.messages),
     }
 
 
-def _file(source: SourceFile | None) -> dict[str, Any]:
+def frame(comparison: FrictionComparison | ShearComparison) -> pd.DataFrame:
+    """Return one row for each load and definition of the loading; open ends are infinite."""
+    import pandas as pd
+
+    rows = []
+    for loading in comparison.loadings:
+        loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
+        for profile, load in zip(comparison.measured.profiles, loads, strict=True):
+            row: dict[str, Any] = {
+                "loading": loading,
+                "lubrication": profile.lubrication,
+                "load (N)": profile.load,
+                "force (N)": profile.force,
+                "u(force) (N)": profile.force_uncertainty,
+            }
+            if isinstance(load, BoundedEstimate):
+                row |= _columns("friction", load)
+            else:
+                row |= {
+                    "S_max (kPa)": load.s_max / KPA,
+                    "u(S_max) (kPa)": load.s_max_uncertainty / KPA,
+                    "p0_max (kPa)": load.p0_max / KPA,
+                    "u(p0_max) (kPa)": load.p0_max_uncertainty / KPA,
+                    "S_max/p0_max": load.ratio,
+                    "u(S_max/p0_max)": load.ratio_uncertainty,
+                    "bracketed": load.bracketed,
+                }
+                row |= _columns("friction by maximum", load.by_maximum)
+                row |= _columns("friction by profile", load.by_profile)
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _columns(name: str, estimate: BoundedEstimate) -> dict[str, float]:
+    value, u, high = estimate.value, estimate.standard_uncertainty, estimate.interval.high
+    return {
+        name: math.nan if value is None else value,
+        f"u({name})": math.nan if u is None else u,
+        f"{name}, low": estimate.interval.low,
+        f"{name}, high": math.inf if high is None else high,
+        f"{name}, chi2": estimate.least,
+        f"{name}, degrees": estimate.degrees,
+        f"{name}, p": estimate.p_value,
+    }
+
+
+def _joint(
+    comparison: FrictionComparison | ShearComparison,
+) -> Iterator[tuple[str, str, BoundedEstimate]]:
+    """Return lubrication, loading and coefficient of all loads together."""
+    for lubrication, by_loading in comparison.joint.items():
+        for loading, estimate in by_loading.items():
+            yield lubrication, loading, estimate
+
+
+def file_json(source: SourceFile | None) -> dict[str, Any]:
+    """Return a file's name and digest as the JSON output holds them."""
     if source is None:
         return {"file_name": None, "sha256": None}
     return {"file_name": source.file_name, "sha256": source.sha256}
@@ -84,63 +153,63 @@ def _coefficient(friction: float) -> dict[str, Any]:
     return {"friction_coefficient": finite(friction), "sticking": math.isinf(friction)}
 
 
-def _load(index: int, found: FrictionComparison, first: LoadComparison) -> dict[str, Any]:
+def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
     """Return what was measured at one load, and what each loading makes of it."""
-    profile = first.profile
+    profile = load.profile
     source = profile.scan.source
     return {
         "scan": None if source is None else source.file_name,
-        "lubrication": first.lubrication,
-        "load": {"value": finite(first.load), "unit": "N"},
+        "lubrication": load.lubrication,
+        "load": {"value": finite(load.load), "unit": "N"},
         "force": _quantity(profile.force, profile.force_uncertainty, "N"),
-        "S_max": _quantity(first.s_max / KPA, first.s_max_uncertainty / KPA, "kPa"),
-        "p0_max": _quantity(first.p0_max / KPA, first.p0_max_uncertainty / KPA, "kPa"),
-        "ratio": _quantity(first.ratio, first.ratio_uncertainty, "1"),
+        "S_max": _quantity(load.s_max / KPA, load.s_max_uncertainty / KPA, "kPa"),
+        "p0_max": _quantity(load.p0_max / KPA, load.p0_max_uncertainty / KPA, "kPa"),
+        "ratio": _quantity(load.ratio, load.ratio_uncertainty, "1"),
         "by_loading": {
-            loading or "given": _by_loading(found, loads[index])
-            for loading, loads in found.loads.items()
+            loading or "given": _by_loading(comparison, loads[index])
+            for loading, loads in comparison.loads.items()
         },
     }
 
 
-def _by_loading(found: FrictionComparison, one: LoadComparison) -> dict[str, Any]:
+def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
     return {
         "effective_friction_coefficient": {
-            "by_maximum": _reading(one.by_maximum),
-            "by_profile": _reading(one.by_profile),
+            "by_maximum": _estimate(load.by_maximum),
+            "by_profile": _estimate(load.by_profile),
         },
-        "bracketed": finite(one.bracketed),
-        "degrees": one.degrees,
+        "bracketed": finite(load.bracketed),
+        "degrees": load.degrees,
         "profiles": [
             {
                 **_coefficient(float(mu)),
-                "p_max": {"value": finite(one.p_max[i] / KPA), "unit": "kPa"},
-                "chi2": finite(float(one.chi_square[i])),
-                "p_value": finite(float(one.p_values[i])),
+                "p_max": {"value": finite(load.p_max[i] / KPA), "unit": "kPa"},
+                "chi2": finite(float(load.chi_square[i])),
+                "p_value": finite(float(load.p_values[i])),
             }
-            for i, mu in enumerate(found.friction)
+            for i, mu in enumerate(comparison.friction)
         ],
     }
 
 
-def _reading(reading: EffectiveFriction) -> dict[str, Any]:
+def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
     """Return a coefficient with its interval; without a value there is a reason."""
     return {
-        "value": finite(reading.value),
-        "standard_uncertainty": finite(reading.standard_uncertainty),
+        "value": finite(estimate.value),
+        "standard_uncertainty": finite(estimate.standard_uncertainty),
         "interval": {
-            "low": finite(reading.interval.low),
-            "high": finite(reading.interval.high),
-            "level": reading.interval.level,
+            "low": finite(estimate.interval.low),
+            "high": finite(estimate.interval.high),
+            "level": estimate.interval.level,
         },
-        "reason": reading.reason or None,
-        "budget": {name: finite(u) for name, u in reading.budget.items()},
-        "chi2": finite(reading.least),
-        "degrees": reading.degrees,
-        "p_value": finite(reading.p_value),
+        "reason": estimate.reason or None,
+        "budget": {name: finite(u) for name, u in estimate.budget.items()},
+        "chi2": finite(estimate.least),
+        "degrees": estimate.degrees,
+        "p_value": finite(estimate.p_value),
         "profile_likelihood": {
-            "friction_coefficient": _shortened(reading.values),
-            "chi2": _shortened(reading.chi_square),
+            "friction_coefficient": _shortened(estimate.values),
+            "chi2": _shortened(estimate.chi_square),
         },
     }
 
@@ -150,14 +219,14 @@ def _shortened(values: FloatArray) -> list[float | None]:
     return [finite(float(f"{value:.6g}")) for value in values]
 
 
-def _difference(one: DryAgainstLubricated) -> dict[str, Any]:
+def _difference(pair: DryAgainstLubricated) -> dict[str, Any]:
     return {
-        "load": {"value": finite(one.load), "unit": "N"},
-        "on_axis": _quantity(one.maximum / KPA, one.maximum_uncertainty / KPA, "kPa"),
-        "relative": _quantity(one.relative, one.relative_uncertainty, "1"),
-        "chi2": finite(one.chi_square),
-        "degrees": one.degrees,
-        "p_value": finite(one.p_value),
+        "load": {"value": finite(pair.load), "unit": "N"},
+        "on_axis": _quantity(pair.maximum / KPA, pair.maximum_uncertainty / KPA, "kPa"),
+        "relative": _quantity(pair.relative, pair.relative_uncertainty, "1"),
+        "chi2": finite(pair.chi_square),
+        "degrees": pair.degrees,
+        "p_value": finite(pair.p_value),
     }
 
 
@@ -165,18 +234,24 @@ def _difference(one: DryAgainstLubricated) -> dict[str, Any]:
 _FAR = 0.26
 
 
-def comparison_notes(found: FrictionComparison) -> Iterator[Message]:
+def notes(comparison: FrictionComparison) -> Iterator[Message]:
     """Return what a user should know, each thing once; what failed of several profiles, once."""
-    others = (message for message in found.messages if message.kind != FAILED_CHECK)
-    of_laws = () if found.interface is None else found.interface.messages
+    others = (message for message in comparison.messages if message.kind != FAILED_CHECK)
+    laws = comparison.interface
+    of_laws = () if laws is None else laws.messages
+    missing = (
+        Message("no_value", f"{_capital(_which(lubrication, loading))}, all loads: {joint.reason}")
+        for lubrication, loading, joint in _joint(comparison)
+        if joint.reason
+    )
     yield from dict.fromkeys(
-        [*_failed(found), *others, *_reasons(found), *_about_profiles(found), *of_laws]
+        [*_failed(comparison), *others, *missing, *_about_profiles(comparison), *of_laws]
     )
 
 
-def _about_profiles(found: FrictionComparison) -> Iterator[Message]:
+def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
     """Say what the calculated profiles do not cover."""
-    friction = found.friction
+    friction = comparison.friction
     if friction[0] > 0:
         yield Message(
             "frictions",
@@ -194,34 +269,28 @@ def _about_profiles(found: FrictionComparison) -> Iterator[Message]:
             )
 
 
-def failures(checks: Sequence[QualityCheck]) -> dict[str, list[QualityCheck]]:
-    """Return the checks that failed, by kind."""
-    failed: dict[str, list[QualityCheck]] = {}
+def _by_kind(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
+    kinds: dict[str, list[QualityCheck]] = {}
     for check in checks:
-        if not check.passed:
-            failed.setdefault(check.kind, []).append(check)
-    return failed
+        kinds.setdefault(check.kind, []).append(check)
+    return kinds
 
 
-def _failed(found: FrictionComparison) -> Iterator[Message]:
+def failures(checks: Iterable[QualityCheck]) -> dict[str, list[QualityCheck]]:
+    """Return the checks that failed, by kind."""
+    return _by_kind(check for check in checks if not check.passed)
+
+
+def _failed(comparison: FrictionComparison) -> Iterator[Message]:
     """Return one warning for each kind of check that failed, about the first profile."""
-    for first, *others in failures(found.checks).values():
+    for first, *others in failures(comparison.checks).values():
         [message] = failed_check_messages([first])
         numbers = ", ".join(check.profile for check in others)
         text = f"{message.text} The same of profiles {numbers}." if others else message.text
         yield replace(message, text=text)
 
 
-def _reasons(found: FrictionComparison) -> Iterator[Message]:
-    """Return why the coefficient of all loads together has no value, where it has none."""
-    for lubrication, by_loading in found.joint.items():
-        for loading, joint in by_loading.items():
-            if joint.reason:
-                words = _capital(which(lubrication, loading))
-                yield Message("no_value", f"{words}, all loads: {joint.reason}")
-
-
-def which(lubrication: str, loading: str) -> str:
+def _which(lubrication: str, loading: str) -> str:
     """Return lubrication and definition of the loading in words."""
     words = [lubrication or "lubrication not stated", f"{loading} loading" if loading else ""]
     return ", ".join(word for word in words if word)
@@ -238,24 +307,30 @@ _WIDTH = 98
 _WIDE, _LONG = 100, 1e5
 
 
-def comparison_tables(found: FrictionComparison) -> list[Table]:
+def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
     """Return what was measured, the friction by each loading, its budget, and the checks."""
+    friction = [_friction_table(comparison, loading) for loading in comparison.loadings]
+    if isinstance(comparison, ShearComparison):
+        return [*friction, _budget_table(comparison)]
     return [
-        _maxima_table(found),
-        *(_friction_table(found, loading) for loading in found.loadings),
-        *(table for loading in found.loadings for table in _chi_square_tables(found, loading)),
-        _budget_table(found),
-        _macroscopic_table(found),
-        _lubrication_table(found),
-        *([] if found.interface is None else interface_tables(found.interface)),
-        _checks_table(found.checks),
+        _maxima_table(comparison),
+        *friction,
+        *(
+            table
+            for loading in comparison.loadings
+            for table in _chi_square_tables(comparison, loading)
+        ),
+        _budget_table(comparison),
+        _macroscopic_table(comparison),
+        _lubrication_table(comparison),
+        *([] if comparison.interface is None else interface_laws.tables(comparison.interface)),
+        _checks_table(comparison.checks),
     ]
 
 
-def _maxima_table(found: FrictionComparison) -> Table:
+def _maxima_table(comparison: FrictionComparison) -> Table:
     """Return the measured force and maximum of each load, beside the frictionless maximum."""
-    first = found.loads[found.loadings[0]]
-    sphere = found.measured.profiles[0].scan.indenter
+    sphere = comparison.measured.profiles[0].scan.indenter
     title = (
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"
@@ -263,90 +338,87 @@ def _maxima_table(found: FrictionComparison) -> Table:
     head = [*_LABELS, "force (N)", "S_max (kPa)", "p0_max (kPa)", "S_max/p0_max"]
     rows = [
         [
-            *_labels(i, one),
-            _pm(one.profile.force, one.profile.force_uncertainty),
-            _pm(one.s_max / KPA, one.s_max_uncertainty / KPA),
-            _pm(one.p0_max / KPA, one.p0_max_uncertainty / KPA),
-            _pm(one.ratio, one.ratio_uncertainty),
+            *_labels(i, load.profile),
+            format_measured(load.profile.force, load.profile.force_uncertainty),
+            format_measured(load.s_max / KPA, load.s_max_uncertainty / KPA),
+            format_measured(load.p0_max / KPA, load.p0_max_uncertainty / KPA),
+            format_measured(load.ratio, load.ratio_uncertainty),
         ]
-        for i, one in enumerate(first, start=1)
+        for i, load in enumerate(comparison.loads[comparison.loadings[0]], start=1)
     ]
     return Table(title, head, rows)
 
 
-def _labels(number: int, one: LoadComparison) -> tuple[str, str, str]:
+def _labels(number: int, profile: MeasuredProfile) -> tuple[str, str, str]:
     """Return number, state and load of a profile; checks and messages use the number."""
-    return str(number), one.lubrication or "not stated", f"{one.load:.4g}"
+    return str(number), profile.lubrication or "not stated", f"{profile.load:.4g}"
 
 
-def _pm(value: float, uncertainty: float) -> str:
-    return format_measured(value, uncertainty)
-
-
-def _friction_table(found: FrictionComparison, loading: str) -> Table:
-    """Return the effective coefficient of each load by both readings, and of all together."""
-    of_all = list(found.joint.values())
-    level = percent(of_all[0][loading].interval.level) if of_all else "95 %"
+def _friction_table(comparison: FrictionComparison | ShearComparison, loading: str) -> Table:
+    """Return the effective coefficient of each load by each reading, and of all together."""
+    level = next((percent(joint.interval.level) for *_, joint in _joint(comparison)), "95 %")
     way = f"{loading} loading" if loading else "profiles as given"
     title = f"Effective friction coefficient, {way} [{level} interval]"
-    head = [*_LABELS, "by the maximum", "by the profile", "χ²/ν", "p", "bracketed"]
+    shear = isinstance(comparison, ShearComparison)
+    loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
+    head = [*_LABELS, "by the shear", "χ²/ν", "p"]
+    if not shear:
+        head = [*_LABELS, "by the maximum", "by the profile", "χ²/ν", "p", "bracketed"]
     rows = []
-    for lubrication, by_loading in found.joint.items():
-        of_it = [
-            (i, one)
-            for i, one in enumerate(found.loads[loading], start=1)
-            if one.lubrication == lubrication
-        ]
-        rows += [
-            [
-                *_labels(i, one),
-                bounded_text(one.by_maximum),
-                bounded_text(one.by_profile),
-                *_fit(one.by_profile),
-                f"{100 * one.bracketed:.0f} %",
-            ]
-            for i, one in of_it
-        ]
-        if len(of_it) > 1:
+    for lubrication, by_loading in comparison.joint.items():
+        count = 0
+        for i, load in enumerate(loads):
+            profile = comparison.measured.profiles[i]
+            if profile.lubrication != lubrication:
+                continue
+            count += 1
+            labels = _labels(i + 1, profile)
+            if isinstance(load, BoundedEstimate):
+                rows.append([*labels, str(load), *_fit(load)])
+            else:
+                cells = [str(load.by_maximum), str(load.by_profile), *_fit(load.by_profile)]
+                rows.append([*labels, *cells, f"{100 * load.bracketed:.0f} %"])
+        if count > 1:
             joint, name = by_loading[loading], lubrication or "not stated"
-            rows.append(["", name, "all", "", bounded_text(joint), *_fit(joint), ""])
+            cells = [str(joint), *_fit(joint)]
+            rows.append(["", name, "all", *(cells if shear else ["", *cells, ""])])
     return Table(title, head, rows)
 
 
-def _fit(reading: EffectiveFriction) -> tuple[str, str]:
+def _fit(reading: BoundedEstimate) -> tuple[str, str]:
     if reading.degrees <= 0:
         return "", ""
     return f"{reading.least / reading.degrees:.2f}", f"{reading.p_value:.2g}"
 
 
-def _chi_square_tables(found: FrictionComparison, loading: str) -> Iterator[Table]:
+def _chi_square_tables(comparison: FrictionComparison, loading: str) -> Iterator[Table]:
     """Return chi-square of each load against each calculated profile, in as few tables as fit."""
-    loads = found.loads[loading]
+    loads = comparison.loads[loading]
     way = f"{loading} loading" if loading else "profiles as given"
-    labels = [[*_labels(i, one), f"{one.degrees}"] for i, one in enumerate(loads, start=1)]
+    labels = [[*_labels(i, load.profile), f"{load.degrees}"] for i, load in enumerate(loads, 1)]
     head = [*_LABELS, "ν"]
     columns = [
-        [friction_name(float(mu)), *(_short(float(one.chi_square[i])) for one in loads)]
-        for i, mu in enumerate(found.friction)
+        [friction_name(float(mu)), *(_short(float(load.chi_square[i])) for load in loads)]
+        for i, mu in enumerate(comparison.friction)
     ]
     room = _WIDTH - sum(2 + max(map(len, column)) for column in zip(head, *labels, strict=True))
-    for part in _fitting(columns, room):
-        values = zip(*(column[1:] for column in part), strict=True)
+    for fitting in _fitting(columns, room):
+        values = zip(*(column[1:] for column in fitting), strict=True)
         rows = [[*label, *row] for label, row in zip(labels, values, strict=True)]
         title = f"χ² of each profile against friction coefficients, {way}"
-        yield Table(title, [*head, *(column[0] for column in part)], rows)
+        yield Table(title, [*head, *(column[0] for column in fitting)], rows)
 
 
 def _fitting(columns: Sequence[list[str]], room: int) -> Iterator[list[list[str]]]:
     """Divide columns among tables none of which is wider than there is room for."""
-    part: list[list[str]] = []
+    fitting: list[list[str]] = []
     for column in columns:
-        widths = [2 + max(map(len, kept)) for kept in (*part, column)]
-        if part and sum(widths) > room:
-            yield part
-            part = []
-        part.append(column)
-    yield part
+        widths = [2 + max(map(len, cells)) for cells in (*fitting, column)]
+        if fitting and sum(widths) > room:
+            yield fitting
+            fitting = []
+        fitting.append(column)
+    yield fitting
 
 
 def _short(chi_square: float) -> str:
@@ -357,12 +429,11 @@ def _short(chi_square: float) -> str:
     return f"{chi_square:.1f}" if chi_square < _WIDE else f"{chi_square:.0f}"
 
 
-def _budget_table(found: FrictionComparison) -> Table:
+def _budget_table(comparison: FrictionComparison | ShearComparison) -> Table:
     """Return what each source adds to the uncertainty of the coefficient of all loads."""
     columns = {
-        which(lubrication, loading).removesuffix(" loading"): joint
-        for lubrication, by_loading in found.joint.items()
-        for loading, joint in by_loading.items()
+        _which(lubrication, loading).removesuffix(" loading"): joint
+        for lubrication, loading, joint in _joint(comparison)
         if joint.value is not None and joint.budget
     }
     sources = dict.fromkeys(name for joint in columns.values() for name in joint.budget)
@@ -383,21 +454,20 @@ def _share(value: float | None) -> str:
     return "0" if value == 0 else f"{value:.2g}"
 
 
-def _macroscopic_table(found: FrictionComparison) -> Table:
+def _macroscopic_table(comparison: FrictionComparison) -> Table:
     """Return where the macroscopic coefficient stands beside the effective ones."""
-    if found.macroscopic is None:
+    if comparison.macroscopic is None:
         return Table("", ("", ""), [])
-    value, u = found.macroscopic
+    value, u = comparison.macroscopic
     title = f"Beside the macroscopic friction coefficient, {format_measured(value, u)}"
     rows = [
-        [which(lubrication, loading), bounded_text(joint), _against(joint, value)]
-        for lubrication, by_loading in found.joint.items()
-        for loading, joint in by_loading.items()
+        [_which(lubrication, loading), str(joint), _against(joint, value)]
+        for lubrication, loading, joint in _joint(comparison)
     ]
     return Table(title, ["all loads of", "effective coefficient", "macroscopic one"], rows)
 
 
-def _against(joint: EffectiveFriction, value: float) -> str:
+def _against(joint: BoundedEstimate, value: float) -> str:
     level = percent(joint.interval.level)
     if joint.interval.holds(value):
         return f"within the {level} interval"
@@ -407,34 +477,27 @@ def _against(joint: EffectiveFriction, value: float) -> str:
 def _checks_table(checks: Sequence[QualityCheck]) -> Table:
     """Return what failed, and of checks that were made of each profile the closest to failing."""
     shown: list[QualityCheck] = []
-    for name, of_it in groupby(sorted(checks, key=_kind_in(checks)), key=lambda check: check.kind):
-        group = list(of_it)
-        passed = [check for check in group if check.passed]
-        shown += [check for check in group if not check.passed]
+    for kind, of_kind in _by_kind(checks).items():
+        passed = [check for check in of_kind if check.passed]
+        shown += [check for check in of_kind if not check.passed]
         if passed:
             worst = max(passed, key=lambda check: check.value / check.limit)
-            many = f"{name}, worst of {len(passed)}" if len(passed) > 1 else worst.name
+            many = f"{kind}, worst of {len(passed)}" if len(passed) > 1 else worst.name
             shown.append(replace(worst, name=many))
     return checks_table(shown)
 
 
-def _kind_in(checks: Sequence[QualityCheck]) -> Callable[[QualityCheck], int]:
-    """Return an order in which checks of one kind follow each other, kinds as they came."""
-    order = list(dict.fromkeys(check.kind for check in checks))
-    return lambda check: order.index(check.kind)
-
-
-def _lubrication_table(found: FrictionComparison) -> Table:
+def _lubrication_table(comparison: FrictionComparison) -> Table:
     """Return how far dry and lubricated stress differ at each load."""
     rows = [
         [
-            f"{one.load:.4g}",
-            _pm(one.maximum / KPA, one.maximum_uncertainty / KPA),
-            format_measured(100 * one.relative, 100 * one.relative_uncertainty, "%"),
-            f"{one.chi_square / one.degrees:.2f}",
-            f"{one.p_value:.2g}",
+            f"{pair.load:.4g}",
+            format_measured(pair.maximum / KPA, pair.maximum_uncertainty / KPA),
+            format_measured(100 * pair.relative, 100 * pair.relative_uncertainty, "%"),
+            f"{pair.chi_square / pair.degrees:.2f}",
+            f"{pair.p_value:.2g}",
         ]
-        for one in found.dry_against_lubricated
+        for pair in comparison.dry_against_lubricated
     ]
     head = ["load (N)", "on the axis (kPa)", "of the lubricated", "χ²/ν of no difference", "p"]
     return Table("Dry less lubricated stress (± standard uncertainty)", head, rows)

@@ -29,7 +29,6 @@ from memscal.friction.model_comparison import (
     weigh_normal_compliance,
     weigh_slip_length,
 )
-from memscal.friction.prediction import members_of
 from memscal.friction.results import LawComparison
 
 
@@ -47,8 +46,7 @@ def relative_uncertainty(length: float, precision: Precision) -> float:
     family = slipping()
     points = read_without_error(family, length, precision)
     found = measured(points, family)
-    members = members_of(family, np.array([length]))
-    curve = likelihood(points, found.sensor, members, range(len(LOADS)))
+    curve = likelihood(points, found.sensor, family.at(length), range(len(LOADS)))
     t = family.coordinate(length)
     return float(1 / np.sqrt(curve.information[0])) / (t * (1 - t))
 
@@ -106,8 +104,8 @@ def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load(
     # A rigid interface of that friction gives the same stress on the axis.
     gauge = sensor(amontons())
     for load, friction in enumerate(implied.friction[:, 1]):
-        rigid = amontons().at(float(friction)).spectra[load]
-        yields = slipping().at(weighed("slipping", 16e-6).length.best).spectra[load]
+        rigid = amontons().at(friction).spectra[0, load]
+        yields = slipping().at(weighed("slipping", 16e-6).length.best).spectra[0, load]
         on_axis = [
             float(amontons().wavenumbers.synthesise(gauge.transfer * own, np.array(0.0)))
             for own in (rigid, yields)
@@ -164,8 +162,7 @@ def test_an_uncertain_macroscopic_coefficient_makes_the_slip_length_as_uncertain
 
     exact = slipping()
     t = exact.coordinates[:, None, None]
-    slope = np.stack([exact.at(float(v)).by_coordinate for v in exact.values])
-    change = -0.1 * t * (1 - t) * slope
+    change = -0.1 * t * (1 - t) * exact.by_coordinate
     doubtful = replace(exact, changes={**exact.changes, "macroscopic_friction": change})
     points = read_without_error(exact, 16e-6, PRECISE)
     found = weigh_slip_length(

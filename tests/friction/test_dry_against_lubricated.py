@@ -11,8 +11,8 @@ import pytest
 from helpers.linear_contacts import CONVERSION, Laboratory, bare_points
 from scipy.stats import kstest
 
-from memscal.friction.lubrication import dry_against_lubricated, lubricated_pairs
-from memscal.friction.prediction import LoadPoints, members_of
+from memscal.friction.effective import dry_against_lubricated, lubricated_pairs
+from memscal.friction.likelihood import LoadPoints
 from memscal.friction.results import DryAgainstLubricated
 
 CHANCE = 1e-4
@@ -52,7 +52,7 @@ def compared(
         (profile(dry, "dry"), profile(wet, "lubricated")),
         (dry, wet),
         laboratory.sensor,
-        members_of(laboratory.family, np.zeros(1)),
+        laboratory.family.at(0.0),
         (LOAD, LOAD),
         conversion_share=0.01,
     )

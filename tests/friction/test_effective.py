@@ -10,7 +10,7 @@ from helpers.linear_contacts import FRICTIONS, Laboratory
 from scipy.stats import binom, kstest
 
 from memscal.friction.effective import fine_values, with_loading
-from memscal.friction.results import EffectiveFriction
+from memscal.friction.results import BoundedEstimate
 
 SEEDS = 60
 CHANCE = 1e-4
@@ -23,7 +23,7 @@ def laboratory() -> Laboratory:
 
 
 @lru_cache
-def found(friction: float) -> list[EffectiveFriction]:
+def found(friction: float) -> list[BoundedEstimate]:
     first = 1000 * round(100 * min(friction, 9.0))
     return [laboratory().drawn(friction, first + seed).effective([0, 1]) for seed in range(SEEDS)]
 

@@ -100,7 +100,7 @@ class Linear:
         residuals = self.data[load] - np.outer(nodes, self.shapes[load])
         each = [tables(r, self.columns[load], np.full(r.size, self.noise)) for r in residuals]
         return Tables(
-            *(np.concatenate(parts) for parts in zip(*(t.parts for t in each), strict=True))
+            *(np.concatenate(parts) for parts in zip(*(t.arrays for t in each), strict=True))
         )
 
 

@@ -1,11 +1,13 @@
-"""Intervals of a profile likelihood with two ends of its own."""
+"""Intervals of a profile likelihood: two ends, one end, none."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from memscal.friction.effective import Profiled, profiled, reason_of
+from memscal.friction.effective import friction_reason, profile_estimate
+from memscal.friction.results import BoundedEstimate
+from memscal.model.arrays import FloatArray
 
 COORDINATES = np.linspace(0.0, 1.0, 101)
 
@@ -14,24 +16,34 @@ def value_at(t: float) -> float:
     return float("inf") if t == 1 else 0.3 * t / (1 - t)
 
 
-def parabola(best: float, sigma: float) -> Profiled:
-    return profiled(COORDINATES, 7.0 + ((COORDINATES - best) / sigma) ** 2, value_at)
+def estimate(chi_square: FloatArray, last: float = np.inf, level: float = 0.95) -> BoundedEstimate:
+    values = np.array([value_at(t) for t in COORDINATES])
+    return profile_estimate(
+        values,
+        COORDINATES,
+        chi_square,
+        value_at,
+        reason=lambda interval: friction_reason(interval, last),
+        level=level,
+    )
+
+
+def parabola(best: float, sigma: float, last: float = np.inf) -> BoundedEstimate:
+    return estimate(7.0 + ((COORDINATES - best) / sigma) ** 2, last)
 
 
 @pytest.mark.parametrize("sigma", [0.002, 0.02, 0.1])
 @pytest.mark.parametrize("best", [0.4, 0.4037])
 def test_the_ends_of_a_parabola_are_known(best: float, sigma: float) -> None:
     found = parabola(best, sigma)
-    assert found.best == pytest.approx(value_at(best), rel=1e-3)
+    assert found.value == pytest.approx(value_at(best), rel=1e-3)
     assert found.least == pytest.approx(7.0, abs=1e-6)
     assert found.interval.low == pytest.approx(value_at(best - 1.959964 * sigma), rel=1e-3)
     assert found.interval.high == pytest.approx(value_at(best + 1.959964 * sigma), rel=1e-3)
     assert found.standard_uncertainty == pytest.approx(
         (value_at(best + sigma) - value_at(best - sigma)) / 2, rel=2e-3
     )
-    assert not found.open_low
-    assert not found.open_high
-    assert reason_of(found, np.inf) == ""
+    assert found.reason == ""
 
 
 def test_an_interval_that_reaches_full_stick_is_a_lower_bound() -> None:
@@ -39,9 +51,10 @@ def test_an_interval_that_reaches_full_stick_is_a_lower_bound() -> None:
     assert found.interval.high is None
     assert found.interval.low == pytest.approx(value_at(0.704), rel=1e-2)
     assert found.interval.holds(float("inf"))
-    assert "lower bound" in reason_of(found, np.inf)
-    assert "full stick" in reason_of(found, np.inf)
-    assert "20" in reason_of(found, 20.0)
+    assert found.value is None
+    assert "lower bound" in found.reason
+    assert "full stick" in found.reason
+    assert "20" in parabola(0.9, 0.1, last=20.0).reason
 
 
 def test_an_interval_that_reaches_no_friction_begins_there() -> None:
@@ -49,33 +62,31 @@ def test_an_interval_that_reaches_no_friction_begins_there() -> None:
     assert found.interval.low == 0
     assert found.interval.high == pytest.approx(value_at(0.246), rel=1e-2)
     assert found.standard_uncertainty is None
-    assert reason_of(found, np.inf) == ""
+    assert found.reason == ""
 
 
 def test_a_best_value_beyond_an_end_is_that_end() -> None:
-    assert parabola(-0.2, 0.1).best == 0
+    assert parabola(-0.2, 0.1).value == 0
     assert parabola(1.2, 0.1).best == float("inf")
 
 
 def test_a_flat_likelihood_identifies_nothing() -> None:
     found = parabola(0.5, 10.0)
     assert (found.interval.low, found.interval.high) == (0, None)
-    assert "not identifiable" in reason_of(found, np.inf)
+    assert "not identifiable" in found.reason
 
 
 def test_what_is_flat_beyond_a_value_bounds_from_below_only() -> None:
     """The shape of the real thing: chi-square falls to a value, and stays."""
     fall = 60 * np.maximum(0.5 - COORDINATES, 0) ** 2 * 100
-    found = profiled(COORDINATES, fall, value_at)
+    found = estimate(fall)
     assert found.interval.high is None
     assert found.interval.low == pytest.approx(value_at(0.5 - np.sqrt(3.84 / 6000)), rel=1e-2)
 
 
 def test_a_lower_level_gives_a_narrower_interval() -> None:
     chi_square = ((COORDINATES - 0.4) / 0.1) ** 2
-    wide, narrow = (
-        profiled(COORDINATES, chi_square, value_at, level=level).interval for level in (0.95, 0.6)
-    )
+    wide, narrow = (estimate(chi_square, level=level).interval for level in (0.95, 0.6))
     assert wide.high is not None
     assert narrow.high is not None
     assert wide.low < narrow.low < narrow.high < wide.high

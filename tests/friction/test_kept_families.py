@@ -10,7 +10,7 @@ import pytest
 from helpers.calculated_cases import FILM, REACH, SPHERE
 from helpers.rounding import assert_same_to_rounding
 
-from memscal.friction import paths as assembly
+from memscal.friction import family as assembly
 from memscal.friction.calculated import amontons_family, normal_compliance_family
 from memscal.friction.family import ProfileFamily
 from memscal.model.film import ElasticFilm

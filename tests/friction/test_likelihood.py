@@ -9,9 +9,8 @@ import pytest
 from helpers.linear_contacts import FRICTIONS, Laboratory, bare_points
 
 from memscal.friction.effective import Confrontation
-from memscal.friction.likelihood import likelihood
+from memscal.friction.likelihood import Predicted, likelihood, predict
 from memscal.friction.marginal_likelihood import log_likelihood
-from memscal.friction.prediction import Predicted, members_of, predict
 
 CORRELATED = {"white": 0.0, "correlated": 0.6}
 
@@ -23,7 +22,7 @@ def laboratory(request: pytest.FixtureRequest) -> Laboratory:
 
 def dense(found: Confrontation, value: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residual, covariance without flat parameters, and flat columns, over all loads."""
-    members = members_of(found.family, np.array([value]))
+    members = found.family.at(value)
     predicted = [
         predict(points, found.sensor, members, load)
         for load, points in zip(found.loads, found.points, strict=True)
@@ -96,7 +95,7 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
     ]
     at, step = laboratory.family.coordinate(0.15), 2e-3
     values = np.array([laboratory.family.value_at(at + shift) for shift in (-step, 0, step)])
-    members = members_of(laboratory.family, values)
+    members = laboratory.family.at(values)
     found = likelihood(points, laboratory.sensor, members, [0, 1])
     curvature = (found.chi_square[0] + found.chi_square[2]) / (2 * step**2)
     assert found.chi_square[1] == pytest.approx(0.0, abs=1e-9)

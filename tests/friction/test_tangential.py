@@ -21,7 +21,7 @@ from memscal.axisymmetry.kernels import GaussianMixture
 from memscal.errors import InputError
 from memscal.friction.calculated import FRICTIONS, amontons_family
 from memscal.friction.compare import compare_shear
-from memscal.friction.prediction import LoadPoints, members_of, predict, sensor_of
+from memscal.friction.likelihood import LoadPoints, predict, sensor_of
 from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredStress
 from memscal.simulation.experiment import Experiment
@@ -69,7 +69,7 @@ def test_a_family_of_shear_is_that_of_contacts_between_its_values(cache: Path) -
         member = family.at(friction)
         contacts = memscal.indent(film, sphere, load=LOADS, friction=friction)
         for i, contact in enumerate(contacts):
-            found = family.wavenumbers.synthesise(member.spectra[i], r, order=1)
+            found = family.wavenumbers.synthesise(member.spectra[0, i], r, order=1)
             exact = contact.base_shear(r)
             np.testing.assert_allclose(found, exact, atol=1e-3 * np.abs(exact).max())
 
@@ -100,7 +100,7 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None
     film, sphere = made.dry.film, made.dry.indenter
     family = amontons_family(film, sphere, LOADS, reach=24e-3, cache=cache, order=1)
     sensor = sensor_of(shear, family, 8e-3)
-    members = members_of(family, np.array([0.1]))
+    members = family.at(0.1)
 
     def at(offset: FloatArray) -> LoadPoints:
         nothing = np.zeros_like(offset)
@@ -152,6 +152,11 @@ def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
     free, stuck = (found.joint["dry"]["incremental"].interval for found in (low, high))
     assert free.high is not None
     assert free.high < stuck.low
+    assert "by the shear" in str(low)
+    assert low.to_dict()["joint"][0]["interval"]["high"] == free.high
+    assert list(low.to_dataframe()["friction, high"]) == [
+        load.interval.high or math.inf for load in low.loads["incremental"]
+    ]
 
 
 def test_what_does_not_belong_together_is_refused(cache: Path) -> None:

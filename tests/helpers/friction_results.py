@@ -11,13 +11,12 @@ import numpy as np
 
 from memscal.friction.results import (
     BayesFactor,
+    BoundedEstimate,
     DryAgainstLubricated,
-    EffectiveFriction,
     FrictionComparison,
     ImpliedFriction,
     InterfaceComparison,
     InterfaceLaw,
-    InterfaceLength,
     Interval,
     LawComparison,
     LoadComparison,
@@ -47,7 +46,7 @@ def stress(r: Any, load: float, friction: float, loading: str) -> Any:
 
 def reading(
     values: np.ndarray, chi_square: np.ndarray, *, degrees: int = 29, **fields: Any
-) -> EffectiveFriction:
+) -> BoundedEstimate:
     """Return what a profile likelihood says, by the rule of the package."""
     least = float(chi_square.min())
     inside = values[chi_square - least <= _LIMIT]
@@ -55,7 +54,7 @@ def reading(
     high = None if math.isinf(inside[-1]) else float(inside[-1])
     value = None if high is None else float(values[np.argmin(chi_square)])
     spread = None if value is None else float(np.ptp(close)) / 2 or 0.01
-    return EffectiveFriction(
+    return BoundedEstimate(
         value=value,
         standard_uncertainty=spread,
         interval=Interval(float(inside[0]), high),
@@ -239,15 +238,22 @@ def _laws(
         loads=np.array(LOADS),
         laws=laws,
         factors=(BayesFactor(names[better], names[worse], abs(evidence[-1] - evidence[0])),),
-        length=InterfaceLength(
-            length, 0.1 * length, Interval(inside[0], inside[-1]), "", lengths, chi_square
+        length=BoundedEstimate(
+            value=length,
+            standard_uncertainty=0.1 * length,
+            interval=Interval(inside[0], inside[-1]),
+            reason="",
+            values=lengths,
+            chi_square=chi_square,
+            least=120.0,
+            unit="m",
         ),
         priors=(PriorChoice("lengths from 0.1 to 30 um", evidence[-1] - 0.4),),
         implied=implied,
     )
 
 
-def _joint(of_each: Sequence[LoadComparison], lubrication: str) -> EffectiveFriction:
+def _joint(of_each: Sequence[LoadComparison], lubrication: str) -> BoundedEstimate:
     chosen = [one.by_profile for one in of_each if one.lubrication == lubrication]
     return reading(chosen[0].values, np.sum([one.chi_square for one in chosen], axis=0))
 

@@ -16,7 +16,7 @@ from memscal.friction.calculated import (
 )
 from memscal.friction.family import ProfileFamily
 from memscal.friction.interface_laws import Measured
-from memscal.friction.prediction import LoadPoints, Sensor, members_of
+from memscal.friction.likelihood import LoadPoints, Sensor
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
 
@@ -92,7 +92,7 @@ def read_without_error(
     """Return 33 points 0.5 mm apart at each load of a family, and their repeats, as calculated."""
     x = np.tile(np.linspace(-8e-3, 8e-3, 33), precision.repeats)
     gauge = sensor(truth)
-    spectra = members_of(truth, np.array([value])).spectra[0]
+    spectra = truth.at(value).spectra[0]
     found = []
     for own in spectra:
         u = truth.wavenumbers.synthesise(gauge.transfer * own, np.abs(x))

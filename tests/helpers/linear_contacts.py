@@ -10,7 +10,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.friction.effective import Confrontation, confront
 from memscal.friction.family import ProfileFamily
-from memscal.friction.prediction import LoadPoints, Predicted, Sensor, members_of, predict
+from memscal.friction.likelihood import LoadPoints, Predicted, Sensor, predict
 
 LOADS = (0.5, 2.0)
 FRICTIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, np.inf])
@@ -89,7 +89,7 @@ class Laboratory:
         return cls(family, gaussian_sensor(), (every,) * family.loads.size)
 
     def predicted(self, friction: float, load: int, points: LoadPoints | None = None) -> Predicted:
-        members = members_of(self.family, np.array([friction]))
+        members = self.family.at(friction)
         return predict(points or self.points[load], self.sensor, members, load)
 
     def drawn(self, friction: float, seed: int) -> Confrontation:
