@@ -96,15 +96,7 @@ class Fields(Protocol):
 
 
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
-    """Choose the grid from the scan: every length from a length of the data.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-    band : Band
-        Its relevant band, which says where the window closes.
-    """
+    """Choose the grid from the scan: every length from a length of the data."""
     points = estimate.points
     support = float(estimate.distance.max())
     if points.as_raster:
@@ -227,11 +219,6 @@ class RasterFields:
 
         ``divided``: whether its field is divided, and so needs an even lattice; else points off
         any lattice get one of their own step, which the fitted profile fills alone.
-
-        Raises
-        ------
-        InputError
-            If it is divided, and the points lie on no even lattice.
         """
         points = estimate.points
         lattice = even_lattice(points.x, points.y, points.places[0].count)
@@ -240,7 +227,7 @@ class RasterFields:
                 f"The raster's {points.u.size} points are not evenly spaced: they lie on no "
                 "lattice of rows and columns within a tenth of its step.",
                 why="This method divides a raster as a field, on its own lattice.",
-                cure='Use method="evidence" (--method evidence), which needs no lattice; or scan '
+                cure='Use method="bayesian" (--method bayesian), which needs no lattice; or scan '
                 "evenly.",
             )
         if lattice is None:

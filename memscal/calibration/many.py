@@ -100,7 +100,7 @@ def calibrate_many(
     --------
     >>> import memscal
     >>> scans = [memscal.simulate(noise=0.005, seed=seed) for seed in range(3)]
-    >>> found = memscal.calibrate_many([*scans, "missing.h5"], method="evidence")
+    >>> found = memscal.calibrate_many([*scans, "missing.h5"], method="bayesian")
     >>> [one.passed for one in found]
     [True, True, True, False]
     """

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.calibration.stages import Solution, deconvolve
-from memscal.deconvolution.division import Regulariser, require_count
-from memscal.deconvolution.windows import WhiteNoise, WhiteNoiseDraw
+from memscal.deconvolution.division import Regulariser, WhiteNoise, WhiteNoiseDraw, require_count
 from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
 

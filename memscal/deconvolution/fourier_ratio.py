@@ -194,7 +194,7 @@ def divide(
     method : str or Regulariser, default "white-noise"
         One of the methods of :func:`memscal.calibrate` that divide fields.
     posterior : callable, optional
-        What method ``"evidence"`` takes in place of a quotient.
+        What method ``"bayesian"`` returns in place of a quotient.
     **options
         Parameters of the method, such as ``amplitude``.
 

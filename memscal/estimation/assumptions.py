@@ -25,7 +25,7 @@ __all__ = [
     "ExtraColumns",
     "HeldOut",
     "axisymmetry_test",
-    "departure_evidence",
+    "departure_test",
     "hold_out",
     "linearity_test",
     "load_groups",
@@ -41,31 +41,16 @@ _DEPENDENT = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """The worst predicted of several groups of points.
+    """The worst predicted of several groups of points."""
 
-    Parameters
-    ----------
-    value : float
-        Chi-square of the held-out voltages per degree of freedom; over the others' own where the
-        noise is not stated (F).
-    limit : float
-        What the worst of all groups exceeds by chance once in a thousand.
-    p_value : float
-        Chance of a group so badly predicted among all, or less.
-    worst : int
-        Its place among the groups, from zero.
-    folds : int
-        How many groups were held out.
-    alone : bool
-        Whether each was one group: more than ten are held out several at a time.
-    """
-
+    #: Chi-square of the held-out voltages per degree of freedom; over the others' own where the
+    #: noise is not stated (F).
     value: float
-    limit: float
-    p_value: float
-    worst: int
-    folds: int
-    alone: bool
+    limit: float  # what the worst of all groups exceeds by chance once in a thousand
+    p_value: float  # chance of a group so badly predicted among all, or less
+    worst: int  # its place among the groups, from zero
+    folds: int  # how many groups were held out
+    alone: bool  # whether each was one group: more than ten are held out several at a time
 
 
 def load_groups(load: FloatArray) -> NDArray[np.intp]:
@@ -76,27 +61,7 @@ def load_groups(load: FloatArray) -> NDArray[np.intp]:
 
 
 def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | None:
-    """Hold out each group of points in turn, and predict it from the others.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-    group : ndarray of int, shape (n,)
-        Which group each point belongs to, counted from zero.
-
-    Returns
-    -------
-    HeldOut or None
-        The worst group; ``None`` where there is one group alone, or none that tells.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> estimate = memscal.calibrate(memscal.simulate(repeats=3)).solution.estimate
-    >>> hold_out(estimate, estimate.points.repeat).folds
-    3
-    """
+    """Hold out each group of points in turn, and predict it from the others."""
     if np.unique(group).size < 2:
         return None
     # Many outliers in one group are its fault, and a single one is not: none may count for much.
@@ -194,7 +159,7 @@ class Departure:
     share: float
 
 
-def departure_evidence(estimate: ProfileEstimate) -> Departure:
+def departure_test(estimate: ProfileEstimate) -> Departure:
     """Weigh departures of any kind against the Gaussian, by their evidence."""
     prior, weighed = HYPOTHESES[0].estimate, estimate.weighed
     posterior = np.clip(weighed.gaussian_probability, _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
@@ -230,13 +195,7 @@ def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
 
 
 def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
-    r"""Test the paper's linearity in load: :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`.
-
-    Returns
-    -------
-    ExtraColumns or None
-        Its coefficient is eta; ``None`` where the loads do not differ enough.
-    """
+    r"""Test the paper's linearity in load: :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`."""
     load = estimate.points.load
     mean = float(load.mean())
     if np.ptp(load) < _LOAD_CONTRAST * mean:

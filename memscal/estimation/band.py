@@ -39,30 +39,15 @@ RESOLVED = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Signal and noise of the voltage's transform, and how far G is known.
+    """Signal and noise of the voltage's transform, and how far G is known."""
 
-    Parameters
-    ----------
-    k : ndarray, shape (n,)
-        Wavenumbers, in rad/m.
-    signal, noise : ndarray, shape (n,)
-        Modulus of the voltage's transform and its noise, in V m^2 / N.
-    relevant : float
-        Wavenumber beyond which the signal stays below ten times the noise, in rad/m; at most the
-        last one that the scan's step samples.
-    resolved : float
-        Wavenumber up to which the transfer function's standard uncertainty stays below a third of
-        the fitted Gaussian's transfer function, in rad/m; at most the last one sampled.
-    weakest_voltage, weakest_reference : float
-        Moduli of both fields' transforms at ``relevant``.
-    """
-
-    k: FloatArray
-    signal: FloatArray
+    k: FloatArray  # (n,): wavenumbers, in rad/m
+    signal: FloatArray  # (n,): modulus of the voltage's transform and its noise, in V m^2 / N
     noise: FloatArray
-    relevant: float
-    resolved: float
-    weakest_voltage: float
+    # Both wavenumbers in rad/m, and at most the last one that the scan's step samples.
+    relevant: float  # beyond it the signal is less than ten times the noise
+    resolved: float  # up to it the uncertainty is less than a third of the Gaussian
+    weakest_voltage: float  # moduli of both fields' transforms at the relevant wavenumber
     weakest_reference: float
 
 

@@ -49,18 +49,11 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class ForwardModel:
-    """Voltages at the points of a scan, for kernels given by their transforms.
+    """Voltages at the points of a scan, for kernels given by their transforms."""
 
-    Parameters
-    ----------
-    points : ScanPoints
-        Where and at what load, in one scan or several.
-    references : tuple of RadialSpectrum
-        Transform of the base stress per newton, dimensionless, for each scan; on the same nodes,
-        and of the order of the points' channel.
-    """
-
-    points: ScanPoints
+    points: ScanPoints  # where and at what load, in one scan or several
+    #: Transform of the base stress per newton, dimensionless, for each scan; on the same nodes, and
+    #: of the order of the points' channel.
     references: tuple[RadialSpectrum, ...]
 
     @property
@@ -210,22 +203,7 @@ _STEP = 1e-4
 def elliptic_columns(
     model: ForwardModel, geometry: Geometry, sigma: float, ellipticity: FloatArray
 ) -> FloatArray:
-    """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2.
-
-    Parameters
-    ----------
-    model, geometry
-        The forward model, and the points about their centres.
-    sigma : float
-        Root of the mean second moment, in m.
-    ellipticity : ndarray, shape (2,)
-        e1 (along x against y) and e2 (along the diagonals).
-
-    Returns
-    -------
-    ndarray, shape (n, 4)
-        In V per V/Pa; per m in the second column.
-    """
+    """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2."""
     steps = np.array([[0.0, 0.0, 0.0], [_STEP * sigma, 0.0, 0.0], [0, _STEP, 0], [0, 0, _STEP]])
     here = np.concatenate([[sigma], ellipticity])
     harmonics = _bessel(geometry.bessel0, geometry.bessel1, geometry.radius, model.k)

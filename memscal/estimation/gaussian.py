@@ -43,33 +43,7 @@ Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 def gauss_newton(
     linearise: Linearised, start: FloatArray, *, tolerance: float, knee: float = np.inf
 ) -> FloatArray | None:
-    """Minimise the loss of the residuals of a model that is nearly linear about the start.
-
-    Parameters
-    ----------
-    linearise : callable
-        Residuals, shape (n,), and their derivatives, shape (n, p), at parameters of shape (p,).
-    start : ndarray, shape (p,)
-        Where to begin; the parameters are scaled to numbers near one.
-    tolerance : float
-        The last step is shorter than this in every parameter.
-    knee : float
-        Residual from which on the loss grows linearly; infinite for least squares.
-
-    Returns
-    -------
-    ndarray, shape (p,), or None
-        ``None`` if the steps do not settle downhill: use a solver with a trust region.
-
-    Examples
-    --------
-    >>> x = np.arange(4.0)
-    >>> def decay(p):
-    ...     curve = np.exp(-p[0] * x)
-    ...     return curve - np.exp(-0.5 * x), -(x * curve)[:, None]
-    >>> round(float(gauss_newton(decay, np.array([0.4]), tolerance=1e-9)[0]), 6)
-    0.5
-    """
+    """Minimise the loss of the residuals of a model that is nearly linear about the start."""
     place: FloatArray = start
     step: FloatArray = np.zeros_like(start)
     cost, halvings = np.inf, 0
@@ -104,21 +78,7 @@ def require_parity(
     odd: tuple[FloatArray, FloatArray],
     even: tuple[FloatArray, FloatArray],
 ) -> None:
-    """Refuse a voltage that a shear of the other sign, or an even signal, meets far better.
-
-    Parameters
-    ----------
-    points : ScanPoints
-        The points of one scan, by a tangential channel.
-    odd, even : tuple of two ndarray, shape (m,)
-        Amplitudes of odd and of even signals of trial centres and widths, fitted to the voltages,
-        and the sums of absolute residuals that each leaves.
-
-    Raises
-    ------
-    InputError
-        If the voltage has the wrong sign, or is even.
-    """
+    """Refuse a voltage that a shear of the other sign, or an even signal, meets far better."""
     amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
     turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
@@ -147,28 +107,7 @@ _STARTING_WIDTHS = (0.1, 0.3, 0.8)
 
 
 def robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Start each scan by itself, and A and the width at the medians of all.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    weights : ndarray, shape (n,)
-        Relative weights of the points.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        A, sigma, centres, drift and ellipticity, as in
-        :func:`memscal.estimation.gaussian.linearise`.
-
-    Raises
-    ------
-    FitError
-        If no Gaussian with a positive A comes near the scan.
-    InputError
-        If a tangential channel's voltage has the wrong parity or sign.
-    """
+    """Start each scan by itself, and A and the width at the medians of all."""
     points = model.points
     parts = [
         _robust_start_of_one(model.only(i), weights[points.scan == i]) for i in range(points.scans)
@@ -284,39 +223,17 @@ _NARROWEST = 0.05
 
 @dataclass(frozen=True, eq=False)
 class GaussianFit:
-    """Best Gaussian in data space, and the model linearised about it.
+    """Best Gaussian in data space, and the model linearised about it."""
 
-    Parameters
-    ----------
-    conversion_constant : float
-        A, in V/Pa.
-    sigma : float
-        Standard deviation of the Gaussian, in m.
-    centre : ndarray, shape (scans, 2)
-        Centre (x0, y0) of the sensor in each scan, in m; zero where a line does not tell.
-    drift : ndarray, shape (2 or 3 a scan,)
-        Baseline of each scan, and its change over half the range along x (and y), in V.
-    ellipticity : ndarray, shape (2,)
-        e1 (along x against y) and e2 (along the diagonals), where the points spread over a plane.
-    points : ScanPoints
-        What was fitted.
-    geometry : Geometry
-        Distances from the centre.
-    jacobian : ndarray, shape (n, p)
-        Derivatives of the voltages by A, sigma, centre and drift, in this order.
-    predicted : ndarray, shape (n,)
-        Voltages of the fit, in V.
-    """
-
-    conversion_constant: float
-    sigma: float
-    centre: FloatArray
-    drift: FloatArray
-    ellipticity: FloatArray
+    conversion_constant: float  # A, in V/Pa
+    sigma: float  # standard deviation of the Gaussian, in m
+    centre: FloatArray  # (scans, 2): of the sensor, in m; zero across a line
+    drift: FloatArray  # baseline, and its change over half the range along x (and y), scan by scan
+    ellipticity: FloatArray  # (2,): e1 (along x against y) and e2 (along the diagonals)
     points: ScanPoints
     geometry: Geometry
-    jacobian: FloatArray
-    predicted: FloatArray
+    jacobian: FloatArray  # (n, p): voltages by A, sigma, centre, drift and ellipticity
+    predicted: FloatArray  # (n,): voltages of the fit, in V
 
     def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
         """Covariance of the parameters for a noise (V) and relative weights."""
@@ -336,22 +253,7 @@ class GaussianFit:
 def fit_gaussian(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
 ) -> GaussianFit:
-    """Fit a Gaussian apparatus function to the scan.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    weights : ndarray, shape (n,)
-        Relative weights: the inverse noise variance up to a common factor.
-    start : GaussianFit, optional
-        An earlier fit to start from; without one the search is global and robust.
-
-    Raises
-    ------
-    FitError
-        If the scan does not determine the parameters.
-    """
+    """Fit a Gaussian apparatus function to the scan."""
     if start is None:
         return _solve(model, weights, robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
@@ -426,16 +328,7 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
 
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
-    """Return the model and its derivatives at given parameters.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    theta : ndarray, shape (p,)
-        A, sigma, free coordinates of the centres, drift, and in a plane the ellipticity, as in
-        :class:`GaussianFit`.
-    """
+    """Return the model and its derivatives at given parameters."""
     free, elliptic = model.points.free, model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)

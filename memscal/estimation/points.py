@@ -33,18 +33,7 @@ CHANNELS = ("zz", *TANGENTIAL)
 
 
 def channel_order(channel: str) -> int:
-    """Order of a channel's Hankel transforms: zero of a scalar, one of a vector's component.
-
-    Raises
-    ------
-    InputError
-        If there is no such channel.
-
-    Examples
-    --------
-    >>> channel_order("zz"), channel_order("xz")
-    (0, 1)
-    """
+    """Order of a channel's Hankel transforms: zero of a scalar, one of a vector's component."""
     if channel not in CHANNELS:
         raise InputError(
             f"There is no channel {channel!r}.", cure=f"The channels are {', '.join(CHANNELS)}."
@@ -58,14 +47,7 @@ def channel_axis(channel: str) -> int:
 
 
 def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | None]:
-    """Return a channel's voltages and their stated standard uncertainty, in V.
-
-    Raises
-    ------
-    InputError
-        If the scan does not hold the channel, or cannot calibrate it: a raster, or a line across
-        the component that the channel measures.
-    """
+    """Return a channel's voltages and their stated standard uncertainty, in V."""
     if channel_order(channel) == 0:
         if scan.sensor.channel in TANGENTIAL:
             raise InputError(
@@ -110,46 +92,22 @@ MINIMUM_POSITIONS = 6
 
 @dataclass(frozen=True, eq=False)
 class ScanPoints:
-    """Every measured point of a scan, missing ones left out.
+    """Every measured point of a scan, missing ones left out."""
 
-    Parameters
-    ----------
-    x, y : ndarray, shape (n,)
-        Position of the indenter, in m; zero across a line scan.
-    u : ndarray, shape (n,)
-        Voltage of the channel, in V.
-    load : ndarray, shape (n,)
-        Load, in N.
-    u_errors : ndarray, shape (n,), or None
-        Stated standard uncertainty of each voltage, in V.
-    x_errors : ndarray, shape (n,)
-        Standard uncertainty of each position along the scan, in m.
-    repeat : ndarray of int, shape (n,)
-        Which repeat each point belongs to, counted through all scans.
-    scan : ndarray of int, shape (n,)
-        Which scan each point belongs to.
-    free : ndarray of bool, shape (scans, 2)
-        Along which of x and y each scan spreads: where its centre is to be found.
-    missing : int
-        How many points were missing.
-    decorrelation : ndarray, shape (n, n), or None
-        Takes noise of unit variance and the stated correlation to independent noise.
-    channel : str
-        ``"zz"``, or a tangential channel: ``"xz"`` or ``"yz"``.
-    """
-
-    x: FloatArray
+    x: FloatArray  # (n,): position of the indenter, in m; zero across a line scan
     y: FloatArray
-    u: FloatArray
-    load: FloatArray
-    u_errors: FloatArray | None
-    x_errors: FloatArray
-    repeat: NDArray[np.intp]
-    scan: NDArray[np.intp]
+    u: FloatArray  # (n,): voltage of the channel, in V
+    load: FloatArray  # (n,): load, in N
+    u_errors: FloatArray | None  # (n,): stated standard uncertainty of each voltage, in V
+    x_errors: FloatArray  # (n,): standard uncertainty of each position along the scan, in m
+    repeat: NDArray[np.intp]  # (n,): which repeat each point belongs to, counted through all scans
+    scan: NDArray[np.intp]  # (n,): which scan each point belongs to
+    #: (scans, 2): along which of x and y each scan spreads: where its centre is to be found.
     free: NDArray[np.bool_]
-    missing: int
+    missing: int  # how many points were missing
+    #: (n, n): takes noise of unit variance and the stated correlation to independent noise.
     decorrelation: FloatArray | None = None
-    channel: str = "zz"
+    channel: str = "zz"  # ``"zz"``, or a tangential channel: ``"xz"`` or ``"yz"``
 
     @property
     def order(self) -> int:
@@ -225,38 +183,14 @@ class ScanPoints:
         )
 
     def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:
-        """Scale rows by the root of their weights, and make their noise independent.
-
-        Parameters
-        ----------
-        values : ndarray, shape (n,) or (n, m)
-            Voltages, or columns of their derivatives.
-        weights : ndarray, shape (n,)
-            Inverse noise variances, up to a common factor.
-        """
+        """Scale rows by the root of their weights, and make their noise independent."""
         root = np.sqrt(weights)
         scaled = values * (root if values.ndim == 1 else root[:, None])
         return scaled if self.decorrelation is None else self.decorrelation @ scaled
 
 
 def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
-    """Flatten a scan to the measured points of one channel.
-
-    Parameters
-    ----------
-    scan : Scan
-        What was measured.
-    channel : str
-        ``"zz"``, ``"xz"`` or ``"yz"``.
-
-    Raises
-    ------
-    InputError
-        If no point was measured, a load is not positive, or the voltage does not change or
-        has the wrong sign; or if the scan cannot calibrate the channel.
-    FitError
-        If there are fewer positions than parameters.
-    """
+    """Flatten a scan to the measured points of one channel."""
     u, errors = channel_signal(scan, channel)
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
     x, y = scan.positions
@@ -297,13 +231,7 @@ def measured_mask(scan: Scan, channel: str = "zz") -> NDArray[np.bool_]:
 
 
 def joined_points(parts: Sequence[ScanPoints]) -> ScanPoints:
-    """Join the points of several scans.
-
-    Raises
-    ------
-    InputError
-        If some scans state their noise and others do not.
-    """
+    """Join the points of several scans."""
     if len(parts) == 1:
         return parts[0]
     if len({part.u_errors is None for part in parts}) > 1:

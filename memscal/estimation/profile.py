@@ -10,8 +10,12 @@ import numpy as np
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
-from memscal.estimation.bayesian import WeighedFit, weigh_departures
-from memscal.estimation.departures import DepartureBasis, departure_basis
+from memscal.estimation.bayesian import (
+    DepartureBasis,
+    WeighedFit,
+    departure_basis,
+    weigh_departures,
+)
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian
 from memscal.estimation.points import ScanPoints
@@ -40,28 +44,14 @@ class CentreError(FitError):
 
 @dataclass(frozen=True, eq=False)
 class ProfileEstimate:
-    """What the scan says, with its uncertainty, before any division.
+    """What the scan says, with its uncertainty, before any division."""
 
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    gaussian : GaussianFit
-        The best Gaussian in data space.
-    basis, weighed : DepartureBasis, WeighedFit
-        Kernels about it and their posterior.
-    weights : ndarray, shape (n,)
-        Relative weight of each point, the outliers' below one included.
-    outlier_weight : ndarray, shape (n,)
-        One for ordinary points; less for outliers.
-    """
-
-    model: ForwardModel
-    gaussian: GaussianFit
-    basis: DepartureBasis
+    model: ForwardModel  # points and reference
+    gaussian: GaussianFit  # the best Gaussian in data space
+    basis: DepartureBasis  # kernels about it and their posterior
     weighed: WeighedFit
-    weights: FloatArray
-    outlier_weight: FloatArray
+    weights: FloatArray  # (n,): relative weight of each point, the outliers' below one included
+    outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
 
     @property
     def points(self) -> ScanPoints:
@@ -193,26 +183,7 @@ class ProfileEstimate:
 
 
 def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> ProfileEstimate:
-    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers.
-
-    Parameters
-    ----------
-    points : ScanPoints
-        The measured points, of one scan or several.
-    *references : RadialSpectrum
-        Transform of the base stress per newton, for each scan; all on the same nodes.
-
-    Returns
-    -------
-    ProfileEstimate
-        The best Gaussian and the weighed departures from it.
-
-    Raises
-    ------
-    FitError
-        If the scan does not determine the parameters: no centre within it, or no signal that
-        stands clear of zero.
-    """
+    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
     model = ForwardModel(points, references)
     fit = fit_gaussian(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
@@ -317,22 +288,7 @@ class PosteriorProfile:
 def constrained_profile(
     estimate: ProfileEstimate, *, nonnegative: bool, monotone: bool
 ) -> PosteriorProfile:
-    """Return the most credible A G under constraints; without any, the posterior mean.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The posterior.
-    nonnegative : bool
-        Whether A G must not be negative.
-    monotone : bool
-        Whether A G must not rise with the radius, nor be negative.
-
-    Raises
-    ------
-    FitError
-        If no profile meets the constraints.
-    """
+    """Return the most credible A G under constraints; without any, the posterior mean."""
     if not (nonnegative or monotone):
         return PosteriorProfile(estimate, np.zeros_like(estimate.weighed.mean))
     width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)

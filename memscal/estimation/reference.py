@@ -38,13 +38,7 @@ _DECAYED = 1e-3
 
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
-    """Refuse scans that cannot be fitted together.
-
-    Raises
-    ------
-    InputError
-        If they contradict each other: other sensors, or one name for films that differ.
-    """
+    """Refuse scans that cannot be fitted together."""
     sensors = {(scan.sensor.name, scan.sensor.channel): None for scan in scans}
     if len(sensors) > 1:
         named = ", ".join(f"{name or 'unnamed'} ({channel})" for name, channel in sensors)
@@ -71,13 +65,7 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
 
 
 def require_calibration_rod(scan: Scan) -> None:
-    """Refuse an indenter that cannot calibrate.
-
-    Raises
-    ------
-    InputError
-        If the indenter is no rod, or is wider than the film is thick.
-    """
+    """Refuse an indenter that cannot calibrate."""
     if not isinstance(scan.indenter, Rod):
         raise InputError(
             f"The scan was made with a {scan.indenter.shape}, but a calibration needs a rod.",
@@ -128,23 +116,7 @@ def reference_spectra(
     parts: Sequence[ScanPoints],
     thicknesses: Sequence[float],
 ) -> tuple[RadialSpectrum, ...]:
-    """Transforms of the references per newton, on common nodes that serve every distance.
-
-    Parameters
-    ----------
-    references : sequence of StressProfile or Contact
-        The base stress of each scan.
-    parts : sequence of ScanPoints
-        Where each scan was measured.
-    thicknesses : sequence of float
-        Film thickness of each, in m: it bounds the wavenumbers that reach the base.
-
-    Raises
-    ------
-    InputError
-        If a table ends inside the scan before its stress has decayed, carries no force, or has no
-        shear where a tangential channel needs it.
-    """
+    """Transforms of the references per newton, on common nodes that serve every distance."""
     order = parts[0].order
     spans = [float(np.hypot(np.ptp(part.x), np.ptp(part.y))) for part in parts]
     # Fields are lifted to squares that reach one span from the centre, to their corners.
@@ -240,11 +212,6 @@ def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Fl
     The rod's solution is varied by centred differences (one-sided at nu = 1/2); for a reference
     from elsewhere, the relative change is taken over.  At a given load the base stress of a
     linear film does not depend on Young's modulus: its contribution is zero, and is stated.
-
-    Returns
-    -------
-    mapping of str to ndarray, shape of ``reference.values``
-        By source, for the sources whose uncertainty is stated.
     """
     film = scan.film
     changes: dict[str, FloatArray] = {}

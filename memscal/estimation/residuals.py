@@ -51,38 +51,18 @@ _CLIPPED = 4.0
 
 @dataclass(frozen=True, eq=False)
 class FreeModel:
-    """The scan's data and the linear model of every apparatus function it can tell apart.
+    """The scan's data and the linear model of every apparatus function it can tell apart."""
 
-    Parameters
-    ----------
-    data : ndarray, shape (m,)
-        What the best Gaussian leaves of the voltages, weighted: independent, and of unit variance
-        where the noise is stated.  Outliers are left out.
-    design : ndarray, shape (m, r)
-        Weighted derivatives by the parameters without prior and by the departures that count.
-        In this order: A, width, centres, baselines and drifts first.
-    kept : ndarray of int, shape (m,)
-        Which points of the scan they are.
-    stated : bool
-        Whether the noise is stated.
-    """
-
+    # (m,): weighted residuals of the best Gaussian, without outliers: independent, and of unit
+    # variance where the noise is stated.
     data: FloatArray
-    design: FloatArray
-    kept: NDArray[np.intp]
-    stated: bool
+    design: FloatArray  # (m, r): weighted columns of the flat parameters, then of the departures
+    kept: NDArray[np.intp]  # (m,): which points of the scan they are
+    stated: bool  # whether the noise is stated
 
 
 def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> FreeModel:
-    """Linearise the model about the best Gaussian, with every departure that can be seen.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-    clip_outliers : bool
-        Keep outliers, with residuals cut to four times their noise, in place of leaving them out.
-    """
+    """Linearise the model about the best Gaussian, with every departure that can be seen."""
     points, basis = estimate.points, estimate.basis
     ordinary = estimate.outlier_weight >= _OUTLIER
     weights, u = estimate.weights / estimate.outlier_weight, points.u
@@ -137,31 +117,14 @@ class TestOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """What no apparatus function explains, in the order of the scan.
+    """What no apparatus function explains, in the order of the scan."""
 
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Weighted residuals of all points but outliers; of unit variance, before the projection,
-        if the noise is as stated.
-    basis : ndarray, shape (n, r)
-        Orthonormal basis of what was projected out.
-    point : ndarray of int, shape (n,)
-        The point of the scan that each belongs to.
-    place : ndarray of int, shape (n,)
-        Its place along the scan, outliers counted.
-    sequence : ndarray of int, shape (n,)
-        Which pass over the sensor it belongs to: a repeat, or a row of a raster.
-    stated : bool
-        Whether the noise is stated.
-    """
-
-    values: FloatArray
-    basis: FloatArray
-    point: NDArray[np.intp]
-    place: NDArray[np.intp]
-    sequence: NDArray[np.intp]
-    stated: bool
+    values: FloatArray  # (n,): weighted; of unit variance before the projection, if as stated
+    basis: FloatArray  # (n, r): orthonormal basis of what was projected out
+    point: NDArray[np.intp]  # (n,): the point of the scan that each belongs to
+    place: NDArray[np.intp]  # (n,): its place along the scan, outliers counted
+    sequence: NDArray[np.intp]  # (n,): which pass over the sensor: a repeat, or a raster's row
+    stated: bool  # whether the noise is stated
 
     @property
     def degrees(self) -> int:
@@ -184,25 +147,7 @@ class Residuals:
 
 
 def residuals_of(estimate: ProfileEstimate) -> Residuals:
-    """Project a scan off everything that an apparatus function may do.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-
-    Returns
-    -------
-    Residuals
-        One for each point that is no outlier.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> residuals = residuals_of(memscal.calibrate(memscal.simulate()).solution.estimate)
-    >>> residuals.values.size, 50 < residuals.degrees < 60
-    (65, True)
-    """
+    """Project a scan off everything that an apparatus function may do."""
     model = free_model(estimate)
     place, sequence = _passes(estimate)
     order = np.argsort(place[model.kept])
@@ -228,11 +173,6 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
     :math:`s^2`; what the means took, of :math:`l` degrees, gives :math:`F(l, m)`.  That is exact
     also where the repeats lie only near each other (Christensen, Ann. Stat. 17, 1989): the design
     tells them apart.
-
-    Returns
-    -------
-    TestOutcome or None
-        ``None`` where no place was measured twice at one load.
     """
     model, points = free_model(estimate), estimate.points
     place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.kept]

@@ -14,14 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.calibration.fields import choose_grid
-from memscal.calibration.inputs import InputEffect, input_effects
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
-from memscal.calibration.uncertainty import Results, propagate
+from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Regulariser, create_regulariser
 from memscal.errors import FitError
 from memscal.estimation.band import find_band
-from memscal.estimation.bayesian import weigh_departures
-from memscal.estimation.departures import departure_basis
+from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points
@@ -185,7 +183,7 @@ class Design:
         return max(parts, key=lambda source: parts[source])
 
 
-def evaluate(plan: Plan, method: str | Regulariser = "evidence", seed: int = 0) -> Design:
+def evaluate(plan: Plan, method: str | Regulariser = "bayesian", seed: int = 0) -> Design:
     """Return what to expect of a plan.
 
     Parameters

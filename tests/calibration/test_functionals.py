@@ -10,7 +10,7 @@ from helpers.scans import RING, SIGMA
 
 from memscal import fit_gaussian, lift
 from memscal.axisymmetry.kernels import unit_gaussian
-from memscal.calibration.functionals import kernel_functionals
+from memscal.calibration.uncertainty import kernel_functionals
 from memscal.model.arrays import FloatArray
 
 R = np.linspace(0.0, 8e-3, 97)

@@ -14,8 +14,7 @@ from helpers.scans import CONVERSION, RING, SIGMA, TAILS, as_points, plane_error
 import memscal
 from memscal.calibration import fields as fields_room
 from memscal.calibration.fields import GridChoice
-from memscal.deconvolution.division import regulariser_names
-from memscal.deconvolution.windows import Tikhonov
+from memscal.deconvolution.division import Tikhonov, regulariser_names
 from memscal.errors import InputError
 from memscal.model.checks import QualityCheck
 

@@ -9,8 +9,13 @@ from hypothesis import strategies as st
 from scipy.special import expm1
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
-from memscal.deconvolution.division import DivisionProblem, filtered_division, image_division
-from memscal.deconvolution.windows import Tikhonov, WhiteNoise
+from memscal.deconvolution.division import (
+    DivisionProblem,
+    Tikhonov,
+    WhiteNoise,
+    filtered_division,
+    image_division,
+)
 from memscal.model.arrays import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -107,7 +107,7 @@ def test_a_plug_in_is_created_with_its_options_and_without_the_seed() -> None:
 @pytest.mark.usefixtures("plug_in")
 def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
     regulariser = create_regulariser("tikhonov")
-    assert type(regulariser).__module__ == "memscal.deconvolution.windows"
+    assert type(regulariser).__module__ == "memscal.deconvolution.division"
 
 
 @pytest.mark.usefixtures("plug_in")

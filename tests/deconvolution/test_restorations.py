@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from memscal.axisymmetry.grids import Lattice
-from memscal.deconvolution.division import DivisionProblem, Regulariser
+from memscal.deconvolution.division import DivisionProblem, Regulariser, Tikhonov
 from memscal.deconvolution.scikit_image import RichardsonLucy, UnsupervisedWiener, Wiener
-from memscal.deconvolution.windows import Tikhonov
 
 CLASSICAL = [Wiener(), UnsupervisedWiener(), RichardsonLucy()]
 

@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import chi2, gamma
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice
-from memscal.deconvolution.division import DivisionProblem
-from memscal.deconvolution.windows import WhiteNoise, WhiteNoiseDraw
+from memscal.deconvolution.division import DivisionProblem, WhiteNoise, WhiteNoiseDraw
 
 RARE = 1e-9
 """Probability with which a correct program would fail one of the random tests here."""

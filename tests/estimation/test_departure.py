@@ -7,7 +7,7 @@ import pytest
 from helpers.scans import CONVERSION, SIGMA, estimated, simulated
 
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.estimation.departures import SHAPES, Rings
+from memscal.estimation.bayesian import SHAPES, Rings
 
 NODES = Wavenumbers.covering(60e3, 12e-3)
 

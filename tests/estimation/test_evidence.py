@@ -35,7 +35,7 @@ def test_log_evidence_ratios_are_those_of_the_marginal_likelihood() -> None:
     null = q[:, basis.flat :]
     rest = null.T @ (root * (estimate.points.u - fit.predicted))
     voltages = model.signal(fit.geometry, basis.kernels(model.k)) * root[:, None]
-    from memscal.estimation.departures import SHAPES
+    from memscal.estimation.bayesian import SHAPES
 
     for i in (1, 5, len(HYPOTHESES) - 1):
         hypothesis = HYPOTHESES[i]
