@@ -103,16 +103,6 @@ def test_both_windows_are_the_formulas_that_they_state(amplitude: float, weakest
     np.testing.assert_allclose(white, -expm1(-z2 / s2), atol=1e-9)
 
 
-def test_tikhonov_leaves_half_where_white_noise_leaves_nearly_two_thirds() -> None:
-    # At |z| = s the windows are 1/2 and 1 - 1/e.
-    grid = EvenGrid(9, 0.5)
-    delta = np.zeros((9, 9))
-    delta[0, 0] = 1 / grid.cell_area
-    problem = DivisionProblem(grid, delta, delta, 1.0, 10.0)
-    np.testing.assert_allclose(Tikhonov().divide(problem).window, 0.5)
-    np.testing.assert_allclose(WhiteNoise().divide(problem).window, 1 - np.exp(-1))
-
-
 @given(seed=SEEDS)
 def test_the_window_of_an_image_is_what_is_left_of_each_component(seed: int) -> None:
     grid = small_lattice()
