@@ -48,5 +48,5 @@ def jobs() -> dict[str, Callable[[], object]]:
 @pytest.mark.parametrize("name", MOST_FILES)
 def test_a_job_runs_through_few_files(name: str, jobs: dict[str, Callable[[], object]]) -> None:
     files = files_called(jobs[name])
-    print(f"{name}: {len(files)} files", *files, sep="\n  ")
+    sys.stdout.write("\n  ".join([f"{name}: {len(files)} files", *files, ""]))
     assert len(files) <= MOST_FILES[name]

@@ -154,20 +154,18 @@ def _symmetry(estimate: ProfileEstimate) -> list[QualityCheck]:
             "is only a mean over directions: use the field."
         )
         return [_added("axisymmetry", uneven, meaning)]
-    odd = symmetry_test(estimate)
+    extra = symmetry_test(estimate)
+    parity, failure = "odd", ": a tilted rod, an uneven film, or a drifting load"
     if estimate.model.order:
-        meaning = (
-            f"Fall of chi-square by {odd.count} even columns, which then make up {odd.size:.2%} of "
-            "the largest signal. A failure means that the left and right halves differ by more "
-            "than their sign: cross-talk of the normal stress, a tilted rod, or an uneven film."
-        )
-        return [_added("symmetry", odd, meaning)]
+        parity = "even"
+        failure = " by more than their sign: cross-talk of the normal stress, a tilted rod, or an "
+        failure += "uneven film"
     meaning = (
-        f"Fall of chi-square by {odd.count} odd columns, which then make up {odd.size:.2%} of the "
-        "largest signal. A failure means that the left and right halves differ: a tilted rod, an "
-        "uneven film, or a drifting load."
+        f"Fall of chi-square by {extra.count} {parity} columns, which then make up "
+        f"{extra.size:.2%} of the largest signal. A failure means that the left and right halves "
+        f"differ{failure}."
     )
-    return [_added("symmetry", odd, meaning)]
+    return [_added("symmetry", extra, meaning)]
 
 
 def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:

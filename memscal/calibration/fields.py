@@ -1,16 +1,16 @@
-"""The two fields of the paper's Eq. (1): lifted from profiles, or measured as a raster."""
+"""Fields of voltage and stress (the paper's Eq. 1): lifted from profiles, or a raster's own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice, cut, on_grid
+from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
 from memscal.deconvolution.division import NOISE_RATIO, KernelProfile
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
@@ -53,46 +53,6 @@ class GridChoice:
             "extent": f"{self.extent * 1e3:.4g} mm: the whole length of the scan, about twice the "
             "support, so that nothing wraps around into it",
         }
-
-
-class Fields(Protocol):
-    """Both fields on one grid, with the ways back from the grid."""
-
-    @property
-    def grid(self) -> FieldGrid:
-        """The grid."""
-        ...
-
-    @property
-    def voltage(self) -> Field:
-        """Voltage per newton, in V/N."""
-        ...
-
-    @property
-    def stress(self) -> Field:
-        """Base stress per newton, in 1/m^2."""
-        ...
-
-    @property
-    def confinement(self) -> FloatArray:
-        """Taper on the grid that confines a kernel to its support."""
-        ...
-
-    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """A radial function about a kernel's zero, on the grid."""
-        ...
-
-    def at_points(self, field: FloatArray) -> FloatArray:
-        """Values of a field at the measured points."""
-        ...
-
-    def on_support(self, kernel: FloatArray, profile: KernelProfile | None) -> Field:
-        """A kernel on its support; from its profile, where that is known."""
-        ...
-
-    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Wavenumbers along one axis and a spectral quantity there."""
-        ...
 
 
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
@@ -154,9 +114,9 @@ class LineFields:
         grid = EvenGrid(cells + 1, choice.spacing)
         step = choice.spacing / 2
         # Both at once: they share the Bessel functions of their transforms.
-        known = estimate.model.reference
-        spectra = np.stack([estimate.spectrum.scalar.values, known.scalar.values], axis=1)
-        wavenumbers = known.wavenumbers
+        reference = estimate.model.reference
+        spectra = np.stack([estimate.spectrum.scalar.values, reference.scalar.values], axis=1)
+        wavenumbers = reference.wavenumbers
         both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
         support = round(choice.support / choice.spacing)
@@ -283,6 +243,10 @@ class RasterFields:
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""
         return self.grid.wavenumber[0], spectral[0]
+
+
+Fields: TypeAlias = LineFields | RasterFields
+"""Voltage and stress on one grid, with the ways back from the grid."""
 
 
 def _about_zero(axis: FloatArray) -> FloatArray:

@@ -186,14 +186,14 @@ def _of_positions(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str,
     if not shares.any():
         return {}
     slope = estimate.model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
-    wrong = slope * estimate.distance * shares[estimate.points.scan]
-    return {"position_scale": InputEffect(-wrong)}
+    error = slope * estimate.distance * shares[estimate.points.scan]
+    return {"position_scale": InputEffect(-error)}
 
 
 def _of_loads(
     scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], estimate: ProfileEstimate
 ) -> dict[str, InputEffect]:
-    """What is wrong by a factor: loads, forces of references, and their discretisation."""
+    """Effects of factors: loads, forces of references, and their discretisation."""
     model = estimate.model
     signal = estimate.predicted - estimate.background
     shares: dict[str, Sequence[float | None]] = {
@@ -211,9 +211,9 @@ def _of_loads(
     for source, stated in shares.items():
         if all(share is None for share in stated):
             continue
-        each = np.array([share or 0.0 for share in stated])
-        common = float(each.mean())
-        apart = (each - common)[estimate.points.scan]
+        of_scans = np.array([share or 0.0 for share in stated])
+        common = float(of_scans.mean())
+        apart = (of_scans - common)[estimate.points.scan]
         effects[source] = InputEffect(-apart * signal, -common)
     return effects
 
@@ -253,30 +253,26 @@ class Results:
     """Everything a calibration states with an uncertainty."""
 
     parameters: ParameterSet  # scalars with their joint covariance
-    #: Standard uncertainty of each budgeted parameter by source, in its SI unit.
-    budget: Mapping[str, Mapping[str, float]]
+    budget: Mapping[str, Mapping[str, float]]  # standard uncertainties by parameter and source
     radial_covariance: FloatArray  # (n, n): covariance of G(r), in 1/m^4
     cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
-    #: (n,): standard uncertainty by what scatters of G(r) as it is given back, in 1/m^2.
-    radial_scatter: FloatArray
+    radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
     """Derivatives of all results by (w, f), and what the window hides of each.
 
-    The results are the parameters, ``names`` with ``values``, then G at its radii, then the
-    transfer function at its wavenumbers: the rows of ``matrix`` and ``hidden``.  ``opened`` are the
-    rows of G as it is given back, through the window.
+    Rows are the parameters, then G at its radii, then the transfer function at its wavenumbers.
     """
 
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the parameters
     values: FloatArray
     radii: int
     matrix: FloatArray
     hidden: FloatArray
-    opened: FloatArray
+    opened: FloatArray  # rows of G as it is stored, through the window
 
     @property
     def stored(self) -> int:
@@ -293,7 +289,11 @@ def propagate(
     correlations: Mapping[tuple[str, str], float],
     raster: FieldNoise | None = None,
 ) -> Results:
-    """Propagate all stated uncertainties to the results."""
+    """Propagate all stated uncertainties to the results.
+
+    ``window``: the regularisation's, at the quadrature nodes; ``wavenumbers``: where the transfer
+    function is stated, in rad/m.
+    """
     rows = _rows(estimate, deconvolution, window, wavenumbers)
     random, fixed = _noise_roots(estimate)
     columns = {
@@ -333,12 +333,12 @@ def _budget(
 ) -> dict[str, float]:
     """Contribution of each source; of correlations with the sign of what they add."""
     row = rows.names.index(name)
-    parts = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
+    budget = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
     variance = float(covariance[row, row])
-    excess = variance - sum(part**2 for part in parts.values())
+    excess = variance - sum(u**2 for u in budget.values())
     if abs(excess) > _ROUNDING * variance:
-        parts["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))
-    return parts
+        budget["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))
+    return budget
 
 
 def _input_column(rows: _Rows, estimate: ProfileEstimate, effect: InputEffect) -> FloatArray:
@@ -408,8 +408,8 @@ def _scalar_rows(
         ("conversion_constant_gaussian", gaussian.conversion_constant, _unit(fitted, 0), count),
     ]
     rows = np.zeros((len(entries), count + fitted))
-    for row, (_, _, part, first) in zip(rows, entries, strict=True):
-        row[first : first + part.size] = part
+    for row, (_, _, derivative, first) in zip(rows, entries, strict=True):
+        row[first : first + derivative.size] = derivative
     return rows, tuple(e[0] for e in entries), np.array([e[1] for e in entries])
 
 
@@ -471,9 +471,9 @@ def _noise_roots(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray]:
 
     A Gaussian fit has no prior: all of its error scatters.
     """
-    own, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
+    covariance, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
     fitted = estimate.gaussian_gain @ estimate.noise_root
-    fixed = _root(own - random @ random.T, np.sqrt(np.maximum(np.diag(own), 0.0)))
+    fixed = _root(covariance - random @ random.T, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
     return np.vstack([random, fitted]), np.pad(fixed, ((0, fitted.shape[0]), (0, 0)))
 
 

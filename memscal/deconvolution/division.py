@@ -56,11 +56,9 @@ class KernelProfile(Protocol):
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values at radii (m)."""
-        ...
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Transform at wavenumbers (rad/m)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +112,6 @@ class Regulariser(Protocol):
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide the voltage field by the stress field."""
-        ...
 
 
 def require_amplitude(method: str, amplitude: Any) -> None:

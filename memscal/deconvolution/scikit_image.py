@@ -1,4 +1,4 @@
-"""The classical restorations of scikit-image, behind the same protocol."""
+"""Classical restorations of images by scikit-image, as methods of division."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["RichardsonLucy", "UnsupervisedWiener", "Wiener"]
 
 @dataclass(frozen=True, eq=False)
 class _Images:
-    """Both fields as scikit-image wants them: of order one, the point spread of sum one."""
+    """Both fields as images of order one, the point spread function of sum one."""
 
     image: FloatArray
     point_spread: FloatArray
@@ -43,9 +43,7 @@ class _Images:
 class Wiener:
     """Wiener-Hunt restoration: the quotient with a Laplacian penalty."""
 
-    #: The penalty equals the square of a tenth of the weakest relevant component there; this factor
-    #: scales that amplitude.
-    amplitude: float = 1.0
+    amplitude: float = 1.0  # root of the penalty over a tenth of the weakest relevant component
     name: ClassVar[str] = "wiener"
     assumes: ClassVar[str] = "G is smooth; the noise of the lifted field is white."
     fails: ClassVar[str] = (

@@ -1,18 +1,17 @@
-r"""Up to which wavenumber the scan determines the apparatus function.
+r"""The band of wavenumbers in which the scan determines the apparatus function.
 
-It is resolved while the posterior standard uncertainty of its transfer function stays below a
+G is resolved while the posterior standard uncertainty of its transfer function stays below a
 third of the fitted Gaussian's transfer function,
 
 .. math::
 
     u[\hat G(k)] < \tfrac13\,e^{-\sigma^2k^2/2}.
 
-The Gaussian's has no zeros, unlike a ring's or a disc's own, and no lobes that a prior could have
-made up: where it has fallen below three times the uncertainty, a shape fitted to smaller
-wavenumbers says more about G than the scan does.
+The Gaussian's has no zeros and no lobes, unlike that of a ring or a disc: where it has fallen
+below three times the uncertainty, G is determined by the prior.
 
-Which components are relevant to a division of fields is told by the voltage itself.  The measured
-points are rings: the transform of the voltage at :math:`k` is a sum
+Components are relevant to a division of fields while the voltage stands above its noise.  The
+measured points are rings: the transform of the voltage at :math:`k` is a sum
 :math:`\sum_i a_i u_i J_0(kR_i)` with ring areas :math:`a_i` (of a tangential channel with
 :math:`J_1`), and its noise is the same sum in quadrature.  Points whose signal is lost in noise
 carry the profile's tail instead, and count as :math:`u_i^2/(u_i^2 + s_i^2)`.
@@ -72,8 +71,8 @@ def find_band(estimate: ProfileEstimate) -> Band:
 def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
     r"""Posterior standard uncertainty of the transfer function at the quadrature nodes.
 
-    That of :math:`\hat G(k) = \hat K(k)/\hat K(0)` for the posterior of :math:`K = A\,G`: the
-    noise and what the prior allows; the uncertainty of the reference is not part of it.
+    That of :math:`\hat K(k)/\hat K(0)` for the posterior of :math:`K = A\,G`; without the
+    uncertainty of the reference.
     """
     basis, a = estimate.basis, estimate.conversion_constant
     rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a

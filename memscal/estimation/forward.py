@@ -35,15 +35,11 @@ __all__ = ["ForwardModel", "Geometry", "elliptic_columns", "elliptic_departure"]
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Distances of the points from a trial centre, and Bessel functions there.
+    """Distances of the points from a trial centre, and Bessel functions there."""
 
-    ``radius`` (n,) in m; ``towards`` (2, n): derivatives of the radius by the centre's x
-    and y; ``bessel0`` and ``bessel1`` (n, nodes).
-    """
-
-    radius: FloatArray
-    towards: FloatArray
-    bessel0: FloatArray
+    radius: FloatArray  # (n,), in m
+    towards: FloatArray  # (2, n): derivatives of the radius by the centre's x and y
+    bessel0: FloatArray  # (n, nodes)
     bessel1: FloatArray
 
 
@@ -51,9 +47,8 @@ class Geometry:
 class ForwardModel:
     """Voltages at the points of a scan, for kernels given by their transforms."""
 
-    points: ScanPoints  # where and at what load, in one scan or several
-    #: Transform of the base stress per newton, dimensionless, for each scan; on the same nodes, and
-    #: of the order of the points' channel.
+    points: ScanPoints
+    # Transform of the base stress per newton for each scan, on the same nodes.
     references: tuple[RadialSpectrum, ...]
 
     @property
@@ -139,8 +134,7 @@ class ForwardModel:
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         r"""Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m.
 
-        A vector's component :math:`f\cos\theta` turns as well as it changes: by
-        :math:`f/R` across the way to the indenter.
+        A vector's component :math:`f\cos\theta` changes by :math:`f/R` across its direction, too.
         """
         if self.order == 0:
             return np.asarray(geometry.towards * self.radial_derivative(geometry, kernel))
@@ -195,6 +189,7 @@ def _unit_range(positions: FloatArray) -> FloatArray:
     return np.asarray((positions - middle) / (np.ptp(positions) / 2))
 
 
+#: An ellipse's response is a sum of so many harmonics, its derivatives are by centred differences.
 _HARMONICS = 5
 _LARGEST = 0.95
 _STEP = 1e-4
@@ -246,8 +241,9 @@ def _response(
     total = np.zeros_like(geometry.radius)
     for m, bessel in enumerate(harmonics):
         kernel = ive(m, half * e) * np.exp(-half * (1 - e))
-        part = model.signal(Geometry(geometry.radius, geometry.towards, bessel, bessel), kernel)
-        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * part
+        around = Geometry(geometry.radius, geometry.towards, bessel, bessel)
+        signal = model.signal(around, kernel)
+        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * signal
     return total
 
 
@@ -256,8 +252,7 @@ def _bessel(
 ) -> list[FloatArray]:
     """Bessel functions of even order, by recurrence upwards from orders zero and one.
 
-    Where the argument is small the recurrence loses digits and the function is nothing: its
-    power series' first term decides.
+    At small arguments, where the recurrence loses digits, the power series' first term is used.
     """
     # Repeats share their positions.
     unique, first, back = np.unique(radius, return_index=True, return_inverse=True)

@@ -43,7 +43,11 @@ Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 def gauss_newton(
     linearise: Linearised, start: FloatArray, *, tolerance: float, knee: float = np.inf
 ) -> FloatArray | None:
-    """Minimise the loss of the residuals of a model that is nearly linear about the start."""
+    """Minimise the loss of the residuals, shape (n,), of a model that is nearly linear.
+
+    Parameters are scaled to numbers near one.  From the residual ``knee`` on, the loss is linear.
+    ``None`` if the steps do not settle downhill: a search with a trust region is then needed.
+    """
     place: FloatArray = start
     step: FloatArray = np.zeros_like(start)
     cost, halvings = np.inf, 0
@@ -51,8 +55,8 @@ def gauss_newton(
         residual, slope = linearise(place)
         stretch = np.sqrt(1 + (residual / knee) ** 2)
         # The loss, in a form without cancellation where the knee is far away.
-        found = float(np.sum(2 * residual**2 / (1 + stretch)))
-        if not found <= cost * (1 + _ROUNDING):
+        loss = float(np.sum(2 * residual**2 / (1 + stretch)))
+        if not loss <= cost * (1 + _ROUNDING):
             halvings += 1
             if halvings > _MOST_HALVINGS:
                 return None
@@ -63,7 +67,7 @@ def gauss_newton(
         whole = np.linalg.lstsq(slope * root[:, None], -residual * root, rcond=None)[0]
         longest = float(np.abs(whole).max())
         step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
-        place, cost = place + step, found
+        place, cost = place + step, loss
         if longest < tolerance:
             return np.asarray(place)
     return None
@@ -74,11 +78,12 @@ _CLEARLY = 0.7
 
 
 def require_parity(
-    points: ScanPoints,
-    odd: tuple[FloatArray, FloatArray],
-    even: tuple[FloatArray, FloatArray],
+    points: ScanPoints, odd: tuple[FloatArray, FloatArray], even: tuple[FloatArray, FloatArray]
 ) -> None:
-    """Refuse a voltage that a shear of the other sign, or an even signal, meets far better."""
+    """Refuse a voltage that a shear of the other sign, or an even signal, fits far better.
+
+    ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
+    """
     amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
     turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
@@ -107,19 +112,19 @@ _STARTING_WIDTHS = (0.1, 0.3, 0.8)
 
 
 def robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Start each scan by itself, and A and the width at the medians of all."""
+    """Parameters to start from: each scan's own, but A and the width at the medians of all."""
     points = model.points
-    parts = [
-        _robust_start_of_one(model.only(i), weights[points.scan == i]) for i in range(points.scans)
+    starts = [
+        _robust_start_of_scan(model.only(i), weights[points.scan == i]) for i in range(points.scans)
     ]
-    shape = np.median([part[:2] for part in parts], axis=0)
+    shape = np.median([start[:2] for start in starts], axis=0)
     free = points.free.sum(axis=1)
-    centres = [part[2 : 2 + n] for part, n in zip(parts, free, strict=True)]
-    drifts = [part[2 + n : 3 + 2 * n] for part, n in zip(parts, free, strict=True)]
+    centres = [start[2 : 2 + n] for start, n in zip(starts, free, strict=True)]
+    drifts = [start[2 + n : 3 + 2 * n] for start, n in zip(starts, free, strict=True)]
     return np.concatenate([shape, *centres, *drifts, np.zeros(points.ellipse)])
 
 
-def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray:
+def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Best of a grid of centres and widths, by the sum of absolute residuals.
 
     A single outlier can be the largest voltage of a scan: positions are tried, not read off.
@@ -153,7 +158,7 @@ def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray
     if model.order:
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
-        even = [np.interp(distances, radii, each) * (points.load * root) for each in potentials]
+        even = [np.interp(distances, radii, table) * (points.load * root) for table in potentials]
         require_parity(
             points,
             _amplitudes(np.concatenate(odd), data, drift),
@@ -203,9 +208,9 @@ def smoothing_length(model: ForwardModel) -> float:
 def undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
     """Return the error for a scan that no Gaussian fits."""
     stopped = conversion_constant is not None
-    found = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
+    end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
     return FitError(
-        f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{found}.",
+        f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{end}.",
         why="The voltage does not rise and fall with the distance from one centre.",
         cure="Look at the scan; check its channel, its positions and that it crosses the sensor.",
     )
@@ -253,7 +258,7 @@ class GaussianFit:
 def fit_gaussian(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
 ) -> GaussianFit:
-    """Fit a Gaussian apparatus function to the scan."""
+    """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     if start is None:
         return _solve(model, weights, robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
@@ -270,7 +275,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     last: dict[bytes, GaussianFit] = {}
 
     def evaluate(scaled: FloatArray) -> GaussianFit:
-        # Residuals and Jacobian are asked for at the same point, one after the other.
+        # The solvers evaluate residuals and Jacobian one after the other, at the same point.
         key = scaled.tobytes()
         if key not in last:
             last.clear()
@@ -289,14 +294,14 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
 
     # A robust fit is only where the next one starts.
     knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
-    found = gauss_newton(
+    solution = gauss_newton(
         lambda scaled: (residual(scaled), slope(scaled)),
         start / scale,
         tolerance=tolerance,
         knee=knee,
     )
     # At a width of zero every slope by the width is zero: steps do not leave it.
-    if found is None or found[1] < _NARROWEST:
+    if solution is None or solution[1] < _NARROWEST:
         result = least_squares(
             residual,
             start / scale,
@@ -310,8 +315,8 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
         )
         if not result.success:
             raise undetermined(model, linearise(model, result.x * scale).conversion_constant)
-        found = np.asarray(result.x)
-    fit = linearise(model, found * scale)
+        solution = np.asarray(result.x)
+    fit = linearise(model, solution * scale)
     if not 0 < fit.conversion_constant < np.inf:
         raise undetermined(model, fit.conversion_constant)
     return _positive_width(fit)
@@ -328,7 +333,7 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
 
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
-    """Return the model and its derivatives at given parameters."""
+    """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
     free, elliptic = model.points.free, model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)

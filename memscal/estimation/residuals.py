@@ -1,7 +1,7 @@
-r"""What no apparatus function explains: independent residuals of a scan, and tests of them.
+r"""Residuals of a scan that do not depend on the apparatus function, and tests of them.
 
-The residuals of a fit that weighs smooth departures against noise have no exact distribution.
-These have one.  Weighted data :math:`z` are projected off a design :math:`X = QR` of all that an
+The residuals of a fit with a prior for departures have no exact distribution.  These have one.
+Weighted data :math:`z` are projected off a design :math:`X = QR` of all that an
 apparatus function may do to first order: conversion constant, width, centre, baseline, drift,
 and every combination of departures that stands above a share of the noise.  What is left,
 :math:`(1 - QQ^T)z`, does not depend on G.  With as many points :math:`o` dropped as there are
@@ -37,12 +37,13 @@ __all__ = [
     "chi_square_test",
     "free_model",
     "neighbour_correlation_test",
+    "orthonormal",
     "pure_error_test",
     "residuals_of",
     "runs_test",
 ]
 
-#: A departure of the expected size that moves no voltage by more of its noise is left as noise.
+#: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
 #: A point of less weight is an outlier and is left out.
 _OUTLIER = 0.5
@@ -51,7 +52,7 @@ _CLIPPED = 4.0
 
 @dataclass(frozen=True, eq=False)
 class FreeModel:
-    """The scan's data and the linear model of every apparatus function it can tell apart."""
+    """The scan's data and the linear model of every apparatus function that it can resolve."""
 
     # (m,): weighted residuals of the best Gaussian, without outliers: independent, and of unit
     # variance where the noise is stated.
@@ -62,7 +63,10 @@ class FreeModel:
 
 
 def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> FreeModel:
-    """Linearise the model about the best Gaussian, with every departure that can be seen."""
+    """Linearise the model about the best Gaussian, with every departure that can be resolved.
+
+    ``clip_outliers`` keeps outliers, with residuals cut to four times their noise.
+    """
     points, basis = estimate.points, estimate.basis
     ordinary = estimate.outlier_weight >= _OUTLIER
     weights, u = estimate.weights / estimate.outlier_weight, points.u
@@ -84,10 +88,10 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None
     noise = 1.0 if stated else estimate.noise_scale
-    seen = singular > _SHARE_OF_NOISE * noise
+    resolved = singular > _SHARE_OF_NOISE * noise
     return FreeModel(
         data=standardised(u - estimate.gaussian.predicted),
-        design=np.hstack([flat, left[:, seen] * singular[seen]]),
+        design=np.hstack([flat, left[:, resolved] * singular[resolved]]),
         kept=kept,
         stated=stated,
     )
@@ -107,7 +111,7 @@ FEWEST_RESIDUALS = 3
 class TestOutcome:
     """A test's value, what it exceeds by chance once in a thousand, and its p-value."""
 
-    #: Not a test case, whatever pytest makes of the name.
+    #: Not a test case of pytest.
     __test__ = False
 
     value: float
@@ -117,7 +121,7 @@ class TestOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """What no apparatus function explains, in the order of the scan."""
+    """Residuals after projection, in the order of the scan."""
 
     values: FloatArray  # (n,): weighted; of unit variance before the projection, if as stated
     basis: FloatArray  # (n, r): orthonormal basis of what was projected out
@@ -147,12 +151,12 @@ class Residuals:
 
 
 def residuals_of(estimate: ProfileEstimate) -> Residuals:
-    """Project a scan off everything that an apparatus function may do."""
+    """Project a scan off all voltages that an apparatus function can make."""
     model = free_model(estimate)
     place, sequence = _passes(estimate)
     order = np.argsort(place[model.kept])
     point = model.kept[order]
-    basis, data = _orthonormal(model.design[order]), model.data[order]
+    basis, data = orthonormal(model.design[order]), model.data[order]
     left_over = data - basis @ (basis.T @ data)
     return Residuals(left_over, basis, point, place[point], sequence[point], model.stated)
 
@@ -183,13 +187,13 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
     square = np.bincount(group, weight**2)
 
     def within(columns: FloatArray) -> FloatArray:
-        """Take from each column its weighted mean at each place."""
+        """Subtract from each column its weighted mean at each place."""
         mean = (
             np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1) / square[:, None]
         )
         return np.asarray(columns - weight[:, None] * mean[group])
 
-    basis = _orthonormal(model.design)
+    basis = orthonormal(model.design)
     left_over = model.data - basis @ (basis.T @ model.data)
     near, singular, _ = np.linalg.svd(within(basis), full_matrices=False)
     near = near[:, singular > _APART]
@@ -265,8 +269,8 @@ def _neighbours(residuals: Residuals) -> csr_array:
         rows.append(first)
         columns.append(first + apart)
         weights.append(0.5 * _DECAY ** (place[first + apart] - place[first]))
-    found = (np.concatenate([np.zeros(0), *weights]), (np.hstack(rows), np.hstack(columns)))
-    pairs = coo_array(found, shape=(n, n))
+    entries = (np.concatenate([np.zeros(0), *weights]), (np.hstack(rows), np.hstack(columns)))
+    pairs = coo_array(entries, shape=(n, n))
     # Assembled once: every sum of sparse matrices costs more than all of their entries.
     return (pairs + pairs.T).tocsr()
 
@@ -287,9 +291,10 @@ def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
     return float(first), float(second), float(third)
 
 
-def _orthonormal(design: FloatArray) -> FloatArray:
-    """Orthonormal basis of the columns' span; columns scaled first, none counted twice."""
-    scaled = design / np.linalg.norm(design, axis=0)
+def orthonormal(design: FloatArray) -> FloatArray:
+    """Orthonormal basis of the columns' span; they are scaled first, and zeros are skipped."""
+    size = np.linalg.norm(design, axis=0)
+    scaled = design[:, size > 0] / size[size > 0]
     left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
     return np.asarray(left[:, singular > 1e-10 * singular[0]])
 

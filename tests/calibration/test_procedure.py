@@ -248,7 +248,6 @@ def test_the_result_is_the_same_however_often_and_whatever_the_global_random_sta
     [
         ({"reference": {1: 2}}, "The reference is a dict"),
         ({"reference": [None, None]}, "2 references were given, but there is one scan"),
-        ({"scan": "scan.h5"}, "read_scan"),
         ({"method": 3}, "cannot divide"),
         ({"method": Tikhonov}, "that is set up"),
         ({"amplitude": "abc"}, "must be a positive number"),
@@ -260,7 +259,7 @@ def test_the_result_is_the_same_however_often_and_whatever_the_global_random_sta
 )
 def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        memscal.calibrate(**({"scan": simulated()} | arguments))
+        memscal.calibrate(simulated(), **arguments)
 
 
 def test_positions_in_the_wrong_unit_fail_a_check() -> None:
