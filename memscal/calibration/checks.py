@@ -83,7 +83,7 @@ def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
 
 
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
-    """Compare what no G explains with the noise, if there is a noise to compare with."""
+    """Compare what no G explains with the stated noise, or with the scatter of repeats."""
     degrees = residuals.degrees
     if residuals.stated:
         outcome = chi_square_test(residuals)
@@ -384,7 +384,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
 
 
 def _chi_square(name: str, misfit: Misfit, meaning: str, *, exact: bool = False) -> QualityCheck:
-    """Check a misfit; its p-value is known where the noise is, for a plain fit."""
+    """Check a misfit; ``exact``: its p-value is that of chi-square."""
     limit = chi_square_limit(misfit.degrees) / misfit.degrees
     p_value = float(chdtrc(misfit.degrees, misfit.chi2_reduced * misfit.degrees))
     return check(name, misfit.chi2_reduced, limit, meaning, p_value if exact else None)

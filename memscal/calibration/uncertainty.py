@@ -158,7 +158,7 @@ def input_effects(
                 blank = [np.zeros_like(change) for _ in scans]
                 changes.setdefault(source + suffix, blank)[i] = change
     for i, stress in enumerate(stresses):
-        # What is stated of the normal stress says nothing of the shear.
+        # Stated errors are those of the normal stress, not of the shear.
         if model.order or not isinstance(stress, StressProfile):
             continue
         if stress.sigma_zz_errors is not None:

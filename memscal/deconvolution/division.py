@@ -1,6 +1,6 @@
 r"""Methods of division, for the paper's :math:`A\hat G = \hat U_{zz}/\hat\sigma_{zz}` (Eq. 2).
 
-Both transforms vanish at large wavenumbers, and a method says what their quotient is there: by a
+Both transforms vanish at large wavenumbers, and methods differ in their quotient there: by a
 window on the spectra (the paper's white noise, Tikhonov's), by the restoration of an image
 (:mod:`memscal.deconvolution.scikit_image`), or by Bayesian model averaging in data space, which
 divides nothing.  Other packages add methods under an entry point.
@@ -52,7 +52,7 @@ _CLOSED = 1e-9
 
 
 class KernelProfile(Protocol):
-    """A radial kernel, known on both sides of the Hankel transform."""
+    """A radial kernel, in closed form on both sides of the Hankel transform."""
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values at radii (m)."""
@@ -331,7 +331,7 @@ def _factory(name: str) -> Any:
     try:
         return points[0].load()
     except Exception as error:
-        # Whatever another package's import raises, the user needs to know which package it is.
+        # Whatever another package's import raises, the message names the package.
         raise InputError(
             f"The method {name}, {points[0].value}, could not be loaded: {error}.",
             cure="Repair or remove the package that provides it.",

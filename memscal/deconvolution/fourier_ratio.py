@@ -270,8 +270,8 @@ def normalise(quotient: Field) -> tuple[float, Field]:
 def fit_gaussian(g: Field, start: float | None = None) -> float:
     r"""Width of the Gaussian of unit integral nearest to G over the plane: the paper's fit.
 
-    Minimises :math:`\int (G - e^{-r^2/2\sigma^2}/2\pi\sigma^2)^2\, r\,dr`.  No width below half a
-    step of the radial grid is told apart from a point.
+    Minimises :math:`\int (G - e^{-r^2/2\sigma^2}/2\pi\sigma^2)^2\, r\,dr`.  A width below half a
+    step of the radial grid is not resolved.
 
     Parameters
     ----------

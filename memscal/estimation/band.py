@@ -38,7 +38,7 @@ RESOLVED = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Signal and noise of the voltage's transform, and how far G is known."""
+    """Signal and noise of the voltage's transform, and the relevant and resolved wavenumbers."""
 
     k: FloatArray  # (n,): wavenumbers, in rad/m
     signal: FloatArray  # (n,): modulus of the voltage's transform and its noise, in V m^2 / N

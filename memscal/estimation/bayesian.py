@@ -394,27 +394,27 @@ def _average(
     prior = np.array([h.estimate for h in HYPOTHESES])
     estimate = _posterior(log_marginal, prior)
     uncertainty = _posterior(log_marginal, np.array([h.uncertainty for h in HYPOTHESES]))
-    gains = {
-        i: _gain(linear, conditional, count)
-        for i, conditional in enumerate(conditionals)
-        if estimate[i] > 0 or uncertainty[i] > 0
-    }
     gain = np.zeros((count, linear.data.size))
-    for i, of_hypothesis in gains.items():
-        gain += estimate[i] * of_hypothesis
+    for p, conditional in zip(estimate, conditionals, strict=True):
+        if p > 0:
+            _add_gain(gain, linear, conditional, p)
     mean = gain @ linear.data
     # The data move the probabilities, too: d(p m) = (m - mean) p d(log marginal likelihood).
     moving, covariance = np.zeros_like(gain), np.zeros((count, count))
-    for i, of_hypothesis in gains.items():
+    for p, q, conditional in zip(estimate, uncertainty, conditionals, strict=True):
+        if p == 0 and q == 0:
+            continue
+        of_hypothesis = np.zeros_like(gain)
+        _add_gain(of_hypothesis, linear, conditional, 1.0)
         off = of_hypothesis @ linear.data - mean
-        if estimate[i] > 0:
-            moving += estimate[i] * np.outer(off, conditionals[i].slope)
-        if uncertainty[i] > 0:
-            covariance += uncertainty[i] * np.outer(off, off)
+        if p > 0:
+            moving += p * np.outer(off, conditional.slope)
+        if q > 0:
+            covariance += q * np.outer(off, off)
             if linear.added:
                 apart = of_hypothesis - gain
-                covariance += uncertainty[i] * linear.added * (apart @ apart.T)
-            _add_covariance(covariance, linear, conditionals[i], uncertainty[i], least_variance)
+                covariance += q * linear.added * (apart @ apart.T)
+            _add_covariance(covariance, linear, conditional, q, least_variance)
     variance = np.array([c.variance for c in conditionals])
     possible = prior > 0
     return WeighedFit(
@@ -437,17 +437,17 @@ def _posterior(log_marginal: FloatArray, prior: FloatArray) -> FloatArray:
     return np.asarray(weight / weight.sum())
 
 
-def _gain(linear: _LinearModel, conditional: _Conditional, count: int) -> FloatArray:
-    """Derivative of the posterior mean given a hypothesis by the weighted data, shape (p, n)."""
-    fitted = linear.least_squares
-    gain = np.zeros((count, linear.data.size))
-    gain[: len(fitted)] = fitted
-    design = conditional.design
+def _add_gain(
+    gain: FloatArray, linear: _LinearModel, conditional: _Conditional, share: float
+) -> None:
+    """Add the derivative of the posterior mean given a hypothesis, times its probability."""
+    fitted, design = linear.least_squares, conditional.design
+    flat = len(fitted)
+    gain[:flat] += share * fitted
     if design is not None:
         amplitudes = (design.right.T * conditional.shrink) @ design.left.T
-        gain[design.block] = amplitudes
-        gain[: len(fitted)] -= (fitted @ design.columns) @ amplitudes
-    return gain
+        gain[design.block] += share * amplitudes
+        gain[:flat] -= share * (fitted @ design.columns) @ amplitudes
 
 
 def _add_covariance(

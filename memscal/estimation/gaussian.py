@@ -1,8 +1,7 @@
 r"""The Gaussian apparatus function that fits the scan best, in data space.
 
-The paper's approximation, fitted where the noise is known: its convolution with the
-reference stress against the scan, together with conversion constant, centre, baseline and
-linear drift, by weighted least squares.
+It is the paper's approximation, convolved with the reference stress and fitted to the voltages
+by weighted least squares, together with conversion constant, centre, baseline and linear drift.
 """
 
 from __future__ import annotations

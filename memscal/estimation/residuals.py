@@ -176,7 +176,7 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
     each place beside the design, what is left has :math:`m` degrees and the mean square
     :math:`s^2`; what the means took, of :math:`l` degrees, gives :math:`F(l, m)`.  That is exact
     also where the repeats lie only near each other (Christensen, Ann. Stat. 17, 1989): the design
-    tells them apart.
+    contains their difference.
     """
     model, points = free_model(estimate), estimate.points
     place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.kept]
@@ -213,10 +213,10 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
 def runs_test(residuals: Residuals) -> TestOutcome:
     r"""Test the residuals' signs along the scan: the share of neighbours that have the same.
 
-    Independent residuals change sign from one to the next as often as a coin does.  (Wald and
-    Wolfowitz, Ann. Math. Stat. 11, 1940, count runs for a median that is not known; here it is
-    zero, and the number of changes is binomial.)  The p-value is one-sided, for too few runs, and
-    as coarse as a count: at most as often below a level as that level says.
+    Independent residuals change sign with a probability of one half: with a median of zero, the
+    number of changes is binomial (Wald and Wolfowitz, Ann. Math. Stat. 11, 1940, count runs for
+    an unknown median).  The p-value is one-sided, for too few runs; it is discrete, and below a
+    level at most as often as the level.
     """
     values, rest = residuals.independent
     same_pass = np.diff(residuals.sequence[rest]) == 0
