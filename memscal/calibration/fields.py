@@ -28,7 +28,6 @@ __all__ = [
     "RasterFields",
     "choose_grid",
     "constrained_kernel",
-    "taper",
 ]
 
 _POINTS_PER_WIDTH = 6.0
@@ -87,7 +86,7 @@ def constrained_kernel(
     return posterior
 
 
-def taper(radius: FloatArray, support: float) -> FloatArray:
+def _taper(radius: FloatArray, support: float) -> FloatArray:
     """One up to half of the support, then falling as a cosine to zero at its edge.
 
     A sharp edge would cut the ripples of G at full height: their integral, and with it A, would
@@ -125,7 +124,7 @@ class LineFields:
     @property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return taper(self.grid.radius, self.support * self.grid.spacing)
+        return _taper(self.grid.radius, self.support * self.grid.spacing)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero."""
@@ -213,7 +212,7 @@ class RasterFields:
     @property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return taper(self._kernel_grid.radius, self.support)
+        return _taper(self._kernel_grid.radius, self.support)
 
     @property
     def _kernel_grid(self) -> Lattice:

@@ -18,16 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "GaussianFit",
-    "fit_gaussian",
-    "gauss_newton",
-    "linearise",
-    "require_parity",
-    "robust_start",
-    "smoothing_length",
-    "undetermined",
-]
+__all__ = ["GaussianFit", "fit_gaussian", "gauss_newton", "linearise"]
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -76,7 +67,7 @@ def gauss_newton(
 _CLEARLY = 0.7
 
 
-def require_parity(
+def _require_parity(
     points: ScanPoints, odd: tuple[FloatArray, FloatArray], even: tuple[FloatArray, FloatArray]
 ) -> None:
     """Refuse a voltage that a shear of the other sign, or an even signal, fits far better.
@@ -110,7 +101,7 @@ def require_parity(
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
 
 
-def robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
+def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Parameters to start from: each scan's own, but A and the width at the medians of all."""
     points = model.points
     starts = [
@@ -132,7 +123,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
     centres = _trial_centres(model)
     distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
     radii = np.linspace(0.0, 2 * np.ptp(points.x) + 2 * np.ptp(points.y), 400)
-    widths = smoothing_length(model) * np.array(_STARTING_WIDTHS)
+    widths = _smoothing_length(model) * np.array(_STARTING_WIDTHS)
     kernels = np.stack([gaussian_transfer(model.k, float(width)) for width in widths])
     # Profiles per newton of every width, on a table for quick trials.
     spectra = (model.reference.values * kernels).T
@@ -158,13 +149,13 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
         even = [np.interp(distances, radii, table) * (points.load * root) for table in potentials]
-        require_parity(
+        _require_parity(
             points,
             _amplitudes(np.concatenate(odd), data, drift),
             _amplitudes(np.concatenate(even), data, drift),
         )
     if not best.size:
-        raise undetermined(model)
+        raise _undetermined(model)
     return best
 
 
@@ -198,13 +189,13 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
     return np.stack([axis.ravel() for axis in mesh], axis=1)
 
 
-def smoothing_length(model: ForwardModel) -> float:
+def _smoothing_length(model: ForwardModel) -> float:
     r"""Length over which the film blurs: :math:`1/k` where the reference has fallen to half."""
     values = model.reference.scalar.values
     return float(1 / model.k[int(np.argmax(values / values[0] < 0.5))])
 
 
-def undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
+def _undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
     """Return the error for a scan that no Gaussian fits."""
     stopped = conversion_constant is not None
     end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
@@ -259,7 +250,7 @@ def fit_gaussian(
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     if start is None:
-        return _solve(model, weights, robust_start(model, weights), loss="soft_l1")
+        return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
     shape = [start.conversion_constant, start.sigma]
     ellipse = start.ellipticity[: model.points.ellipse]
@@ -313,17 +304,17 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
             max_nfev=100,
         )
         if not result.success:
-            raise undetermined(model, linearise(model, result.x * scale).conversion_constant)
+            raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
         solution = np.asarray(result.x)
     fit = linearise(model, solution * scale)
     if not 0 < fit.conversion_constant < np.inf:
-        raise undetermined(model, fit.conversion_constant)
+        raise _undetermined(model, fit.conversion_constant)
     return _positive_width(fit)
 
 
 def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     """Typical size of each parameter, so that the solver sees numbers near one."""
-    width = max(abs(theta[1]), 0.05 * smoothing_length(model))
+    width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
     amplitude = np.ptp(model.points.u)
     centres = int(model.points.free.sum())
     ellipse = np.full(model.points.ellipse, _TYPICAL_ELLIPTICITY)

@@ -308,7 +308,7 @@ def _require_usable(points: ScanPoints) -> None:
             why="A calibration needs a voltage that follows the indenter.",
             cure="Check the channel.",
         )
-    # The parity of a shear is tested later, by gaussian.require_parity.
+    # The parity of a shear is tested later, by estimation.gaussian.
     if points.order == 0:
         _require_positive_peak(points)
 
