@@ -44,7 +44,7 @@ import numpy as np
 
 import memscal
 from memscal.calibration.fields import division_problem
-from memscal.deconvolution.windows import WhiteNoise, WhiteNoiseDraw
+from memscal.deconvolution.division import WhiteNoise, WhiteNoiseDraw
 from memscal.figures.sweep import sweep_figure
 from memscal.model.notation import format_measured
 

@@ -14,10 +14,9 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
-from memscal.calibration.inputs import InputEffect, input_effects
 from memscal.calibration.stages import Solution, field_noise, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
-from memscal.calibration.uncertainty import Results, propagate
+from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Regulariser, create_regulariser
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
@@ -169,7 +168,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
 
 
 #: Methods that are a fixed window or none: their uncertainties are complete to first order.
-_WINDOWS = ("white-noise", "tikhonov", "evidence")
+_WINDOWS = ("white-noise", "tikhonov", "bayesian")
 #: Relative difference below which two lengths or ratios are the same.
 _SAME = 1e-6
 
@@ -399,10 +398,10 @@ def calibrate(
         reference is counted as an uncertainty of the model's form, ``model_form``, rectangular.
     channel : str, default "zz"
         ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
-        by method ``"evidence"``; see docs/tangential.md.
+        by method ``"bayesian"``; see docs/tangential.md.
     method : str or Regulariser, default "white-noise"
         How the fields are divided; see :func:`memscal.deconvolution.division.regulariser_names`.
-        ``"evidence"`` divides none: it takes G from the scan's points, and is the most accurate.
+        ``"bayesian"`` divides none: it takes G from the scan's points, and is the most accurate.
     correlations : mapping of (str, str) to float, optional
         Correlation coefficients of the inputs' errors, such as
         ``{("thickness", "poisson_ratio"): 0.5}``.

@@ -8,11 +8,11 @@ from scipy.special import chdtrc
 
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Misfit, Solution
-from memscal.deconvolution.division import Evidence
+from memscal.deconvolution.division import Bayesian
 from memscal.estimation.assumptions import (
     ExtraColumns,
     axisymmetry_test,
-    departure_evidence,
+    departure_test,
     hold_out,
     linearity_test,
     load_groups,
@@ -44,9 +44,9 @@ from memscal.model.checks import (
 
 __all__ = ["model_checks", "quality_checks"]
 
-#: Evidence exceeds this in less than one Gaussian sensor of a thousand: odds of mean one
-#: exceed a thousand at most once in a thousand (Markov's inequality).
-_EVIDENCE_LIMIT = -float(np.log(FALSE_ALARM))
+#: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
+#: thousand (Markov's inequality).
+_LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))
 _KINDS = {
     "edge": "an edge: a flat top with steep flanks, as of a disc",
     "rough edge": "an edge: a flat top with steep flanks, as of a disc",
@@ -60,9 +60,8 @@ def model_checks(estimate: ProfileEstimate) -> list[QualityCheck]:
     residuals = residuals_of(estimate)
     checks = _noise(estimate)
     if residuals.degrees >= FEWEST_RESIDUALS:
-        checks += _size(estimate, residuals)
-        checks += _order(residuals)
-    checks.append(_evidence(estimate))
+        checks += _size(estimate, residuals) + _order(residuals)
+    checks.append(_bayes_factor(estimate))
     checks += _symmetry(estimate)
     checks += _linearity(estimate)
     return checks + _held_out(estimate)
@@ -77,25 +76,24 @@ def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
             estimate.weighed.noise,
             NOISE_LIMIT,
             f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. "
-            "A failure means that "
-            "something besides electronic noise scatters the scan, such as position or load; the "
-            "uncertainties have been raised accordingly.",
+            "A failure means that something besides electronic noise scatters the scan, such as "
+            "position or load; the uncertainties have been raised accordingly.",
         )
     ]
 
 
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
-    """Compare what no G explains with the noise, if there is a noise to compare with."""
+    """Compare what no G explains with the stated noise, or with the scatter of repeats."""
     degrees = residuals.degrees
     if residuals.stated:
-        found = chi_square_test(residuals)
+        outcome = chi_square_test(residuals)
         compared = f"with the stated noise: reduced chi-square of {degrees} degrees"
         noise = "the noise is larger than stated, or "
     else:
         pure = pure_error_test(estimate)
         if pure is None:
             return []
-        found, noise = pure, ""
+        outcome, noise = pure, ""
         compared = "with the scatter of repeats, as no noise is stated: an F ratio"
     meaning = (
         f"What no radial G can explain of the scan, compared {compared}. A failure means that "
@@ -103,7 +101,7 @@ def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]
         "radius, the film's thickness and Poisson's ratio, a baseline that is no straight line, "
         "and the positions; every uncertainty is doubtful until then."
     )
-    return [check("chi_square", found.value, found.limit, meaning, found.p_value)]
+    return [check("chi_square", outcome.value, outcome.limit, meaning, outcome.p_value)]
 
 
 def _order(residuals: Residuals) -> list[QualityCheck]:
@@ -134,16 +132,16 @@ def _order(residuals: Residuals) -> list[QualityCheck]:
     ]
 
 
-def _evidence(estimate: ProfileEstimate) -> QualityCheck:
-    found = departure_evidence(estimate)
+def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
+    departure = departure_test(estimate)
     return check(
         "gaussian_evidence",
-        found.log_bayes_factor,
-        _EVIDENCE_LIMIT,
-        "Natural logarithm of the odds by which the scan speaks for a departure of G from a "
-        "Gaussian (Bayes factor; within ±8.5); below zero it speaks for the Gaussian, and "
-        "gaussian_sigma may be used. A failure means that G is not Gaussian: use the found G. The "
-        f"likeliest departure is {_KINDS[found.kind]} ({found.share:.0%} of them).",
+        departure.log_bayes_factor,
+        _LOG_BAYES_LIMIT,
+        "Natural logarithm of the Bayes factor for a departure of G from a Gaussian (within ±8.5); "
+        "below zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
+        "means that G is not Gaussian: use the deconvolved G. The most probable departure is "
+        f"{_KINDS[departure.kind]} ({departure.share:.0%} of them).",
     )
 
 
@@ -156,20 +154,18 @@ def _symmetry(estimate: ProfileEstimate) -> list[QualityCheck]:
             "is only a mean over directions: use the field."
         )
         return [_added("axisymmetry", uneven, meaning)]
-    odd = symmetry_test(estimate)
+    extra = symmetry_test(estimate)
+    parity, failure = "odd", ": a tilted rod, an uneven film, or a drifting load"
     if estimate.model.order:
-        meaning = (
-            f"Fall of chi-square by {odd.count} even columns, which then make up {odd.size:.2%} of "
-            "the largest signal. A failure means that the left and right halves differ by more "
-            "than their sign: cross-talk of the normal stress, a tilted rod, or an uneven film."
-        )
-        return [_added("symmetry", odd, meaning)]
+        parity = "even"
+        failure = " by more than their sign: cross-talk of the normal stress, a tilted rod, or an "
+        failure += "uneven film"
     meaning = (
-        f"Fall of chi-square by {odd.count} odd columns, which then make up {odd.size:.2%} of the "
-        "largest signal. A failure means that the left and right halves differ: a tilted rod, an "
-        "uneven film, or a drifting load."
+        f"Fall of chi-square by {extra.count} {parity} columns, which then make up "
+        f"{extra.size:.2%} of the largest signal. A failure means that the left and right halves "
+        f"differ{failure}."
     )
-    return [_added("symmetry", odd, meaning)]
+    return [_added("symmetry", extra, meaning)]
 
 
 def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
@@ -184,9 +180,9 @@ def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
     return [_added("load_linearity", linear, meaning)]
 
 
-def _added(name: str, found: ExtraColumns, meaning: str) -> QualityCheck:
-    p_value = float(chdtrc(found.count, found.fall))
-    return check(name, found.fall, chi_square_limit(found.count), meaning, p_value)
+def _added(name: str, extra: ExtraColumns, meaning: str) -> QualityCheck:
+    p_value = float(chdtrc(extra.count, extra.fall))
+    return check(name, extra.fall, chi_square_limit(extra.count), meaning, p_value)
 
 
 def _held_out(estimate: ProfileEstimate) -> list[QualityCheck]:
@@ -201,20 +197,20 @@ def _held_out(estimate: ProfileEstimate) -> list[QualityCheck]:
         _prediction(estimate, "load", load) if not _same(load, points.scan) else None,
         _prediction(estimate, "scan", points.scan) if several_scans else None,
     ]
-    return [found for found in checks if found is not None]
+    return [outcome for outcome in checks if outcome is not None]
 
 
-def _same(one: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
+def _same(first: NDArray[np.intp], second: NDArray[np.intp]) -> bool:
     """Whether two groupings of the points are the same but for the groups' names."""
-    pairs = np.unique(np.stack([one, other]), axis=1).shape[1]
-    return bool(pairs == np.unique(one).size == np.unique(other).size)
+    pairs = np.unique(np.stack([first, second]), axis=1).shape[1]
+    return bool(pairs == np.unique(first).size == np.unique(second).size)
 
 
 def _prediction(
     estimate: ProfileEstimate, what: str, group: NDArray[np.intp]
 ) -> QualityCheck | None:
-    found = hold_out(estimate, group)
-    if found is None:
+    worst = hold_out(estimate, group)
+    if worst is None:
         return None
     causes = {
         "repeat": "something changed between repeats: the load, the contact, the sensor; look at "
@@ -226,14 +222,14 @@ def _prediction(
     }
     stated = estimate.points.u_errors is not None
     scale = "" if stated else ", over the others' own scatter as no noise is stated"
-    joined = "" if found.alone else f", {what}s taken several at a time"
+    joined = "" if worst.alone else f", {what}s taken several at a time"
     meaning = (
         f"Chi-square per degree of one {what}'s voltages against their prediction from the others, "
-        f"with the uncertainty of both{scale}; the worst of {found.folds}, number {found.worst + 1}"
+        f"with the uncertainty of both{scale}; the worst of {worst.folds}, number {worst.worst + 1}"
         f"{joined}. Its own baseline, drift and centre are fitted to it. A failure means that "
         f"{causes[what]}."
     )
-    return check(f"held_out_{what}", found.value, found.limit, meaning, found.p_value)
+    return check(f"held_out_{what}", worst.value, worst.limit, meaning, worst.p_value)
 
 
 _BASELINE_DRIFT_LIMIT = 0.05
@@ -258,18 +254,17 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
 
 
 def _reconvolutions(solution: Solution) -> list[QualityCheck]:
-    evidence = solution.regulariser.name == "evidence"
     removed = (
         "the posterior mean of G misses something that the scan shows"
-        if evidence
-        else "the regularisation has removed something that the scan shows (see method evidence)"
+        if isinstance(solution.regulariser, Bayesian)
+        else "the regularisation has removed something that the scan shows (see method bayesian)"
     )
     stated = solution.estimate.points.u_errors is not None
     return [
         _chi_square(
             "reconvolution",
             solution.deconvolution.misfit,
-            "Reduced chi-square of the scan against the found G convolved with the reference. A "
+            "Reduced chi-square of the scan against the G found, convolved with the reference. A "
             f"failure means that {removed}, or that the scan is no convolution of the reference: "
             "look at chi_square, which does not depend on G.",
         ),
@@ -277,8 +272,8 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
             "gaussian_misfit",
             solution.gaussian_misfit,
             "Reduced chi-square of the scan against the fitted Gaussian convolved with the "
-            "reference. A failure means that G is not Gaussian at this noise: use the found G, "
-            "not gaussian_sigma.",
+            "reference. A failure means that G is not Gaussian at this noise: use the "
+            "deconvolved G, not gaussian_sigma.",
             exact=stated,
         ),
     ]
@@ -287,20 +282,20 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
 def _constraint(solution: Solution) -> list[QualityCheck]:
     """Compare a G that was kept from falling below zero, or from rising, with the free one."""
     regulariser, estimate = solution.regulariser, solution.estimate
-    if not (isinstance(regulariser, Evidence) and regulariser.constrained):
+    if not (isinstance(regulariser, Bayesian) and regulariser.constrained):
         return []
     weights = estimate.weights / estimate.noise_scale**2
     misfits = [
         float(np.sum(estimate.points.standardised(estimate.points.u - u, weights) ** 2))
         for u in (solution.deconvolution.predicted, estimate.predicted)
     ]
-    # As many directions of G as the scan tells apart, and which the constraint may cost.
-    told = free_model(estimate).design.shape[1] - estimate.basis.flat
+    # As many combinations of departures as the scan determines, and as a constraint may remove.
+    determined = free_model(estimate).design.shape[1] - estimate.basis.flat
     return [
         check(
             "constraint",
             max(misfits[0] - misfits[1], 0.0),
-            chi_square_limit(max(told, 1)),
+            chi_square_limit(max(determined, 1)),
             "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
             "estimate. A failure means that the scan contradicts it: leave it out.",
         )
@@ -308,29 +303,28 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
 
 
 def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
-    """Compare the found G with the Gaussian; the two are fitted to the same noise."""
-    if solution.regulariser.name == "evidence":
-        found = "of the free G in data space"
-        else_ = ""
+    """Compare the deconvolved G with the Gaussian; the two are fitted to the same noise."""
+    if isinstance(solution.regulariser, Bayesian):
+        source, failure = "of the free G in data space", ""
     else:
-        found = "of the G by division of the fields"
-        else_ = ", or that the method of division failed: compare method evidence"
+        source = "of the G by division of the fields"
+        failure = ", or that the method of division failed: compare method bayesian"
     return [
         _agreement(
             parameters,
             ("conversion_constant", "conversion_constant_gaussian"),
             "method_agreement",
-            f"Difference of the conversion constant {found} from the Gaussian fit's, in its "
+            f"Difference of the conversion constant {source} from the Gaussian fit's, in its "
             "standard uncertainty. A failure means that the Gaussian's is biased, as when G has "
-            f"tails that a Gaussian lacks{else_}.",
+            f"tails that a Gaussian lacks{failure}.",
         ),
         _agreement(
             parameters,
             ("gaussian_sigma_deconvolved", "gaussian_sigma"),
             "width_agreement",
-            f"Difference of the width {found} from the one fitted to the scan, in its standard "
+            f"Difference of the width {source} from the one fitted to the scan, in its standard "
             "uncertainty. A failure means that G is not Gaussian, so that its width depends on how "
-            f"it is read off{else_}. Look at both reconvolutions.",
+            f"it is read off{failure}. Look at both reconvolutions.",
         ),
     ]
 
@@ -354,8 +348,8 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
             "Transfer function of the fitted Gaussian at the resolved wavenumber, here "
             f"{resolved * 1e-3:.3g} rad/mm: up to there, the posterior standard uncertainty of G's "
             f"transfer function is less than 1/{RESOLVED:g} of it, whatever the method of "
-            "division; beyond, the prior speaks and not the scan. A failure means that noise hides "
-            "more than half of G's spectrum: average repeats or raise the load.",
+            "division; beyond, G is determined by the prior. A failure means that noise hides more "
+            "than half of G's spectrum: average repeats or raise the load.",
         ),
         check(
             "tail_share",
@@ -390,7 +384,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
 
 
 def _chi_square(name: str, misfit: Misfit, meaning: str, *, exact: bool = False) -> QualityCheck:
-    """Check a misfit; its p-value is known where the noise is, for a plain fit."""
+    """Check a misfit; ``exact``: its p-value is that of chi-square."""
     limit = chi_square_limit(misfit.degrees) / misfit.degrees
     p_value = float(chdtrc(misfit.degrees, misfit.chi2_reduced * misfit.degrees))
     return check(name, misfit.chi2_reduced, limit, meaning, p_value if exact else None)
@@ -402,6 +396,6 @@ def _agreement(
     i, j = (parameters.names.index(name) for name in names)
     c, values = parameters.covariance, parameters.values
     variance = max(c[i, i] + c[j, j] - 2 * c[i, j], 0.0)
-    # Differences below a fifth of a percent matter to nobody, however small their noise.
+    # Differences below a fifth of a percent are negligible, however small their noise.
     allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * values[j])
     return check(name, abs(values[i] - values[j]) / allowed, 3.0, meaning)

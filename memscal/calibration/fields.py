@@ -1,16 +1,16 @@
-"""The two fields of the paper's Eq. (1): lifted from profiles, or measured as a raster."""
+"""Fields of voltage and stress (the paper's Eq. 1): lifted from profiles, or a raster's own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice, cut, on_grid
+from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
 from memscal.deconvolution.division import NOISE_RATIO, KernelProfile
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
@@ -28,7 +28,6 @@ __all__ = [
     "RasterFields",
     "choose_grid",
     "constrained_kernel",
-    "taper",
 ]
 
 _POINTS_PER_WIDTH = 6.0
@@ -55,56 +54,8 @@ class GridChoice:
         }
 
 
-class Fields(Protocol):
-    """Both fields on one grid, with the ways back from the grid."""
-
-    @property
-    def grid(self) -> FieldGrid:
-        """The grid."""
-        ...
-
-    @property
-    def voltage(self) -> Field:
-        """Voltage per newton, in V/N."""
-        ...
-
-    @property
-    def stress(self) -> Field:
-        """Base stress per newton, in 1/m^2."""
-        ...
-
-    @property
-    def confinement(self) -> FloatArray:
-        """Taper on the grid that confines a kernel to its support."""
-        ...
-
-    def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """A radial function about a kernel's zero, on the grid."""
-        ...
-
-    def at_points(self, field: FloatArray) -> FloatArray:
-        """Values of a field at the measured points."""
-        ...
-
-    def on_support(self, kernel: FloatArray, profile: KernelProfile | None) -> Field:
-        """A kernel on its support; from its profile, where that is known."""
-        ...
-
-    def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Wavenumbers along one axis and a spectral quantity there."""
-        ...
-
-
 def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
-    """Choose the grid from the scan: every length from a length of the data.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-    band : Band
-        Its relevant band, which says where the window closes.
-    """
+    """Choose the grid from the scan: every length from a length of the data."""
     points = estimate.points
     support = float(estimate.distance.max())
     if points.as_raster:
@@ -135,7 +86,7 @@ def constrained_kernel(
     return posterior
 
 
-def taper(radius: FloatArray, support: float) -> FloatArray:
+def _taper(radius: FloatArray, support: float) -> FloatArray:
     """One up to half of the support, then falling as a cosine to zero at its edge.
 
     A sharp edge would cut the ripples of G at full height: their integral, and with it A, would
@@ -162,9 +113,9 @@ class LineFields:
         grid = EvenGrid(cells + 1, choice.spacing)
         step = choice.spacing / 2
         # Both at once: they share the Bessel functions of their transforms.
-        known = estimate.model.reference
-        spectra = np.stack([estimate.spectrum.scalar.values, known.scalar.values], axis=1)
-        wavenumbers = known.wavenumbers
+        reference = estimate.model.reference
+        spectra = np.stack([estimate.spectrum.scalar.values, reference.scalar.values], axis=1)
+        wavenumbers = reference.wavenumbers
         both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
         support = round(choice.support / choice.spacing)
@@ -173,7 +124,7 @@ class LineFields:
     @property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return taper(self.grid.radius, self.support * self.grid.spacing)
+        return _taper(self.grid.radius, self.support * self.grid.spacing)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero."""
@@ -227,11 +178,6 @@ class RasterFields:
 
         ``divided``: whether its field is divided, and so needs an even lattice; else points off
         any lattice get one of their own step, which the fitted profile fills alone.
-
-        Raises
-        ------
-        InputError
-            If it is divided, and the points lie on no even lattice.
         """
         points = estimate.points
         lattice = even_lattice(points.x, points.y, points.places[0].count)
@@ -240,7 +186,7 @@ class RasterFields:
                 f"The raster's {points.u.size} points are not evenly spaced: they lie on no "
                 "lattice of rows and columns within a tenth of its step.",
                 why="This method divides a raster as a field, on its own lattice.",
-                cure='Use method="evidence" (--method evidence), which needs no lattice; or scan '
+                cure='Use method="bayesian" (--method bayesian), which needs no lattice; or scan '
                 "evenly.",
             )
         if lattice is None:
@@ -266,7 +212,7 @@ class RasterFields:
     @property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return taper(self._kernel_grid.radius, self.support)
+        return _taper(self._kernel_grid.radius, self.support)
 
     @property
     def _kernel_grid(self) -> Lattice:
@@ -296,6 +242,10 @@ class RasterFields:
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""
         return self.grid.wavenumber[0], spectral[0]
+
+
+Fields: TypeAlias = LineFields | RasterFields
+"""Voltage and stress on one grid, with the ways back from the grid."""
 
 
 def _about_zero(axis: FloatArray) -> FloatArray:

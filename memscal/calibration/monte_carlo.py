@@ -20,10 +20,14 @@ from scipy.special import ndtr, ndtri
 
 from memscal.axisymmetry.hankel import RadialSpectrum, radial_spline
 from memscal.calibration.calibrate import Calibration, uncertainties
-from memscal.calibration.functionals import kernel_functionals
-from memscal.calibration.inputs import InputEffect, correlation_matrix
 from memscal.calibration.stages import Solution, solve
-from memscal.calibration.uncertainty import BUDGETED, NOT_RANDOM
+from memscal.calibration.uncertainty import (
+    BUDGETED,
+    NOT_RANDOM,
+    InputEffect,
+    correlation_matrix,
+    kernel_functionals,
+)
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
@@ -391,7 +395,7 @@ def monte_carlo(
     Examples
     --------
     >>> import memscal
-    >>> calibration = memscal.calibrate(memscal.simulate(noise=0.003, seed=2), method="evidence")
+    >>> calibration = memscal.calibrate(memscal.simulate(noise=0.003, seed=2), method="bayesian")
     >>> drawn = memscal.monte_carlo(calibration, draws=20)
     >>> 0.4 < drawn["gaussian_sigma"].ratio < 1.6
     True

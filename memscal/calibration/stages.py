@@ -1,4 +1,14 @@
-"""The calibration's chain of steps, up to A and G, without their uncertainty."""
+r"""The paper's steps from scans to A and G, without their uncertainty.
+
+.. math::
+
+    U_{zz} = A\,G \otimes \sigma_{zz}, \qquad
+    A\,G = \mathcal F^{-1}\left\{\frac{\mathcal F\{U_{zz}\}}{\mathcal F\{\sigma_{zz}\}}\right\},
+    \qquad A = \int A\,G\,dx\,dy
+
+(the paper's Eq. 1 to 3).  :func:`solve` makes the two fields of a scan and its reference, and
+:func:`deconvolve` divides them.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +26,7 @@ from memscal.calibration.fields import (
     choose_grid,
     constrained_kernel,
 )
-from memscal.deconvolution.division import Regulariser
+from memscal.deconvolution.division import Bayesian, Regulariser
 from memscal.deconvolution.fourier_ratio import (
     Field,
     Quotient,
@@ -47,113 +57,9 @@ __all__ = [
     "solve",
 ]
 
-#: The spectra are resolved out to twice the scan's reach at the least.
+#: A shear's integral is summed out to this multiple of the scan's reach, at this many radii.
 _FAR = 2.0
 _RADII = 2001
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """How well a prediction meets the scan.
-
-    ``relative_rms``: root-mean-square residual over the largest signal; ``chi2_reduced``:
-    chi-square against the noise per degree of freedom; ``degrees``: how many there are.
-    """
-
-    relative_rms: float
-    chi2_reduced: float
-    degrees: float
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Deconvolution:
-    """One division of the fields: A and G, and what they predict for the scan.
-
-    ``quotient``: A G confined to the support, with its window; ``conversion_constant`` in V/Pa;
-    ``g``: G on its support, in 1/m^2; ``gaussian_sigma`` in m: the Gaussian nearest to G;
-    ``predicted`` (n,) in V, at the measured points.
-    """
-
-    quotient: Quotient
-    conversion_constant: float
-    g: Field
-    gaussian_sigma: float
-    predicted: FloatArray
-    misfit: Misfit
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Solution:
-    """Every step of a calibration.
-
-    Parameters
-    ----------
-    scans : tuple of Scan
-        What was measured.
-    stresses : tuple of StressProfile or Contact
-        The reference of each scan.
-    estimate : ProfileEstimate
-        Centre, baseline, noise, outliers and profile.
-    band : Band
-        Signal and noise of the voltage's transform.
-    choice : GridChoice
-        The grid and the reasons for it.
-    fields : Fields
-        The two fields.
-    regulariser : Regulariser
-        How they were divided.
-    deconvolution : Deconvolution
-        A and G by the division, and their misfit.
-    gaussian_misfit : Misfit
-        The Gaussian fitted in data space against the scan.
-    """
-
-    scans: tuple[Scan, ...]
-    stresses: tuple[StressProfile | Contact, ...]
-    estimate: ProfileEstimate
-    band: Band
-    choice: GridChoice
-    fields: Fields
-    regulariser: Regulariser
-    deconvolution: Deconvolution
-    gaussian_misfit: Misfit
-
-    @property
-    def scan(self) -> Scan:
-        """The first scan."""
-        return self.scans[0]
-
-    @property
-    def stress(self) -> StressProfile | Contact:
-        """The reference of the first scan, which the fields are made with."""
-        return self.stresses[0]
-
-    @property
-    def window_at_nodes(self) -> FloatArray:
-        """The regularisation's window at the quadrature nodes of the estimate.
-
-        What the grid does not carry, beyond its last wavenumber, is as hidden as if windowed.
-        """
-        k, window = self.fields.along_axis(self.deconvolution.quotient.window)
-        return np.interp(self.estimate.model.k, k, window, right=0.0)
-
-    @property
-    def tail_share(self) -> float:
-        r"""Share of the voltage's integral beyond the scan's reach.
-
-        Within a radius R the integral is
-        :math:`R \int \hat U(k) J_1(kR)\,dk`, from the Hankel transform.  Of a tangential channel
-        it is that of the radial component's modulus, of which it is summed over radii.
-        """
-        spectrum, reach = self.estimate.spectrum, self.choice.support
-        if spectrum.order:
-            r = np.linspace(0.0, _FAR * reach, _RADII)
-            flux = np.abs(spectrum.at(r)) * r
-            return float(flux[r > reach].sum() / flux.sum())
-        k = spectrum.wavenumbers.k
-        dk = 2 * np.pi * spectrum.wavenumbers.weights / k
-        inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
-        return abs(1 - inside / spectrum.integral)
 
 
 def solve(
@@ -162,15 +68,14 @@ def solve(
     regulariser: Regulariser,
     channel: str = "zz",
 ) -> Solution:
-    """Go through the paper's steps: profile, lift, transform, divide, normalise, reconvolve."""
+    """Find A and G: profile of the scans, fields over the plane, and their division."""
     require_channel_method(channel, regulariser)
-    parts = [measured_points(scan, channel) for scan in scans]
-    thicknesses = [scan.film.thickness for scan in scans]
-    references = reference_spectra(stresses, parts, thicknesses)
-    estimate = estimate_profile(joined_points(parts), *references)
+    points = [measured_points(scan, channel) for scan in scans]
+    references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
+    estimate = estimate_profile(joined_points(points), *references)
     band = find_band(estimate)
     choice = choose_grid(estimate, band)
-    fields = prepare_fields(estimate, choice, divided=regulariser.name != "evidence")
+    fields = prepare_fields(estimate, choice, divided=not isinstance(regulariser, Bayesian))
     return Solution(
         scans=tuple(scans),
         stresses=tuple(stresses),
@@ -184,20 +89,36 @@ def solve(
     )
 
 
-def require_channel_method(channel: str, regulariser: Regulariser) -> None:
-    """Refuse to divide the fields of a tangential channel.
+def deconvolve(
+    estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
+) -> Deconvolution:
+    """Divide the fields, normalise, fit a Gaussian, and convolve back."""
+    require_channel_method(estimate.points.channel, regulariser)
+    # Eq. 2: A G.
+    quotient = divide(
+        fields.voltage,
+        fields.stress,
+        weakest=(band.weakest_reference, band.weakest_voltage),
+        method=regulariser,
+        posterior=constrained_kernel(estimate, fields),
+    )
+    quotient = replace(quotient, values=quotient.values * fields.confinement)
+    # Eq. 3: A, and G of unit integral.
+    a, g = normalise(fields.on_support(quotient.values, quotient.profile))
+    sigma = fit_gaussian(g, estimate.gaussian.sigma)
+    # Eq. 1: the voltage that A and G predict.
+    predicted = _reconvolved(estimate, fields, quotient) + estimate.background
+    return Deconvolution(quotient, a, g, sigma, predicted, _misfit(estimate, predicted))
 
-    Raises
-    ------
-    InputError
-        If the method is not evidence, or there is no such channel.
-    """
-    if channel_order(channel) and regulariser.name != "evidence":
+
+def require_channel_method(channel: str, regulariser: Regulariser) -> None:
+    """Refuse to divide the fields of a tangential channel, and a channel that does not exist."""
+    if channel_order(channel) and not isinstance(regulariser, Bayesian):
         raise InputError(
             f"Channel {channel} cannot be calibrated by method {regulariser.name}.",
             why="It divides fields, and the transform of a shear is zero along a line and at "
             "k = 0, where A is read off.",
-            cure='Use method="evidence" (--method evidence), which divides none.',
+            cure='Use method="bayesian" (--method bayesian), which divides none.',
         )
 
 
@@ -213,29 +134,76 @@ def prepare_fields(
     return LineFields.lift(estimate, choice)
 
 
-def deconvolve(
-    estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
-) -> Deconvolution:
-    """Divide the fields, normalise, fit a Gaussian, and convolve back (Eq. 1 to 3)."""
-    require_channel_method(estimate.points.channel, regulariser)
-    quotient = divide(
-        fields.voltage,
-        fields.stress,
-        weakest=(band.weakest_reference, band.weakest_voltage),
-        method=regulariser,
-        posterior=constrained_kernel(estimate, fields),
-    )
-    quotient = replace(quotient, values=quotient.values * fields.confinement)
-    a, g = normalise(fields.on_support(quotient.values, quotient.profile))
-    predicted = _reconvolved(estimate, fields, quotient) + estimate.background
-    return Deconvolution(
-        quotient=quotient,
-        conversion_constant=a,
-        g=g,
-        gaussian_sigma=fit_gaussian(g, estimate.gaussian.sigma),
-        predicted=predicted,
-        misfit=_misfit(estimate, predicted),
-    )
+@dataclass(frozen=True)
+class Misfit:
+    """How well a prediction meets the scan."""
+
+    relative_rms: float  # root-mean-square residual over the largest signal
+    chi2_reduced: float  # chi-square against the noise per degree of freedom
+    degrees: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Deconvolution:
+    """One division of the fields: A and G, and what they predict for the scan."""
+
+    quotient: Quotient  # A G confined to the support, with its window
+    conversion_constant: float  # in V/Pa
+    g: Field  # on its support, in 1/m^2
+    gaussian_sigma: float  # of the Gaussian nearest to G, in m
+    predicted: FloatArray  # (n,): voltages at the measured points, in V
+    misfit: Misfit
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution:
+    """Every step of a calibration."""
+
+    scans: tuple[Scan, ...]
+    stresses: tuple[StressProfile | Contact, ...]  # the reference of each scan
+    estimate: ProfileEstimate  # centre, baseline, noise, outliers and profile
+    band: Band  # signal and noise of the voltage's transform
+    choice: GridChoice
+    fields: Fields
+    regulariser: Regulariser
+    deconvolution: Deconvolution  # A and G by the division, and their misfit
+    gaussian_misfit: Misfit  # the Gaussian fitted in data space against the scan
+
+    @property
+    def scan(self) -> Scan:
+        """The first scan."""
+        return self.scans[0]
+
+    @property
+    def stress(self) -> StressProfile | Contact:
+        """The reference of the first scan, which the fields are made with."""
+        return self.stresses[0]
+
+    @property
+    def window_at_nodes(self) -> FloatArray:
+        """The regularisation's window at the quadrature nodes of the estimate.
+
+        It is zero beyond the grid's last wavenumber.
+        """
+        k, window = self.fields.along_axis(self.deconvolution.quotient.window)
+        return np.interp(self.estimate.model.k, k, window, right=0.0)
+
+    @property
+    def tail_share(self) -> float:
+        r"""Share of the voltage's integral beyond the scan's reach.
+
+        Within a radius R the integral is :math:`R \int \hat U(k) J_1(kR)\,dk`.  Of a tangential
+        channel it is that of the radial component's modulus, summed over radii.
+        """
+        spectrum, reach = self.estimate.spectrum, self.choice.support
+        if spectrum.order:
+            r = np.linspace(0.0, _FAR * reach, _RADII)
+            flux = np.abs(spectrum.at(r)) * r
+            return float(flux[r > reach].sum() / flux.sum())
+        k = spectrum.wavenumbers.k
+        dk = 2 * np.pi * spectrum.wavenumbers.weights / k
+        inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
+        return abs(1 - inside / spectrum.integral)
 
 
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
@@ -270,27 +238,15 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
 
 @dataclass(frozen=True, eq=False)
 class FieldNoise:
-    """What a raster's noise adds to the uncertainties.
+    """What a raster's noise adds to the uncertainties."""
 
-    ``conversion_constant`` in V/Pa; ``radial`` (n, m): columns whose squares add up to the
-    variance of G, in 1/m^2; ``transfer`` (p,): standard uncertainty of single components.
-    """
-
-    conversion_constant: float
-    radial: FloatArray
-    transfer: FloatArray
+    conversion_constant: float  # in V/Pa
+    radial: FloatArray  # (n, m): columns whose squares add up to the variance of G, in 1/m^2
+    transfer: FloatArray  # (p,): standard uncertainty of single components
 
 
 def field_noise(solution: Solution, wavenumbers: FloatArray) -> FieldNoise | None:
-    """Return what a raster's noise adds; ``None`` for a line scan, which adds nothing.
-
-    Parameters
-    ----------
-    solution : Solution
-        The calibration's steps.
-    wavenumbers : ndarray, shape (p,)
-        Where the transfer function is stated, in rad/m.
-    """
+    """Return what a raster's noise adds at wavenumbers (rad/m); ``None`` for a line scan."""
     estimate, deconvolution = solution.estimate, solution.deconvolution
     if not estimate.points.planar or estimate.points.scans > 1:
         return None

@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from memscal.calibration.stages import Solution, deconvolve
-from memscal.deconvolution.division import Regulariser, require_count
-from memscal.deconvolution.windows import WhiteNoise, WhiteNoiseDraw
+from memscal.deconvolution.division import Regulariser, WhiteNoise, WhiteNoiseDraw, require_count
 from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
 from memscal.model.result import Result

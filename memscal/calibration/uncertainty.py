@@ -1,63 +1,59 @@
-r"""First-order propagation: noise, what regularisation hides, and uncertain inputs.
+r"""First-order propagation of noise, regularisation and uncertain inputs to A, G and its widths.
 
 Every result is a linear function of the posterior of the profile's parameters (:math:`w`)
 and of the Gaussian fit's (:math:`f`).  What scatters of them from scan to scan, by their
 derivatives by the voltages, is ``noise``; the rest of the expected squared error of :math:`w`,
-which does not scatter, is ``regularisation``: what the estimate cannot know.  What a window hides
-beyond that is counted as an error of the size that the profile's own continuation has there.
+which does not scatter, is ``regularisation``.  What a window hides beyond that is counted as an
+error of the size that the profile's own continuation has there.
+
 Inputs add one column each, the change of all results by one standard uncertainty, and their
-correlations combine these.
+correlations combine these.  An input that is larger than stated changes the estimate as
+voltages would: by :math:`-A\,G\otimes\delta\sigma_{zz}` for a change of the base stress, by
+:math:`-U'(R)\,\delta R` for one of the positions.  A change of the load scales A alone.
+
+Numbers read off G(r) are functionals of it: their derivative is a row that multiplies a change
+of G at the radii of the profile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import j0
 
-from memscal.calibration.functionals import Functional, kernel_functionals
-from memscal.calibration.inputs import InputEffect, correlation_matrix
+from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform, radial_spline, ring_areas
+from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.calibration.stages import Deconvolution, FieldNoise
+from memscal.deconvolution.fourier_ratio import Field
+from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reference import carried_force, film_sensitivities, rod_sensitivities
+from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
 
-__all__ = ["BUDGETED", "NOT_RANDOM", "Results", "propagate"]
+__all__ = [
+    "BUDGETED",
+    "NOT_RANDOM",
+    "Functional",
+    "InputEffect",
+    "Results",
+    "correlation_matrix",
+    "input_effects",
+    "kernel_functionals",
+    "propagate",
+]
 
+#: Points per step of the profile between which the half maximum is interpolated.
+_FINE = 20
+#: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
+_RECTANGLE = 1 / np.sqrt(3)
 #: What sums of squares lose to rounding.
 _ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Results:
-    """Everything a calibration states with an uncertainty.
-
-    Parameters
-    ----------
-    parameters : ParameterSet
-        Scalars with their joint covariance.
-    budget : mapping
-        Standard uncertainty of each budgeted parameter by source, in its SI unit.
-    radial_covariance : ndarray, shape (n, n)
-        Covariance of G(r), in 1/m^4.
-    cross_covariance : ndarray, shape (n, p)
-        Covariance of G(r) with the parameters, in their units.
-    transfer_errors : ndarray, shape (m,)
-        Standard uncertainty of the transfer function.
-    radial_scatter : ndarray, shape (n,)
-        Standard uncertainty by what scatters of G(r) as it is given back, in 1/m^2.
-    """
-
-    parameters: ParameterSet
-    budget: Mapping[str, Mapping[str, float]]
-    radial_covariance: FloatArray
-    cross_covariance: FloatArray
-    transfer_errors: FloatArray
-    radial_scatter: FloatArray
-
-
 #: Parameters whose uncertainty is broken down by source.
 BUDGETED = (
     "conversion_constant",
@@ -66,27 +62,217 @@ BUDGETED = (
     "fwhm",
     "noise_equivalent_area",
 )
-
-
 #: Sources that are the same error in every scan.
 NOT_RANDOM = ("regularisation", "window")
+
+
+@dataclass(frozen=True, eq=False)
+class Functional:
+    """A number read off G: its parameter's name, its value, and its derivative by G(r)."""
+
+    name: str
+    value: float
+    row: FloatArray
+
+
+def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
+    """Return the Gaussian width nearest to G, its full width at half maximum and its area."""
+    r, g = field.r, field.radial
+    return (_gaussian_width(r, g, sigma), _half_width(r, g), _equivalent_area(r, g))
+
+
+def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
+    """Width of the Gaussian u nearest to G over the plane.
+
+    Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
+    """
+    slope, step = unit_gaussian_slope(r, sigma), 1e-4 * sigma
+    bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
+    left = unit_gaussian(r, sigma) - g
+    row = r * slope / np.sum(r * (slope**2 + left * bend / (2 * step)))
+    return Functional("gaussian_sigma_deconvolved", sigma, row)
+
+
+def _half_width(r: FloatArray, g: FloatArray) -> Functional:
+    """Diameter of the outermost circle where G is half of its maximum.
+
+    With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
+    """
+    fine = np.linspace(r[0], r[-1], _FINE * r.size)
+    values = radial_spline(r, g)(fine)
+    top = int(np.argmax(values))
+    last = int(np.flatnonzero(values >= values[top] / 2)[-1])
+    last = min(last, fine.size - 2)
+    slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
+    half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
+    row = _at(r, half) - 0.5 * _at(r, float(fine[top]))
+    row = -2 * row / slope if slope else np.zeros_like(row)
+    return Functional("fwhm", float(2 * half), row)
+
+
+def _equivalent_area(r: FloatArray, g: FloatArray) -> Functional:
+    r"""Noise-equivalent area :math:`1/\int G^2\,dA`, in m^2: 4 pi sigma^2 of a Gaussian."""
+    ring = ring_areas(r)
+    area = float(1 / np.sum(ring * g**2))
+    return Functional("noise_equivalent_area", area, -2 * area**2 * ring * g)
+
+
+def _at(r: FloatArray, place: float) -> FloatArray:
+    """Row that reads a profile at a radius, by linear interpolation."""
+    row = np.zeros_like(r)
+    i = int(np.clip(np.searchsorted(r, place) - 1, 0, r.size - 2))
+    share = (place - r[i]) / (r[i + 1] - r[i])
+    row[i], row[i + 1] = 1 - share, share
+    return row
+
+
+@dataclass(frozen=True, eq=False)
+class InputEffect:
+    """What one standard uncertainty of an input does."""
+
+    voltage: FloatArray  # (n,): change of the voltages that it would be mistaken for, in V
+    scaling: float = 0.0  # relative change of A beside that
+
+
+def input_effects(
+    scans: Sequence[Scan],
+    stresses: Sequence[StressProfile | Contact],
+    estimate: ProfileEstimate,
+    alternatives: Sequence[RadialSpectrum] | None = None,
+) -> Mapping[str, InputEffect]:
+    """Return the effect of every input whose uncertainty is stated, by its name.
+
+    Scans that share a film, or a rod, share its error; the load is read from one balance, and
+    the positions from one stage.
+    """
+    model = estimate.model
+    changes: dict[str, list[FloatArray]] = {}
+    shared = [("film", film_sensitivities), ("indenter", rod_sensitivities)]
+    for attribute, sensitivities in shared:
+        owners = [getattr(scan, attribute) for scan in scans]
+        distinct = list(dict.fromkeys(owners))
+        for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
+            number = distinct.index(owner)
+            suffix = "" if number == 0 else f"_{number + 1}"
+            for source, change in sensitivities(scan, model.references[i]).items():
+                blank = [np.zeros_like(change) for _ in scans]
+                changes.setdefault(source + suffix, blank)[i] = change
+    for i, stress in enumerate(stresses):
+        # Stated errors are those of the normal stress, not of the shear.
+        if model.order or not isinstance(stress, StressProfile):
+            continue
+        if stress.sigma_zz_errors is not None:
+            errors = hankel_transform(stress.r, stress.sigma_zz_errors, model.k) / stress.load
+            blank = [np.zeros_like(errors) for _ in scans]
+            changes.setdefault("reference_stress", blank)[i] = errors
+    if alternatives is not None:
+        pairs = zip(alternatives, model.references, strict=True)
+        changes["model_form"] = [_RECTANGLE * (a.values - ours.values) for a, ours in pairs]
+    effects = {source: _of_reference(estimate, change) for source, change in changes.items()}
+    return effects | _of_positions(scans, estimate) | _of_loads(scans, stresses, estimate)
+
+
+def _of_reference(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> InputEffect:
+    spectra = (
+        replace(reference, values=change)
+        for reference, change in zip(estimate.model.references, changes, strict=True)
+    )
+    changed = replace(estimate.model, references=tuple(spectra))
+    return InputEffect(-changed.signal(estimate.gaussian.geometry, estimate.kernel))
+
+
+def _of_positions(scans: Sequence[Scan], estimate: ProfileEstimate) -> dict[str, InputEffect]:
+    shares = np.array([scan.position_scale_uncertainty or 0.0 for scan in scans])
+    if not shares.any():
+        return {}
+    slope = estimate.model.radial_derivative(estimate.gaussian.geometry, estimate.kernel)
+    error = slope * estimate.distance * shares[estimate.points.scan]
+    return {"position_scale": InputEffect(-error)}
+
+
+def _of_loads(
+    scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], estimate: ProfileEstimate
+) -> dict[str, InputEffect]:
+    """Effects of factors: loads, forces of references, and their discretisation."""
+    model = estimate.model
+    signal = estimate.predicted - estimate.background
+    shares: dict[str, Sequence[float | None]] = {
+        "reference_force": [
+            abs(carried_force(stress, reference) - 1.0)
+            for stress, reference in zip(stresses, model.references, strict=True)
+        ],
+        "load": [
+            None if scan.load_uncertainty is None else scan.load_uncertainty / scan.load
+            for scan in scans
+        ],
+        "reference_convergence": [stress.convergence for stress in stresses],
+    }
+    effects = {}
+    for source, stated in shares.items():
+        if all(share is None for share in stated):
+            continue
+        of_scans = np.array([share or 0.0 for share in stated])
+        common = float(of_scans.mean())
+        apart = (of_scans - common)[estimate.points.scan]
+        effects[source] = InputEffect(-apart * signal, -common)
+    return effects
+
+
+def correlation_matrix(
+    sources: Sequence[str], correlations: Mapping[tuple[str, str], float]
+) -> FloatArray:
+    """Return the correlation matrix of inputs, the identity but for the stated pairs."""
+    matrix = np.eye(len(sources))
+    for pair, coefficient in correlations.items():
+        unknown = [name for name in pair if name not in sources]
+        if unknown or len(set(pair)) != 2:
+            raise InputError(
+                f"A correlation is given for {' and '.join(map(repr, pair))}.",
+                why="It must be between two inputs whose uncertainty is stated.",
+                cure=f"Choose from {', '.join(sources) or 'none'}.",
+            )
+        if not -1 <= coefficient <= 1:
+            raise InputError(
+                f"The correlation of {pair[0]} and {pair[1]} is {coefficient:g}, outside -1 to 1."
+            )
+        i, j = (sources.index(name) for name in pair)
+        matrix[i, j] = matrix[j, i] = coefficient
+    least = float(np.linalg.eigvalsh(matrix)[0]) if sources else 1.0
+    if least < -1e-9:
+        raise InputError(
+            f"The correlations of the inputs contradict each other: their matrix has the "
+            f"eigenvalue {least:.3g}.",
+            why="A covariance is positive semi-definite.",
+            cure="Two inputs that both follow a third closely cannot be opposed.",
+        )
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """Everything a calibration states with an uncertainty."""
+
+    parameters: ParameterSet  # scalars with their joint covariance
+    budget: Mapping[str, Mapping[str, float]]  # standard uncertainties by parameter and source
+    radial_covariance: FloatArray  # (n, n): covariance of G(r), in 1/m^4
+    cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
+    transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
+    radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
     """Derivatives of all results by (w, f), and what the window hides of each.
 
-    The results are the parameters, ``names`` with ``values``, then G at its radii, then the
-    transfer function at its wavenumbers: the rows of ``matrix`` and ``hidden``.  ``opened`` are the
-    rows of G as it is given back, through the window.
+    Rows are the parameters, then G at its radii, then the transfer function at its wavenumbers.
     """
 
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the parameters
     values: FloatArray
     radii: int
     matrix: FloatArray
     hidden: FloatArray
-    opened: FloatArray
+    opened: FloatArray  # rows of G as it is stored, through the window
 
     @property
     def stored(self) -> int:
@@ -105,22 +291,8 @@ def propagate(
 ) -> Results:
     """Propagate all stated uncertainties to the results.
 
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile and its posterior.
-    deconvolution : Deconvolution
-        A and G.
-    window : ndarray, shape of ``estimate.model.k``
-        The regularisation's window at the quadrature nodes.
-    wavenumbers : ndarray, shape (m,)
-        Where the transfer function is stated, in rad/m.
-    effects : mapping of str to InputEffect
-        What one standard uncertainty of each input does.
-    correlations : mapping
-        Correlation coefficients of pairs of inputs; none where absent.
-    raster : FieldNoise, optional
-        What the noise of a measured field adds.
+    ``window``: the regularisation's, at the quadrature nodes; ``wavenumbers``: where the transfer
+    function is stated, in rad/m.
     """
     rows = _rows(estimate, deconvolution, window, wavenumbers)
     random, fixed = _noise_roots(estimate)
@@ -161,12 +333,12 @@ def _budget(
 ) -> dict[str, float]:
     """Contribution of each source; of correlations with the sign of what they add."""
     row = rows.names.index(name)
-    parts = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
+    budget = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
     variance = float(covariance[row, row])
-    excess = variance - sum(part**2 for part in parts.values())
+    excess = variance - sum(u**2 for u in budget.values())
     if abs(excess) > _ROUNDING * variance:
-        parts["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))
-    return parts
+        budget["correlations"] = float(np.copysign(np.sqrt(abs(excess)), excess))
+    return budget
 
 
 def _input_column(rows: _Rows, estimate: ProfileEstimate, effect: InputEffect) -> FloatArray:
@@ -236,8 +408,8 @@ def _scalar_rows(
         ("conversion_constant_gaussian", gaussian.conversion_constant, _unit(fitted, 0), count),
     ]
     rows = np.zeros((len(entries), count + fitted))
-    for row, (_, _, part, first) in zip(rows, entries, strict=True):
-        row[first : first + part.size] = part
+    for row, (_, _, derivative, first) in zip(rows, entries, strict=True):
+        row[first : first + derivative.size] = derivative
     return rows, tuple(e[0] for e in entries), np.array([e[1] for e in entries])
 
 
@@ -299,9 +471,9 @@ def _noise_roots(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray]:
 
     A Gaussian fit has no prior: all of its error scatters.
     """
-    own, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
+    covariance, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
     fitted = estimate.gaussian_gain @ estimate.noise_root
-    fixed = _root(own - random @ random.T, np.sqrt(np.maximum(np.diag(own), 0.0)))
+    fixed = _root(covariance - random @ random.T, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
     return np.vstack([random, fitted]), np.pad(fixed, ((0, fitted.shape[0]), (0, 0)))
 
 

@@ -117,7 +117,7 @@ def _chosen_method(
     from memscal.deconvolution.division import create_regulariser
     from memscal.errors import InputError
 
-    method = method or ("white-noise" if channel == "zz" else "evidence")
+    method = method or ("white-noise" if channel == "zz" else "bayesian")
     values = dict(_option(text) for text in options)
     if "seed" in values:
         raise click.UsageError("Give the seed as --seed, not as --option.")
@@ -174,7 +174,7 @@ Examples:
   memscal calibrate scan.h5 -o sensor.apparatus.h5 --figure scan.png --report scan.html
   memscal calibrate scan.h5 --reference fem.h5 --json --sweep
   memscal calibrate scan.h5 --method richardson-lucy --option iterations=80
-  memscal calibrate scan.h5 --method evidence --monte-carlo 1000
+  memscal calibrate scan.h5 --method bayesian --monte-carlo 1000
   memscal calibrate scan.h5 --channel xz
 """
 
@@ -220,14 +220,14 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     type=click.Choice(("zz", "xz", "yz")),
     default="zz",
     show_default=True,
-    help="Which voltage is calibrated. xz, yz: the shear, experimental, by method evidence, to "
+    help="Which voltage is calibrated. xz, yz: the shear, experimental, by method bayesian, to "
     "SCAN.xz.apparatus.h5.",
 )
 @click.option(
     "--method",
     metavar="NAME",
     shell_complete=_complete_method,
-    help="How G is found: evidence (from the scan's points, the most accurate), or by a division "
+    help="How G is found: bayesian (from the scan's points, the most accurate), or by a division "
     "of fields: white-noise (its exact expectation), white-noise-draw (one "
     "seeded draw, as published), tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a "
     "plug-in's.  [default: white-noise]",

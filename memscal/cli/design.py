@@ -120,7 +120,7 @@ class _Wish(_WishType):
 )
 @click.option(
     "--method",
-    default="evidence",
+    default="bayesian",
     show_default=True,
     help="Method of memscal calibrate with which the scan would be evaluated.",
 )

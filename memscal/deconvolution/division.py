@@ -1,4 +1,10 @@
-"""What every regulariser is given, and what it gives back."""
+r"""Methods of division, for the paper's :math:`A\hat G = \hat U_{zz}/\hat\sigma_{zz}` (Eq. 2).
+
+Both transforms vanish at large wavenumbers, and methods differ in their quotient there: by a
+window on the spectra (the paper's white noise, Tikhonov's), by the restoration of an image
+(:mod:`memscal.deconvolution.scikit_image`), or by Bayesian model averaging in data space, which
+divides nothing.  Other packages add methods under an entry point.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +18,7 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
+import scipy.fft
 
 from memscal.axisymmetry.grids import FieldGrid
 from memscal.errors import InputError
@@ -22,11 +29,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ENTRY_POINT_GROUP",
+    "Bayesian",
     "Division",
     "DivisionProblem",
-    "Evidence",
     "KernelProfile",
     "Regulariser",
+    "Tikhonov",
+    "WhiteNoise",
+    "WhiteNoiseDraw",
     "create_regulariser",
     "filtered_division",
     "image_division",
@@ -42,41 +52,28 @@ _CLOSED = 1e-9
 
 
 class KernelProfile(Protocol):
-    """A radial kernel, known on both sides of the Hankel transform."""
+    """A radial kernel, in closed form on both sides of the Hankel transform."""
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values at radii (m)."""
-        ...
 
     def transform(self, k: FloatArray) -> FloatArray:
         """Transform at wavenumbers (rad/m)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
 class DivisionProblem:
-    r"""The two fields of the paper's Eq. (2), and how far their spectra can be believed.
+    """The two fields of the paper's Eq. (2), and which of their components are relevant.
 
-    Parameters
-    ----------
-    grid : FieldGrid
-        Where the fields live.
-    voltage : ndarray
-        Lifted voltage per newton, in V/N.
-    reference : ndarray
-        Lifted base stress per newton, in 1/m^2.
-    weakest_voltage, weakest_reference : float
-        Moduli of the weakest relevant spectral components: the fields' transforms where the
-        voltage's stands ten times above its noise, in V m^2/N and 1.
-    posterior : callable, optional
-        Returns A G, in V/Pa/m^2, as the scan's points give it without any division, and the same
-        on the grid: the mean of its posterior, or the most credible that is not negative (first
-        argument) or does not rise with the radius (second).
+    ``posterior`` returns A G (V/Pa/m^2) as estimated from the scan's points, and the same on the
+    grid: the posterior mean, or the MAP estimate that is not negative (first argument) or does
+    not rise with the radius (second).
     """
 
     grid: FieldGrid
-    voltage: FloatArray
-    reference: FloatArray
+    voltage: FloatArray  # lifted voltage per newton, in V/N
+    reference: FloatArray  # lifted base stress per newton, in 1/m^2
+    # Moduli of the fields' transforms where the voltage's is ten times its noise, V m^2/N and 1.
     weakest_voltage: float
     weakest_reference: float
     posterior: Callable[[bool, bool], tuple[KernelProfile, FloatArray]] | None = None
@@ -94,21 +91,11 @@ class DivisionProblem:
 
 @dataclass(frozen=True, eq=False)
 class Division:
-    """The quotient of the fields.
+    """The quotient of the fields."""
 
-    Parameters
-    ----------
-    field : ndarray
-        A G on the grid, in V/Pa/m^2.
-    window : ndarray
-        What the regularisation leaves of each spectral component, from 0 to 1.
-    profile : KernelProfile, optional
-        What the field was made of, where it was no division: finer than any grid.
-    """
-
-    field: FloatArray
-    window: FloatArray
-    profile: KernelProfile | None = None
+    field: FloatArray  # A G on the grid, in V/Pa/m^2
+    window: FloatArray  # what is left of each spectral component, from 0 to 1
+    profile: KernelProfile | None = None  # of a field that is no quotient: finer than any grid
 
 
 class Regulariser(Protocol):
@@ -125,7 +112,6 @@ class Regulariser(Protocol):
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide the voltage field by the stress field."""
-        ...
 
 
 def require_amplitude(method: str, amplitude: Any) -> None:
@@ -165,33 +151,110 @@ def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
     modulus, voltage = np.abs(problem.reference_spectrum), np.abs(problem.voltage_spectrum)
     kept = np.abs(grid.transfer(field)) * modulus
     # Where the reference has vanished, so has the voltage: their rounding has no window.
-    there = modulus > _CLOSED * modulus.max()
-    window = np.divide(kept, voltage, out=np.zeros_like(kept), where=there)
+    relevant = modulus > _CLOSED * modulus.max()
+    window = np.divide(kept, voltage, out=np.zeros_like(kept), where=relevant)
     return Division(field, np.clip(window, 0.0, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evidence:
-    r"""Posterior mean of A G, given the scan's points, their noise, and a prior about a Gaussian.
+class WhiteNoise:
+    r"""Expectation of the paper's method over all draws of its noise.
 
-    The radial profile of a scan is estimated in data space before any field is divided: the best
-    Gaussian, and departures from it whose shape, smoothness and strength are weighed by evidence
-    (:mod:`memscal.estimation.bayesian`).  The fields of the other methods are made of that
-    estimate's convolution with the reference; this method takes the estimate itself, so that
-    nothing is lost to a window, and beyond the resolved band the prior takes over.
-
-    Parameters
-    ----------
-    nonnegative : bool
-        Take the most credible G that is nowhere negative.
-    monotone : bool
-        Take the most credible G that nowhere rises with the radius.  A ring does: whether a
-        constraint contradicts the scan is what the check ``reconvolution`` tells.
+    White noise added to both fields leaves the numerator's mean as it is and turns the
+    denominator's reciprocal, for circular complex noise of variance :math:`s^2`, into
+    :math:`E[1/(z + n)] = (1 - \exp(-|z|^2/s^2))/z`: a smooth spectral window.
     """
 
-    nonnegative: bool = False
-    monotone: bool = False
-    name: ClassVar[str] = "evidence"
+    amplitude: float = 1.0  # of the noise: s over a tenth of the weakest relevant component
+    name: ClassVar[str] = "white-noise"
+    assumes: ClassVar[str] = (
+        "G is negligible beyond the wavenumber where the voltage sinks into its noise."
+    )
+    fails: ClassVar[str] = (
+        "A G with fine detail (sharp edges, a narrow ring) is smoothed to the resolved band."
+    )
+
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide with the expected window."""
+        s = self.amplitude * NOISE_RATIO * problem.weakest_reference
+        window = -np.expm1(-((np.abs(problem.reference_spectrum) / s) ** 2))
+        return filtered_division(problem, window)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WhiteNoiseDraw:
+    """One seeded draw of the paper's method, as published.
+
+    White noise is added to both fields before the transform.  The quotient of two
+    components lost in noise has no finite variance: single draws carry rare, large ripples.
+    """
+
+    amplitude: float = 1.0  # of the noise, as in WhiteNoise
+    seed: int = 0
+    name: ClassVar[str] = "white-noise-draw"
+    assumes: ClassVar[str] = WhiteNoise.assumes
+    fails: ClassVar[str] = "Draws are heavy-tailed: some carry ripples that others do not."
+
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
+        require_count(self.name, "seed", self.seed, 0)
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide one draw; the window is that of its expectation."""
+        grid = problem.grid
+        rng = np.random.default_rng(self.seed)
+        numerator = grid.to_period(problem.voltage)
+        denominator = grid.to_period(problem.reference)
+        # Noise of spectral amplitude s has, per pixel, s / (cell area * sqrt(pixels)).
+        per_pixel = self.amplitude * NOISE_RATIO / (grid.cell_area * np.sqrt(numerator.size))
+        noisy_u = numerator + rng.normal(0, per_pixel * problem.weakest_voltage, numerator.shape)
+        noisy_s = denominator + rng.normal(
+            0, per_pixel * problem.weakest_reference, denominator.shape
+        )
+        quotient = scipy.fft.rfft2(noisy_u) / scipy.fft.rfft2(noisy_s)
+        period = scipy.fft.irfft2(quotient, s=numerator.shape) / grid.cell_area
+        expected = WhiteNoise(amplitude=self.amplitude).divide(problem)
+        return Division(grid.from_quotient(period), expected.window)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tikhonov:
+    r"""Minimiser of :math:`|\hat\sigma \hat g - \hat u|^2 + \alpha |\hat g|^2`.
+
+    Its window :math:`|\hat\sigma|^2 / (|\hat\sigma|^2 + \alpha)` closes more slowly than
+    the white noise's, at the same wavenumber: :math:`\sqrt\alpha` is the paper's noise amplitude.
+    """
+
+    amplitude: float = 1.0  # root of alpha over a tenth of the weakest relevant component
+    name: ClassVar[str] = "tikhonov"
+    assumes: ClassVar[str] = "G has little power; all wavenumbers are equally likely to carry it."
+    fails: ClassVar[str] = "Every component is a little too small, the peak of G with them."
+
+    def __post_init__(self) -> None:
+        require_amplitude(self.name, self.amplitude)
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        """Divide with the Tikhonov window."""
+        alpha = (self.amplitude * NOISE_RATIO * problem.weakest_reference) ** 2
+        power = np.abs(problem.reference_spectrum) ** 2
+        return filtered_division(problem, power / (power + alpha))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bayesian:
+    """Bayesian model averaging of radial departures from a Gaussian: the posterior mean of A G.
+
+    The estimate from the scan's points in data space (:mod:`memscal.estimation.bayesian`) is
+    returned as it is: nothing is lost to a window, and beyond the resolved band the prior
+    determines G.  With a constraint it is the MAP estimate.
+    """
+
+    nonnegative: bool = False  # G is nowhere negative
+    monotone: bool = False  # G nowhere rises with the radius (a ring's does)
+    name: ClassVar[str] = "bayesian"
     assumes: ClassVar[str] = "G is a Gaussian, or departs from one smoothly."
     fails: ClassVar[str] = (
         "Detail finer than a third of G's width that the film hides is not found, only allowed for."
@@ -199,15 +262,15 @@ class Evidence:
 
     @property
     def constrained(self) -> bool:
-        """Whether a constraint was asked for."""
+        """Whether a constraint is set."""
         return self.nonnegative or self.monotone
 
     def divide(self, problem: DivisionProblem) -> Division:
-        """Take the posterior mean; its window is open everywhere."""
+        """Return the posterior's estimate; its window is open everywhere."""
         if problem.posterior is None:
             raise InputError(
-                "Method evidence was given fields without the scan that they came from.",
-                cure="Use it by memscal.calibrate(scan, method='evidence').",
+                "Method bayesian was given fields without the scan that they came from.",
+                cure="Use it by memscal.calibrate(scan, method='bayesian').",
             )
         profile, field = problem.posterior(self.nonnegative, self.monotone)
         return Division(field, np.ones(problem.voltage_spectrum.shape), profile)
@@ -215,50 +278,32 @@ class Evidence:
 
 ENTRY_POINT_GROUP = "memscal.regularisers"
 
+_SCIKIT_IMAGE = "memscal.deconvolution.scikit_image"
 _OWN = {
-    "white-noise": "memscal.deconvolution.windows:WhiteNoise",
-    "evidence": "memscal.deconvolution.division:Evidence",
-    "white-noise-draw": "memscal.deconvolution.windows:WhiteNoiseDraw",
-    "tikhonov": "memscal.deconvolution.windows:Tikhonov",
-    "wiener": "memscal.deconvolution.scikit_image:Wiener",
-    "unsupervised-wiener": "memscal.deconvolution.scikit_image:UnsupervisedWiener",
-    "richardson-lucy": "memscal.deconvolution.scikit_image:RichardsonLucy",
+    "white-noise": (__name__, "WhiteNoise"),
+    "bayesian": (__name__, "Bayesian"),
+    "white-noise-draw": (__name__, "WhiteNoiseDraw"),
+    "tikhonov": (__name__, "Tikhonov"),
+    "wiener": (_SCIKIT_IMAGE, "Wiener"),
+    "unsupervised-wiener": (_SCIKIT_IMAGE, "UnsupervisedWiener"),
+    "richardson-lucy": (_SCIKIT_IMAGE, "RichardsonLucy"),
 }
+#: Former names, which are accepted but no longer printed.
+_ALIASES = {"evidence": "bayesian"}
 
 
 def regulariser_names() -> tuple[str, ...]:
-    """Names of every regulariser: memscal's own first, then plug-ins'.
-
-    Examples
-    --------
-    >>> regulariser_names()[0]
-    'white-noise'
-    """
+    """Names of every regulariser: memscal's own first, then plug-ins'."""
     others = sorted({point.name for point in _plug_ins()} - set(_OWN))
     return (*_OWN, *others)
 
 
 def create_regulariser(name: str, /, **options: Any) -> Regulariser:
-    """Create a regulariser by name.
+    """Create a regulariser by its name, or a former one, with its options.
 
-    Parameters
-    ----------
-    name : str
-        One of :func:`regulariser_names`.
-    **options
-        Its parameters; ``seed`` is passed on only to those that draw random numbers.
-
-    Raises
-    ------
-    InputError
-        If there is no such regulariser, or it has no such option.
-
-    Examples
-    --------
-    >>> create_regulariser("tikhonov", amplitude=0.5).amplitude
-    0.5
+    ``seed`` is passed on only to those that draw random numbers.
     """
-    factory = _factory(name)
+    factory = _factory(_ALIASES.get(name, name))
     accepted = inspect.signature(factory).parameters
     if "seed" not in accepted:
         options = {key: value for key, value in options.items() if key != "seed"}
@@ -275,21 +320,20 @@ def create_regulariser(name: str, /, **options: Any) -> Regulariser:
 
 def _factory(name: str) -> Any:
     if name in _OWN:
-        module, _, attribute = _OWN[name].partition(":")
+        module, attribute = _OWN[name]
         return getattr(import_module(module), attribute)
-    found = [point for point in _plug_ins() if point.name == name]
-    if not found:
+    points = [point for point in _plug_ins() if point.name == name]
+    if not points:
         raise InputError(
             f"There is no method named {name}.",
             cure=f"Choose from {', '.join(regulariser_names())}.",
         )
-    point = found[0]
     try:
-        return point.load()
+        return points[0].load()
     except Exception as error:
-        # Whatever another package's import raises, the user needs to know which package it is.
+        # Whatever another package's import raises, the message names the package.
         raise InputError(
-            f"The method {name}, {point.value}, could not be loaded: {error}.",
+            f"The method {name}, {points[0].value}, could not be loaded: {error}.",
             cure="Repair or remove the package that provides it.",
         ) from error
 

@@ -1,12 +1,13 @@
-r"""The paper's method on arrays, step by step: lift, divide, normalise, fit, convolve back.
+r"""The Fourier ratio, the paper's method on arrays: lift, divide, normalise, fit, convolve back.
 
 .. math::
 
+    U_{zz} = A\,G \otimes \sigma_{zz}, \qquad
     A\,G = \mathcal F^{-1}\left\{\frac{\mathcal F\{U_{zz}\}}{\mathcal F\{\sigma_{zz}\}}\right\},
     \qquad A = \int A\,G\,dx\,dy
 
-(the paper's Eq. 2).  :func:`memscal.calibrate` goes through these functions; they can be called on
-radial profiles that come from anywhere.
+(the paper's Eq. 1 to 3).  :func:`memscal.calibrate` calls these functions; they take radial
+profiles from any source.
 """
 
 from __future__ import annotations
@@ -194,7 +195,7 @@ def divide(
     method : str or Regulariser, default "white-noise"
         One of the methods of :func:`memscal.calibrate` that divide fields.
     posterior : callable, optional
-        What method ``"evidence"`` takes in place of a quotient.
+        What method ``"bayesian"`` returns in place of a quotient.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -269,8 +270,8 @@ def normalise(quotient: Field) -> tuple[float, Field]:
 def fit_gaussian(g: Field, start: float | None = None) -> float:
     r"""Width of the Gaussian of unit integral nearest to G over the plane: the paper's fit.
 
-    Minimises :math:`\int (G - e^{-r^2/2\sigma^2}/2\pi\sigma^2)^2\, r\,dr`.  No width below half a
-    step of the radial grid is told apart from a point.
+    Minimises :math:`\int (G - e^{-r^2/2\sigma^2}/2\pi\sigma^2)^2\, r\,dr`.  A width below half a
+    step of the radial grid is not resolved.
 
     Parameters
     ----------
@@ -306,9 +307,9 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
         inside = np.maximum(scaled, narrowest / start)
         return misfit(inside), slope(inside)
 
-    near = gauss_newton(linearise, begin, tolerance=1e-10)
-    if near is not None and near[0] * start > 2 * narrowest:
-        return float(near[0] * start)
+    width = gauss_newton(linearise, begin, tolerance=1e-10)
+    if width is not None and width[0] * start > 2 * narrowest:
+        return float(width[0] * start)
     from scipy.optimize import least_squares
 
     bounded = least_squares(

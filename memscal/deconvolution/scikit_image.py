@@ -1,4 +1,4 @@
-"""The classical restorations of scikit-image, behind the same protocol."""
+"""Classical restorations of images by scikit-image, as methods of division."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["RichardsonLucy", "UnsupervisedWiener", "Wiener"]
 
 @dataclass(frozen=True, eq=False)
 class _Images:
-    """Both fields as scikit-image wants them: of order one, the point spread of sum one."""
+    """Both fields as images of order one, the point spread function of sum one."""
 
     image: FloatArray
     point_spread: FloatArray
@@ -41,16 +41,9 @@ class _Images:
 
 @dataclass(frozen=True, kw_only=True)
 class Wiener:
-    """Wiener-Hunt restoration: the quotient with a Laplacian penalty.
+    """Wiener-Hunt restoration: the quotient with a Laplacian penalty."""
 
-    Parameters
-    ----------
-    amplitude : float
-        The penalty equals the square of a tenth of the weakest relevant component there;
-        this factor scales that amplitude.
-    """
-
-    amplitude: float = 1.0
+    amplitude: float = 1.0  # root of the penalty over a tenth of the weakest relevant component
     name: ClassVar[str] = "wiener"
     assumes: ClassVar[str] = "G is smooth; the noise of the lifted field is white."
     fails: ClassVar[str] = (
@@ -80,15 +73,9 @@ class Wiener:
 
 @dataclass(frozen=True, kw_only=True)
 class UnsupervisedWiener:
-    """Wiener-Hunt restoration whose two precisions are sampled with the image.
+    """Wiener-Hunt restoration whose two precisions are sampled with the image."""
 
-    Parameters
-    ----------
-    seed : int
-        Seed of the Gibbs sampler.
-    """
-
-    seed: int = 0
+    seed: int = 0  # seed of the Gibbs sampler
     name: ClassVar[str] = "unsupervised-wiener"
     assumes: ClassVar[str] = "The noise of the field is white, and G is smooth."
     fails: ClassVar[str] = (
@@ -111,15 +98,9 @@ class UnsupervisedWiener:
 
 @dataclass(frozen=True, kw_only=True)
 class RichardsonLucy:
-    """Richardson-Lucy restoration: multiplicative steps that keep G positive.
+    """Richardson-Lucy restoration: multiplicative steps that keep G positive."""
 
-    Parameters
-    ----------
-    iterations : int
-        Number of steps; more of them resolve finer detail, then noise.
-    """
-
-    iterations: int = 50
+    iterations: int = 50  # number of steps; more of them resolve finer detail, then noise
     name: ClassVar[str] = "richardson-lucy"
     assumes: ClassVar[str] = "G is nowhere negative; the noise is a counting noise."
     fails: ClassVar[str] = (

@@ -1,8 +1,8 @@
-r"""Tests of what the model takes for granted: symmetry, linearity in load, a round sensor.
+r"""Tests of the model's assumptions: symmetry, linearity in load, a round and Gaussian sensor.
 
-Each adds a few columns to the fitted model and asks by how much the misfit falls.  With
+Some add a few columns to the fitted model and test by how much the misfit falls.  With
 :math:`m` columns that should not be needed, the fall of chi-square follows the chi-square
-distribution of :math:`m` degrees of freedom.
+distribution of :math:`m` degrees of freedom.  Others predict a group of points from the rest.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model
+from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model, orthonormal
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
@@ -25,7 +25,7 @@ __all__ = [
     "ExtraColumns",
     "HeldOut",
     "axisymmetry_test",
-    "departure_evidence",
+    "departure_test",
     "hold_out",
     "linearity_test",
     "load_groups",
@@ -36,36 +36,18 @@ __all__ = [
 _MOST_FOLDS = 10
 #: Loads that differ by less of their mean are one load, recorded with scatter.
 _SAME_LOAD = 0.05
-_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """The worst predicted of several groups of points.
+    """The worst predicted of several groups of points."""
 
-    Parameters
-    ----------
-    value : float
-        Chi-square of the held-out voltages per degree of freedom; over the others' own where the
-        noise is not stated (F).
-    limit : float
-        What the worst of all groups exceeds by chance once in a thousand.
-    p_value : float
-        Chance of a group so badly predicted among all, or less.
-    worst : int
-        Its place among the groups, from zero.
-    folds : int
-        How many groups were held out.
-    alone : bool
-        Whether each was one group: more than ten are held out several at a time.
-    """
-
-    value: float
-    limit: float
-    p_value: float
-    worst: int
-    folds: int
-    alone: bool
+    value: float  # chi-square per degree of freedom; over the others' if no noise is stated (F)
+    limit: float  # what the worst of all groups exceeds by chance once in a thousand
+    p_value: float  # chance of a group so badly predicted among all, or less
+    worst: int  # its number among the groups, from zero
+    folds: int  # how many groups were held out
+    alone: bool  # whether each group was held out by itself: of more than ten, several are at once
 
 
 def load_groups(load: FloatArray) -> NDArray[np.intp]:
@@ -78,46 +60,29 @@ def load_groups(load: FloatArray) -> NDArray[np.intp]:
 def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | None:
     """Hold out each group of points in turn, and predict it from the others.
 
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-    group : ndarray of int, shape (n,)
-        Which group each point belongs to, counted from zero.
-
-    Returns
-    -------
-    HeldOut or None
-        The worst group; ``None`` where there is one group alone, or none that tells.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> estimate = memscal.calibrate(memscal.simulate(repeats=3)).solution.estimate
-    >>> hold_out(estimate, estimate.points.repeat).folds
-    3
+    ``None`` where there are fewer than two groups that can be predicted.
     """
     if np.unique(group).size < 2:
         return None
-    # Many outliers in one group are its fault, and a single one is not: none may count for much.
+    # Clipped: many outliers in one group count together, and a single one counts little.
     model = free_model(estimate, clip_outliers=True)
-    # Centre, baseline and drift, which a held-out group has to itself.
+    # Centre, baseline and drift are fitted to a held-out group by itself.
     nuisances = int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
-    own = model.design[:, 2 : 2 + nuisances]
+    columns = model.design[:, 2 : 2 + nuisances]
     fold = _folds(group)[model.kept]
-    found = {
+    outcomes = {
         int(i): outcome
         for i in np.unique(fold)
-        if (outcome := _predict(model, own, fold == i)) is not None
+        if (outcome := _predict(model, columns, fold == i)) is not None
     }
-    if len(found) < 2:
+    if len(outcomes) < 2:
         return None
-    p_values = {i: _p_value(*outcome) for i, outcome in found.items()}
+    p_values = {i: _p_value(*outcome) for i, outcome in outcomes.items()}
     worst = min(p_values, key=lambda i: p_values[i])
     # The worst of several is worse than one: Bonferroni's correction, for any dependence.
-    folds = len(found)
+    folds = len(outcomes)
     p_value, share = min(folds * p_values[worst], 1.0), FALSE_ALARM / folds
-    value, degrees, rest = found[worst]
+    value, degrees, rest = outcomes[worst]
     limit = chdtri(degrees, share) / degrees if rest is None else fdtri(degrees, rest, 1 - share)
     return HeldOut(value, float(limit), p_value, worst, folds, alone=int(group.max()) < _MOST_FOLDS)
 
@@ -129,11 +94,11 @@ def _folds(group: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _predict(
-    model: FreeModel, own: FloatArray, out: NDArray[np.bool_]
+    model: FreeModel, nuisances: FloatArray, out: NDArray[np.bool_]
 ) -> tuple[float, int, int | None] | None:
-    """Chi-square per degree, its degrees, and those of the others where the noise is theirs."""
+    """Chi-square per degree, its degrees, and those of the others if no noise is stated."""
     others, others_degrees = _residual(model.design[~out], model.data[~out])
-    both, both_degrees = _residual(np.hstack([model.design, own * out[:, None]]), model.data)
+    both, both_degrees = _residual(np.hstack([model.design, nuisances * out[:, None]]), model.data)
     degrees = both_degrees - others_degrees
     if degrees < FEWEST_RESIDUALS or others_degrees < FEWEST_RESIDUALS:
         return None
@@ -145,10 +110,7 @@ def _predict(
 
 def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:
     """Residual sum of squares and its degrees of freedom."""
-    size = np.linalg.norm(design, axis=0)
-    scaled = design[:, size > 0] / size[size > 0]
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    basis = left[:, singular > _DEPENDENT * singular[0]]
+    basis = orthonormal(design)
     rest = data - basis @ (basis.T @ data)
     return float(rest @ rest), int(data.size - basis.shape[1])
 
@@ -161,46 +123,37 @@ def _p_value(value: float, degrees: int, rest: int | None) -> float:
 
 #: Loads must differ by this share of their mean before linearity can be tested.
 _LOAD_CONTRAST = 0.05
-#: Probabilities below this are not followed by the evidence.
+#: Posterior probabilities are cut off at this and one minus this.
 _LEAST_PROBABILITY = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class ExtraColumns:
-    """Outcome of adding columns to the model.
+    """Outcome of adding columns to the model."""
 
-    ``fall`` of chi-square for ``count`` columns; ``coefficients`` and their standard
-    ``errors``; ``size``: largest voltage of the added part over the largest signal.
-    """
-
-    fall: float
-    count: int
+    fall: float  # of chi-square
+    count: int  # of columns
     coefficients: FloatArray
-    errors: FloatArray
-    size: float
+    errors: FloatArray  # standard uncertainties of the coefficients
+    size: float  # largest voltage that the columns add, over the largest signal
 
 
 @dataclass(frozen=True)
 class Departure:
-    """How far the scan speaks for a departure from a Gaussian G.
+    """Departures from a Gaussian G against the Gaussian itself."""
 
-    ``log_bayes_factor``: natural logarithm of the evidence for departures over that for the
-    Gaussian, the prior odds taken out, within -8.5 and 8.5; ``kind``: the most probable kind of
-    departure, and its ``share`` of all departures' probability (zero where none has any).
-    """
-
-    log_bayes_factor: float
-    kind: str
-    share: float
+    log_bayes_factor: float  # natural logarithm, within -8.5 and 8.5
+    kind: str  # the most probable kind of departure
+    share: float  # its share of all departures' probability
 
 
-def departure_evidence(estimate: ProfileEstimate) -> Departure:
-    """Weigh departures of any kind against the Gaussian, by their evidence."""
-    prior, weighed = HYPOTHESES[0].estimate, estimate.weighed
-    posterior = np.clip(weighed.gaussian_probability, _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
+def departure_test(estimate: ProfileEstimate) -> Departure:
+    """Compare departures of any kind with the Gaussian, by their marginal likelihoods."""
+    prior, averaged = HYPOTHESES[0].estimate, estimate.weighed
+    posterior = np.clip(averaged.gaussian_probability, _LEAST_PROBABILITY, 1 - _LEAST_PROBABILITY)
     factor = (1 - posterior) / posterior * prior / (1 - prior)
     kinds: dict[str, float] = {}
-    for hypothesis, probability in zip(HYPOTHESES[1:], weighed.probability[1:], strict=True):
+    for hypothesis, probability in zip(HYPOTHESES[1:], averaged.probability[1:], strict=True):
         if hypothesis.shape is not None and hypothesis.estimate > 0:
             name = hypothesis.shape.name
             kinds[name] = kinds.get(name, 0.0) + float(probability)
@@ -211,8 +164,8 @@ def departure_evidence(estimate: ProfileEstimate) -> Departure:
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Compare the left and right halves of a line scan.
 
-    Is anything odd left over?  The columns are odd in the distance from the centre, at three
-    widths of the profile.  A tangential channel's own signal is odd, and the columns are even.
+    The columns are odd in the distance from the centre, at three widths of the profile; even for
+    a tangential channel, whose signal is odd.
     """
     points = estimate.points
     dx, dy = estimate.offset
@@ -221,7 +174,7 @@ def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
 
 
 def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
-    """Ask whether a raster is elliptic: columns that vary as cos 2a and sin 2a."""
+    """Test whether a raster is elliptic: columns that vary as cos 2a and sin 2a."""
     dx, dy = estimate.offset
     quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy], axis=1)
     shapes = _widened(estimate, (0.5, 1.0))
@@ -230,13 +183,7 @@ def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
 
 
 def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
-    r"""Test the paper's linearity in load: :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`.
-
-    Returns
-    -------
-    ExtraColumns or None
-        Its coefficient is eta; ``None`` where the loads do not differ enough.
-    """
+    r"""Fit eta of :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`; ``None`` for equal loads."""
     load = estimate.points.load
     mean = float(load.mean())
     if np.ptp(load) < _LOAD_CONTRAST * mean:
@@ -254,10 +201,7 @@ def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArra
 
 
 def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
-    """Fit the columns together with a round model to what that leaves over.
-
-    The departures enter as explained: they are even, and absorb nothing odd or uneven.
-    """
+    """Fit the columns together with a round Gaussian, the departures subtracted as estimated."""
     weights = estimate.weights / estimate.noise_scale**2
     standardised = estimate.points.standardised
     scale = np.abs(columns).max(axis=0)

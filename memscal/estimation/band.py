@@ -1,18 +1,17 @@
-r"""Up to which wavenumber the scan determines the apparatus function.
+r"""The band of wavenumbers in which the scan determines the apparatus function.
 
-It is resolved while the posterior standard uncertainty of its transfer function stays below a
+G is resolved while the posterior standard uncertainty of its transfer function stays below a
 third of the fitted Gaussian's transfer function,
 
 .. math::
 
     u[\hat G(k)] < \tfrac13\,e^{-\sigma^2k^2/2}.
 
-The Gaussian's has no zeros, unlike a ring's or a disc's own, and no lobes that a prior could have
-made up: where it has fallen below three times the uncertainty, a shape fitted to smaller
-wavenumbers says more about G than the scan does.
+The Gaussian's has no zeros and no lobes, unlike that of a ring or a disc: where it has fallen
+below three times the uncertainty, G is determined by the prior.
 
-Which components are relevant to a division of fields is told by the voltage itself.  The measured
-points are rings: the transform of the voltage at :math:`k` is a sum
+Components are relevant to a division of fields while the voltage stands above its noise.  The
+measured points are rings: the transform of the voltage at :math:`k` is a sum
 :math:`\sum_i a_i u_i J_0(kR_i)` with ring areas :math:`a_i` (of a tangential channel with
 :math:`J_1`), and its noise is the same sum in quadrature.  Points whose signal is lost in noise
 carry the profile's tail instead, and count as :math:`u_i^2/(u_i^2 + s_i^2)`.
@@ -39,30 +38,15 @@ RESOLVED = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Signal and noise of the voltage's transform, and how far G is known.
+    """Signal and noise of the voltage's transform, and the relevant and resolved wavenumbers."""
 
-    Parameters
-    ----------
-    k : ndarray, shape (n,)
-        Wavenumbers, in rad/m.
-    signal, noise : ndarray, shape (n,)
-        Modulus of the voltage's transform and its noise, in V m^2 / N.
-    relevant : float
-        Wavenumber beyond which the signal stays below ten times the noise, in rad/m; at most the
-        last one that the scan's step samples.
-    resolved : float
-        Wavenumber up to which the transfer function's standard uncertainty stays below a third of
-        the fitted Gaussian's transfer function, in rad/m; at most the last one sampled.
-    weakest_voltage, weakest_reference : float
-        Moduli of both fields' transforms at ``relevant``.
-    """
-
-    k: FloatArray
-    signal: FloatArray
+    k: FloatArray  # (n,): wavenumbers, in rad/m
+    signal: FloatArray  # (n,): modulus of the voltage's transform and its noise, in V m^2 / N
     noise: FloatArray
-    relevant: float
-    resolved: float
-    weakest_voltage: float
+    # Both wavenumbers in rad/m, and at most the last one that the scan's step samples.
+    relevant: float  # beyond it the signal is less than ten times the noise
+    resolved: float  # up to it the uncertainty is less than a third of the Gaussian
+    weakest_voltage: float  # moduli of both fields' transforms at the relevant wavenumber
     weakest_reference: float
 
 
@@ -87,8 +71,8 @@ def find_band(estimate: ProfileEstimate) -> Band:
 def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
     r"""Posterior standard uncertainty of the transfer function at the quadrature nodes.
 
-    That of :math:`\hat G(k) = \hat K(k)/\hat K(0)` for the posterior of :math:`K = A\,G`: the
-    noise and what the prior allows; the uncertainty of the reference is not part of it.
+    That of :math:`\hat K(k)/\hat K(0)` for the posterior of :math:`K = A\,G`; without the
+    uncertainty of the reference.
     """
     basis, a = estimate.basis, estimate.conversion_constant
     rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a

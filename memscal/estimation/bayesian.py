@@ -1,157 +1,300 @@
-r"""How far the scan departs from the Gaussian: hypotheses weighed by their evidence.
+r"""Bayesian model averaging of radial departures from a Gaussian apparatus function.
 
-A hypothesis is a shape of departure and its strength; its evidence and its posterior are those of
-:mod:`memscal.estimation.bayesian`.
+A departure is a sum of rings of radius q, blurred by a Gaussian of width b, with random
+amplitudes; each has a closed form on both sides of the Hankel transform,
 
-Two sets of prior weights are in use.  The estimate is the posterior mean under one that believes
-in the Gaussian by 0.4, so that a Gaussian sensor costs little.  Its uncertainty is the mean
-squared distance from the truth under another that believes in departures only, rougher ones
-among them: what regularisation hides is counted as what such fields have there.
+.. math::
+
+    a\,(\delta_q \otimes g_b)(r) = \frac{a}{2\pi b^2}\,e^{-(r^2+q^2)/2b^2} I_0(rq/b^2),
+    \qquad a\,J_0(kq)\,e^{-b^2k^2/2} .
+
+Rings of one blur make a random radial field of correlation length :math:`\sqrt2\,b` within an
+extent w; rings of radius zero and many widths, one that varies fast at the axis and slowly far
+from it.  Lengths are in units of the width of the best Gaussian; the strength is the expected
+size over the Gaussian's, both as L2 norms over the plane.
+
+A hypothesis is a shape of departure and its strength.  Given one, the model is linear, with
+Gaussian priors for the amplitudes and flat ones for the nuisance parameters: its marginal
+likelihood and its posterior are in closed form.  There are two sets of prior probabilities.  The
+estimate is the posterior mean under one that gives the Gaussian itself 0.4, so that a Gaussian
+sensor loses little precision.  Its uncertainty is the mean squared error under another that
+allows departures only, rougher ones among them: what regularisation hides is counted as what
+such fields have there.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
+from scipy.special import i0e, j0
 
-from memscal.estimation.departures import SHAPES, DepartureBasis, Shape
+from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian, unit_gaussian_slope
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray
 
-__all__ = ["HYPOTHESES", "Outcome", "Part", "Projected", "WeighedFit", "weigh_departures"]
+__all__ = [
+    "HYPOTHESES",
+    "SHAPES",
+    "DepartureBasis",
+    "Rings",
+    "Shape",
+    "WeighedFit",
+    "departure_basis",
+    "weigh_departures",
+]
 
-_VARIANCE_ROUNDS = 8
-#: The smallest noise, over the largest residual of a Gaussian, that is told from rounding.
-_ROUNDING = 1e-9
+#: Rings are never narrower than this many steps: a width below the sampling is not resolved.
+_SMALLEST_WIDTH_IN_STEPS = 0.5
+#: Neighbouring rings overlap: this share of their blur apart.
+_SPACING = 0.7
+_FEWEST_RINGS = 6
+#: A field is cut at this multiple of its extent, where its envelope has fallen to 1e-5.
+_REACH = 2.2
+_SCALES = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """One shape's design with the flat columns projected out, by its singular values.
+class Rings:
+    """Blurred rings: ``radius`` and ``blur`` in m, ``amplitude`` in V/Pa; each of shape (m,)."""
 
-    ``along``: the data along the left singular vectors; ``power``: their squares, those of the
-    expected noise included.
-    """
+    radius: FloatArray
+    blur: FloatArray
+    amplitude: FloatArray
 
-    block: slice
-    columns: FloatArray
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Hankel transforms at ``k`` (rad/m), shape (k, m)."""
+        blurred = np.exp(-0.5 * np.multiply.outer(k, self.blur) ** 2)
+        return np.asarray(self.amplitude * blurred * j0(np.multiply.outer(k, self.radius)))
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """Values at radii ``r`` (m), shape (r, m), in V/Pa/m^2."""
+        square = self.blur**2
+        # The scaled Bessel function carries exp(-rq/b^2), which completes the square.
+        near = np.exp(-0.5 * np.subtract.outer(r, self.radius) ** 2 / square)
+        bessel = i0e(np.multiply.outer(r, self.radius / square))
+        return np.asarray(self.amplitude / (2 * np.pi * square) * near * bessel)
+
+    @property
+    def size(self) -> float:
+        """Expected L2 norm over the plane of the sum with random signs, in V/Pa/m."""
+        square = i0e(self.radius**2 / (2 * self.blur**2)) / (4 * np.pi * self.blur**2)
+        return float(np.sqrt(np.sum(self.amplitude**2 * square)))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A kind of departure, in units of the Gaussian's width."""
+
+    name: str
+    blur: float  # finest width of its components
+    extent: float  # of a field, the radius where its envelope falls; of scales, the largest width
+    scales: bool = False  # Gaussians of all widths from blur to extent, not rings of one blur
+
+    def rings(self, width: float, amplitude: float) -> Rings:
+        """Return its components about a Gaussian of a width (m) and an amplitude (V/Pa).
+
+        They are scaled to the Gaussian's own L2 norm, so that a strength of one is as large.
+        """
+        if self.scales:
+            blur = width * np.geomspace(self.blur, self.extent, _SCALES)
+            plain = Rings(np.zeros(_SCALES), blur, np.ones(_SCALES))
+        else:
+            reach = _REACH * self.extent
+            count = max(_FEWEST_RINGS, math.ceil(reach / (_SPACING * self.blur)))
+            q = (np.arange(count) + 0.5) * reach / count
+            envelope = np.sqrt(q) * np.exp(-0.5 * (q / self.extent) ** 4)
+            plain = Rings(width * q, np.full(count, width * self.blur), envelope)
+        gaussian = amplitude / (2 * np.sqrt(np.pi) * width)
+        return Rings(plain.radius, plain.blur, plain.amplitude * gaussian / plain.size)
+
+
+#: Edges (a disc, a plateau), a core of its own (a ring, a spike), and tails.
+SHAPES = (
+    Shape("edge", 0.65, 0.8),
+    Shape("edge", 0.65, 1.2),
+    Shape("rough edge", 0.4, 0.8),
+    Shape("rough edge", 0.4, 1.2),
+    Shape("rough edge", 0.5, 0.8),
+    Shape("rough edge", 0.5, 1.2),
+    Shape("core", 0.3, 2.0, scales=True),
+    Shape("tail", 0.85, 1.8),
+    Shape("tail", 0.85, 3.0),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class DepartureBasis:
+    """The kernels that an estimate is a combination of, about the best Gaussian."""
+
+    conversion_constant: float  # the Gaussian, in V/Pa and m
+    sigma: float
+    flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
+    rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
+
+    @property
+    def blocks(self) -> tuple[slice, ...]:
+        """Columns of each shape."""
+        ends = self.flat + np.cumsum([0, *(ring.radius.size for ring in self.rings)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def kernels(self, k: FloatArray) -> FloatArray:
+        """Transforms of all columns at ``k`` (rad/m), shape (k, p).
+
+        The first two are the derivatives of the Gaussian's by A and width; the other parameters
+        without prior move no kernel and hold zeros.
+        """
+        gaussian = gaussian_transfer(k, self.sigma)
+        widening = -self.conversion_constant * self.sigma * k**2 * gaussian
+        return self._columns(gaussian, widening, [ring.transform(k) for ring in self.rings])
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """Values of all columns at radii ``r`` (m), shape (r, p)."""
+        gaussian = unit_gaussian(r, self.sigma)
+        widening = self.conversion_constant * unit_gaussian_slope(r, self.sigma)
+        return self._columns(gaussian, widening, [ring.radial(r) for ring in self.rings])
+
+    @cached_property
+    def integrals(self) -> FloatArray:
+        """Integrals of all columns over the plane, shape (p,)."""
+        return np.asarray(self.kernels(np.zeros(1))[0])
+
+    def _columns(
+        self, gaussian: FloatArray, widening: FloatArray, rings: list[FloatArray]
+    ) -> FloatArray:
+        unmoved = np.zeros((gaussian.size, self.flat - 2))
+        return np.hstack([gaussian[:, None], widening[:, None], unmoved, *rings])
+
+
+def departure_basis(model: ForwardModel, fit: GaussianFit) -> DepartureBasis:
+    """Return the kernels of the fit's own parameters and of every shape about it."""
+    width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
+    rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
+    return DepartureBasis(fit.conversion_constant, fit.sigma, fit.jacobian.shape[1], rings)
+
+
+_VARIANCE_ROUNDS = 8
+#: The smallest noise, over the largest residual of a Gaussian, that is distinct from rounding.
+_ROUNDING = 1e-9
+#: Hypotheses of a smaller share of the posterior probability are left out.
+_NEGLIGIBLE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """One shape's weighted columns, and the SVD of what is left of them beside the flat columns."""
+
+    block: slice  # where its amplitudes stand among all parameters
+    columns: FloatArray  # (n, m)
     left: FloatArray
     singular: FloatArray
     right: FloatArray
-    along: FloatArray
-    power: FloatArray
+    along: FloatArray  # the data along the left singular vectors
+    power: FloatArray  # their squares, those of the expected noise included
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """One hypothesis: log evidence, noise variance, and what gives its posterior.
+class _Conditional:
+    """Marginal likelihood and posterior given one hypothesis, at the MAP estimate of the noise."""
 
-    ``shrink``: factors from data to amplitudes along the singular vectors; ``slope``: derivative
-    of the log evidence by the weighted data.
-    """
-
-    log_evidence: float
-    variance: float
+    log_marginal: float
+    variance: float  # of the noise
     strength: float
-    part: Part | None
-    shrink: FloatArray
-    slope: FloatArray
+    design: _Design | None
+    shrink: FloatArray  # from data to amplitudes, along the singular vectors
+    slope: FloatArray  # (n,): derivative of log_marginal by the weighted data
 
     def amplitude_covariance(self, least_variance: float) -> FloatArray:
-        """Posterior covariance of the amplitudes, at a noise that is believed at least."""
-        if self.part is None:
+        """Posterior covariance of the amplitudes, for at least this variance of the noise."""
+        if self.design is None:
             return np.zeros((0, 0))
-        prior, right = self.strength**2, self.part.right
+        prior, right = self.strength**2, self.design.right
         variance = max(self.variance, least_variance)
-        left_over = prior * variance / (variance + prior * self.part.singular**2)
-        seen = (right.T * left_over) @ right
+        left_over = prior * variance / (variance + prior * self.design.singular**2)
+        determined = (right.T * left_over) @ right
         if right.shape[0] == right.shape[1]:
-            return np.asarray(seen)
-        # Fewer points than components leave the prior as it was along what they do not see.
-        return np.asarray(seen + prior * (np.eye(right.shape[1]) - right.T @ right))
+            return np.asarray(determined)
+        # Fewer points than components leave the prior as it was in all other directions.
+        return np.asarray(determined + prior * (np.eye(right.shape[1]) - right.T @ right))
 
 
 @dataclass(frozen=True, eq=False)
-class Projected:
-    """Weighted data and flat columns: what every hypothesis shares.
+class _LinearModel:
+    """Weighted data and columns of flat prior, which every hypothesis shares."""
 
-    ``added``: variance of noise that is expected, but not in the data.
-    """
-
-    scale: FloatArray
+    scale: FloatArray  # (flat,)
     q: FloatArray
     inverse: FloatArray
-    data: FloatArray
-    rest: FloatArray
+    data: FloatArray  # (n,)
+    rest: FloatArray  # (n,): what the flat columns leave over
     freedom: float
-    added: float
+    added: float  # variance of noise that is expected, but not in the data
 
     @classmethod
     def from_columns(
         cls, flat: FloatArray, data: FloatArray, freedom: float, added: float
-    ) -> Projected:
-        """Project the flat columns out of the data; all of them weighted."""
+    ) -> _LinearModel:
+        """Project the weighted flat columns out of the weighted data."""
         scale = np.linalg.norm(flat, axis=0)
         q, r = np.linalg.qr(flat / scale)
         return cls(scale, q, np.linalg.inv(r), data, data - q @ (q.T @ data), freedom, added)
 
-    @property
+    @cached_property
+    def least_squares(self) -> FloatArray:
+        """From weighted data to the flat parameters without departures, shape (flat, n)."""
+        return np.asarray((self.inverse @ self.q.T) / self.scale[:, None])
+
+    @cached_property
     def power(self) -> float:
         """Square of all that the flat columns leave over, the expected noise included."""
         return float(self.rest @ self.rest) + self.added * self.freedom
 
-    def part(self, columns: FloatArray, block: slice) -> Part:
-        """Decompose a shape's columns, weighted; ``block`` is where they stand among all."""
+    def decompose(self, columns: FloatArray, block: slice) -> _Design:
+        """Decompose a shape's weighted columns; ``block`` is where they stand among all."""
         free = columns - self.q @ (self.q.T @ columns)
         left, singular, right = np.linalg.svd(free, full_matrices=False)
         along = left.T @ self.rest
-        # Of a vector that meets the flat columns, only the part beside them carries noise.
+        # Of a vector that meets the flat columns, only what lies beside them carries noise.
         free_share = 1 - np.sum((self.q.T @ left) ** 2, axis=0)
-        return Part(
-            block, columns, left, singular, right, along, along**2 + self.added * free_share
-        )
+        power = along**2 + self.added * free_share
+        return _Design(block, columns, left, singular, right, along, power)
 
-    def gaussian(self) -> Outcome:
-        """Return the outcome without any departure."""
+    def gaussian(self) -> _Conditional:
+        """Return the conditional without any departure."""
         variance = self._floor(self.power / self.freedom)
-        nothing = np.zeros(0)
-        log_evidence = -0.5 * self.freedom * float(np.log(variance))
-        return Outcome(log_evidence, variance, 0.0, None, nothing, -self.rest / variance)
+        log_marginal = -0.5 * self.freedom * float(np.log(variance))
+        return _Conditional(log_marginal, variance, 0.0, None, np.zeros(0), -self.rest / variance)
 
-    def weigh(self, part: Part, strength: float) -> Outcome:
-        """Return the outcome for one shape at one strength, the noise at its most probable."""
-        beyond = max(self.power - float(part.power.sum()), 0.0)
-        signal = (strength * part.singular) ** 2
+    def condition(self, design: _Design, strength: float) -> _Conditional:
+        """Return the conditional on a shape and its strength, the noise at its MAP estimate."""
+        beyond = max(self.power - float(design.power.sum()), 0.0)
+        signal = (strength * design.singular) ** 2
         variance = self._floor(self.power / self.freedom)
         for _ in range(_VARIANCE_ROUNDS):
-            explained = part.power * variance / (variance + signal)
+            explained = design.power * variance / (variance + signal)
             variance = self._floor((beyond + float(explained.sum())) / self.freedom)
-        inflation = 1 + signal / variance
-        log_evidence = -0.5 * (self.freedom * np.log(variance) + float(np.log(inflation).sum()))
-        return Outcome(
-            log_evidence,
-            variance,
-            strength,
-            part,
-            strength**2 * part.singular / (variance + signal),
-            (part.left @ (signal / (variance + signal) * part.along) - self.rest) / variance,
+        log_determinant = float(np.log(1 + signal / variance).sum())
+        left_over = signal / (variance + signal) * design.along
+        return _Conditional(
+            log_marginal=-0.5 * (self.freedom * np.log(variance) + log_determinant),
+            variance=variance,
+            strength=strength,
+            design=design,
+            shrink=strength**2 * design.singular / (variance + signal),
+            slope=(design.left @ left_over - self.rest) / variance,
         )
 
     def _floor(self, variance: float) -> float:
         return max(variance, (_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
 
 
-_NEGLIGIBLE = 1e-4
-
-
 @dataclass(frozen=True)
 class Hypothesis:
-    """A shape at a strength, with its weights in the estimate and in the uncertainty.
-
-    ``shape`` and ``strength`` are ``None`` and zero for the Gaussian itself.
-    """
+    """A shape at a strength, with its prior probabilities; no shape for the Gaussian itself."""
 
     shape: Shape | None
     strength: float
@@ -160,7 +303,7 @@ class Hypothesis:
 
 
 def _hypotheses() -> tuple[Hypothesis, ...]:
-    """The prior: weights by kind of departure, shared evenly within one."""
+    """The prior: probabilities by kind of departure, shared evenly within one."""
     kinds: list[tuple[str, tuple[float, ...], float, float]] = [
         ("edge", (0.4, 0.8), 0.20, 0.0),
         ("rough edge 0.4", (0.4,), 0.07, 0.30),
@@ -169,16 +312,16 @@ def _hypotheses() -> tuple[Hypothesis, ...]:
         ("core", (0.3,), 0.0, 0.30),
         ("tail", (0.2,), 0.27, 0.30),
     ]
-    found = [Hypothesis(None, 0.0, 0.40, 0.0)]
+    hypotheses = [Hypothesis(None, 0.0, 0.40, 0.0)]
     for kind, strengths, estimate, uncertainty in kinds:
         shapes = [s for s in SHAPES if kind in (s.name, f"{s.name} {s.blur}")]
         share = len(shapes) * len(strengths)
-        found += [
+        hypotheses += [
             Hypothesis(shape, strength, estimate / share, uncertainty / share)
             for shape in shapes
             for strength in strengths
         ]
-    return tuple(found)
+    return tuple(hypotheses)
 
 
 HYPOTHESES = _hypotheses()
@@ -186,33 +329,15 @@ HYPOTHESES = _hypotheses()
 
 @dataclass(frozen=True, eq=False)
 class WeighedFit:
-    """Posterior of corrections to the Gaussian fit, averaged over the hypotheses.
+    """Posterior of corrections to the Gaussian fit, averaged over the hypotheses."""
 
-    Parameters
-    ----------
-    mean : ndarray, shape (p,)
-        Corrections to the Gaussian fit's parameters, then amplitudes of the shapes' components.
-    covariance : ndarray, shape (p, p)
-        Their expected squared error, the spread over hypotheses included.
-    gain : ndarray, shape (p, n)
-        Derivative of ``mean`` by the voltages.
-    noise : float
-        Noise of a point of weight one: in V, or a factor on the stated uncertainties.
-    probability : ndarray, shape (h,)
-        Posterior probability of each of :data:`HYPOTHESES`.
-    residual : ndarray, shape (n,)
-        Voltages that are not explained, in V.
-    log_evidence : float
-        Of all hypotheses together, up to a constant of the scan.
-    """
-
-    mean: FloatArray
-    covariance: FloatArray
-    gain: FloatArray
-    noise: float
-    probability: FloatArray
-    residual: FloatArray
-    log_evidence: float = 0.0
+    mean: FloatArray  # (p,): corrections to the fit's parameters, then the shapes' amplitudes
+    covariance: FloatArray  # (p, p): expected squared error, the spread over hypotheses included
+    gain: FloatArray  # (p, n): derivative of the mean by the voltages
+    noise: float  # noise of a point of weight one: in V, or a factor on the stated uncertainties
+    probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
+    residual: FloatArray  # (n,): voltages that are not explained, in V
+    log_marginal_likelihood: float = 0.0  # of all hypotheses, up to a constant of the scan
 
     @property
     def gaussian_probability(self) -> float:
@@ -229,28 +354,12 @@ def weigh_departures(
     expected_noise: float = 0.0,
     least_noise: float = 0.0,
 ) -> WeighedFit:
-    """Weigh departures from a Gaussian fit by evidence.
+    """Average departures from a Gaussian fit over the hypotheses.
 
-    Parameters
-    ----------
-    model, fit, basis
-        The forward model, the best Gaussian, and the kernels about it.
-    weights : ndarray, shape (n,)
-        Relative weights of the points.
-    effective_count : float
-        How many points the data are worth, outliers down-weighted; more than there are if each
-        stands for the mean of several repeats to come.
-    expected_noise : float
-        Standard deviation of the noise of a point of weight one that is to be expected, for
-        voltages that have none; zero for data.
-    least_noise : float
-        Noise of a point of weight one that the covariance counts at least: what is stated is
-        believed though the data scatter less.
-
-    Returns
-    -------
-    WeighedFit
-        Posterior mean and covariance of all corrections, and the noise.
+    ``effective_count``: how many points the data are worth, outliers down-weighted; more than
+    there are if each stands for the mean of several repeats to come.  Of a point of weight one,
+    ``expected_noise`` is the noise to be expected of voltages that have none (zero for data), and
+    ``least_noise`` the least that the covariance counts, though the data scatter less.
     """
     standardised, flat = model.points.standardised, basis.flat
     voltages = model.signal(fit.geometry, basis.kernels(model.k)[:, flat:])
@@ -258,105 +367,105 @@ def weigh_departures(
     rings, data = standardised(voltages, weights), standardised(unexplained, weights)
     # Down-weighted points carry no full degree of freedom.
     jacobian = standardised(fit.jacobian, weights)
-    problem = Projected.from_columns(jacobian, data, effective_count - flat, expected_noise**2)
-    parts = [problem.part(rings[:, b.start - flat : b.stop - flat], b) for b in basis.blocks]
-    outcomes = [problem.gaussian()]
+    linear = _LinearModel.from_columns(jacobian, data, effective_count - flat, expected_noise**2)
+    designs = [
+        linear.decompose(rings[:, block.start - flat : block.stop - flat], block)
+        for block in basis.blocks
+    ]
+    conditionals = [linear.gaussian()]
     for hypothesis in HYPOTHESES[1:]:
         assert hypothesis.shape is not None
-        part = parts[SHAPES.index(hypothesis.shape)]
-        outcomes.append(problem.weigh(part, hypothesis.strength))
-    found = _average(problem, outcomes, flat + rings.shape[1], least_noise**2)
-    explained = fit.jacobian @ found.mean[:flat] + voltages @ found.mean[flat:]
-    gain = found.gain @ standardised(np.eye(data.size), weights)
-    return replace(found, gain=gain, residual=unexplained - explained)
+        design = designs[SHAPES.index(hypothesis.shape)]
+        conditionals.append(linear.condition(design, hypothesis.strength))
+    averaged = _average(linear, conditionals, flat + rings.shape[1], least_noise**2)
+    explained = fit.jacobian @ averaged.mean[:flat] + voltages @ averaged.mean[flat:]
+    gain = averaged.gain @ standardised(np.eye(data.size), weights)
+    return replace(averaged, gain=gain, residual=unexplained - explained)
 
 
 def _average(
-    problem: Projected, outcomes: list[Outcome], count: int, least_variance: float
+    linear: _LinearModel, conditionals: list[_Conditional], count: int, least_variance: float
 ) -> WeighedFit:
-    """Average mean and gain by one set of weights, squared errors by the other.
+    """Average mean and gain by one set of probabilities, squared errors by the other.
 
-    The gain is that of the standardised data, and the residual is left to be found.
+    The gain is that of the standardised data, and the residual is left to be computed.
     """
-    evidence = np.array([o.log_evidence for o in outcomes])
-    estimate, uncertainty = (
-        _posterior(evidence, np.array([getattr(h, name) for h in HYPOTHESES]))
-        for name in ("estimate", "uncertainty")
-    )
-    gain = np.zeros((count, problem.data.size))
-    for p, outcome in zip(estimate, outcomes, strict=True):
-        if p > 0:
-            _add_gain(gain, problem, outcome, p)
-    mean = gain @ problem.data
-    # The data move the probabilities, too: d(p m) = (m - mean) p d(log evidence).
-    moving = np.zeros_like(gain)
-    for p, outcome in zip(estimate, outcomes, strict=True):
-        if p > 0:
-            own = np.zeros_like(gain)
-            _add_gain(own, problem, outcome, 1.0)
-            moving += p * np.outer(own @ problem.data - mean, outcome.slope)
-    covariance = np.zeros((count, count))
-    for p, outcome in zip(uncertainty, outcomes, strict=True):
-        if p > 0:
-            own = np.zeros_like(gain)
-            _add_gain(own, problem, outcome, 1.0)
-            off = own @ problem.data - mean
-            covariance += p * np.outer(off, off)
-            if problem.added:
-                apart = own - gain
-                covariance += p * problem.added * (apart @ apart.T)
-            _add_covariance(covariance, problem, outcome, p, least_variance)
-    variance = np.array([o.variance for o in outcomes])
+    log_marginal = np.array([c.log_marginal for c in conditionals])
     prior = np.array([h.estimate for h in HYPOTHESES])
-    believed = prior > 0
+    estimate = _posterior(log_marginal, prior)
+    uncertainty = _posterior(log_marginal, np.array([h.uncertainty for h in HYPOTHESES]))
+    gain = np.zeros((count, linear.data.size))
+    for p, conditional in zip(estimate, conditionals, strict=True):
+        if p > 0:
+            _add_gain(gain, linear, conditional, p)
+    mean = gain @ linear.data
+    # The data move the probabilities, too: d(p m) = (m - mean) p d(log marginal likelihood).
+    moving, covariance = np.zeros_like(gain), np.zeros((count, count))
+    for p, q, conditional in zip(estimate, uncertainty, conditionals, strict=True):
+        if p == 0 and q == 0:
+            continue
+        of_hypothesis = np.zeros_like(gain)
+        _add_gain(of_hypothesis, linear, conditional, 1.0)
+        off = of_hypothesis @ linear.data - mean
+        if p > 0:
+            moving += p * np.outer(off, conditional.slope)
+        if q > 0:
+            covariance += q * np.outer(off, off)
+            if linear.added:
+                apart = of_hypothesis - gain
+                covariance += q * linear.added * (apart @ apart.T)
+            _add_covariance(covariance, linear, conditional, q, least_variance)
+    variance = np.array([c.variance for c in conditionals])
+    possible = prior > 0
     return WeighedFit(
         mean=mean,
         covariance=covariance,
         gain=gain + moving,
         noise=float(np.sqrt(estimate @ variance)),
         probability=estimate,
-        residual=problem.data,
-        log_evidence=float(np.logaddexp.reduce(evidence[believed] + np.log(prior[believed]))),
+        residual=linear.data,
+        log_marginal_likelihood=float(
+            np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible]))
+        ),
     )
 
 
-def _posterior(log_evidence: FloatArray, prior: FloatArray) -> FloatArray:
-    weight = prior * np.exp(log_evidence - log_evidence[prior > 0].max())
+def _posterior(log_marginal: FloatArray, prior: FloatArray) -> FloatArray:
+    """Posterior probabilities by Bayes' theorem, negligible ones set to zero."""
+    weight = prior * np.exp(log_marginal - log_marginal[prior > 0].max())
     weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
     return np.asarray(weight / weight.sum())
 
 
-def _flat_map(problem: Projected) -> FloatArray:
-    """From weighted data to the flat parameters of a plain fit, shape (flat, n)."""
-    return np.asarray((problem.inverse @ problem.q.T) / problem.scale[:, None])
-
-
-def _add_gain(gain: FloatArray, problem: Projected, outcome: Outcome, share: float) -> None:
-    fitted = _flat_map(problem)
-    flat = fitted.shape[0]
+def _add_gain(
+    gain: FloatArray, linear: _LinearModel, conditional: _Conditional, share: float
+) -> None:
+    """Add the derivative of the posterior mean given a hypothesis, times its probability."""
+    fitted, design = linear.least_squares, conditional.design
+    flat = len(fitted)
     gain[:flat] += share * fitted
-    part = outcome.part
-    if part is not None:
-        amplitudes = (part.right.T * outcome.shrink) @ part.left.T
-        gain[part.block] += share * amplitudes
-        gain[:flat] -= share * (fitted @ part.columns) @ amplitudes
+    if design is not None:
+        amplitudes = (design.right.T * conditional.shrink) @ design.left.T
+        gain[design.block] += share * amplitudes
+        gain[:flat] -= share * (fitted @ design.columns) @ amplitudes
 
 
 def _add_covariance(
     covariance: FloatArray,
-    problem: Projected,
-    outcome: Outcome,
+    linear: _LinearModel,
+    conditional: _Conditional,
     share: float,
     least_variance: float,
 ) -> None:
-    flat = problem.scale.size
-    plain = problem.inverse @ problem.inverse.T / np.outer(problem.scale, problem.scale)
-    covariance[:flat, :flat] += share * max(outcome.variance, least_variance) * plain
-    part = outcome.part
-    if part is not None:
-        amplitudes = outcome.amplitude_covariance(least_variance)
-        carried = _flat_map(problem) @ part.columns
-        covariance[part.block, part.block] += share * amplitudes
-        covariance[:flat, part.block] -= share * carried @ amplitudes
-        covariance[part.block, :flat] -= share * amplitudes @ carried.T
+    """Add the posterior covariance given a hypothesis, times its probability."""
+    flat = linear.scale.size
+    plain = linear.inverse @ linear.inverse.T / np.outer(linear.scale, linear.scale)
+    covariance[:flat, :flat] += share * max(conditional.variance, least_variance) * plain
+    design = conditional.design
+    if design is not None:
+        amplitudes = conditional.amplitude_covariance(least_variance)
+        carried = linear.least_squares @ design.columns
+        covariance[design.block, design.block] += share * amplitudes
+        covariance[:flat, design.block] -= share * carried @ amplitudes
+        covariance[design.block, :flat] -= share * amplitudes @ carried.T
         covariance[:flat, :flat] += share * carried @ amplitudes @ carried.T

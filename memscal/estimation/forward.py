@@ -35,32 +35,20 @@ __all__ = ["ForwardModel", "Geometry", "elliptic_columns", "elliptic_departure"]
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Distances of the points from a trial centre, and Bessel functions there.
+    """Distances of the points from a trial centre, and Bessel functions there."""
 
-    ``radius`` (n,) in m; ``towards`` (2, n): derivatives of the radius by the centre's x
-    and y; ``bessel0`` and ``bessel1`` (n, nodes).
-    """
-
-    radius: FloatArray
-    towards: FloatArray
-    bessel0: FloatArray
+    radius: FloatArray  # (n,), in m
+    towards: FloatArray  # (2, n): derivatives of the radius by the centre's x and y
+    bessel0: FloatArray  # (n, nodes)
     bessel1: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class ForwardModel:
-    """Voltages at the points of a scan, for kernels given by their transforms.
-
-    Parameters
-    ----------
-    points : ScanPoints
-        Where and at what load, in one scan or several.
-    references : tuple of RadialSpectrum
-        Transform of the base stress per newton, dimensionless, for each scan; on the same nodes,
-        and of the order of the points' channel.
-    """
+    """Voltages at the points of a scan, for kernels given by their transforms."""
 
     points: ScanPoints
+    # Transform of the base stress per newton for each scan, on the same nodes.
     references: tuple[RadialSpectrum, ...]
 
     @property
@@ -146,8 +134,7 @@ class ForwardModel:
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         r"""Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m.
 
-        A vector's component :math:`f\cos\theta` turns as well as it changes: by
-        :math:`f/R` across the way to the indenter.
+        A vector's component :math:`f\cos\theta` changes by :math:`f/R` across its direction, too.
         """
         if self.order == 0:
             return np.asarray(geometry.towards * self.radial_derivative(geometry, kernel))
@@ -202,6 +189,7 @@ def _unit_range(positions: FloatArray) -> FloatArray:
     return np.asarray((positions - middle) / (np.ptp(positions) / 2))
 
 
+#: An ellipse's response is a sum of so many harmonics, its derivatives are by centred differences.
 _HARMONICS = 5
 _LARGEST = 0.95
 _STEP = 1e-4
@@ -210,22 +198,7 @@ _STEP = 1e-4
 def elliptic_columns(
     model: ForwardModel, geometry: Geometry, sigma: float, ellipticity: FloatArray
 ) -> FloatArray:
-    """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2.
-
-    Parameters
-    ----------
-    model, geometry
-        The forward model, and the points about their centres.
-    sigma : float
-        Root of the mean second moment, in m.
-    ellipticity : ndarray, shape (2,)
-        e1 (along x against y) and e2 (along the diagonals).
-
-    Returns
-    -------
-    ndarray, shape (n, 4)
-        In V per V/Pa; per m in the second column.
-    """
+    """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2."""
     steps = np.array([[0.0, 0.0, 0.0], [_STEP * sigma, 0.0, 0.0], [0, _STEP, 0], [0, 0, _STEP]])
     here = np.concatenate([[sigma], ellipticity])
     harmonics = _bessel(geometry.bessel0, geometry.bessel1, geometry.radius, model.k)
@@ -268,8 +241,9 @@ def _response(
     total = np.zeros_like(geometry.radius)
     for m, bessel in enumerate(harmonics):
         kernel = ive(m, half * e) * np.exp(-half * (1 - e))
-        part = model.signal(Geometry(geometry.radius, geometry.towards, bessel, bessel), kernel)
-        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * part
+        around = Geometry(geometry.radius, geometry.towards, bessel, bessel)
+        signal = model.signal(around, kernel)
+        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * signal
     return total
 
 
@@ -278,8 +252,7 @@ def _bessel(
 ) -> list[FloatArray]:
     """Bessel functions of even order, by recurrence upwards from orders zero and one.
 
-    Where the argument is small the recurrence loses digits and the function is nothing: its
-    power series' first term decides.
+    At small arguments, where the recurrence loses digits, the power series' first term is used.
     """
     # Repeats share their positions.
     unique, first, back = np.unique(radius, return_index=True, return_inverse=True)

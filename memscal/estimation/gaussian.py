@@ -1,8 +1,7 @@
 r"""The Gaussian apparatus function that fits the scan best, in data space.
 
-The paper's approximation, fitted where the noise is known: its convolution with the
-reference stress against the scan, together with conversion constant, centre, baseline and
-linear drift, by weighted least squares.
+It is the paper's approximation, convolved with the reference stress and fitted to the voltages
+by weighted least squares, together with conversion constant, centre, baseline and linear drift.
 """
 
 from __future__ import annotations
@@ -19,16 +18,7 @@ from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "GaussianFit",
-    "fit_gaussian",
-    "gauss_newton",
-    "linearise",
-    "require_parity",
-    "robust_start",
-    "smoothing_length",
-    "undetermined",
-]
+__all__ = ["GaussianFit", "fit_gaussian", "gauss_newton", "linearise"]
 
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
@@ -43,32 +33,10 @@ Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 def gauss_newton(
     linearise: Linearised, start: FloatArray, *, tolerance: float, knee: float = np.inf
 ) -> FloatArray | None:
-    """Minimise the loss of the residuals of a model that is nearly linear about the start.
+    """Minimise the loss of the residuals, shape (n,), of a model that is nearly linear.
 
-    Parameters
-    ----------
-    linearise : callable
-        Residuals, shape (n,), and their derivatives, shape (n, p), at parameters of shape (p,).
-    start : ndarray, shape (p,)
-        Where to begin; the parameters are scaled to numbers near one.
-    tolerance : float
-        The last step is shorter than this in every parameter.
-    knee : float
-        Residual from which on the loss grows linearly; infinite for least squares.
-
-    Returns
-    -------
-    ndarray, shape (p,), or None
-        ``None`` if the steps do not settle downhill: use a solver with a trust region.
-
-    Examples
-    --------
-    >>> x = np.arange(4.0)
-    >>> def decay(p):
-    ...     curve = np.exp(-p[0] * x)
-    ...     return curve - np.exp(-0.5 * x), -(x * curve)[:, None]
-    >>> round(float(gauss_newton(decay, np.array([0.4]), tolerance=1e-9)[0]), 6)
-    0.5
+    Parameters are scaled to numbers near one.  From the residual ``knee`` on, the loss is linear.
+    ``None`` if the steps do not settle downhill: a search with a trust region is then needed.
     """
     place: FloatArray = start
     step: FloatArray = np.zeros_like(start)
@@ -77,8 +45,8 @@ def gauss_newton(
         residual, slope = linearise(place)
         stretch = np.sqrt(1 + (residual / knee) ** 2)
         # The loss, in a form without cancellation where the knee is far away.
-        found = float(np.sum(2 * residual**2 / (1 + stretch)))
-        if not found <= cost * (1 + _ROUNDING):
+        loss = float(np.sum(2 * residual**2 / (1 + stretch)))
+        if not loss <= cost * (1 + _ROUNDING):
             halvings += 1
             if halvings > _MOST_HALVINGS:
                 return None
@@ -89,7 +57,7 @@ def gauss_newton(
         whole = np.linalg.lstsq(slope * root[:, None], -residual * root, rcond=None)[0]
         longest = float(np.abs(whole).max())
         step = np.asarray(whole * (_LONGEST_STEP / max(longest, _LONGEST_STEP)), dtype=np.float64)
-        place, cost = place + step, found
+        place, cost = place + step, loss
         if longest < tolerance:
             return np.asarray(place)
     return None
@@ -99,25 +67,12 @@ def gauss_newton(
 _CLEARLY = 0.7
 
 
-def require_parity(
-    points: ScanPoints,
-    odd: tuple[FloatArray, FloatArray],
-    even: tuple[FloatArray, FloatArray],
+def _require_parity(
+    points: ScanPoints, odd: tuple[FloatArray, FloatArray], even: tuple[FloatArray, FloatArray]
 ) -> None:
-    """Refuse a voltage that a shear of the other sign, or an even signal, meets far better.
+    """Refuse a voltage that a shear of the other sign, or an even signal, fits far better.
 
-    Parameters
-    ----------
-    points : ScanPoints
-        The points of one scan, by a tangential channel.
-    odd, even : tuple of two ndarray, shape (m,)
-        Amplitudes of odd and of even signals of trial centres and widths, fitted to the voltages,
-        and the sums of absolute residuals that each leaves.
-
-    Raises
-    ------
-    InputError
-        If the voltage has the wrong sign, or is even.
+    ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
     """
     amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
@@ -146,41 +101,20 @@ def require_parity(
 _STARTING_WIDTHS = (0.1, 0.3, 0.8)
 
 
-def robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Start each scan by itself, and A and the width at the medians of all.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    weights : ndarray, shape (n,)
-        Relative weights of the points.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        A, sigma, centres, drift and ellipticity, as in
-        :func:`memscal.estimation.gaussian.linearise`.
-
-    Raises
-    ------
-    FitError
-        If no Gaussian with a positive A comes near the scan.
-    InputError
-        If a tangential channel's voltage has the wrong parity or sign.
-    """
+def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
+    """Parameters to start from: each scan's own, but A and the width at the medians of all."""
     points = model.points
-    parts = [
-        _robust_start_of_one(model.only(i), weights[points.scan == i]) for i in range(points.scans)
+    starts = [
+        _robust_start_of_scan(model.only(i), weights[points.scan == i]) for i in range(points.scans)
     ]
-    shape = np.median([part[:2] for part in parts], axis=0)
+    shape = np.median([start[:2] for start in starts], axis=0)
     free = points.free.sum(axis=1)
-    centres = [part[2 : 2 + n] for part, n in zip(parts, free, strict=True)]
-    drifts = [part[2 + n : 3 + 2 * n] for part, n in zip(parts, free, strict=True)]
+    centres = [start[2 : 2 + n] for start, n in zip(starts, free, strict=True)]
+    drifts = [start[2 + n : 3 + 2 * n] for start, n in zip(starts, free, strict=True)]
     return np.concatenate([shape, *centres, *drifts, np.zeros(points.ellipse)])
 
 
-def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray:
+def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
     """Best of a grid of centres and widths, by the sum of absolute residuals.
 
     A single outlier can be the largest voltage of a scan: positions are tried, not read off.
@@ -189,7 +123,7 @@ def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray
     centres = _trial_centres(model)
     distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
     radii = np.linspace(0.0, 2 * np.ptp(points.x) + 2 * np.ptp(points.y), 400)
-    widths = smoothing_length(model) * np.array(_STARTING_WIDTHS)
+    widths = _smoothing_length(model) * np.array(_STARTING_WIDTHS)
     kernels = np.stack([gaussian_transfer(model.k, float(width)) for width in widths])
     # Profiles per newton of every width, on a table for quick trials.
     spectra = (model.reference.values * kernels).T
@@ -214,14 +148,14 @@ def _robust_start_of_one(model: ForwardModel, weights: FloatArray) -> FloatArray
     if model.order:
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
-        even = [np.interp(distances, radii, each) * (points.load * root) for each in potentials]
-        require_parity(
+        even = [np.interp(distances, radii, table) * (points.load * root) for table in potentials]
+        _require_parity(
             points,
             _amplitudes(np.concatenate(odd), data, drift),
             _amplitudes(np.concatenate(even), data, drift),
         )
     if not best.size:
-        raise undetermined(model)
+        raise _undetermined(model)
     return best
 
 
@@ -255,18 +189,18 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
     return np.stack([axis.ravel() for axis in mesh], axis=1)
 
 
-def smoothing_length(model: ForwardModel) -> float:
+def _smoothing_length(model: ForwardModel) -> float:
     r"""Length over which the film blurs: :math:`1/k` where the reference has fallen to half."""
     values = model.reference.scalar.values
     return float(1 / model.k[int(np.argmax(values / values[0] < 0.5))])
 
 
-def undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
+def _undetermined(model: ForwardModel, conversion_constant: float | None = None) -> FitError:
     """Return the error for a scan that no Gaussian fits."""
     stopped = conversion_constant is not None
-    found = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
+    end = f" (it stopped at A = {conversion_constant:.3g} V/Pa)" if stopped else ""
     return FitError(
-        f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{found}.",
+        f"No Gaussian apparatus function fits the scan of {model.points.u.size} points{end}.",
         why="The voltage does not rise and fall with the distance from one centre.",
         cure="Look at the scan; check its channel, its positions and that it crosses the sensor.",
     )
@@ -284,39 +218,17 @@ _NARROWEST = 0.05
 
 @dataclass(frozen=True, eq=False)
 class GaussianFit:
-    """Best Gaussian in data space, and the model linearised about it.
+    """Best Gaussian in data space, and the model linearised about it."""
 
-    Parameters
-    ----------
-    conversion_constant : float
-        A, in V/Pa.
-    sigma : float
-        Standard deviation of the Gaussian, in m.
-    centre : ndarray, shape (scans, 2)
-        Centre (x0, y0) of the sensor in each scan, in m; zero where a line does not tell.
-    drift : ndarray, shape (2 or 3 a scan,)
-        Baseline of each scan, and its change over half the range along x (and y), in V.
-    ellipticity : ndarray, shape (2,)
-        e1 (along x against y) and e2 (along the diagonals), where the points spread over a plane.
-    points : ScanPoints
-        What was fitted.
-    geometry : Geometry
-        Distances from the centre.
-    jacobian : ndarray, shape (n, p)
-        Derivatives of the voltages by A, sigma, centre and drift, in this order.
-    predicted : ndarray, shape (n,)
-        Voltages of the fit, in V.
-    """
-
-    conversion_constant: float
-    sigma: float
-    centre: FloatArray
-    drift: FloatArray
-    ellipticity: FloatArray
+    conversion_constant: float  # A, in V/Pa
+    sigma: float  # standard deviation of the Gaussian, in m
+    centre: FloatArray  # (scans, 2): of the sensor, in m; zero across a line
+    drift: FloatArray  # baseline, and its change over half the range along x (and y), scan by scan
+    ellipticity: FloatArray  # (2,): e1 (along x against y) and e2 (along the diagonals)
     points: ScanPoints
     geometry: Geometry
-    jacobian: FloatArray
-    predicted: FloatArray
+    jacobian: FloatArray  # (n, p): voltages by A, sigma, centre, drift and ellipticity
+    predicted: FloatArray  # (n,): voltages of the fit, in V
 
     def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
         """Covariance of the parameters for a noise (V) and relative weights."""
@@ -336,24 +248,9 @@ class GaussianFit:
 def fit_gaussian(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
 ) -> GaussianFit:
-    """Fit a Gaussian apparatus function to the scan.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    weights : ndarray, shape (n,)
-        Relative weights: the inverse noise variance up to a common factor.
-    start : GaussianFit, optional
-        An earlier fit to start from; without one the search is global and robust.
-
-    Raises
-    ------
-    FitError
-        If the scan does not determine the parameters.
-    """
+    """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     if start is None:
-        return _solve(model, weights, robust_start(model, weights), loss="soft_l1")
+        return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
     shape = [start.conversion_constant, start.sigma]
     ellipse = start.ellipticity[: model.points.ellipse]
@@ -368,7 +265,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     last: dict[bytes, GaussianFit] = {}
 
     def evaluate(scaled: FloatArray) -> GaussianFit:
-        # Residuals and Jacobian are asked for at the same point, one after the other.
+        # The solvers evaluate residuals and Jacobian one after the other, at the same point.
         key = scaled.tobytes()
         if key not in last:
             last.clear()
@@ -387,14 +284,14 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
 
     # A robust fit is only where the next one starts.
     knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
-    found = gauss_newton(
+    solution = gauss_newton(
         lambda scaled: (residual(scaled), slope(scaled)),
         start / scale,
         tolerance=tolerance,
         knee=knee,
     )
     # At a width of zero every slope by the width is zero: steps do not leave it.
-    if found is None or found[1] < _NARROWEST:
+    if solution is None or solution[1] < _NARROWEST:
         result = least_squares(
             residual,
             start / scale,
@@ -407,17 +304,17 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
             max_nfev=100,
         )
         if not result.success:
-            raise undetermined(model, linearise(model, result.x * scale).conversion_constant)
-        found = np.asarray(result.x)
-    fit = linearise(model, found * scale)
+            raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
+        solution = np.asarray(result.x)
+    fit = linearise(model, solution * scale)
     if not 0 < fit.conversion_constant < np.inf:
-        raise undetermined(model, fit.conversion_constant)
+        raise _undetermined(model, fit.conversion_constant)
     return _positive_width(fit)
 
 
 def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     """Typical size of each parameter, so that the solver sees numbers near one."""
-    width = max(abs(theta[1]), 0.05 * smoothing_length(model))
+    width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
     amplitude = np.ptp(model.points.u)
     centres = int(model.points.free.sum())
     ellipse = np.full(model.points.ellipse, _TYPICAL_ELLIPTICITY)
@@ -426,16 +323,7 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
 
 
 def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
-    """Return the model and its derivatives at given parameters.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    theta : ndarray, shape (p,)
-        A, sigma, free coordinates of the centres, drift, and in a plane the ellipticity, as in
-        :class:`GaussianFit`.
-    """
+    """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
     free, elliptic = model.points.free, model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)

@@ -1,4 +1,4 @@
-"""The measured points of one scan or several, flattened and proven usable."""
+"""The measured points of one scan or several, flattened, and refusals of unusable ones."""
 
 from __future__ import annotations
 
@@ -33,18 +33,7 @@ CHANNELS = ("zz", *TANGENTIAL)
 
 
 def channel_order(channel: str) -> int:
-    """Order of a channel's Hankel transforms: zero of a scalar, one of a vector's component.
-
-    Raises
-    ------
-    InputError
-        If there is no such channel.
-
-    Examples
-    --------
-    >>> channel_order("zz"), channel_order("xz")
-    (0, 1)
-    """
+    """Order of a channel's Hankel transforms: zero of a scalar, one of a vector's component."""
     if channel not in CHANNELS:
         raise InputError(
             f"There is no channel {channel!r}.", cure=f"The channels are {', '.join(CHANNELS)}."
@@ -58,14 +47,7 @@ def channel_axis(channel: str) -> int:
 
 
 def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | None]:
-    """Return a channel's voltages and their stated standard uncertainty, in V.
-
-    Raises
-    ------
-    InputError
-        If the scan does not hold the channel, or cannot calibrate it: a raster, or a line across
-        the component that the channel measures.
-    """
+    """Return a channel's voltages and their stated standard uncertainty, in V."""
     if channel_order(channel) == 0:
         if scan.sensor.channel in TANGENTIAL:
             raise InputError(
@@ -78,9 +60,9 @@ def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | N
         return scan.u_zz, scan.u_zz_errors
     name, along = f"u_{channel}", channel[0]
     if name not in scan.channels:
-        known = ", ".join(["u_zz", *scan.channels])
+        held = ", ".join(["u_zz", *scan.channels])
         raise InputError(
-            f"The scan holds no {name}, only {known}.",
+            f"The scan holds no {name}, only {held}.",
             why=f"Channel {channel} is calibrated with its own voltage.",
             cure=f"Import it (memscal import --{name.replace('_', '-')} COLUMN), or calibrate "
             "channel zz.",
@@ -110,45 +92,19 @@ MINIMUM_POSITIONS = 6
 
 @dataclass(frozen=True, eq=False)
 class ScanPoints:
-    """Every measured point of a scan, missing ones left out.
+    """Every measured point of a scan, missing ones left out."""
 
-    Parameters
-    ----------
-    x, y : ndarray, shape (n,)
-        Position of the indenter, in m; zero across a line scan.
-    u : ndarray, shape (n,)
-        Voltage of the channel, in V.
-    load : ndarray, shape (n,)
-        Load, in N.
-    u_errors : ndarray, shape (n,), or None
-        Stated standard uncertainty of each voltage, in V.
-    x_errors : ndarray, shape (n,)
-        Standard uncertainty of each position along the scan, in m.
-    repeat : ndarray of int, shape (n,)
-        Which repeat each point belongs to, counted through all scans.
-    scan : ndarray of int, shape (n,)
-        Which scan each point belongs to.
-    free : ndarray of bool, shape (scans, 2)
-        Along which of x and y each scan spreads: where its centre is to be found.
-    missing : int
-        How many points were missing.
-    decorrelation : ndarray, shape (n, n), or None
-        Takes noise of unit variance and the stated correlation to independent noise.
-    channel : str
-        ``"zz"``, or a tangential channel: ``"xz"`` or ``"yz"``.
-    """
-
-    x: FloatArray
+    x: FloatArray  # (n,): position of the indenter, in m; zero across a line scan
     y: FloatArray
-    u: FloatArray
-    load: FloatArray
-    u_errors: FloatArray | None
-    x_errors: FloatArray
-    repeat: NDArray[np.intp]
-    scan: NDArray[np.intp]
-    free: NDArray[np.bool_]
-    missing: int
-    decorrelation: FloatArray | None = None
+    u: FloatArray  # (n,): voltage of the channel, in V
+    load: FloatArray  # (n,): load, in N
+    u_errors: FloatArray | None  # (n,): stated standard uncertainty of each voltage, in V
+    x_errors: FloatArray  # (n,): standard uncertainty of each position along the scan, in m
+    repeat: NDArray[np.intp]  # (n,): number of each point's repeat, counted through all scans
+    scan: NDArray[np.intp]  # (n,): number of each point's scan
+    free: NDArray[np.bool_]  # (scans, 2): along x and y, whether the centre is a free parameter
+    missing: int  # how many points were missing
+    decorrelation: FloatArray | None = None  # (n, n): makes noise of the stated correlation white
     channel: str = "zz"
 
     @property
@@ -173,7 +129,7 @@ class ScanPoints:
 
     @property
     def ellipse(self) -> int:
-        """How many numbers of an ellipse the points tell: crossed lines do not see diagonals."""
+        """How many parameters of an ellipse are fitted: of crossed lines, not the diagonal one."""
         if self.order:
             return 0
         return 2 if self.planar else int(self.free.any(axis=0).all())
@@ -225,42 +181,19 @@ class ScanPoints:
         )
 
     def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:
-        """Scale rows by the root of their weights, and make their noise independent.
-
-        Parameters
-        ----------
-        values : ndarray, shape (n,) or (n, m)
-            Voltages, or columns of their derivatives.
-        weights : ndarray, shape (n,)
-            Inverse noise variances, up to a common factor.
-        """
+        """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
         root = np.sqrt(weights)
         scaled = values * (root if values.ndim == 1 else root[:, None])
         return scaled if self.decorrelation is None else self.decorrelation @ scaled
 
 
 def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
-    """Flatten a scan to the measured points of one channel.
-
-    Parameters
-    ----------
-    scan : Scan
-        What was measured.
-    channel : str
-        ``"zz"``, ``"xz"`` or ``"yz"``.
-
-    Raises
-    ------
-    InputError
-        If no point was measured, a load is not positive, or the voltage does not change or
-        has the wrong sign; or if the scan cannot calibrate the channel.
-    FitError
-        If there are fewer positions than parameters.
-    """
+    """Flatten a scan to the measured points of one channel."""
     u, errors = channel_signal(scan, channel)
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
     x, y = scan.positions
     repeat = scan.passes
+    x_errors = np.zeros(()) if scan.x_errors is None else scan.x_errors
     keep = measured_mask(scan, channel)
     if not keep.any():
         raise InputError(
@@ -274,7 +207,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
         u=u[keep],
         load=load[keep],
         u_errors=_stated_errors(errors, keep, channel),
-        x_errors=np.zeros(int(keep.sum())) if scan.x_errors is None else _along(scan)[keep],
+        x_errors=np.broadcast_to(x_errors, u.shape)[keep],
         repeat=repeat[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
@@ -296,49 +229,42 @@ def measured_mask(scan: Scan, channel: str = "zz") -> NDArray[np.bool_]:
     return keep
 
 
-def joined_points(parts: Sequence[ScanPoints]) -> ScanPoints:
-    """Join the points of several scans.
-
-    Raises
-    ------
-    InputError
-        If some scans state their noise and others do not.
-    """
-    if len(parts) == 1:
-        return parts[0]
-    if len({part.u_errors is None for part in parts}) > 1:
+def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
+    """Join the points of several scans, of which all state their noise, or none."""
+    if len(scans) == 1:
+        return scans[0]
+    stated = [points.u_errors for points in scans if points.u_errors is not None]
+    if len(stated) not in (0, len(scans)):
         raise InputError(
             "Some of the scans state their noise (u_zz_errors) and others do not.",
-            why="They are weighed against each other by it.",
+            why="It determines their relative weights.",
             cure="State it in every scan, or leave it out of every one.",
         )
-    first_repeat = np.cumsum([0, *(int(part.repeat.max()) + 1 for part in parts)])
-    stated = [part.u_errors for part in parts if part.u_errors is not None]
-    number = [np.full(part.u.size, i, dtype=np.intp) for i, part in enumerate(parts)]
+    first_repeat = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans[:-1])])
+    repeats = [points.repeat + first for points, first in zip(scans, first_repeat, strict=True)]
+    numbers = [np.full(points.u.size, i, dtype=np.intp) for i, points in enumerate(scans)]
     return ScanPoints(
-        x=np.concatenate([part.x for part in parts]),
-        y=np.concatenate([part.y for part in parts]),
-        u=np.concatenate([part.u for part in parts]),
-        load=np.concatenate([part.load for part in parts]),
+        x=np.concatenate([points.x for points in scans]),
+        y=np.concatenate([points.y for points in scans]),
+        u=np.concatenate([points.u for points in scans]),
+        load=np.concatenate([points.load for points in scans]),
         u_errors=np.concatenate(stated) if stated else None,
-        x_errors=np.concatenate([part.x_errors for part in parts]),
-        repeat=np.concatenate(
-            [part.repeat + shift for part, shift in zip(parts, first_repeat, strict=False)]
-        ),
-        scan=np.concatenate(number),
-        free=np.concatenate([part.free for part in parts]),
-        missing=sum(part.missing for part in parts),
-        decorrelation=_joined_decorrelation(parts),
-        channel=parts[0].channel,
+        x_errors=np.concatenate([points.x_errors for points in scans]),
+        repeat=np.concatenate(repeats),
+        scan=np.concatenate(numbers),
+        free=np.concatenate([points.free for points in scans]),
+        missing=sum(points.missing for points in scans),
+        decorrelation=_joined_decorrelation(scans),
+        channel=scans[0].channel,
     )
 
 
-def _joined_decorrelation(parts: Sequence[ScanPoints]) -> FloatArray | None:
-    if all(part.decorrelation is None for part in parts):
+def _joined_decorrelation(scans: Sequence[ScanPoints]) -> FloatArray | None:
+    if all(points.decorrelation is None for points in scans):
         return None
     from scipy.linalg import block_diag
 
-    blocks = [np.eye(p.u.size) if p.decorrelation is None else p.decorrelation for p in parts]
+    blocks = [np.eye(p.u.size) if p.decorrelation is None else p.decorrelation for p in scans]
     return np.asarray(block_diag(*blocks))
 
 
@@ -351,10 +277,6 @@ def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> FloatArray | None:
     kept = keep.ravel()
     factor = np.linalg.cholesky(whole[np.ix_(kept, kept)])
     return np.asarray(np.linalg.inv(factor))
-
-
-def _along(scan: Scan) -> FloatArray:
-    return np.broadcast_to(np.asarray(scan.x_errors), scan.u_zz.shape)
 
 
 def _stated_errors(
@@ -380,19 +302,15 @@ def _require_usable(points: ScanPoints) -> None:
             why="Conversion constant, width, centre, baseline and noise are estimated from them.",
             cure="Scan more positions.",
         )
-    _require_change(points)
-    if points.order == 0:
-        # The parity of a shear is held against the reference, where the search for a fit begins.
-        _require_positive_peak(points)
-
-
-def _require_change(points: ScanPoints) -> None:
     if np.ptp(points.u) == 0:
         raise InputError(
             f"Every voltage of the scan is {points.u[0]:g} V.",
             why="A calibration needs a voltage that follows the indenter.",
             cure="Check the channel.",
         )
+    # The parity of a shear is tested later, by estimation.gaussian.
+    if points.order == 0:
+        _require_positive_peak(points)
 
 
 def _require_positive_peak(points: ScanPoints) -> None:

@@ -1,4 +1,4 @@
-"""From the points of a scan to its radial profile: centre, baseline, noise and outliers."""
+"""Estimate of a radial profile from the points of scans: centre, baseline, noise and outliers."""
 
 from __future__ import annotations
 
@@ -10,20 +10,18 @@ import numpy as np
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
-from memscal.estimation.bayesian import WeighedFit, weigh_departures
-from memscal.estimation.departures import DepartureBasis, departure_basis
+from memscal.estimation.bayesian import (
+    DepartureBasis,
+    WeighedFit,
+    departure_basis,
+    weigh_departures,
+)
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "CentreError",
-    "PosteriorProfile",
-    "ProfileEstimate",
-    "constrained_profile",
-    "estimate_profile",
-]
+__all__ = ["CentreError", "ProfileEstimate", "constrained_profile", "estimate_profile"]
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
@@ -40,28 +38,14 @@ class CentreError(FitError):
 
 @dataclass(frozen=True, eq=False)
 class ProfileEstimate:
-    """What the scan says, with its uncertainty, before any division.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Points and reference.
-    gaussian : GaussianFit
-        The best Gaussian in data space.
-    basis, weighed : DepartureBasis, WeighedFit
-        Kernels about it and their posterior.
-    weights : ndarray, shape (n,)
-        Relative weight of each point, the outliers' below one included.
-    outlier_weight : ndarray, shape (n,)
-        One for ordinary points; less for outliers.
-    """
+    """Posterior of the radial profile A G in data space, before any division."""
 
     model: ForwardModel
     gaussian: GaussianFit
-    basis: DepartureBasis
-    weighed: WeighedFit
-    weights: FloatArray
-    outlier_weight: FloatArray
+    basis: DepartureBasis  # kernels about the Gaussian
+    weighed: WeighedFit  # their posterior
+    weights: FloatArray  # (n,): relative weight of each point, the outliers' below one included
+    outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
 
     @property
     def points(self) -> ScanPoints:
@@ -70,10 +54,7 @@ class ProfileEstimate:
 
     @property
     def noise(self) -> FloatArray:
-        """Standard uncertainty of each voltage, shape (n,), in V; outliers' noise is not raised.
-
-        Uncertain positions count as noise of the voltage.
-        """
+        """Adopted noise of each voltage, shape (n,), in V, uncertain positions included."""
         stated = self.weights / self.outlier_weight
         return np.asarray(self.noise_scale / np.sqrt(stated))
 
@@ -88,15 +69,15 @@ class ProfileEstimate:
     def noise_scale(self) -> float:
         """Noise of a point (V); or, with stated uncertainties, the factor they must grow by.
 
-        Stated uncertainties are believed until the residuals exceed them (Birge's ratio).  A
-        scatter is never taken for less than the model's own numerical error.
+        Stated uncertainties are adopted unless the residuals exceed them (Birge's ratio).  A
+        scatter is never less than the model's own numerical error.
         """
-        found = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
-        return found if self.points.u_errors is None else max(found, 1.0)
+        scatter = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
+        return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of all corrections, at the noise that is believed."""
+        """Covariance of all corrections, at the adopted noise."""
         return self.weighed.covariance
 
     @property
@@ -193,26 +174,7 @@ class ProfileEstimate:
 
 
 def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> ProfileEstimate:
-    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers.
-
-    Parameters
-    ----------
-    points : ScanPoints
-        The measured points, of one scan or several.
-    *references : RadialSpectrum
-        Transform of the base stress per newton, for each scan; all on the same nodes.
-
-    Returns
-    -------
-    ProfileEstimate
-        The best Gaussian and the weighed departures from it.
-
-    Raises
-    ------
-    FitError
-        If the scan does not determine the parameters: no centre within it, or no signal that
-        stands clear of zero.
-    """
+    """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
     model = ForwardModel(points, references)
     fit = fit_gaussian(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
@@ -227,10 +189,10 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
         weighed = weigh_departures(
             model, fit, basis, weights, float(outlier.sum()), least_noise=least
         )
-        found = _outlier_weight(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
-        if np.allclose(found, outlier, atol=0.02):
+        updated = _outlier_weight(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
+        if np.allclose(updated, outlier, atol=0.02):
             break
-        outlier = found
+        outlier = updated
     estimate = ProfileEstimate(model, fit, basis, weighed, weights, outlier)
     _require_determined(estimate)
     return estimate
@@ -262,7 +224,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
             raise CentreError(
                 f"The sensor's centre would lie at {name} = {centre * 1e3:.4g} mm, outside the "
                 f"scan from {positions.min() * 1e3:.4g} mm to {positions.max() * 1e3:.4g} mm.",
-                why="A centre that was not crossed is not determined, nor is anything else.",
+                why="A centre that was not crossed is not determined, nor are A and G.",
                 cure="Scan across the sensor.",
             )
     # Rounding makes the variance of a scan without noise negative.
@@ -271,9 +233,9 @@ def _require_determined(estimate: ProfileEstimate) -> None:
     if not estimate.conversion_constant > LEAST_SIGNIFICANCE * uncertainty:
         raise FitError(
             f"The conversion constant would be ({estimate.conversion_constant * 1e3:.2g} ± "
-            f"{uncertainty * 1e3:.2g}) mV/Pa: it is not told apart from zero.",
+            f"{uncertainty * 1e3:.2g}) mV/Pa: it is not distinct from zero.",
             why="The voltage does not rise above its noise as the rod passes, or the scan is too "
-            "short to tell the profile's tail from the baseline.",
+            "short to separate the profile's tail from the baseline.",
             cure="Check channel and positions; scan farther; raise the load or average repeats.",
         )
 
@@ -297,7 +259,7 @@ _SLACK = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class PosteriorProfile:
-    """A G as the scan's points have it: the posterior mean, its coefficients shifted."""
+    """A G with the coefficients of the posterior mean, shifted."""
 
     estimate: ProfileEstimate
     shift: FloatArray
@@ -317,47 +279,25 @@ class PosteriorProfile:
 def constrained_profile(
     estimate: ProfileEstimate, *, nonnegative: bool, monotone: bool
 ) -> PosteriorProfile:
-    """Return the most credible A G under constraints; without any, the posterior mean.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The posterior.
-    nonnegative : bool
-        Whether A G must not be negative.
-    monotone : bool
-        Whether A G must not rise with the radius, nor be negative.
-
-    Raises
-    ------
-    FitError
-        If no profile meets the constraints.
-    """
+    """Return the MAP estimate of A G under constraints; without any, the posterior mean."""
     if not (nonnegative or monotone):
         return PosteriorProfile(estimate, np.zeros_like(estimate.weighed.mean))
     width = max(estimate.gaussian.sigma, 0.5 * estimate.points.step)
     r = np.linspace(0.0, _REACH_IN_WIDTHS * width, _RADII)
     profile, columns = estimate.radial(r), estimate.basis.radial(r)
     if monotone:
-        # What falls all the way to nothing is nowhere negative, either.
+        # A profile that falls all the way to zero is nowhere negative.
         profile = np.append(profile[:-1] - profile[1:], profile[-1])
         columns = np.vstack([columns[:-1] - columns[1:], columns[-1:]])
     scale = float(np.abs(profile).max())
-    values, vectors = np.linalg.eigh(_scaled(estimate))
+    # A square root of the covariance, from its correlation matrix: amplitudes differ in size.
+    deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
+    deviation = np.where(deviation > 0, deviation, 1.0)
+    values, vectors = np.linalg.eigh(estimate.covariance / np.outer(deviation, deviation))
     kept = values > 1e-12 * values[-1]
-    root = _deviation(estimate)[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    root = deviation[:, None] * vectors[:, kept] * np.sqrt(values[kept])
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
     return PosteriorProfile(estimate, root @ z)
-
-
-def _deviation(estimate: ProfileEstimate) -> FloatArray:
-    deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
-    return np.where(deviation > 0, deviation, 1.0)
-
-
-def _scaled(estimate: ProfileEstimate) -> FloatArray:
-    deviation = _deviation(estimate)
-    return np.asarray(estimate.covariance / np.outer(deviation, deviation))
 
 
 def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
@@ -369,7 +309,7 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
     residual = np.vstack([matrix.T, bound]) @ dual - target
     if not residual[-1] < -1e-12:
         raise FitError(
-            "No apparatus function of the kind that was asked for comes near the scan.",
+            "No apparatus function that meets the constraint comes near the scan.",
             why="It would have to be negative, or to rise, somewhere.",
             cure="Leave out the constraint: nonnegative=false, monotone=false.",
         )

@@ -1,4 +1,4 @@
-"""The reference stress of a calibration: where it comes from, and its transform."""
+"""The reference stress of a calibration: its source, its transform, and its sensitivities."""
 
 from __future__ import annotations
 
@@ -38,13 +38,7 @@ _DECAYED = 1e-3
 
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
-    """Refuse scans that cannot be fitted together.
-
-    Raises
-    ------
-    InputError
-        If they contradict each other: other sensors, or one name for films that differ.
-    """
+    """Refuse scans that cannot be fitted together."""
     sensors = {(scan.sensor.name, scan.sensor.channel): None for scan in scans}
     if len(sensors) > 1:
         named = ", ".join(f"{name or 'unnamed'} ({channel})" for name, channel in sensors)
@@ -56,13 +50,13 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
     films: dict[str, ElasticFilm] = {}
     for scan in scans:
         film = scan.film
-        known = films.setdefault(film.name, film)
-        if film.name and known != film:
+        first = films.setdefault(film.name, film)
+        if film.name and first != film:
             raise InputError(
                 f"Two of the scans name their film {film.name!r}, but give it a thickness of "
-                f"{known.thickness * 1e3:.4g} and {film.thickness * 1e3:.4g} mm, a Poisson's ratio "
-                f"of {known.poisson_ratio:.4g} and {film.poisson_ratio:.4g}, and a modulus of "
-                f"{known.young_modulus * 1e-6:.4g} and {film.young_modulus * 1e-6:.4g} MPa, or "
+                f"{first.thickness * 1e3:.4g} and {film.thickness * 1e3:.4g} mm, a Poisson's ratio "
+                f"of {first.poisson_ratio:.4g} and {film.poisson_ratio:.4g}, and a modulus of "
+                f"{first.young_modulus * 1e-6:.4g} and {film.young_modulus * 1e-6:.4g} MPa, or "
                 "other uncertainties.",
                 why="One film has one set of properties.",
                 cure="Correct /entry/sample/film in one of the files, or its name.",
@@ -71,13 +65,7 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
 
 
 def require_calibration_rod(scan: Scan) -> None:
-    """Refuse an indenter that cannot calibrate.
-
-    Raises
-    ------
-    InputError
-        If the indenter is no rod, or is wider than the film is thick.
-    """
+    """Refuse an indenter that cannot calibrate."""
     if not isinstance(scan.indenter, Rod):
         raise InputError(
             f"The scan was made with a {scan.indenter.shape}, but a calibration needs a rod.",
@@ -108,7 +96,7 @@ def reference_contact(film: ElasticFilm, indenter: RoundIndenter, load: float) -
 def reference_profile(
     scan: Scan, reference: StressProfile | Contact | None
 ) -> StressProfile | Contact:
-    """Choose the reference: the one given, the scan's own, or the rod's solution."""
+    """Choose the reference: the argument, the scan's own, or the rod's solution."""
     if reference is not None:
         return reference
     if scan.reference is not None:
@@ -125,28 +113,12 @@ def reference_spectrum(
 
 def reference_spectra(
     references: Sequence[StressProfile | Contact],
-    parts: Sequence[ScanPoints],
+    points: Sequence[ScanPoints],
     thicknesses: Sequence[float],
 ) -> tuple[RadialSpectrum, ...]:
-    """Transforms of the references per newton, on common nodes that serve every distance.
-
-    Parameters
-    ----------
-    references : sequence of StressProfile or Contact
-        The base stress of each scan.
-    parts : sequence of ScanPoints
-        Where each scan was measured.
-    thicknesses : sequence of float
-        Film thickness of each, in m: it bounds the wavenumbers that reach the base.
-
-    Raises
-    ------
-    InputError
-        If a table ends inside the scan before its stress has decayed, carries no force, or has no
-        shear where a tangential channel needs it.
-    """
-    order = parts[0].order
-    spans = [float(np.hypot(np.ptp(part.x), np.ptp(part.y))) for part in parts]
+    """Transforms of the references per newton, on common nodes that serve every distance."""
+    order = points[0].order
+    spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in points]
     # Fields are lifted to squares that reach one span from the centre, to their corners.
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / min(thicknesses), 1.5 * max(spans))
     return tuple(
@@ -200,15 +172,15 @@ def _require_held_back(values: FloatArray) -> None:
 def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
     """Transform of a contact's stress at wavenumbers, kept for scans over the same positions."""
     k = np.frombuffer(nodes)
-    found = contact.base_shear_spectrum(k) if order else contact.base_spectrum(k)
-    found.flags.writeable = False
-    return found
+    values = contact.base_shear_spectrum(k) if order else contact.base_spectrum(k)
+    values.flags.writeable = False
+    return values
 
 
 def carried_force(stress: StressProfile | Contact, reference: RadialSpectrum) -> float:
     """Force that a reference carries, over the load it was made for: one if it is sound.
 
-    The shear's transform does not tell: there it is that of the normal stress beside it.
+    A shear's transform does not contain it: there it is that of the normal stress beside it.
     """
     if reference.order == 0:
         return reference.integral
@@ -240,24 +212,19 @@ def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Fl
     The rod's solution is varied by centred differences (one-sided at nu = 1/2); for a reference
     from elsewhere, the relative change is taken over.  At a given load the base stress of a
     linear film does not depend on Young's modulus: its contribution is zero, and is stated.
-
-    Returns
-    -------
-    mapping of str to ndarray, shape of ``reference.values``
-        By source, for the sources whose uncertainty is stated.
     """
     film = scan.film
     changes: dict[str, FloatArray] = {}
     if film.young_modulus_uncertainty is not None:
         changes["young_modulus"] = np.zeros_like(reference.values)
     if u := film.thickness_uncertainty:
-        thicker = replace(film, thickness=film.thickness + u)
-        thinner = replace(film, thickness=film.thickness - u)
-        changes["thickness"] = _difference(scan, reference, (thicker, thinner), None) / 2
+        films = [replace(film, thickness=film.thickness + step) for step in (u, -u)]
+        changes["thickness"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
     if u := film.poisson_ratio_uncertainty:
         above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
-        films = (replace(film, poisson_ratio=above), replace(film, poisson_ratio=below))
-        changes["poisson_ratio"] = _difference(scan, reference, films, None) * u / (above - below)
+        films = [replace(film, poisson_ratio=ratio) for ratio in (above, below)]
+        difference = _difference(scan, reference, films, [scan.indenter] * 2)
+        changes["poisson_ratio"] = difference * u / (above - below)
     return changes
 
 
@@ -266,16 +233,16 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     rod = scan.indenter
     if not (u := rod.radius_uncertainty):
         return {}
-    wider = replace(rod, radius=rod.radius + u)
-    narrower = replace(rod, radius=max(rod.radius - u, rod.radius / 2))
-    return {"rod_radius": _difference(scan, reference, None, (wider, narrower)) / 2}
+    radii = (rod.radius + u, max(rod.radius - u, rod.radius / 2))
+    rods = [replace(rod, radius=radius) for radius in radii]
+    return {"rod_radius": _difference(scan, reference, [scan.film] * 2, rods) / 2}
 
 
 def _difference(
     scan: Scan,
     reference: RadialSpectrum,
-    films: tuple[ElasticFilm, ElasticFilm] | None,
-    rods: tuple[RoundIndenter, RoundIndenter] | None,
+    films: Sequence[ElasticFilm],
+    rods: Sequence[RoundIndenter],
 ) -> FloatArray:
     """Difference of two rods' solutions, scaled from the rod's own to the reference."""
     k = reference.wavenumbers.k
@@ -284,6 +251,6 @@ def _difference(
         contact = reference_contact(film, rod, scan.load)
         return _base_spectrum(contact, k.tobytes(), reference.order)
 
-    upper, lower = zip(films or (scan.film,) * 2, rods or (scan.indenter,) * 2, strict=True)
+    upper, lower = (transform(film, rod) for film, rod in zip(films, rods, strict=True))
     scale = reference.values / transform(scan.film, scan.indenter)
-    return np.asarray((transform(*upper) - transform(*lower)) * scale)
+    return np.asarray((upper - lower) * scale)

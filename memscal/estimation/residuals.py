@@ -1,7 +1,7 @@
-r"""What no apparatus function explains: independent residuals of a scan, and tests of them.
+r"""Residuals of a scan that do not depend on the apparatus function, and tests of them.
 
-The residuals of a fit that weighs smooth departures against noise have no exact distribution.
-These have one.  Weighted data :math:`z` are projected off a design :math:`X = QR` of all that an
+The residuals of a fit with a prior for departures have no exact distribution.  These have one.
+Weighted data :math:`z` are projected off a design :math:`X = QR` of all that an
 apparatus function may do to first order: conversion constant, width, centre, baseline, drift,
 and every combination of departures that stands above a share of the noise.  What is left,
 :math:`(1 - QQ^T)z`, does not depend on G.  With as many points :math:`o` dropped as there are
@@ -37,12 +37,13 @@ __all__ = [
     "chi_square_test",
     "free_model",
     "neighbour_correlation_test",
+    "orthonormal",
     "pure_error_test",
     "residuals_of",
     "runs_test",
 ]
 
-#: A departure of the expected size that moves no voltage by more of its noise is left as noise.
+#: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
 #: A point of less weight is an outlier and is left out.
 _OUTLIER = 0.5
@@ -51,37 +52,20 @@ _CLIPPED = 4.0
 
 @dataclass(frozen=True, eq=False)
 class FreeModel:
-    """The scan's data and the linear model of every apparatus function it can tell apart.
+    """The scan's data and the linear model of every apparatus function that it can resolve."""
 
-    Parameters
-    ----------
-    data : ndarray, shape (m,)
-        What the best Gaussian leaves of the voltages, weighted: independent, and of unit variance
-        where the noise is stated.  Outliers are left out.
-    design : ndarray, shape (m, r)
-        Weighted derivatives by the parameters without prior and by the departures that count.
-        In this order: A, width, centres, baselines and drifts first.
-    kept : ndarray of int, shape (m,)
-        Which points of the scan they are.
-    stated : bool
-        Whether the noise is stated.
-    """
-
+    # (m,): weighted residuals of the best Gaussian, without outliers: independent, and of unit
+    # variance where the noise is stated.
     data: FloatArray
-    design: FloatArray
-    kept: NDArray[np.intp]
-    stated: bool
+    design: FloatArray  # (m, r): weighted columns of the flat parameters, then of the departures
+    kept: NDArray[np.intp]  # (m,): which points of the scan they are
+    stated: bool  # whether the noise is stated
 
 
 def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> FreeModel:
-    """Linearise the model about the best Gaussian, with every departure that can be seen.
+    """Linearise the model about the best Gaussian, with every departure that can be resolved.
 
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-    clip_outliers : bool
-        Keep outliers, with residuals cut to four times their noise, in place of leaving them out.
+    ``clip_outliers`` keeps outliers, with residuals cut to four times their noise.
     """
     points, basis = estimate.points, estimate.basis
     ordinary = estimate.outlier_weight >= _OUTLIER
@@ -104,10 +88,10 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None
     noise = 1.0 if stated else estimate.noise_scale
-    seen = singular > _SHARE_OF_NOISE * noise
+    resolved = singular > _SHARE_OF_NOISE * noise
     return FreeModel(
         data=standardised(u - estimate.gaussian.predicted),
-        design=np.hstack([flat, left[:, seen] * singular[seen]]),
+        design=np.hstack([flat, left[:, resolved] * singular[resolved]]),
         kept=kept,
         stated=stated,
     )
@@ -127,7 +111,7 @@ FEWEST_RESIDUALS = 3
 class TestOutcome:
     """A test's value, what it exceeds by chance once in a thousand, and its p-value."""
 
-    #: Not a test case, whatever pytest makes of the name.
+    #: Not a test case of pytest.
     __test__ = False
 
     value: float
@@ -137,31 +121,14 @@ class TestOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """What no apparatus function explains, in the order of the scan.
+    """Residuals after projection, in the order of the scan."""
 
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Weighted residuals of all points but outliers; of unit variance, before the projection,
-        if the noise is as stated.
-    basis : ndarray, shape (n, r)
-        Orthonormal basis of what was projected out.
-    point : ndarray of int, shape (n,)
-        The point of the scan that each belongs to.
-    place : ndarray of int, shape (n,)
-        Its place along the scan, outliers counted.
-    sequence : ndarray of int, shape (n,)
-        Which pass over the sensor it belongs to: a repeat, or a row of a raster.
-    stated : bool
-        Whether the noise is stated.
-    """
-
-    values: FloatArray
-    basis: FloatArray
-    point: NDArray[np.intp]
-    place: NDArray[np.intp]
-    sequence: NDArray[np.intp]
-    stated: bool
+    values: FloatArray  # (n,): weighted; of unit variance before the projection, if as stated
+    basis: FloatArray  # (n, r): orthonormal basis of what was projected out
+    point: NDArray[np.intp]  # (n,): the point of the scan that each belongs to
+    place: NDArray[np.intp]  # (n,): its place along the scan, outliers counted
+    sequence: NDArray[np.intp]  # (n,): which pass over the sensor: a repeat, or a raster's row
+    stated: bool  # whether the noise is stated
 
     @property
     def degrees(self) -> int:
@@ -184,30 +151,12 @@ class Residuals:
 
 
 def residuals_of(estimate: ProfileEstimate) -> Residuals:
-    """Project a scan off everything that an apparatus function may do.
-
-    Parameters
-    ----------
-    estimate : ProfileEstimate
-        The scan's profile.
-
-    Returns
-    -------
-    Residuals
-        One for each point that is no outlier.
-
-    Examples
-    --------
-    >>> import memscal
-    >>> residuals = residuals_of(memscal.calibrate(memscal.simulate()).solution.estimate)
-    >>> residuals.values.size, 50 < residuals.degrees < 60
-    (65, True)
-    """
+    """Project a scan off all voltages that an apparatus function can make."""
     model = free_model(estimate)
     place, sequence = _passes(estimate)
     order = np.argsort(place[model.kept])
     point = model.kept[order]
-    basis, data = _orthonormal(model.design[order]), model.data[order]
+    basis, data = orthonormal(model.design[order]), model.data[order]
     left_over = data - basis @ (basis.T @ data)
     return Residuals(left_over, basis, point, place[point], sequence[point], model.stated)
 
@@ -227,12 +176,7 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
     each place beside the design, what is left has :math:`m` degrees and the mean square
     :math:`s^2`; what the means took, of :math:`l` degrees, gives :math:`F(l, m)`.  That is exact
     also where the repeats lie only near each other (Christensen, Ann. Stat. 17, 1989): the design
-    tells them apart.
-
-    Returns
-    -------
-    TestOutcome or None
-        ``None`` where no place was measured twice at one load.
+    contains their difference.
     """
     model, points = free_model(estimate), estimate.points
     place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.kept]
@@ -243,13 +187,13 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
     square = np.bincount(group, weight**2)
 
     def within(columns: FloatArray) -> FloatArray:
-        """Take from each column its weighted mean at each place."""
+        """Subtract from each column its weighted mean at each place."""
         mean = (
             np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1) / square[:, None]
         )
         return np.asarray(columns - weight[:, None] * mean[group])
 
-    basis = _orthonormal(model.design)
+    basis = orthonormal(model.design)
     left_over = model.data - basis @ (basis.T @ model.data)
     near, singular, _ = np.linalg.svd(within(basis), full_matrices=False)
     near = near[:, singular > _APART]
@@ -269,10 +213,10 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
 def runs_test(residuals: Residuals) -> TestOutcome:
     r"""Test the residuals' signs along the scan: the share of neighbours that have the same.
 
-    Independent residuals change sign from one to the next as often as a coin does.  (Wald and
-    Wolfowitz, Ann. Math. Stat. 11, 1940, count runs for a median that is not known; here it is
-    zero, and the number of changes is binomial.)  The p-value is one-sided, for too few runs, and
-    as coarse as a count: at most as often below a level as that level says.
+    Independent residuals change sign with a probability of one half: with a median of zero, the
+    number of changes is binomial (Wald and Wolfowitz, Ann. Math. Stat. 11, 1940, count runs for
+    an unknown median).  The p-value is one-sided, for too few runs; it is discrete, and below a
+    level at most as often as the level.
     """
     values, rest = residuals.independent
     same_pass = np.diff(residuals.sequence[rest]) == 0
@@ -325,8 +269,8 @@ def _neighbours(residuals: Residuals) -> csr_array:
         rows.append(first)
         columns.append(first + apart)
         weights.append(0.5 * _DECAY ** (place[first + apart] - place[first]))
-    found = (np.concatenate([np.zeros(0), *weights]), (np.hstack(rows), np.hstack(columns)))
-    pairs = coo_array(found, shape=(n, n))
+    entries = (np.concatenate([np.zeros(0), *weights]), (np.hstack(rows), np.hstack(columns)))
+    pairs = coo_array(entries, shape=(n, n))
     # Assembled once: every sum of sparse matrices costs more than all of their entries.
     return (pairs + pairs.T).tocsr()
 
@@ -347,9 +291,10 @@ def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
     return float(first), float(second), float(third)
 
 
-def _orthonormal(design: FloatArray) -> FloatArray:
-    """Orthonormal basis of the columns' span; columns scaled first, none counted twice."""
-    scaled = design / np.linalg.norm(design, axis=0)
+def orthonormal(design: FloatArray) -> FloatArray:
+    """Orthonormal basis of the columns' span; they are scaled first, and zeros are skipped."""
+    size = np.linalg.norm(design, axis=0)
+    scaled = design[:, size > 0] / size[size > 0]
     left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
     return np.asarray(left[:, singular > 1e-10 * singular[0]])
 

@@ -217,7 +217,7 @@ def measure_stress(
     Examples
     --------
     >>> import memscal
-    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1), method="evidence").apparatus
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1), method="bayesian").apparatus
     >>> measured = memscal.measure_stress(memscal.simulate(seed=2), apparatus)
     >>> [profile] = measured.profiles
     >>> abs(profile.force - profile.load) < 3 * profile.force_uncertainty

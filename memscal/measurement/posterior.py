@@ -36,8 +36,7 @@ from scipy.special import hyp0f1
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import weigh_departures
-from memscal.estimation.departures import DepartureBasis, departure_basis
+from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, gauss_newton
 from memscal.estimation.points import ScanPoints
@@ -187,7 +186,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
         gain=rows @ weighed.gain,
         residual=weighed.residual,
         noise=weighed.noise,
-        log_evidence=weighed.log_evidence - 0.5 * _log_information(model, weights, fit),
+        log_evidence=weighed.log_marginal_likelihood - 0.5 * _log_information(model, weights, fit),
     )
 
 

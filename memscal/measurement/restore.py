@@ -376,7 +376,7 @@ def restore(
     Examples
     --------
     >>> import memscal
-    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1), method="evidence").apparatus
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1), method="bayesian").apparatus
     >>> restored = memscal.restore(memscal.simulate(seed=2), apparatus)
     >>> abs(restored.force - 1.0) < 3 * restored.force_uncertainty
     True

@@ -235,7 +235,7 @@ def design(
     noise: float = 0.005,
     noise_voltage: float | None = None,
     centre: float = 0.0,
-    method: str | Regulariser = "evidence",
+    method: str | Regulariser = "bayesian",
     seed: int = 0,
     want: Mapping[str, float] | None = None,
     vary: str | None = None,

@@ -15,14 +15,12 @@ from typing import ClassVar
 import numpy as np
 
 from memscal.calibration.fields import choose_grid
-from memscal.calibration.inputs import InputEffect, input_effects
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
-from memscal.calibration.uncertainty import Results, propagate
+from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Regulariser, create_regulariser
 from memscal.errors import FitError
 from memscal.estimation.band import find_band
-from memscal.estimation.bayesian import weigh_departures
-from memscal.estimation.departures import departure_basis
+from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points
@@ -181,7 +179,7 @@ class Design(Result):
         return max(parts, key=lambda source: parts[source])
 
 
-def evaluate(plan: Plan, method: str | Regulariser = "evidence", seed: int = 0) -> Design:
+def evaluate(plan: Plan, method: str | Regulariser = "bayesian", seed: int = 0) -> Design:
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
     regulariser = create_regulariser(method, seed=seed) if isinstance(method, str) else method
     expected = expected_calibration(plan, regulariser)

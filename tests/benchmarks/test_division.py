@@ -11,8 +11,7 @@ from scipy.optimize import curve_fit
 
 import memscal
 from memscal.axisymmetry.grids import EvenGrid
-from memscal.deconvolution.division import DivisionProblem
-from memscal.deconvolution.windows import WhiteNoise
+from memscal.deconvolution.division import DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile

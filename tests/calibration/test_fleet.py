@@ -28,10 +28,10 @@ def constant(result: FleetCalibration) -> float:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_scan_says_what_it_says_by_itself(workers: int) -> None:
     given = scans(5)
-    found = memscal.calibrate_many(given, workers=workers, method="evidence")
+    found = memscal.calibrate_many(given, workers=workers, method="bayesian")
     assert [one.index for one in found] == list(range(5))
     for one, scan in zip(found, given, strict=True):
-        alone = memscal.calibrate(scan, method="evidence").apparatus
+        alone = memscal.calibrate(scan, method="bayesian").apparatus
         assert constant(one) == pytest.approx(alone.conversion_constant, rel=1e-9)
         assert one.parameters is not None
         assert one.radial_profile is not None
@@ -78,9 +78,9 @@ def test_files_and_joint_scans_are_calibrated(tmp_path: Path) -> None:
     first, second = scans(2)
     path = tmp_path / "scan.h5"
     memscal.write_scan(first, path)
-    found = memscal.calibrate_many([path, [first, second]], method="evidence")
-    alone = memscal.calibrate(first, method="evidence").apparatus
-    joint = memscal.calibrate([first, second], method="evidence").apparatus
+    found = memscal.calibrate_many([path, [first, second]], method="bayesian")
+    alone = memscal.calibrate(first, method="bayesian").apparatus
+    joint = memscal.calibrate([first, second], method="bayesian").apparatus
     assert constant(found[0]) == pytest.approx(alone.conversion_constant, rel=1e-9)
     assert constant(found[1]) == pytest.approx(joint.conversion_constant, rel=1e-9)
     assert "A = " in repr(found[0])
@@ -100,7 +100,7 @@ def test_a_wrong_method_or_option_is_refused_at_once() -> None:
     with pytest.raises(memscal.MemscalError, match="nonsense"):
         memscal.calibrate_many(scans(2), method="nonsense")
     with pytest.raises(memscal.MemscalError, match="bogus"):
-        memscal.calibrate_many(scans(2), method="evidence", bogus=1)
+        memscal.calibrate_many(scans(2), method="bayesian", bogus=1)
 
 
 def test_one_scan_is_no_list() -> None:

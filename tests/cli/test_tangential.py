@@ -19,12 +19,12 @@ def sheared(folder: Path) -> Path:
     return path
 
 
-def test_the_channel_goes_to_an_artifact_of_its_own_by_method_evidence(
+def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(
     run: Run, sheared: Path
 ) -> None:
     done = run("calibrate", sheared, "--channel", "xz", "--json")
     assert done.code == 0, done.err
-    assert done.json["method"] == "evidence"
+    assert done.json["method"] == "bayesian"
     assert "experimental" in done.err
     apparatus = memscal.load_apparatus(sheared.with_name("scan.xz.apparatus.h5"))
     assert apparatus.sensor.channel == "xz"
@@ -48,7 +48,7 @@ def test_a_method_that_divides_fields_is_an_input_refused(
 ) -> None:
     done = run("calibrate", sheared, "--channel", "xz", "--method", "wiener", *further)
     assert done.code == 3
-    assert "evidence" in done.err
+    assert "bayesian" in done.err
     assert names(sheared.parent) == ["scan.h5"]
 
 

@@ -9,8 +9,13 @@ from hypothesis import strategies as st
 from scipy.special import expm1
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
-from memscal.deconvolution.division import DivisionProblem, filtered_division, image_division
-from memscal.deconvolution.windows import Tikhonov, WhiteNoise
+from memscal.deconvolution.division import (
+    DivisionProblem,
+    Tikhonov,
+    WhiteNoise,
+    filtered_division,
+    image_division,
+)
 from memscal.model.arrays import FloatArray
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -96,16 +101,6 @@ def test_both_windows_are_the_formulas_that_they_state(amplitude: float, weakest
     white = WhiteNoise(amplitude=amplitude).divide(problem).window
     # Where z has sunk into rounding, at 1e-16, so has the window: at 1e-32/s^2.
     np.testing.assert_allclose(white, -expm1(-z2 / s2), atol=1e-9)
-
-
-def test_tikhonov_leaves_half_where_white_noise_leaves_nearly_two_thirds() -> None:
-    # At |z| = s the windows are 1/2 and 1 - 1/e.
-    grid = EvenGrid(9, 0.5)
-    delta = np.zeros((9, 9))
-    delta[0, 0] = 1 / grid.cell_area
-    problem = DivisionProblem(grid, delta, delta, 1.0, 10.0)
-    np.testing.assert_allclose(Tikhonov().divide(problem).window, 0.5)
-    np.testing.assert_allclose(WhiteNoise().divide(problem).window, 1 - np.exp(-1))
 
 
 @given(seed=SEEDS)

@@ -69,8 +69,11 @@ def test_a_seed_reaches_only_those_that_draw(name: str) -> None:
     assert getattr(regulariser, "seed", None) == (41 if draws else None)
 
 
-def test_the_method_of_the_paper_comes_first() -> None:
-    assert regulariser_names()[0] == create_regulariser("white-noise").name
+def test_the_former_name_of_the_bayesian_method_is_an_alias() -> None:
+    assert create_regulariser("evidence", monotone=True) == create_regulariser(
+        "bayesian", monotone=True
+    )
+    assert "evidence" not in regulariser_names()
 
 
 def test_an_unknown_name_is_refused_with_the_names_there_are() -> None:
@@ -86,19 +89,9 @@ def test_an_unknown_option_is_refused_with_the_options_there_are() -> None:
     assert "amplitude" in caught.value.cure
 
 
-def test_an_option_reaches_its_method() -> None:
-    assert create_regulariser("richardson-lucy", iterations=7).iterations == 7
-
-
 @pytest.mark.usefixtures("plug_in")
-def test_a_plug_in_is_listed_after_our_own_and_each_name_once() -> None:
-    names = regulariser_names()
-    assert names[-1] == "cutoff"
-    assert len(set(names)) == len(names)
-
-
-@pytest.mark.usefixtures("plug_in")
-def test_a_plug_in_is_created_with_its_options_and_without_the_seed() -> None:
+def test_a_plug_in_is_listed_and_created_with_its_options_and_without_the_seed() -> None:
+    assert regulariser_names().index("cutoff") == len(regulariser_names()) - 1
     regulariser = create_regulariser("cutoff", k_max=2e3, seed=3)
     assert type(regulariser).__module__ == "sharp_edges"
     assert regulariser.k_max == 2e3
@@ -107,7 +100,7 @@ def test_a_plug_in_is_created_with_its_options_and_without_the_seed() -> None:
 @pytest.mark.usefixtures("plug_in")
 def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
     regulariser = create_regulariser("tikhonov")
-    assert type(regulariser).__module__ == "memscal.deconvolution.windows"
+    assert type(regulariser).__module__ == "memscal.deconvolution.division"
 
 
 @pytest.mark.usefixtures("plug_in")
@@ -120,11 +113,6 @@ def test_a_calibration_runs_with_a_plug_in() -> None:
     beyond = transfer.k > 2.6e3
     np.testing.assert_array_equal(transfer.window[beyond], 0.0)
     np.testing.assert_array_equal(transfer.window[transfer.k < 2.4e3], 1.0)
-
-
-def test_without_the_plug_in_its_name_is_unknown() -> None:
-    with pytest.raises(InputError, match="no method named cutoff"):
-        create_regulariser("cutoff")
 
 
 @pytest.mark.parametrize(
@@ -142,7 +130,3 @@ def test_without_the_plug_in_its_name_is_unknown() -> None:
 def test_senseless_options_are_refused(name: str, options: dict[str, object]):
     with pytest.raises(InputError):
         create_regulariser(name, **options)
-
-
-def test_numpys_integers_are_whole_numbers():
-    create_regulariser("white-noise-draw", seed=np.int64(3))

@@ -9,8 +9,7 @@ from scipy.special import j0
 
 import memscal
 from memscal.estimation.band import _ring_areas, find_band, transfer_uncertainty
-from memscal.estimation.bayesian import HYPOTHESES
-from memscal.estimation.departures import SHAPES
+from memscal.estimation.bayesian import HYPOTHESES, SHAPES
 from memscal.estimation.profile import ProfileEstimate
 
 

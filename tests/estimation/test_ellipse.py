@@ -68,7 +68,7 @@ def test_an_ellipse_is_found_with_an_uncertainty_that_is_true() -> None:
     truth, deviates = (0.25, -0.15), []
     for seed in range(SEEDS):
         p = memscal.calibrate(
-            elliptic_scan(truth, 0.01, seed), method="evidence"
+            elliptic_scan(truth, 0.01, seed), method="bayesian"
         ).apparatus.parameters
         names = ("ellipticity", "ellipticity_diagonal", "gaussian_sigma")
         wanted = (*truth, SIGMA)
@@ -80,7 +80,7 @@ def test_an_ellipse_is_found_with_an_uncertainty_that_is_true() -> None:
 
 
 def test_the_field_of_an_elliptic_sensor_is_elliptic() -> None:
-    field = memscal.calibrate(elliptic_scan((0.4, 0.0), 0.003), method="evidence").apparatus.field
+    field = memscal.calibrate(elliptic_scan((0.4, 0.0), 0.003), method="bayesian").apparatus.field
     plane_x, plane_y = np.meshgrid(field.x, field.y)
     near = np.hypot(plane_x, plane_y) < 2.5e-3
     along_x = np.sum((field.g * plane_x**2)[near])
@@ -93,6 +93,6 @@ def test_two_lines_across_each_other_tell_along_from_across() -> None:
     middle = 8
     x_line = replace(raster, y=None, u_zz=raster.u_zz[middle])
     y_line = replace(raster, y=None, u_zz=raster.u_zz[:, middle], direction="y")
-    found = memscal.calibrate([x_line, y_line], method="evidence").apparatus.parameters
+    found = memscal.calibrate([x_line, y_line], method="bayesian").apparatus.parameters
     # Neither line passes through the centre itself: 0.15 mm beside it, a quarter of the width.
     assert found["ellipticity"] == pytest.approx(0.3, abs=0.05)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from helpers.scans import simulated
 
-import memscal
 from memscal.errors import FitError, InputError
 from memscal.estimation.points import measured_points
 
@@ -64,8 +63,3 @@ def test_a_negative_outlier_is_no_wrong_sign() -> None:
     u = scan.u_zz.copy()
     u[5] -= 10 * u.max()
     assert measured_points(replace(scan, u_zz=u)).u.size == 65
-
-
-def test_a_scan_of_no_load_is_refused_when_it_is_made() -> None:
-    with pytest.raises(memscal.MemscalError, match="0 N"):
-        replace(simulated(), load=0.0)

@@ -13,8 +13,7 @@ import memscal
 from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
 from memscal.estimation.band import find_band
-from memscal.estimation.bayesian import weigh_departures
-from memscal.estimation.departures import departure_basis
+from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points

@@ -1,32 +1,33 @@
-"""Departures weighed by evidence, against the textbook formulas for linear Gaussian models."""
+"""Bayesian model averaging against the formulas of linear Gaussian models; shapes of departure."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
 from helpers.scans import CONVERSION, RING, SIGMA, TAILS, estimated, plane_error, simulated
 from scipy.stats import multivariate_normal
 
 import memscal
+from memscal.axisymmetry.grids import EvenGrid
+from memscal.axisymmetry.hankel import Wavenumbers
+from memscal.deconvolution.division import DivisionProblem, create_regulariser
 from memscal.errors import InputError
-from memscal.estimation.bayesian import HYPOTHESES
+from memscal.estimation.bayesian import HYPOTHESES, SHAPES, Rings
 from memscal.estimation.profile import constrained_profile
 
 R = np.linspace(0.0, 3e-3, 121)
+NODES = Wavenumbers.covering(60e3, 12e-3)
 DISC = memscal.SmoothedDisc(0.8e-3, 0.3e-3)
 
 
-def test_the_prior_weights_add_up_and_the_uncertainty_believes_in_no_gaussian() -> None:
+def test_the_prior_weights_add_up_and_the_uncertainty_allows_no_gaussian() -> None:
     assert sum(h.estimate for h in HYPOTHESES) == pytest.approx(1.0)
     assert sum(h.uncertainty for h in HYPOTHESES) == pytest.approx(1.0)
     assert HYPOTHESES[0].shape is None
     assert HYPOTHESES[0].uncertainty == 0.0
 
 
-def test_log_evidence_ratios_are_those_of_the_marginal_likelihood() -> None:
+def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods() -> None:
     """Densities of the data with the flat parameters projected out, covariance by covariance."""
     estimate = estimated(simulated(noise=0.003, kernel=TAILS, repeats=2))
     fit, basis, model = estimate.gaussian, estimate.basis, estimate.model
@@ -35,8 +36,6 @@ def test_log_evidence_ratios_are_those_of_the_marginal_likelihood() -> None:
     null = q[:, basis.flat :]
     rest = null.T @ (root * (estimate.points.u - fit.predicted))
     voltages = model.signal(fit.geometry, basis.kernels(model.k)) * root[:, None]
-    from memscal.estimation.departures import SHAPES
-
     for i in (1, 5, len(HYPOTHESES) - 1):
         hypothesis = HYPOTHESES[i]
         block = basis.blocks[SHAPES.index(hypothesis.shape)]
@@ -88,8 +87,8 @@ def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior() -> 
     scan = simulated(points=15, half_range=5e-3, noise=0.003)
     found = estimated(scan)
     assert np.isfinite(found.covariance).all()
-    few = memscal.calibrate(scan, method="evidence").apparatus
-    many = memscal.calibrate(simulated(points=129, noise=0.003), method="evidence").apparatus
+    few = memscal.calibrate(scan, method="bayesian").apparatus
+    many = memscal.calibrate(simulated(points=129, noise=0.003), method="bayesian").apparatus
     assert few.radial_uncertainty(0.0) > many.radial_uncertainty(0.0)
 
 
@@ -109,8 +108,8 @@ def test_a_constrained_profile_meets_its_constraint_and_moves_little(monotone) -
 
 def test_a_ring_is_no_falling_profile_and_its_constrained_fit_misses_the_scan() -> None:
     scan = simulated(noise=5e-4, repeats=2, kernel=RING)
-    free = memscal.calibrate(scan, method="evidence").apparatus
-    falling = memscal.calibrate(scan, method="evidence", monotone=True).apparatus
+    free = memscal.calibrate(scan, method="bayesian").apparatus
+    falling = memscal.calibrate(scan, method="bayesian", monotone=True).apparatus
     assert plane_error(R, falling.radial(R), RING.radial(R)) > 1.5 * plane_error(
         R, free.radial(R), RING.radial(R)
     )
@@ -118,25 +117,53 @@ def test_a_ring_is_no_falling_profile_and_its_constrained_fit_misses_the_scan() 
     assert residual[falling] > residual[free]
 
 
-def test_without_constraints_the_profile_is_the_posterior_mean() -> None:
-    estimate = estimated(simulated(noise=0.003))
-    profile = constrained_profile(estimate, nonnegative=False, monotone=False)
-    assert_same_to_rounding(profile.radial(R), estimate.radial(R))
-
-
 def test_the_method_needs_a_scan_and_says_so() -> None:
-    from memscal.axisymmetry.grids import EvenGrid
-    from memscal.deconvolution.division import DivisionProblem, create_regulariser
-
     grid = EvenGrid(9, 1e-3)
     field = np.ones((9, 9))
     with pytest.raises(InputError, match="without the scan"):
-        create_regulariser("evidence").divide(DivisionProblem(grid, field, field, 1.0, 1.0))
+        create_regulariser("bayesian").divide(DivisionProblem(grid, field, field, 1.0, 1.0))
 
 
-def test_evidence_leaves_nothing_to_a_window() -> None:
-    apparatus = memscal.calibrate(replace(simulated(), notes=""), method="evidence").apparatus
+def test_the_method_leaves_nothing_to_a_window() -> None:
+    apparatus = memscal.calibrate(simulated(), method="bayesian").apparatus
     assert np.all(apparatus.transfer.window == 1.0)
     assert apparatus.budget["gaussian_sigma_deconvolved"]["window"] == 0.0
     assert apparatus.gaussian_sigma == pytest.approx(SIGMA, rel=0.1)
     assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=0.05)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: f"{s.name} {s.blur} {s.extent}")
+def test_a_shape_is_the_same_on_both_sides_of_the_transform(shape) -> None:
+    rings = shape.rings(SIGMA, CONVERSION)
+    r = np.linspace(0.0, 4e-3, 41)
+    transform = rings.transform(NODES.k)
+    by_quadrature = np.stack([NODES.synthesise(column, r) for column in transform.T], axis=1)
+    np.testing.assert_allclose(rings.radial(r), by_quadrature, atol=1e-9 * by_quadrature.max())
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: f"{s.name} {s.blur} {s.extent}")
+def test_a_strength_of_one_is_as_large_as_the_gaussian(shape) -> None:
+    transform = shape.rings(SIGMA, CONVERSION).transform(NODES.k)
+    expected = np.sqrt(np.sum(NODES.weights @ transform**2))
+    gaussian = CONVERSION * np.exp(-0.5 * (SIGMA * NODES.k) ** 2)
+    assert expected == pytest.approx(np.sqrt(NODES.weights @ gaussian**2), rel=1e-6)
+
+
+def test_a_ring_carries_its_amplitude_whatever_its_radius_and_blur() -> None:
+    rings = Rings(np.array([0.0, 1e-3, 3e-3]), np.array([0.2e-3, 0.3e-3, 1e-3]), np.ones(3))
+    r = np.linspace(0.0, 10e-3, 20001)
+    integrals = 2 * np.pi * np.trapezoid(rings.radial(r) * r[:, None], r, axis=0)
+    np.testing.assert_allclose(integrals, 1.0, rtol=1e-6)
+    np.testing.assert_allclose(rings.transform(np.zeros(1))[0], 1.0)
+
+
+def test_the_basis_moves_the_estimate_as_its_columns_say() -> None:
+    estimate = estimated(simulated(noise=0.002))
+    basis, r = estimate.basis, np.linspace(0.0, 3e-3, 31)
+    columns = basis.kernels(NODES.k)
+    np.testing.assert_allclose(
+        np.stack([NODES.synthesise(c, r) for c in columns.T], axis=1),
+        basis.radial(r),
+        atol=1e-8 * np.abs(basis.radial(r)).max(),
+    )
+    assert basis.blocks[-1].stop == basis.integrals.size == columns.shape[1]
