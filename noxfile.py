@@ -54,7 +54,7 @@ def outside_the_checkout(session: nox.Session, *, requirements: list[str]) -> It
             clutter = shutil.ignore_patterns("__pycache__", ".*")
             if (ROOT / name).is_dir():
                 shutil.copytree(ROOT / name, copy / name, ignore=clutter)
-        for name in ("pyproject.toml", "README.md"):
+        for name in ("pyproject.toml", "README.md", "CONTRIBUTING.md"):
             shutil.copy(ROOT / name, copy)
         with session.chdir(copy):
             yield copy
