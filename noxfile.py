@@ -78,7 +78,7 @@ def tests(session: nox.Session) -> None:
 @nox.session(default=False)
 def benchmarks(session: nox.Session) -> None:
     """Print how fast memscal is beside other ways to the same numbers, on this machine."""
-    with outside_the_checkout(session, requirements=[*group("test"), *group("benchmark")]):
+    with outside_the_checkout(session, requirements=group("test")):
         run_pytest(session, "-m", "benchmark", "--capture=no", "tests/benchmarks", *session.posargs)
 
 
