@@ -12,8 +12,17 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.scans import EXACT_FILM, RING, TAILS, plane_error, simulated
-from helpers.spheres import GAUSSIAN, known_apparatus, pressed, sphere_scan
+from helpers.scans import (
+    EXACT_FILM,
+    GAUSSIAN,
+    RING,
+    TAILS,
+    known_apparatus,
+    plane_error,
+    pressed,
+    simulated,
+    sphere_scan,
+)
 from scipy.stats import binom
 
 import memscal

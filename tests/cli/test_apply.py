@@ -9,8 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.console import Run, names
-from helpers.contacts import contact_scan
-from helpers.spheres import known_apparatus
+from helpers.scans import contact_scan, known_apparatus
 
 import memscal
 from memscal.cli.failures import CHECK_FAILED

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.contacts import contact_scan
-from helpers.spheres import known_apparatus, pressed, sphere_scan
+from helpers.scans import contact_scan, known_apparatus, pressed, sphere_scan
 from matplotlib.axes import Axes
 
 import memscal

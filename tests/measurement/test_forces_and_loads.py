@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.builders import make_scan
-from helpers.contacts import LOADS, contact_scan, measured
-from helpers.scans import EXACT_FILM, SIGMA
-from helpers.spheres import known_apparatus
+from helpers.scans import EXACT_FILM, LOADS, SIGMA, contact_scan, known_apparatus, measured
 
 import memscal
 from memscal.errors import InputError
