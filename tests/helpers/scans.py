@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from helpers.builders import make_artifact
 
 import memscal
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
@@ -14,13 +15,7 @@ from memscal.axisymmetry.kernels import RadialKernel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectrum
-from memscal.model.apparatus import (
-    ApparatusField,
-    ApparatusRadial,
-    ParameterSet,
-    Reconvolution,
-    TransferFunction,
-)
+from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.provenance import Process
 from memscal.model.scan import Scan, StressSensor
@@ -134,19 +129,12 @@ def known_apparatus(
 
     The uncertainties are relative.
     """
-    r = np.linspace(0.0, 6e-3, 301)
+    r, k = np.linspace(0.0, 6e-3, 301), np.linspace(0.0, 12e3, 241)
     g = kernel.radial(r)
     spread = width_uncertainty * (2 * g + r * np.gradient(g, r))
-    k = np.linspace(0.0, 12e3, 241)
-    plane = np.zeros((3, 3))
-    line = np.linspace(-1e-3, 1e-3, 3)
-    zeros = np.zeros(3)
-    scan = memscal.simulate(points=33)
-    return memscal.ApparatusFunction(
-        field=ApparatusField(line, line, plane, plane),
+    data = make_artifact(
         radial_profile=ApparatusRadial(r, g, np.abs(spread), g, np.outer(spread, spread)),
         transfer=TransferFunction(k, np.abs(kernel.transform(k)), 0 * k, 0 * k + 1, 5e3),
-        reconvolution=Reconvolution(line, zeros, zeros + 1, zeros, zeros, zeros),
         parameters=ParameterSet(
             ("conversion_constant", "gaussian_sigma"),
             np.array([conversion, SIGMA]),
@@ -154,12 +142,14 @@ def known_apparatus(
         ),
         checks=(),
         film=EXACT_FILM,
-        indenter=replace(scan.indenter, radius_uncertainty=None),
+        indenter=EXACT_ROD,
         sensor=SENSOR,
-        load=1.0,
         reference=pressed().profile(),
         process=Process(program="test", version="0", date=""),
         budget={},
+    )
+    return memscal.ApparatusFunction(
+        **{item.name: getattr(data, item.name) for item in fields(data)}
     )
 
 
