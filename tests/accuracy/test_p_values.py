@@ -1,6 +1,6 @@
 """P-values of the residuals are uniform for scans that are as stated, whatever G.
 
-Set MEMSCAL_FULL_STUDY for 400 seeds in place of 40.
+Set MEMSCAL_FULL_STUDY for 400 seeds in place of 60.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from memscal.model.scan import Scan
 
 pytestmark = pytest.mark.accuracy
 
-SEEDS = 400 if FULL else 40
+SEEDS = 400 if FULL else 60
 CHANCE = 1e-5
 NOISES = (0.003, 0.02)
 
