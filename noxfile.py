@@ -54,7 +54,7 @@ def outside_the_checkout(session: nox.Session, *, requirements: list[str]) -> It
             clutter = shutil.ignore_patterns("__pycache__", ".*")
             if (ROOT / name).is_dir():
                 shutil.copytree(ROOT / name, copy / name, ignore=clutter)
-        for name in ("pyproject.toml", "README.md"):
+        for name in ("pyproject.toml", "README.md", "CONTRIBUTING.md"):
             shutil.copy(ROOT / name, copy)
         with session.chdir(copy):
             yield copy
@@ -78,7 +78,7 @@ def tests(session: nox.Session) -> None:
 @nox.session(default=False)
 def benchmarks(session: nox.Session) -> None:
     """Print how fast memscal is beside other ways to the same numbers, on this machine."""
-    with outside_the_checkout(session, requirements=[*group("test"), *group("benchmark")]):
+    with outside_the_checkout(session, requirements=group("test")):
         run_pytest(session, "-m", "benchmark", "--capture=no", "tests/benchmarks", *session.posargs)
 
 

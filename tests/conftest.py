@@ -21,6 +21,22 @@ settings.load_profile("memscal")
 REMEMBERING = ("memscal.mechanics.solver.refinement", "memscal.mechanics.finite_strain.solve")
 
 
+FULL_STUDY = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
+
+
+def pytest_report_header() -> list[str]:
+    """Say in the head of a report what is not run."""
+    text = "studies: reduced; those marked full_study are deselected (set MEMSCAL_FULL_STUDY)"
+    return [] if FULL_STUDY else [text]
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deselect the studies that have no reduced form."""
+    full = [item for item in items if item.get_closest_marker("full_study") and not FULL_STUDY]
+    config.hook.pytest_deselected(items=full)
+    items[:] = [item for item in items if item not in full]
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _forget_what_was_solved(request: pytest.FixtureRequest) -> Iterator[None]:
     """Free the contacts and meshes that a file's tests kept: gigabytes, over all files."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -41,7 +42,7 @@ SLOW = {
     "scipy.interpolate", "scipy.optimize", "scipy.signal", "scipy.stats",
 }  # fmt: skip
 LONGEST, SHORT = 600, 120
-MOST_MODULES, MOST_LINES = 185, 42_000
+MOST_MODULES, MOST_LINES, MOST_LINES_OF_TESTS = 185, 40_500, 24_600
 SHORT_WITH_ONE_IMPORTER = {
     "memscal.cli.commands": "asking for help imports it and nothing that a command needs",
 }
@@ -147,6 +148,16 @@ def test_a_module_is_short_enough_to_hold_in_the_head(sources: dict[str, str]) -
 def test_the_house_is_small(sources: dict[str, str]) -> None:
     assert len(sources) <= MOST_MODULES
     assert sum(len(source.splitlines()) for source in sources.values()) <= MOST_LINES
+    tests = Path(__file__).parent.rglob("*.py")
+    assert sum(len(path.read_text().splitlines()) for path in tests) <= MOST_LINES_OF_TESTS
+
+
+def test_the_map_of_the_house_has_a_line_for_every_room() -> None:
+    contributing = Path(__file__).parents[1] / "CONTRIBUTING.md"
+    lines = re.findall(r"^- `([\w/.]+)`: ", contributing.read_text(encoding="utf-8"), re.MULTILINE)
+    folders = {path.parent for path in PACKAGE.rglob("__init__.py")} - {PACKAGE}
+    rooms = {f"{folder.relative_to(PACKAGE).as_posix()}/" for folder in folders}
+    assert sorted(lines) == sorted(rooms | {path.name for path in PACKAGE.glob("*.py")})
 
 
 @pytest.fixture(scope="module")

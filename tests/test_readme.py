@@ -28,6 +28,15 @@ def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def run_installed(arguments: list[str]) -> list[str]:
+    """Run the installed program; return the lines that it prints."""
+    installed = os.fspath(Path(sys.executable).with_name("memscal"))
+    run = subprocess.run([installed, *arguments], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip()
+    return run.stdout.splitlines()
+
+
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
@@ -47,40 +56,24 @@ def test_set_up_takes_exactly_two_commands() -> None:
 def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> None:
     program, *arguments = shlex.split(COMMANDS[0])[-7:]
     assert Path(program).name == "memscal"
-    installed = Path(sys.executable).with_name("memscal")
-    run = subprocess.run(
-        [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 0, run.stderr
+    run_installed(arguments)
     assert (fresh_folder / "rod_scan_65.apparatus.h5").is_file()
     assert (fresh_folder / "calibration.png").is_file()
-    assert run.stdout.strip()
 
 
 def test_the_commands_for_the_best_estimate_and_its_plan_run(fresh_folder: Path) -> None:
     best = next(block for block in COMMANDS if "--method evidence" in block)
-    installed = Path(sys.executable).with_name("memscal")
     for line in best.strip().splitlines():
-        _, *arguments = shlex.split(line)
-        run = subprocess.run(
-            [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
-        )
-        assert run.returncode == 0, run.stderr
-        assert run.stdout.strip()
+        run_installed(shlex.split(line)[1:])
     assert (fresh_folder / "best.apparatus.h5").is_file()
     assert (fresh_folder / "design.png").is_file()
 
 
 def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
-    _, *arguments = shlex.split(SPHERE)
-    installed = Path(sys.executable).with_name("memscal")
-    run = subprocess.run(
-        [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 0, run.stderr
+    printed = run_installed(shlex.split(SPHERE)[1:])
     assert (fresh_folder / "sphere.png").is_file()
     shown = README.split(SPHERE)[1].split("```text\n")[1].split("```")[0]
-    printed, expected = run.stdout.splitlines(), shown.splitlines()
+    expected = shown.splitlines()
     assert printed[:2] == expected[:2]
     for ours, theirs in zip(printed[3:], expected[3:], strict=True):
         # Depths, radii and stresses; the last digit of another machine may differ.
@@ -93,15 +86,8 @@ def test_the_way_from_contacts_to_friction_prints_what_is_shown(
 ) -> None:
     """The whole chain, from files only; in a cache of its own, so that it starts from cold."""
     monkeypatch.setenv("XDG_CACHE_HOME", os.fspath(fresh_folder / "cache"))
-    installed = Path(sys.executable).with_name("memscal")
-    printed: dict[str, list[str]] = {}
-    for line in CHAIN.strip().splitlines():
-        _, *arguments = shlex.split(line)
-        run = subprocess.run(
-            [os.fspath(installed), *arguments], capture_output=True, text=True, check=False
-        )
-        assert run.returncode == 0, run.stderr
-        printed[arguments[0]] = run.stdout.splitlines()
+    lines = [shlex.split(line)[1:] for line in CHAIN.strip().splitlines()]
+    printed = {arguments[0]: run_installed(arguments) for arguments in lines}
     for name in ("contacts.stress.h5", "contacts.png", "friction.png"):
         assert (fresh_folder / name).is_file()
     applied, compared = README.split(CHAIN)[1].split("```text\n")[1:3]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 import shutil
 from functools import lru_cache
 from pathlib import Path
@@ -15,8 +14,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.calculix import Film, PressedSphere, press_rod, press_sphere
-from helpers.contact_edge import contact_radius
+from helpers.getfem_sphere import contact_radius
 
 import memscal
 
@@ -28,7 +28,6 @@ pytestmark = [
     ),
 ]
 
-FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 # An incompressible film is beyond CalculiX's elements: both sides are nearly so.
 RATIOS = (0.495, 0.499) if FULL else (0.495,)
 HALVINGS = (1, 2, 3) if FULL else (1, 2)

@@ -5,12 +5,12 @@ Set MEMSCAL_FULL_STUDY for ten designs of 40 seeds in place of three of 16.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from scipy.stats import chi2
 
 import memscal
@@ -20,7 +20,6 @@ from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 
-FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 DESIGNS, SEEDS = (10, 40) if FULL else (3, 16)
 #: How near a prediction is to come.
 TOLERANCE = 0.15

@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.bounds import root_mean_square_limit
+from helpers.bounds import FULL, root_mean_square_limit
 from helpers.estimation_study import (
     BANDS,
     CASES,
     EFFICIENCY,
-    FULL,
     MEAN_COVERAGE,
     REDUCED,
     SEEDS,
@@ -75,7 +74,7 @@ def test_the_table_has_the_cases_of_the_study() -> None:
         assert not_kept(name) <= ADMITTED[case.label.split()[0]]
 
 
-@pytest.mark.skipif(not FULL, reason="takes the seeds of the table: set MEMSCAL_FULL_STUDY")
+@pytest.mark.full_study
 @pytest.mark.parametrize("name", REDUCED)
 def test_the_table_is_what_its_script_prints(name: str) -> None:
     printed = [cell.strip() for cell in script()["row"](study(name)).split("|")[1:-1]]

@@ -6,12 +6,12 @@ film, radii.  Set MEMSCAL_FULL_STUDY for 60 experiments a case in place of 4.
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from scipy.stats import binom
 
 import memscal
@@ -19,7 +19,6 @@ from memscal.measurement.measure_stress import pooled_force
 
 pytestmark = pytest.mark.accuracy
 
-FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 EXPERIMENTS = 60 if FULL else 4
 CHANCE = 1e-3
 #: Repeats and loads that are known well enough to see five percent.

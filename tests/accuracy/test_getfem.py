@@ -18,18 +18,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.contact_edge import contact_radius, load_beyond
+from helpers import getfem_sphere
+from helpers.bounds import FULL
+from helpers.getfem_sphere import contact_radius, load_beyond
 from helpers.timing import once
 
 import memscal
 from memscal.mechanics.solver.refinement import solve_on_rings
 
-FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 STEP, LAYERS = (0.05, 8) if FULL else (0.1, 5)
 STEPS = (50, 100, 200) if FULL else (50, 100)
 FRICTIONS = (0.3, 1.0, math.inf)
 LOADS = (0.34, 0.69, 1.37, 2.75)
-PROGRAM = Path(__file__).with_name("getfem_sphere.py")
+PROGRAM = Path(getfem_sphere.__file__)
 # As good as infinite: the shear of a sticking contact stays below the pressure.
 STICKING = 1e3
 
@@ -163,7 +164,7 @@ def test_friction_moves_getfem_by_far_more_than_the_two_differ(python: str) -> N
     assert rough["base_normal"].max() > 1.003 * slippery["base_normal"].max()
 
 
-@pytest.mark.skipif(not FULL, reason="takes minutes of GetFEM: set MEMSCAL_FULL_STUDY")
+@pytest.mark.full_study
 def test_a_loading_curve_takes_a_hundredth_of_a_general_program_s_time(python: str) -> None:
     # GetFEM's base stress is then good to 1e-3, ours to 1e-4, its estimate of error included.
     def ours() -> object:

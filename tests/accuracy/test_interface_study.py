@@ -9,17 +9,22 @@ more repeats, do; those on a film that is *known* better than the paper's do wit
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from scipy.stats import binom
 
 import memscal
-from memscal.friction.calculated import amontons_family, elasto_plastic_family
+from memscal.friction.calculated import (
+    FRICTIONS,
+    SLIP_LENGTHS,
+    amontons_family,
+    elasto_plastic_family,
+)
 from memscal.friction.family import ProfileFamily
 from memscal.friction.model_comparison import compare_interface
 from memscal.friction.results import LawComparison
@@ -30,9 +35,7 @@ from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
 
-FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 SEEDS = 40 if FULL else 2
-FULL_ONLY = pytest.mark.skipif(not FULL, reason="another film: set MEMSCAL_FULL_STUDY")
 CHANCE = 1e-3
 MACROSCOPIC = 1.6
 SLIP_LENGTH = 16e-6
@@ -61,13 +64,16 @@ KNOWN_FILM = replace(
 @lru_cache
 def rigid(film: ElasticFilm) -> ProfileFamily:
     """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
-    return amontons_family(film, PAPER_SPHERE, PAPER_LOADS, reach=_REACH)
+    friction = FRICTIONS if FULL else (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, math.inf)
+    return amontons_family(film, PAPER_SPHERE, PAPER_LOADS, friction=friction, reach=_REACH)
 
 
 @lru_cache
 def slipping(film: ElasticFilm) -> ProfileFamily:
+    # Short lengths take the longest, and the truth of the reduced form is none.
+    lengths = SLIP_LENGTHS if FULL else (0.0, 4e-6, 1e-5, 3e-5, 1e-4, math.inf)
     return elasto_plastic_family(
-        film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, reach=_REACH
+        film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, slip_lengths=lengths, reach=_REACH
     )
 
 
@@ -131,7 +137,7 @@ def test_on_a_known_film_the_slip_length_is_recovered_within_a_fifth() -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.03 + 3.3 * 0.08 / math.sqrt(SEEDS))
 
 
-@FULL_ONLY
+@pytest.mark.full_study
 def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
     # Stated: 10 %.  The spread over experiments is 12 %, as A G and the contacts depend on the same
     # film, which the likelihood does not know: docs/friction.md.
@@ -149,7 +155,7 @@ def test_the_effective_coefficient_grows_with_the_load() -> None:
         assert one.implied.friction[-1, 1] > 1.5 * one.implied.friction[0, 1]
 
 
-@FULL_ONLY
+@pytest.mark.full_study
 def test_an_experiment_like_the_papers_tells_a_slip_length_at_best_by_a_factor() -> None:
     wide = 0
     for one in experiments(MACROSCOPIC, 1.82e-6, "paper"):

@@ -5,13 +5,13 @@ Set MEMSCAL_FULL_STUDY for 400 seeds in place of 60.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.scans import CONVERSION, RING, SIGMA, TAILS, estimated, simulated
 from scipy.special import j0, j1
 from scipy.stats import binom, kstest
@@ -27,7 +27,7 @@ from memscal.model.scan import Scan
 
 pytestmark = pytest.mark.accuracy
 
-SEEDS = 400 if os.environ.get("MEMSCAL_FULL_STUDY") else 60
+SEEDS = 400 if FULL else 60
 CHANCE = 1e-5
 NOISES = (0.003, 0.02)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +14,13 @@ from scipy.special import ellipk
 from memscal.mechanics.hankel_film import HankelFilm
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.path import follow
-from memscal.mechanics.solver.problem import ContactProblem, Depth, Load
+from memscal.mechanics.solver.problem import ContactProblem, ContactState, Depth, Load
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
+
+pytestmark = pytest.mark.benchmark
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = Sphere(radius=128.8e-3)
@@ -38,47 +39,41 @@ def smooth() -> ContactProblem:
     return contact_of_200_rings(0.0)
 
 
+def contact(problem: ContactProblem) -> ContactState:
+    """The contact at 2.75 N."""
+    return follow(problem, [Load(2.75)], "incremental", 1)[0].state
+
+
 def plain_contact(problem: ContactProblem, depth: float) -> FloatArray:
     """The same contact at a given depth as non-negative least squares, a library's way."""
     pressing = problem.heights < depth
     matrix = problem.compliance.normal[np.ix_(pressing, pressing)]
     scale = matrix[0, 0]
     pressure, _ = nnls(matrix / scale, (depth - problem.heights[pressing]) / scale)
-    found = np.zeros(problem.size)
-    found[pressing] = pressure
-    return found
+    whole = np.zeros(problem.size)
+    whole[pressing] = pressure
+    return whole
 
 
-@pytest.mark.benchmark(group="frictionless sphere, 200 rings")
-def test_a_frictionless_contact(benchmark: Any, smooth: ContactProblem) -> None:
-    point = benchmark.pedantic(
-        follow, (smooth, [Load(2.75)], "incremental", 1), rounds=15, warmup_rounds=1
-    )[0]
-    assert point.state.depth == pytest.approx(43.766e-6, rel=1e-4)
-
-
-@pytest.mark.benchmark(group="frictionless sphere, 200 rings")
-def test_the_same_contact_by_non_negative_least_squares(
-    benchmark: Any, smooth: ContactProblem
+def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(
+    smooth: ContactProblem,
 ) -> None:
-    depth = follow(smooth, [Load(2.75)], "incremental", 1)[0].state.depth
-    pressure = benchmark.pedantic(plain_contact, (smooth, depth), rounds=3, warmup_rounds=1)
-    # Where the surfaces only just meet, least squares and Signorini differ by a ring.
-    assert smooth.compliance.areas @ pressure == pytest.approx(2.75, rel=5e-3)
-
-
-@pytest.mark.benchmark
-def test_a_contact_costs_a_few_dense_solutions(smooth: ContactProblem) -> None:
     right = np.ones(smooth.size)
+    depth = contact(smooth).depth
+    assert depth == pytest.approx(43.766e-6, rel=1e-4)
+    # Where the surfaces only just meet, least squares and Signorini differ by a ring.
+    pressure = plain_contact(smooth, depth)
+    assert smooth.compliance.areas @ pressure == pytest.approx(2.75, rel=5e-3)
+    at_depth = follow(smooth, [Depth(depth)], "incremental", 1)[0].state
+    assert at_depth.load == pytest.approx(2.75, rel=1e-9)
 
-    def contact() -> object:
-        return follow(smooth, [Load(2.75)], "incremental", 1)
+    def dense() -> object:
+        return np.linalg.solve(smooth.compliance.normal, right)
 
-    ratio = turns(contact, lambda: np.linalg.solve(smooth.compliance.normal, right), 15)
+    ratio = turns(lambda: contact(smooth), dense, 15)
     show("frictionless contact, over a dense solution", ratio, 40)
-    depth = follow(smooth, [Load(2.75)], "incremental", 1)[0].state.depth
-    found = follow(smooth, [Depth(depth)], "incremental", 1)[0].state
-    assert found.load == pytest.approx(2.75, rel=1e-9)
+    ratio = turns(lambda: contact(smooth), lambda: plain_contact(smooth, depth), 3)
+    show("frictionless contact, over non-negative least squares", ratio, 1)
 
 
 def adaptive_entry(x: float, start: float, end: float) -> float:
@@ -91,7 +86,6 @@ def adaptive_entry(x: float, start: float, end: float) -> float:
     return quad(density, start, end, epsrel=1e-8)[0]
 
 
-@pytest.mark.benchmark
 def test_a_compliance_is_built_far_faster_than_entry_by_entry() -> None:
     rings = np.linspace(0.0, 4e-3, 401)
 
@@ -103,7 +97,6 @@ def test_a_compliance_is_built_far_faster_than_entry_by_entry() -> None:
     show("compliance, over 100 of its entries", ratio, 4 * 160_000 / 100 / 20)
 
 
-@pytest.mark.benchmark
 def test_friction_along_a_path_costs_a_few_solutions_per_ring() -> None:
     problem = contact_of_200_rings(0.3)
     rough, right = problem.compliance, np.ones(2 * problem.size)
@@ -120,7 +113,6 @@ def test_friction_along_a_path_costs_a_few_solutions_per_ring() -> None:
     show("friction along a path, over a dense solution", ratio, 400)
 
 
-@pytest.mark.benchmark
 def test_a_second_call_is_instant() -> None:
     request = RingRequest(
         film=FILM, indenter=SPHERE, interface=Interface(), friction=0.2, loading="total",

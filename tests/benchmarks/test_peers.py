@@ -1,14 +1,13 @@
 """G against the programs that people reach for: error and time on the same scans, in one run.
 
 The peers are given the scan's true centre, baseline and drift, and all but DeerLab choose their
-settings by the G that is looked for (see tests/peers.py); ours is given the scan.
+settings by the G that is looked for (see tests/helpers/peers.py); ours is given the scan.
 
 Set MEMSCAL_FULL_STUDY for 40 seeds in place of a few.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,6 +16,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
+from helpers.bounds import FULL
 from helpers.peers import PEERS, RADII, Kernel
 from helpers.scans import RING, TAILS, plane_error, simulated
 
@@ -27,7 +27,6 @@ from memscal.model.scan import Scan
 pytestmark = pytest.mark.benchmark
 
 METHOD = "evidence"
-FULL = os.environ.get("MEMSCAL_FULL_STUDY")
 SEEDS = 40 if FULL else 6
 # A disc's error has two humps, where it is taken for a Gaussian and where it is not: few seeds
 # tell neither.

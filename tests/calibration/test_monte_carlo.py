@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, simulated
-from helpers.shears import shear_scan
+from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, shear_scan, simulated
 
 import memscal
 from memscal.calibration.calibrate import Calibration

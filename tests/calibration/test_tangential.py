@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.rounding import assert_same_to_rounding
-from helpers.shears import CENTRE, CONVERSION, SIGMA, shear_scan
+from helpers.scans import CENTRE, SHEAR_CONVERSION, SHEAR_SIGMA, shear_scan
 from scipy.stats import binom, norm
 
 import memscal
@@ -46,9 +46,9 @@ def study(noise: float) -> dict[str, np.ndarray]:
         "load_uncertainty": None,
     }
     truth = {
-        "conversion_constant": CONVERSION,
-        "conversion_constant_gaussian": CONVERSION,
-        "gaussian_sigma": SIGMA,
+        "conversion_constant": SHEAR_CONVERSION,
+        "conversion_constant_gaussian": SHEAR_CONVERSION,
+        "gaussian_sigma": SHEAR_SIGMA,
         "centre": CENTRE,
     }
     found = [
@@ -91,7 +91,7 @@ def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
         free.append(np.sqrt(np.sum(r * (apparatus.radial(r) - truth) ** 2)) / norm_)
         gaussian.append(np.sqrt(np.sum(r * (round_ - truth) ** 2)) / norm_)
         u = apparatus.parameters.uncertainty("conversion_constant")
-        a.append((apparatus.conversion_constant - CONVERSION) / u)
+        a.append((apparatus.conversion_constant - SHEAR_CONVERSION) / u)
     assert np.median(free) < 0.5 * np.median(gaussian)
     assert abs(np.mean(a)) < 1.5
 
@@ -165,7 +165,7 @@ def test_a_film_that_is_off_by_its_uncertainty_moves_the_width_by_its_share() ->
 def test_a_line_along_y_calibrates_the_other_channel() -> None:
     apparatus = calibrated(shear_scan(seed=7, channel="yz"), "yz").apparatus
     u = apparatus.parameters.uncertainty("conversion_constant")
-    assert abs(apparatus.conversion_constant - CONVERSION) < 5 * u
+    assert abs(apparatus.conversion_constant - SHEAR_CONVERSION) < 5 * u
     assert abs(apparatus.parameters["centre_y"] - CENTRE) < 20e-6
 
 
@@ -266,5 +266,5 @@ def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative(
                                                         thickness=2e-3))  # fmt: skip
     sticking = memscal.indent(scan.film, scan.indenter, load=1.0, friction=np.inf)
     found = memscal.calibrate(scan, alternative=sticking, channel="xz", method="bayesian")
-    share = found.apparatus.budget["conversion_constant"]["model_form"] / CONVERSION
+    share = found.apparatus.budget["conversion_constant"]["model_form"] / SHEAR_CONVERSION
     assert 1e-4 < share < 0.03

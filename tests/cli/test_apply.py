@@ -8,8 +8,7 @@ from pathlib import Path
 import h5py
 import pytest
 from helpers.console import Run, names
-from helpers.contacts import contact_scan
-from helpers.spheres import known_apparatus
+from helpers.scans import contact_scan, known_apparatus
 
 import memscal
 from memscal.cli.failures import CHECK_FAILED

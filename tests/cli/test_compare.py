@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers.console import Run, names
 from helpers.friction_results import comparison, interface_comparison
-from helpers.spheres import known_apparatus
+from helpers.scans import known_apparatus
 
 import memscal
 from memscal.cli.compare import cache_from, user_cache_folder

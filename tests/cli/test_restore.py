@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.console import Run, names
-from helpers.spheres import known_apparatus, pressed, sphere_scan
+from helpers.scans import known_apparatus, pressed, sphere_scan
 
 import memscal
 from memscal.cli.failures import CHECK_FAILED

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.console import Run
-from helpers.contacts import contact_scan
-from helpers.spheres import known_apparatus, pressed, sphere_scan
+from helpers.scans import contact_scan, known_apparatus, pressed, sphere_scan
 
 import memscal
 from memscal.errors import InputError

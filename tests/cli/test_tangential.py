@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from helpers.console import Run, names
-from helpers.shears import CONVERSION, shear_scan
+from helpers.scans import SHEAR_CONVERSION, shear_scan
 
 import memscal
 
@@ -29,7 +29,7 @@ def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(
     apparatus = memscal.load_apparatus(sheared.with_name("scan.xz.apparatus.h5"))
     assert apparatus.sensor.channel == "xz"
     u = apparatus.parameters.uncertainty("conversion_constant")
-    assert abs(apparatus.conversion_constant - CONVERSION) < 5 * u
+    assert abs(apparatus.conversion_constant - SHEAR_CONVERSION) < 5 * u
     assert run("calibrate", sheared).code == 0
     assert names(sheared.parent) == ["scan.apparatus.h5", "scan.h5", "scan.xz.apparatus.h5"]
 

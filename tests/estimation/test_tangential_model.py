@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.shears import CENTRE, shear_scan
+from helpers.scans import CENTRE, shear_scan
 
 import memscal
 from memscal.axisymmetry.kernels import GaussianMixture

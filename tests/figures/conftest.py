@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.builders import make_artifact
 from matplotlib.figure import Figure
 
 from memscal.figures.calibration import calibration_figure
@@ -20,9 +22,6 @@ from memscal.model.apparatus import (
     TransferFunction,
 )
 from memscal.model.checks import Message, QualityCheck
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
-from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
@@ -30,10 +29,7 @@ MakeApparatus = Callable[..., ApparatusData]
 
 _LOAD = 1.0
 _WIDTH = 0.9e-3  # of the reference stress
-_PARTS = (
-    (0.85, 0.50e-3),
-    (0.15, 0.85e-3),
-)  # G: two Gaussians, so that no single one is right
+_PARTS = ((0.85, 0.50e-3), (0.15, 0.85e-3))  # G: two Gaussians, so that no single one is right
 _SIGMA = 0.561e-3
 _CONSTANT = 3.0e-8  # V/Pa
 _CENTRE, _BASELINE = 0.14e-3, 4.0e-5
@@ -77,15 +73,8 @@ def radial_profile(error: float, ripple: float) -> ApparatusRadial:
     r = np.linspace(0.0, 8e-3, 321)
     g = sum(w * gaussian(r, s) for w, s in _PARTS)
     g = g + ripple * g[0] * np.cos(3500.0 * r) * np.exp(-r / 4e-3)
-    errors = np.full(r.size, error * g[0])
-    errors = errors * (0.4 + 0.6 * np.exp(-r / 1e-3))
-    return ApparatusRadial(
-        r=r,
-        g=g,
-        g_errors=errors,
-        g_gaussian=gaussian(r, _SIGMA),
-        g_covariance=np.diag(errors**2),
-    )
+    errors = error * g[0] * (0.4 + 0.6 * np.exp(-r / 1e-3))
+    return ApparatusRadial(r, g, errors, gaussian(r, _SIGMA), np.diag(errors**2))
 
 
 def transfer_function(resolved: float) -> TransferFunction:
@@ -93,13 +82,7 @@ def transfer_function(resolved: float) -> TransferFunction:
     k = np.linspace(0.0, 12e3, 241)
     window = 1.0 / (1.0 + (k / resolved) ** 12)
     modulus = sum(w * np.exp(-0.5 * (s * k) ** 2) for w, s in _PARTS) * window
-    return TransferFunction(
-        k=k,
-        modulus=modulus,
-        modulus_errors=0.004 * np.exp(k / 2.2e3) * window,
-        window=window,
-        resolved_wavenumber=resolved,
-    )
+    return TransferFunction(k, modulus, 0.004 * np.exp(k / 2.2e3) * window, window, resolved)
 
 
 def build(
@@ -118,17 +101,7 @@ def build(
     """Return the data of a calibration that never ran."""
     grid = np.linspace(-3e-3, 3e-3, 61)
     g = sum(w * gaussian(np.hypot(grid, grid[:, None]), s) for w, s in _PARTS)
-    names = (
-        "reconvolution",
-        "symmetry",
-        "tail_share",
-        "resolved_band",
-        "gaussian_misfit",
-    )
-    checks = tuple(
-        QualityCheck(name, 1.7 if i < failed else 0.41, 1.0, i >= failed, meaning)
-        for i, name in enumerate(names)
-    )
+    names = ("reconvolution", "symmetry", "tail_share", "resolved_band", "gaussian_misfit")
     values = {
         "conversion_constant": (_CONSTANT, 1.3e-10),
         "gaussian_sigma": (_SIGMA, 3.4e-6),
@@ -138,46 +111,31 @@ def build(
     }
     if kind != "line":
         values["centre_y"] = (0.0, 4.4e-6)
+    numbers, spreads = np.array(list(values.values())).T
     r = np.linspace(0.0, 10e-3, 201)
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    rod = Rod(radius=0.25e-3)
-    return ApparatusData(
+    data = make_artifact()
+    return replace(
+        data,
         field=ApparatusField(x=grid, y=grid, g=g, g_errors=np.full(g.shape, error * g.max())),
         radial_profile=radial_profile(error, ripple),
         transfer=transfer_function(3.7e3),
         reconvolution=reconvolution(kind, points, noise, seed),
-        parameters=ParameterSet(
-            tuple(values),
-            np.array([value for value, _ in values.values()]),
-            np.diag([spread**2 for _, spread in values.values()]),
+        parameters=ParameterSet(tuple(values), numbers, np.diag(spreads**2)),
+        checks=tuple(
+            QualityCheck(name, 1.7 if i < failed else 0.41, 1.0, i >= failed, meaning)
+            for i, name in enumerate(names)
         ),
-        checks=checks,
-        film=film,
-        indenter=rod,
         sensor=sensor or StressSensor(name="array 3", model="MEMS membrane", channel="zz"),
-        load=_LOAD,
         reference=StressProfile(
             r=r,
             sigma_zz=_LOAD * gaussian(r, _WIDTH),
             load=_LOAD,
-            film=film,
-            indenter=rod,
+            film=data.film,
+            indenter=data.indenter,
         ),
-        process=Process(
-            program="memscal",
-            version="0.1.0",
-            date="2024-03-01T12:00:00+00:00",
-            configuration={"method": "white-noise", "seed": None, "support": 0.008},
-            environment={"python": "3.11", "numpy": "2.0"},
-            messages=(Message("outlier", message),),
-            input_scan=SourceFile("scan.h5", "ab" * 32),
-        ),
+        process=replace(data.process, messages=(Message("outlier", message),)),
         budget={
-            "conversion_constant": {
-                "noise": 9e-11,
-                "load": 6e-11,
-                "film thickness": 7e-11,
-            },
+            "conversion_constant": {"noise": 9e-11, "load": 6e-11, "film thickness": 7e-11},
             "gaussian_sigma": {"noise": 2.4e-6, "load": 0.0, "film thickness": 2.4e-6},
         },
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.shears import shear_scan
+from helpers.scans import shear_scan
 from matplotlib.figure import Figure
 
 import memscal

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.builders import make_artifact, make_film
-from helpers.spheres import known_apparatus
+from helpers.scans import known_apparatus
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

@@ -1,4 +1,4 @@
-"""Two runs of a command write the same bytes, if they are told the same time."""
+"""Two runs of the commands of ``commands_of_files.txt`` write the same bytes at the same time."""
 
 from __future__ import annotations
 
@@ -8,27 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from golden.make import LINKS, SPHERE
+from golden.make import HERE, LINKS
 
-COMMANDS = [
-    "simulate -o scan.h5 --points 17",
-    "simulate --experiment sphere -o experiment --points 33 --contacts 25 --spacing 0.6 --load 1",
-    (
-        "import meshes/vtk_film.vtu -o mesh.h5 --format reference --r-unit mm --sigma S"
-        " --sigma-unit MPa --load 1"
-    ),
-    "reference rod --backend fem --rings 24 -o rod.h5 --figure rod.svg --mesh rod.vtu",
-    "reference sphere --load 1 -o mu0.h5",
-    "reference sphere --load 1 --friction inf -o sticking.h5",
-    "calibrate data/rod_scan_33.h5 -o sensor.h5 --report report.html --figure scan.png",
-    f"apply sensor.h5 {SPHERE}/sphere_lubricated.h5 -o stress.h5 --figure stress.svg --override",
-    "restore sensor.h5 experiment/sphere_dry.h5 -o restored.h5 --figure restored.svg",
-    (
-        "compare sensor.h5 experiment/sphere_dry.h5 --friction 0.2 --loading total"
-        " --cache contacts --figures figures --figure-format svg --override"
-    ),
-    "design --figure design.pdf",
-]
+COMMANDS = (HERE / "commands_of_files.txt").read_text(encoding="utf-8").splitlines()
 PROGRAM = """
 import sys
 from memscal.cli import main
@@ -45,12 +27,12 @@ def digests(folder: Path, hash_seed: str) -> dict[str, str]:
     folder.mkdir()
     for name, target in LINKS.items():
         (folder / name).symlink_to(target)
-    environment = {"SOURCE_DATE_EPOCH": "1700000000", "PYTHONHASHSEED": hash_seed}
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *COMMANDS],
-        cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True, check=False,
+    run = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *COMMANDS], cwd=folder,
+        env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000", "PYTHONHASHSEED": hash_seed},
+        capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert run.returncode == 0, run.stderr
     return {
         path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in folder.rglob("*")
@@ -59,8 +41,7 @@ def digests(folder: Path, hash_seed: str) -> dict[str, str]:
 
 
 def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
-    first = digests(tmp_path / "first", hash_seed="1")
-    second = digests(tmp_path / "second", hash_seed="2")
+    first, second = (digests(tmp_path / seed, hash_seed=seed) for seed in "12")
     assert first == second
     kinds = {Path(name).suffix for name in first}
     assert kinds >= {".h5", ".html", ".pdf", ".png", ".svg", ".vtu"}

@@ -1,17 +1,45 @@
-"""The results that every command prints, and the public names, stay what they were."""
+"""Printed results, public names and the contents of old files stay what they were."""
 
 from __future__ import annotations
 
+from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from golden.make import COMMANDS, OUTPUTS, SIGNATURES, Runs, differences, load, signatures
+from numpy.testing import assert_allclose
+
+import memscal
 
 TOLERANCE = 1e-6
 """Iterative solvers stop at other last digits with other processors and builds of BLAS."""
 
 TOLERANCE_OF_DRAWS = 1e-4
 """A draw divides by what is nearly zero at some wavenumbers, and magnifies the last digits."""
+
+FILES: dict[str, tuple[Any, dict[str, Any]]] = {
+    "line.scan.h5": (memscal.read_scan, {
+        "u_zz.shape": (33,), "load": 1.0, "direction": "x", "sensor.name": "a simulated sensor",
+        "film.poisson_ratio_uncertainty": 0.005, "indenter.shape": "rod",
+        "indenter.radius": 0.25e-3, "indenter.radius_uncertainty": 2.5e-6,
+    }),
+    "raster.scan.h5": (memscal.read_scan, {
+        "u_zz.shape": (9, 33), "y.size": 9, "title": "A scan", "film.roughness_rms": 1.82e-6,
+        "notes": "Two lines\nof notes, with an é.",
+    }),
+    "reference.h5": (memscal.read_reference, {
+        "load": 1.0, "depth": 0.587e-3, "contact_radius": 0.25e-3, "solver": "closed form",
+        "friction_coefficient": 0.0, "film.young_modulus": 2.2e6,
+    }),
+    "artifact.h5": (memscal.load_apparatus, {
+        "conversion_constant": 3e-8, "gaussian_sigma": 561e-6, "resolved_wavenumber": 3700.0,
+        "field.g.shape": (13, 17), "process.input_scan.file_name": "scan.h5",
+    }),
+    "stress.h5": (memscal.read_stress, {}),
+}  # fmt: skip
+"""Files that version 0.1 wrote, one of each schema 1.0.0: a later version must read them."""
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +50,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_prints_the_golden_results(name: str, runs: Runs) -> None:
     tolerance = TOLERANCE_OF_DRAWS if name in {"calibrate-draw", "calibrate-sweep"} else TOLERANCE
-    found = list(differences(load(name), runs[name], tolerance))
-    assert not found, "\n".join(found[:20])
+    changes = list(differences(load(name), runs[name], tolerance))
+    assert not changes, "\n".join(changes[:20])
 
 
 def test_every_golden_output_has_its_command() -> None:
@@ -36,3 +64,38 @@ def test_public_signatures_are_those_of_the_text_file() -> None:
         " the diff of tests/golden/signatures.txt: is each change in the changelog, and does old"
         " code still run?"
     )
+
+
+def test_files_of_version_0_1_say_what_they_said(runs: Runs) -> None:
+    line, raster, reference, apparatus, stress = (
+        read(runs.folder / "files" / name) for name, (read, _) in FILES.items()
+    )
+    records = dict(zip(FILES, (line, raster, reference, apparatus, stress), strict=True))
+    for name, (_, values) in FILES.items():
+        for path, value in values.items():
+            expected = pytest.approx(value, rel=1e-9) if isinstance(value, float) else value
+            assert attrgetter(path)(records[name]) == expected, (name, path)
+
+    assert_allclose(line.x[[0, -1]], [-8e-3, 8e-3])
+    assert_allclose(line.u_zz[:3], [1.3730e-4, 1.7451e-4, 1.5166e-4], atol=1e-8)
+    assert_allclose(line.channels["u_xz"][0], 4.99209e-5, rtol=1e-5)
+    assert line.synthetic["conversion_constant"] == pytest.approx(1e-7)
+    assert np.isnan(raster.u_zz).sum() == 9
+    assert np.nanmax(raster.u_zz) == pytest.approx(3e-3)
+    assert_allclose(raster.u_zz_errors, 1e-5)
+    assert_allclose(raster.normal_load, 1.01)
+    assert_allclose(reference.sigma_zz[0], 1e6 / (2 * np.pi))
+    assert_allclose(reference.sigma_rz, 100 * reference.r * reference.sigma_zz)
+    assert apparatus.parameters.uncertainty("gaussian_sigma") == pytest.approx(1e-6)
+    assert apparatus.budget["conversion_constant"] == pytest.approx({"noise": 1e-10, "load": 3e-10})
+    axis = 1 / (2 * np.pi * 561e-6**2)
+    assert_allclose(apparatus.radial([0.0, 1e-3]) / axis, [1, np.exp(-0.5 / 0.561**2)], atol=0.01)
+    passed = {check.name: check.passed for check in apparatus.checks}
+    assert passed == {"reconvolution": True, "symmetry": False}
+    (profile,) = stress.profiles
+    assert_allclose([profile.load, profile.force, profile.maximum], [0.5, 0.505, 5e4])
+    assert_allclose(profile.r, [0, 0.5e-3, 0.5e-3, 1e-3, 1e-3, 1.5e-3, 2e-3], atol=1e-12)
+    assert_allclose(profile.s_zz, 5e4 * np.exp(-((profile.r / 1e-3) ** 2)))
+    assert_allclose(profile.covariance, sum(profile.covariances.values()))
+    assert_allclose([*profile.centre, profile.baseline], [1.2e-4, 0.0, 1e-5])
+    assert profile.lubrication == "dry"

@@ -1,7 +1,8 @@
-"""What no estimator can be better than, and what chance allows of a root-mean-square."""
+"""The size of the studies, what no estimator can be better than, and what chance allows."""
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +11,9 @@ from scipy.stats import chi2
 
 import memscal
 from memscal.model.arrays import FloatArray
+
+FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
+"""Whether studies run over all their seeds and on their finest meshes."""
 
 
 def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:

@@ -5,14 +5,13 @@ Limits are on what the truth says: error of G and of A, and how often the stated
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from zlib import crc32
 
 import numpy as np
-from helpers.bounds import cramer_rao, root_mean_square_limit
+from helpers.bounds import FULL, cramer_rao, root_mean_square_limit
 from helpers.scans import CONVERSION, plane_error, simulated
 from scipy.optimize import brentq
 from scipy.stats import binom, t
@@ -23,7 +22,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 
 METHOD = "evidence"
-FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 FULL_SEEDS, FEW_SEEDS = 200, 12
 SEEDS = FULL_SEEDS if FULL else FEW_SEEDS
 R = np.linspace(0.0, 3e-3, 121)

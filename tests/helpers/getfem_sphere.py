@@ -55,6 +55,28 @@ def grid(step, layers, contact, thickness):
     return radii, thickness * (1 + x * (1.5 - 0.5 * x**2)) / 2
 
 
+def load_beyond(r, pressure):
+    """Load carried outside each radius, of a pressure that is linear between them."""
+    inner, outer = r[:-1], r[1:]
+    first, last = pressure[:-1], pressure[1:]
+    rings = (outer - inner) * (first * (2 * inner + outer) + last * (inner + 2 * outer)) * np.pi / 3
+    return np.append(np.cumsum(rings[::-1])[::-1], 0.0)
+
+
+def contact_radius(r, beyond, guess):
+    """Radius outside which no load is carried, by extrapolation from well inside the contact.
+
+    Pressure goes to zero like a square root, so that ``beyond ** (2/3)`` goes to zero linearly
+    in the square of the radius; and unlike the pressure itself it does not waver at the nodes
+    that the edge cuts.
+    """
+    for _ in range(4):
+        inside = (r >= 0.5 * guess) & (r <= 0.95 * guess)
+        shape = np.polynomial.Polynomial.fit(beyond[inside] ** (2 / 3), r[inside] ** 2, 3)
+        guess = float(np.sqrt(shape(0.0)))
+    return guess
+
+
 class Film:
     """The discretised film, its unknowns and its equations."""
 

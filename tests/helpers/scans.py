@@ -1,21 +1,30 @@
-"""Scans and their steps, shared by the tests of estimation and calibration."""
+"""Scans of known truth: with a rod, with a sphere, with a tangential channel; and their steps."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from helpers.builders import make_artifact
 
 import memscal
+from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
+from memscal.axisymmetry.kernels import RadialKernel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectrum
-from memscal.model.scan import Scan
+from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
+from memscal.model.measured_stress import MeasuredStress
+from memscal.model.provenance import Process
+from memscal.model.scan import Scan, StressSensor
+from memscal.simulation.contact_scan import simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 CONVERSION = 1e-7
 SIGMA = 561e-6
+CENTRE = 0.14e-3
 RING = memscal.GaussianMixture((1.3, -0.3), (0.6e-3, 0.3e-3))
 TAILS = memscal.GaussianMixture((0.75, 0.25), (0.5e-3, 1.0e-3))
 
@@ -59,3 +68,140 @@ def as_points(scan: Scan, seed: int = 0) -> Scan:
 def plane_error(r: np.ndarray, found: np.ndarray, truth: np.ndarray) -> float:
     """Relative L2 error over the plane, for a radial function on even radii."""
     return float(np.sqrt(np.sum(r * (found - truth) ** 2) / np.sum(r * truth**2)))
+
+
+SPHERE = memscal.Sphere(radius=0.1288)
+GAUSSIAN = memscal.GaussianMixture((1.0,), (SIGMA,))
+SENSOR = StressSensor(name="a simulated sensor", channel="zz")
+
+
+def pressed(
+    load: float = 1.0,
+    friction: float = 0.0,
+    *,
+    film: memscal.ElasticFilm = EXACT_FILM,
+    indenter: memscal.Rod | memscal.Sphere = SPHERE,
+) -> memscal.Contact:
+    """Press the paper's sphere on the film; the contact is remembered."""
+    contact = memscal.indent(film, indenter, load=load, friction=friction)
+    assert isinstance(contact, memscal.Contact)
+    return contact
+
+
+def sphere_scan(
+    contact: memscal.Contact,
+    *,
+    kernel: RadialKernel = GAUSSIAN,
+    noise: float = 0.005,
+    seed: int = 0,
+    centre: float = 0.14e-3,
+    half_range: float = 8e-3,
+    points: int = 33,
+) -> Scan:
+    """Scan a contact: its base stress convolved by Hankel transforms, noise, offset and drift."""
+    x = np.linspace(-half_range, half_range, points)
+    nodes = Wavenumbers.covering(40 / contact.film.thickness, 3 * half_range)
+    spectrum = contact.base_spectrum(nodes.k) * kernel.transform(nodes.k)
+    signal = CONVERSION * nodes.synthesise(spectrum, np.abs(x - centre))
+    top = float(signal.max())
+    rng = np.random.default_rng(seed)
+    u = signal + top * (0.01 + 0.0025 * x / half_range + rng.normal(0.0, noise, x.size))
+    assert isinstance(contact.indenter, memscal.Sphere | memscal.Rod)
+    return Scan(
+        x=x,
+        u_zz=u,
+        u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
+        load=contact.load,
+        indenter=contact.indenter,
+        film=contact.film,
+        sensor=SENSOR,
+    )
+
+
+def known_apparatus(
+    kernel: RadialKernel = GAUSSIAN,
+    *,
+    conversion_uncertainty: float = 0.0,
+    width_uncertainty: float = 0.0,
+    conversion: float = CONVERSION,
+) -> memscal.ApparatusFunction:
+    """Return a sensor whose G is known, or wrong in one way only: wider or narrower.
+
+    The uncertainties are relative.
+    """
+    r, k = np.linspace(0.0, 6e-3, 301), np.linspace(0.0, 12e3, 241)
+    g = kernel.radial(r)
+    spread = width_uncertainty * (2 * g + r * np.gradient(g, r))
+    data = make_artifact(
+        radial_profile=ApparatusRadial(r, g, np.abs(spread), g, np.outer(spread, spread)),
+        transfer=TransferFunction(k, np.abs(kernel.transform(k)), 0 * k, 0 * k + 1, 5e3),
+        parameters=ParameterSet(
+            ("conversion_constant", "gaussian_sigma"),
+            np.array([conversion, SIGMA]),
+            np.diag([(conversion_uncertainty * conversion) ** 2, 0.0]),
+        ),
+        checks=(),
+        film=EXACT_FILM,
+        indenter=EXACT_ROD,
+        sensor=SENSOR,
+        reference=pressed().profile(),
+        process=Process(program="test", version="0", date=""),
+        budget={},
+    )
+    return memscal.ApparatusFunction(
+        **{item.name: getattr(data, item.name) for item in fields(data)}
+    )
+
+
+LOADS = (0.34, 0.69, 1.37, 2.75)
+
+
+def contact_scan(seed: int = 0, **options: Any) -> Scan:
+    """Scan contacts on an exactly known film, at exactly known nominal loads."""
+    exact = {"film": EXACT_FILM, "sphere": SPHERE, "load": LOADS, "load_uncertainty": None}
+    return simulate_contacts(seed=seed, **(exact | options))
+
+
+@lru_cache
+def measured(seed: int = 0, conversion_uncertainty: float = 0.0, **options: Any) -> MeasuredStress:
+    """Measure such a scan with a sensor whose G is known."""
+    known = known_apparatus(conversion_uncertainty=conversion_uncertainty)
+    return memscal.measure_stress(contact_scan(seed, **options), known)
+
+
+SHEAR_CONVERSION = 5e-8
+SHEAR_SIGMA = 400e-6
+
+
+def shear_scan(
+    *,
+    seed: int,
+    kernel: RadialKernel | None = None,
+    noise: float = 0.005,
+    crosstalk: float = 0.0,
+    repeats: int = 1,
+    channel: str = "xz",
+    **options: Any,
+) -> Scan:
+    """A scan whose tangential channel has a G and an A of its own; its noise is stated.
+
+    ``noise``, and ``crosstalk`` of the normal channel, are shares of the largest voltage.
+    """
+    scan = memscal.simulate(seed=seed, repeats=repeats, centre=(CENTRE, 0.0), **options)
+    kernel = kernel or memscal.GaussianMixture(sigmas=(SHEAR_SIGMA,))
+    contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
+    wavenumbers = Wavenumbers.covering(40 / scan.film.thickness, 12e-3)
+    transform = contact.base_shear_spectrum(wavenumbers.k) * kernel.transform(wavenumbers.k)
+    spectrum = RadialSpectrum(wavenumbers, transform, order=1)
+    offset = scan.x - CENTRE
+    signal = SHEAR_CONVERSION * spectrum.at(np.abs(offset)) * np.sign(offset)
+    largest = float(np.abs(signal).max())
+    level = (
+        0.01
+        + 0.0025 * scan.x / np.abs(scan.x).max()
+        + crosstalk * np.exp(-((offset / 1.5e-3) ** 2) / 2)
+    )
+    rng = np.random.default_rng([seed, 1])
+    u = signal + largest * (level + rng.normal(0.0, noise, scan.u_zz.shape))
+    channels = {f"u_{channel}": u, f"u_{channel}_errors": np.full(u.shape, noise * largest)}
+    return replace(scan, channels=channels, direction=channel[0])

@@ -7,9 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.contacts import CENTRE, LOADS, contact_scan, measured
-from helpers.scans import CONVERSION, EXACT_FILM, SIGMA, as_points
-from helpers.spheres import GAUSSIAN, known_apparatus, pressed
+from helpers.scans import (
+    CENTRE,
+    CONVERSION,
+    EXACT_FILM,
+    GAUSSIAN,
+    LOADS,
+    SIGMA,
+    as_points,
+    contact_scan,
+    known_apparatus,
+    measured,
+    pressed,
+)
 
 import memscal
 from memscal.axisymmetry.hankel import Wavenumbers

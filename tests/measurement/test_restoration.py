@@ -7,8 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from helpers.scans import CONVERSION, SIGMA, plane_error
-from helpers.spheres import known_apparatus, pressed, sphere_scan
+from helpers.scans import CONVERSION, SIGMA, known_apparatus, plane_error, pressed, sphere_scan
 
 import memscal
 from memscal.measurement.restoration import Restoration

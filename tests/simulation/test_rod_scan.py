@@ -38,15 +38,9 @@ def seed() -> int:
 def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: RadialKernel) -> None:
     # The integral of a smooth field is the sum of a raster's pixels; this one, of an
     # incompressible film, is gone only at 20 thicknesses.
+    options: dict[str, Any] = {"points": 161, "half_range": 40e-3, "centre": (0.2e-3, -0.3e-3)}
     scan = simulate(
-        raster=True,
-        points=161,
-        half_range=40e-3,
-        load=2.0,
-        kernel=kernel,
-        conversion_constant=3e-8,
-        centre=(0.2e-3, -0.3e-3),
-        **STILL,
+        raster=True, load=2.0, kernel=kernel, conversion_constant=3e-8, **options, **STILL
     )
     total = scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2
     assert total == pytest.approx(3e-8 * 2.0, rel=1e-6)
@@ -189,6 +183,13 @@ def test_another_film_and_rod_are_simulated_as_they_are() -> None:
         ({"load": 0.0}, "load"),
         ({"load": float("nan")}, "load"),
         ({"load_uncertainty": -0.1}, "uncertainty of the load"),
+        ({"conversion_constant": -1e-7}, "conversion_constant"),
+        ({"noise": float("nan")}, "noise"),
+        ({"half_range": 8.0}, "8"),
+        ({"load": []}, "load"),
+        ({"load": [-1.0, 3.0]}, "load"),
+        ({"seed": -1}, "seed"),
+        ({"centre": (float("nan"), 0.0)}, "centre"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: str) -> None:
@@ -196,30 +197,11 @@ def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: s
         simulate(**options)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"conversion_constant": -1e-7},
-        {"noise": float("nan")},
-        {"half_range": 8.0},
-        {"load": []},
-        {"load": [-1.0, 3.0]},
-        {"seed": -1},
-        {"centre": (float("nan"), 0.0)},
-    ],
-)
-def test_bad_simulations_are_refused(options: dict[str, object]):
-    with pytest.raises(InputError):
-        simulate(**options)
-
-
-def test_the_stored_truth_rebuilds_the_mixture():
+def test_the_stored_truth_rebuilds_the_kernel() -> None:
     kernel = GaussianMixture((1 / 3, 2 / 3), (0.5e-3, 1e-3))
     truth = simulate(kernel=kernel, points=9).synthetic
-    assert tuple(float(w) for w in truth["kernel_weights"].split(",")) == kernel.weights
-
-
-def test_the_stored_truth_rebuilds_the_disc() -> None:
+    assert truth is not None
+    assert tuple(float(w) for w in str(truth["kernel_weights"]).split(",")) == kernel.weights
     truth = simulate(kernel=DISC, points=9).synthetic
     assert truth is not None
     assert "disc" in str(truth["kernel"])

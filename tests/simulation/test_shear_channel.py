@@ -51,15 +51,9 @@ def test_a_raster_s_shear_is_one_component_of_a_vector_field() -> None:
 
 def test_a_sphere_s_shear_is_that_of_its_contact_at_its_friction() -> None:
     for friction in (0.0, 0.3):
-        scan = simulate_contacts(
-            load=1.37,
-            friction=friction,
-            load_scatter=0.0,
-            position_error=0.0,
-            centre=(0.0, 0.0),
-            **QUIET,
-            **BOTH | {"shear_kernel": GaussianMixture(sigmas=(5e-6,))},
-        )
+        exact = {"load_scatter": 0.0, "position_error": 0.0, "centre": (0.0, 0.0), **QUIET}
+        narrow = BOTH | {"shear_kernel": GaussianMixture(sigmas=(5e-6,))}
+        scan = simulate_contacts(load=1.37, friction=friction, **exact, **narrow)
         contact = memscal.indent(scan.film, scan.indenter, load=1.37, friction=friction)
         expected = 4e-8 * contact.base_shear(np.abs(scan.x)) * np.sign(scan.x)
         found = scan.channels["u_xz"]

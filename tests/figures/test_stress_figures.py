@@ -1,0 +1,134 @@
+"""The figures of measured and of restored stress: what is drawn is what was found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.scans import contact_scan, known_apparatus, pressed, sphere_scan
+from matplotlib.axes import Axes
+
+import memscal
+from memscal.figures.stress import measured_stress_figure, restoration_figure
+from memscal.figures.style import render_figure
+from memscal.measurement.restoration import Restoration
+from memscal.model.measured_stress import MeasuredStress
+
+
+@pytest.fixture(scope="module")
+def stress() -> MeasuredStress:
+    scans = [
+        contact_scan(1, load=(0.34, 2.75)),
+        contact_scan(2, load=(0.34,), lubrication="lubricated"),
+    ]
+    return memscal.measure_stress(scans, known_apparatus(conversion_uncertainty=0.01))
+
+
+def points(axes: Axes) -> np.ndarray:
+    """All points that are drawn with a mark, shape (n, 2), in order."""
+    drawn = [line.get_xydata() for line in axes.lines if line.get_marker() in ("o", "s")]
+    together = np.concatenate([np.asarray(d) for d in drawn if len(d)])
+    return together[np.lexsort(together.T)]
+
+
+def test_both_panels_show_every_point(stress: MeasuredStress) -> None:
+    rows = [np.column_stack([p.r * 1e3, p.s_zz * 1e-3]) for p in stress.profiles]
+    wanted = np.concatenate(rows)
+    wanted = wanted[np.lexsort(wanted.T)]
+    for axes in measured_stress_figure(stress).axes:
+        np.testing.assert_allclose(points(axes), wanted)
+
+
+def test_the_bars_are_those_of_95_percent(stress: MeasuredStress) -> None:
+    bars = measured_stress_figure(stress).axes[0].collections
+    assert len(bars) == len(stress.profiles)
+    for bar, profile in zip(bars, stress.profiles, strict=True):
+        lengths = [segment[1, 1] - segment[0, 1] for segment in bar.get_segments()]
+        np.testing.assert_allclose(lengths, 2 * 1.96 * profile.s_zz_errors * 1e-3)
+
+
+def test_the_logarithmic_panel_shows_three_decades(stress: MeasuredStress) -> None:
+    axes = measured_stress_figure(stress).axes[1]
+    low, high = axes.get_ylim()
+    top = max(profile.s_zz.max() for profile in stress.profiles) * 1e-3
+    assert axes.get_yscale() == "log"
+    assert low == pytest.approx(1e-3 * top)
+    assert high > top
+
+
+def test_dry_and_lubricated_differ_in_mark_and_line_and_share_the_colour_of_their_load(
+    stress: MeasuredStress,
+) -> None:
+    axes = measured_stress_figure(stress).axes[0]
+    curves = [line for line in axes.lines if len(line.get_xdata()) > 100]
+    styles = [line.get_linestyle() for line in curves]
+    colours = [line.get_color() for line in curves]
+    assert styles == ["-", "-", "--"]
+    assert colours[0] == colours[2] != colours[1]
+
+
+def test_the_contact_radii_are_marked(stress: MeasuredStress) -> None:
+    axes = measured_stress_figure(stress).axes[0]
+    marked = [line.get_xdata()[0] for line in axes.lines if line.get_xdata()[0] > 1.0]
+    for profile in stress.profiles:
+        assert np.any(np.isclose(marked, profile.contact_radius * 1e3))
+
+
+def test_the_legend_names_loads_and_states(stress: MeasuredStress) -> None:
+    figure = measured_stress_figure(stress)
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words[:2] == ["0.34 N", "2.75 N"]
+    assert any("dry" in word for word in words)
+    assert any("lubricated" in word for word in words)
+
+
+@pytest.fixture(scope="module")
+def restoration() -> Restoration:
+    return memscal.restore(sphere_scan(pressed(), seed=1), known_apparatus(), expected=pressed())
+
+
+def lines(axes) -> dict[str, object]:
+    return {line.get_label(): line for line in axes.lines}
+
+
+def test_the_curves_are_those_of_the_restoration(restoration: Restoration) -> None:
+    drawn = lines(restoration_figure(restoration).axes[0])
+    by_word = {
+        word: next(line for label, line in drawn.items() if word in label)
+        for word in ("restored", "blurred", "calculated", "scan")
+    }
+    np.testing.assert_allclose(by_word["restored"].get_ydata(), restoration.sigma_zz * 1e-3)
+    np.testing.assert_allclose(
+        by_word["blurred"].get_ydata(), restoration.blurred_stress(restoration.r) * 1e-3
+    )
+    np.testing.assert_allclose(
+        by_word["calculated"].get_ydata(), pressed().base_stress(restoration.r) * 1e-3, atol=1e-3
+    )
+    np.testing.assert_allclose(by_word["scan"].get_ydata(), restoration.measured_stress * 1e-3)
+
+
+def test_the_band_is_two_standard_uncertainties(restoration: Restoration) -> None:
+    (band,) = restoration_figure(restoration).axes[0].collections
+    upper = band.get_paths()[0].vertices[:, 1].max()
+    highest = restoration.sigma_zz + 2 * restoration.stress_uncertainty(restoration.r)
+    assert upper == pytest.approx(highest.max() * 1e-3)
+
+
+def test_residuals_beyond_the_axis_stand_at_its_edge(restoration: Restoration) -> None:
+    scan = sphere_scan(pressed(), seed=1)
+    u = scan.u_zz.copy()
+    u[5] += 100 * scan.u_zz_errors[5]
+    spoilt = memscal.restore(replace(scan, u_zz=u), known_apparatus())
+    axes = restoration_figure(spoilt).axes[1]
+    low, high = axes.get_ylim()
+    drawn = [line.get_ydata() for line in axes.lines if line.get_marker() in ("o", "^")]
+    shown = np.concatenate(drawn)
+    assert shown.size == scan.x.size
+    assert np.all((shown > low) & (shown < high))
+
+
+def test_a_restoration_renders_without_a_comparison(restoration: Restoration) -> None:
+    figure = restoration_figure(replace(restoration, comparison=None))
+    assert not any("calculated" in label for label in lines(figure.axes[0]))
+    assert render_figure(figure, "png").startswith(b"\x89PNG")
