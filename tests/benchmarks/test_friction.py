@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from statistics import median
 
-import numpy as np
 import pytest
 from helpers.linear_contacts import Laboratory
 from helpers.timing import once, show
-from memscal.friction.prediction import members_of
 
 from memscal.friction.calculated import amontons_family
 from memscal.friction.effective import fine_values
@@ -45,8 +43,8 @@ def test_a_whole_profile_likelihood_costs_less_than_its_values_separately() -> N
     laboratory = Laboratory.of()
     points = laboratory.measured(0.2, seed=1)
     values = fine_values(laboratory.family)
-    members = members_of(laboratory.family, values)
-    single = [members_of(laboratory.family, np.array([value])) for value in values]
+    members = laboratory.family.at(values)
+    single = [laboratory.family.at(value) for value in values]
 
     def together() -> None:
         assert likelihood(points, laboratory.sensor, members, [0, 1]).chi_square.all()

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from helpers.builders import make_scan
 from helpers.scans import EXACT_FILM, LOADS, SIGMA, contact_scan, known_apparatus, measured
-from memscal.measurement.measured_profile import single_loads
 
 import memscal
 from memscal.errors import InputError
 from memscal.measurement.measure_stress import pooled_force
+from memscal.measurement.measured_profile import single_loads
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.provenance import SourceFile
 
