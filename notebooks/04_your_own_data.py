@@ -316,8 +316,8 @@ forces(memscal.measure_stress(wrong_gain, apparatus))
 
 # %% [markdown]
 # Every force is about 5 % too large. A single profile hardly shows it; all together do, and the
-# ratio says by how much. Undetected, it would look like friction: full stick adds no more than 12 to
-# 21 % to these maxima.
+# ratio says by how much. Undetected, it would look like friction: full stick adds no more than
+# 12 to 21 % to these maxima.
 #
 # Second, a film whose stated thickness is 5 % too large, in the calibration and in the measurement:
 
