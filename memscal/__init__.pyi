@@ -2,7 +2,9 @@
 
 from .apparatus import ApparatusFunction as ApparatusFunction
 from .apparatus import load_apparatus as load_apparatus
+from .axisymmetry.grids import EvenGrid as EvenGrid
 from .axisymmetry.grids import FieldGrid as FieldGrid
+from .axisymmetry.grids import Lattice as Lattice
 from .axisymmetry.kernels import GaussianMixture as GaussianMixture
 from .axisymmetry.kernels import RadialKernel as RadialKernel
 from .axisymmetry.kernels import SmoothedDisc as SmoothedDisc

@@ -13,8 +13,6 @@
 #     name: python3
 # ---
 
-# %%
-
 # %% [markdown]
 # # Contact stress and friction: the paper's figures
 #
@@ -26,8 +24,8 @@
 #
 # **All data here are synthetic.** They come from a virtual laboratory with the paper's film, rod,
 # sphere, loads and spacing; nothing was measured, and nothing is tuned to meet the paper. The
-# paper's own voltages are not published as numbers. So what can be compared is the method and the
-# mechanics: what such an experiment can tell, and what it cannot.
+# paper's own voltages are not published as numbers. What can be compared is the method and the
+# mechanics.
 
 # %%
 from dataclasses import replace
@@ -40,20 +38,13 @@ import numpy as np
 from IPython.display import Markdown
 
 import memscal
-from memscal.figures.calibration import draw_radial
-from memscal.figures.friction import interface_figure, maxima_figure
-from memscal.figures.friction_profiles import draw_profiles, friction_set_figure
-from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
-from memscal.figures.friction_scale import friction_colours, friction_name, on_axis
-from memscal.figures.scan import draw_scan
-from memscal.figures.style import house_style, legend_above, new_figure, panel_letter
 
 DATA = Path("../calibration_data/sphere_experiment")
-MM, UM, KPA = 1e-3, 1e-6, 1e3  # memscal computes in SI units; people read these
+MM, UM, KPA, MV = 1e-3, 1e-6, 1e3, 1e-3  # memscal computes in SI units
+BLACK, BLUE, ORANGE, GREEN, GREY = "black", "#0072B2", "#D55E00", "#009E73", "0.6"
 
 # %matplotlib inline
 cache = TemporaryDirectory()  # calculated contacts are kept here while the notebook runs
-
 plt.rcParams.update({"figure.figsize": (7.2, 3.2), "figure.dpi": 110, "font.size": 9})
 plt.rcParams.update({"figure.constrained_layout.use": True, "legend.frameon": False})
 
@@ -73,57 +64,94 @@ for scan in (rod, dry, lubricated):
 
 # %%
 apparatus = memscal.calibrate(rod).apparatus
+back, radial = apparatus.reconvolution, apparatus.radial_profile
+x = back.x / MM
+order = np.argsort(x)
+r = np.linspace(0, 16 * MM, 321)
+rod_stress = memscal.indent(film, rod.indenter, load=rod.load).base_stress(r)
 
-with house_style():
-    figure = new_figure(3.6)
-    left, right = figure.subplots(1, 2)
-    draw_scan(left, apparatus)
-    draw_radial(right, apparatus)
-    for axes, letter in zip((left, right), "ab", strict=True):
-        axes.set_xlabel("position $x$ (mm)" if letter == "a" else "distance from the axis (mm)")
-        panel_letter(axes, letter)
-figure
+fig, (left, right) = plt.subplots(1, 2)
+left.plot(x, back.u_zz / MV, "o", ms=3, color=BLACK, label="voltage")
+left.plot(x[order], back.u_zz_predicted[order] / MV, color=BLUE, label=r"$A\,G\otimes\sigma_{zz}$")
+distance = np.abs(back.x[order] - apparatus.parameters["centre"])
+scale = np.max(back.u_zz) / np.max(rod_stress)
+left.plot(
+    x[order], np.interp(distance, r, rod_stress) * scale / MV, "--", color=GREEN,
+    label=r"$\sigma_{zz}$, scaled",
+)  # fmt: skip
+left.set(xlabel="position x (mm)", ylabel="$U_{zz}$ (mV)", xlim=(-6, 6))
+left.legend()
+g, u_g = radial.g * MM**2, radial.g_errors * MM**2
+right.fill_between(radial.r / MM, g - 2 * u_g, g + 2 * u_g, color=BLUE, alpha=0.25, lw=0)
+right.plot(radial.r / MM, g, color=BLUE, label="deconvolved G, band k = 2")
+right.plot(radial.r / MM, radial.g_gaussian * MM**2, "--", color=ORANGE, label="Gaussian")
+right.set(xlabel="distance from the axis (mm)", ylabel="G (1/mm²)", xlim=(0, 3))
+right.legend()
+plt.show()
 
 # %%
-print(apparatus)
+print(repr(apparatus))
 
 # %% [markdown]
-# *What agrees.* The voltage is wider than the stress, and a bell of about 600 µm between them
-# accounts for it; convolved with the stress it gives back the scan, the deconvolved one and the
-# Gaussian alike. *What does not, and why.* Our Gaussian of 561 µm was put in, so that meeting
-# it says only that the method works. The paper prints no conversion constant: ours is invented.
-# And our rod presses on a linear film; the paper's sinks half a millimetre into two, where its
-# film was hardly linear (notebook 01). The band on the right is what the scan leaves open: fine
-# detail of G is not resolved, and the contacts below do not need it.
+# *What agrees.* The voltage is wider than the stress, and a bell of about 600 µm width accounts for
+# the difference; convolved with the stress it gives back the scan, the deconvolved one and the
+# Gaussian alike. *What does not, and why.* Our Gaussian of 561 µm was put in, and our conversion
+# constant is invented: the paper prints none. Our rod presses on a linear film; the paper's
+# sinks half a millimetre into two, where its film was hardly linear (notebook 01). The band on the
+# right is what the scan leaves open: fine detail of G is not resolved, and the contacts below do
+# not need it.
 #
 # ## Figure 3: measured stress between no friction and full stick
 #
-# The sphere's scans have 33 contacts 0.5 mm apart, here twice at each load. $S_{zz} = U/A$ is held
-# against $G \otimes \sigma_{zz}$ for $\mu = 0$ and $\mu = \infty$. The bars at the bottom of the
-# left panel are the frictionless contacts, from the axis to their edge. In the table, depths with
-# $\mu = \infty$ are of incremental and of total loading; the paper's last number is what it calls
-# the contact diameter; and *within* is the share of points between the limits, give or take 1.96
-# standard uncertainties.
+# The sphere's scans have 33 contacts 0.5 mm apart, here twice at each load. $S_{zz} = U/A$ is
+# compared with $G \otimes \sigma_{zz}$ for $\mu = 0$ and $\mu = \infty$. The bars at the bottom of
+# the left panel are the frictionless contacts, from the axis to their edge.
 
 # %%
-found = memscal.compare([dry, lubricated], apparatus, macroscopic=1.6, cache=cache.name)
-incremental = found.loads["incremental"]
-shown = [one for one in incremental if one.lubrication == "dry" and one.load != 0.69]
+FRICTION = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, inf)
+measured = memscal.measure_stress([dry, lubricated], apparatus)
+comparison = memscal.compare(measured, apparatus, friction=FRICTION, cache=cache.name)
+incremental = comparison.loads["incremental"]
+dry_loads = [load for load in incremental if load.lubrication == "dry"]
+LOADS = [load.load for load in dry_loads]
 
-with house_style():
-    figure = new_figure(3.6)
-    linear, logarithmic = figure.subplots(1, 2)
-    draw_profiles(linear, found, shown)
-    draw_profiles(logarithmic, found, shown, logarithmic=True)
-    linear.set_ylim(bottom=-12)
-    logarithmic.set_xlim(linear.get_xlim())
-    for row, one in enumerate(shown):
-        width = one.profile.contact_radius / MM
-        linear.barh(-3.5 - 3 * row, width, height=2, color="black", zorder=3)
-    for axes, letter in zip((linear, logarithmic), "ab", strict=True):
-        axes.set_xlabel("distance from the centre (mm)")
-        panel_letter(axes, letter)
-figure
+
+def name(friction):
+    return "∞" if friction == inf else f"{friction:g}"
+
+
+def contacts(friction, loading="incremental"):
+    """Calculated contacts by load."""
+    path = memscal.indent(film, sphere, load=LOADS, friction=friction, loading=loading)
+    return dict(zip(LOADS, path, strict=True))
+
+
+free, stuck, stuck_at_once = contacts(0.0, "total"), contacts(inf), contacts(inf, "total")
+
+fig, (linear, logarithmic) = plt.subplots(1, 2, figsize=(7.2, 3.6))
+shown = [load for load in dry_loads if load.load != 0.69]
+for row, (load, colour) in enumerate(zip(shown, (GREEN, BLUE, ORANGE), strict=True)):
+    profile = load.profile
+    for ax in (linear, logarithmic):
+        for contact, style in ((free, "-"), (stuck, "--")):
+            curve = apparatus.convolve(r, contact[load.load].base_stress(r))
+            ax.plot(r / MM, curve / KPA, style, color=colour, lw=0.9)
+        ax.errorbar(
+            profile.r / MM, profile.s_zz / KPA, profile.s_zz_errors / KPA, fmt="o", ms=2.5, lw=0.7,
+            color=colour, label=f"{load.load:g} N",
+        )  # fmt: skip
+        ax.set(xlabel="distance from the centre (mm)", xlim=(0, 8))
+    width = free[load.load].contact_radius / MM
+    linear.barh(-3.5 - 3 * row, width, height=2, color=colour)
+linear.set(ylabel="stress at the base (kPa)", ylim=(-12, None))
+linear.legend(title="solid: μ = 0, dashed: μ = ∞")
+logarithmic.set(yscale="log", ylim=(0.05, 200))
+plt.show()
+
+# %% [markdown]
+# In the table, depths with $\mu = \infty$ are of incremental and of total loading; the paper's last
+# number is what it calls the contact diameter; *within* is the share of points that lie between
+# both limits or within 1.96 standard uncertainties of one.
 
 # %%
 paper = {0.34: (18, 16, 2.00), 1.37: (33, 28, 2.90), 2.75: (45, 37, 3.45)}
@@ -131,152 +159,175 @@ rows = [
     "| load (N) | depth, μ = 0 (µm) | paper | μ = ∞ (µm) | paper | radius (mm) | paper | within |",
     "|-|-|-|-|-|-|-|-|",
 ]
-for one in shown:
-    free, slow, step = (
-        memscal.indent(film, sphere, load=one.load, friction=mu, loading=loading)
-        for mu, loading in ((0.0, "total"), (inf, "incremental"), (inf, "total"))
-    )
-    smooth, sticking, width = paper[one.load]
+for load in shown:
+    smooth, sticking, width = paper[load.load]
+    slow, step = stuck[load.load].depth / UM, stuck_at_once[load.load].depth / UM
+    contact = free[load.load]
     rows.append(
-        f"| {one.load} | {free.depth / UM:.1f} | {smooth} "
-        f"| {slow.depth / UM:.1f} / {step.depth / UM:.1f} | {sticking} "
-        f"| {free.contact_radius / MM:.2f} | {width:.2f} | {one.bracketed:.0%} |"
+        f"| {load.load} | {contact.depth / UM:.1f} | {smooth} | {slow:.1f} / {step:.1f} "
+        f"| {sticking} | {contact.contact_radius / MM:.2f} | {width:.2f} | {load.bracketed:.0%} |"
     )
 Markdown("\n".join(rows))
 
 # %% [markdown]
 # *What agrees.* The measured profiles lie between the two limits within their uncertainty, at the
-# centre as in the tails, over more than two decades; below that they are lost in noise. Friction
-# raises the centre and draws the profile in, and it does so more at higher loads. *What does not,
-# and why.* The paper's "contact diameters" are radii: as diameters they would be half of what any
-# film of this thickness and modulus gives. Its depths without friction are ours with Poisson's
-# ratio 0.495, and half a micrometre to a micrometre above those of 0.5. With $\mu = \infty$ its
-# film is stiffer than ours, by less if the load is taken to come in one step (notebook 02). The
-# paper finds the outer region "systematically very close to the frictionless profile whereas at
-# the center it increasingly departs from it". In our calculation one coefficient departs at both:
-# 0.2 takes the centre 79 % of the way from no friction to full stick at 2.75 N, and the
-# stress at 5 mm 65 % of it; an interface that yields (below) does much the same. Far out
-# the two limits are two kilopascals apart, or less, so that a baseline must be known to
-# better than that; something else that widens profiles, such as a normal compliance, may be at work
-# in the experiment, and is not in ours.
+# centre and in the tails, over more than two decades; below that they are lost in noise. Friction
+# raises the centre and narrows the profile, more so at higher loads. *What does not, and why.* The
+# paper's "contact diameters" are radii: as diameters they would be half of what any film of this
+# thickness and modulus gives. Its depths without friction are ours with Poisson's ratio 0.495, and
+# half a micrometre to a micrometre above those of 0.5. With $\mu = \infty$ its film is stiffer than
+# ours, by less if the load is taken to come in one step (notebook 02). The paper finds the outer
+# region "systematically very close to the frictionless profile whereas at the center it
+# increasingly departs from it". In our calculation the profile of one coefficient departs at both:
+# 0.2 takes the centre 79 % of the way from no friction to full stick at 2.75 N, and the stress at
+# 5 mm 65 % of it; an interface that yields (below) does much the same. Far out the two limits are
+# 2 kPa apart or less, so the baseline must be known to better than that. Something that widens
+# profiles, such as a normal compliance, may be at work in the experiment; it is not in ours.
 #
 # ## Figure 4: dry against lubricated
 #
-# At 2.75 N, both scans and four friction coefficients.
+# At 2.75 N, both scans and four friction coefficients; right, the difference from the frictionless
+# profile.
 
 # %%
-one, wet = (
-    next(c for c in incremental if c.load == 2.75 and c.lubrication == kind)
-    for kind in ("dry", "lubricated")
+dry_load, wet_load = (
+    next(load for load in incremental if load.load == 2.75 and load.lubrication == state)
+    for state in ("dry", "lubricated")
 )
-r = np.linspace(0.0, 6e-3, 241)
 
-with house_style():
-    figure = new_figure(3.6)
-    left, right = figure.subplots(1, 2)
-    for mu, style in ((0.0, "-"), (0.3, "--"), (0.4, "-."), (inf, ":")):
-        i = int(np.flatnonzero(found.friction == mu)[0])
-        curve, free = on_axis(one.profile.r, one.calculated[[i, 0]], r)
-        colour, label = friction_colours(mu)[0], rf"$\mu$ = {friction_name(mu)}"
-        left.plot(r / MM, curve / KPA, style, color=colour, label=label)
-        right.plot(r / MM, (curve - free) / KPA, style, color=colour)
-    for c, marker, face in ((one, "o", "black"), (wet, "s", "white")):
-        profile, kept = c.profile, c.profile.r < r[-1]
-        x, u = profile.r[kept] / MM, profile.s_zz_errors[kept] / KPA
-        style = {"fmt": marker, "color": "black", "mfc": face, "ms": 3, "lw": 0.7, "ls": "none"}
-        left.errorbar(x, profile.s_zz[kept] / KPA, u, label=c.lubrication, **style)
-        right.errorbar(x, (profile.s_zz - c.calculated[0])[kept] / KPA, u, **style)
-    left.barh(-3, one.profile.contact_radius / MM, height=3, color="black")
-    legend_above(left, columns=3)
-    left.set(xlabel="distance from the centre (mm)", ylabel="stress at the base (kPa)")
-    right.set(xlabel="distance from the centre (mm)", ylabel=r"less that of $\mu$ = 0 (kPa)")
-    for axes, letter in zip((left, right), "ab", strict=True):
-        panel_letter(axes, letter)
-figure
+fig, (left, right) = plt.subplots(1, 2, figsize=(7.2, 3.6))
+frictionless = apparatus.convolve(r, free[2.75].base_stress(r))
+for friction, style, colour in (
+    (0.0, "-", BLUE), (0.3, "--", GREEN), (0.4, "-.", GREY), (inf, ":", ORANGE),
+):  # fmt: skip
+    curve = apparatus.convolve(r, contacts(friction)[2.75].base_stress(r))
+    left.plot(r / MM, curve / KPA, style, color=colour, label=f"μ = {name(friction)}")
+    right.plot(r / MM, (curve - frictionless) / KPA, style, color=colour)
+for load, marker, face in ((dry_load, "o", "black"), (wet_load, "s", "white")):
+    profile = load.profile
+    style = {"fmt": marker, "color": "black", "mfc": face, "ms": 3, "lw": 0.7, "ls": "none"}
+    errors = profile.s_zz_errors / KPA
+    left.errorbar(profile.r / MM, profile.s_zz / KPA, errors, label=load.lubrication, **style)
+    departure = profile.s_zz - np.interp(profile.r, r, frictionless)
+    right.errorbar(profile.r / MM, departure / KPA, errors, **style)
+left.set(xlim=(-0.1, 6), xlabel="distance from the centre (mm)", ylabel="stress at the base (kPa)")
+right.set(xlim=(-0.1, 6), xlabel="distance from the centre (mm)", ylabel="less that of μ = 0 (kPa)")
+left.legend()
+plt.show()
 
 # %%
-rows = ["| loading | " + " | ".join(f"μ = {friction_name(mu)}" for mu in found.friction) + " |"]
-rows.append("|-" * (1 + found.friction.size) + "|")
-for loading, loads in found.loads.items():
-    c = next(c for c in loads if c.load == 2.75 and c.lubrication == "dry")
-    rows.append(
-        f"| largest stress, {loading} | " + " | ".join(f"{p / KPA:.1f}" for p in c.p_max) + " |"
-    )
-    away = c.chi_square - c.chi_square.min()
-    rows.append(
-        f"| χ² beyond the least, {loading} | " + " | ".join(f"{d:.1f}" for d in away) + " |"
-    )
+rows = ["| loading | " + " | ".join(f"μ = {name(friction)}" for friction in FRICTION) + " |"]
+rows.append("|-" * (1 + len(FRICTION)) + "|")
+for loading, loads in comparison.loads.items():
+    load = next(load for load in loads if load.load == 2.75 and load.lubrication == "dry")
+    peaks = " | ".join(f"{peak / KPA:.1f}" for peak in load.p_max)
+    rises = " | ".join(f"{rise:.1f}" for rise in load.chi_square - load.chi_square.min())
+    rows.append(f"| largest stress (kPa), {loading} | {peaks} |")
+    rows.append(f"| χ² above the least, {loading} | {rises} |")
 Markdown("\n".join(rows))
 
 # %% [markdown]
-# *What agrees.* The lubricated profile is wider and lower, and the frictionless calculation meets
-# it with nothing adjusted. The dry one is a few percent higher at the centre, and some coefficient
-# describes all of it. *What does not, and why.* The paper tells 0.3 from 0.4 and both from
-# infinity, "with a resolution of order 0.1". In our calculation 0.3, 0.4 and ∞ differ by no more
-# than 0.7 % of the maximum where the load grows slowly: the contact sticks as it grows, and nothing
-# above a coefficient of about 0.3 can be told from full stick. If the load comes in one step, the
-# four curves are 2 % apart, which is more like the paper's figure, although it says that the load
-# was reached "step-by-step". A lower Poisson's ratio makes it worse, not better: with 0.48, where a
-# film gives way to the side by being compressed, full stick adds 19 % in place of 24 %, and is
-# reached below 0.4.
+# *What agrees.* The lubricated profile is wider and lower, and the frictionless calculation agrees
+# with it with nothing adjusted. The dry one is a few percent higher at the centre, and some
+# coefficient describes all of it. *What does not, and why.* The paper distinguishes 0.3 from 0.4
+# and both from infinity, "with a resolution of order 0.1". In our calculation 0.3, 0.4 and ∞ differ
+# by at most 0.7 % of the maximum where the load grows slowly: the contact sticks as it grows, and
+# a coefficient above about 0.3 cannot be distinguished from full stick. If the load comes in one
+# step, the four curves are 2 % apart, more like the paper's figure, although it says that the load
+# was reached "step-by-step". A lower Poisson's ratio makes the difference larger: with 0.48, where
+# a film yields to the side by compression, full stick adds 19 % instead of 24 %, and is reached
+# below 0.4.
 #
-# The paper's next step is to read an effective coefficient $\mu_e$ at each load. All loads, all
-# coefficients, seen with a glass:
+# The paper's next step is to read an effective coefficient $\mu_e$ at each load. The difference
+# from the frictionless profile at all loads, in percent of its maximum:
 
 # %%
-friction_set_figure(found)
+fig, axes = plt.subplots(1, 4, figsize=(9, 2.8), sharey=True)
+colours = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(FRICTION)))
+for ax, load in zip(axes, dry_loads, strict=True):
+    profile, percent = load.profile, load.p_max[0] / 100
+    for i, colour in enumerate(colours):
+        curve = (load.calculated[i] - load.calculated[0]) / percent
+        ax.plot(profile.r / MM, curve, color=colour, label=name(FRICTION[i]))
+    errors = profile.s_zz_errors / percent
+    departure = (profile.s_zz - load.calculated[0]) / percent
+    ax.errorbar(profile.r / MM, departure, errors, fmt="o", ms=2.5, lw=0.7, color=BLACK)
+    ax.set(title=f"{load.load:g} N", xlabel="r (mm)", xlim=(-0.1, 5), ylim=(-8, 28))
+axes[0].set_ylabel("difference (%)")
+axes[-1].legend(title="μ", loc="center left", bbox_to_anchor=(1, 0.5))
+plt.show()
 
 # %% [markdown]
 # ## Figure 5: maxima against the load
 #
-# $S_{max}/p^0_{max}$ is read against calculated maxima over frictionless ones.
-
-# %%
-maxima_figure(found)
-
-# %%
-effective_friction_figure(found)
+# $S_{max}/p^0_{max}$ is compared with calculated maxima over frictionless ones.
 
 
 # %%
-def in_words(reading):
+def draw_maxima(ax, comparison, loading):
+    loads = comparison.loads[loading]
+    by_load = {load.load: load.p_max / load.p_max[0] for load in loads}
+    curves = np.array([by_load[load] for load in sorted(by_load)])
+    colours = plt.get_cmap("viridis")(np.linspace(0, 0.9, comparison.friction.size))
+    for i, (friction, colour) in enumerate(zip(comparison.friction, colours, strict=True)):
+        ax.plot(sorted(by_load), curves[:, i], color=colour, lw=0.9, label=f"μ = {name(friction)}")
+    for state, face in (("dry", "black"), ("lubricated", "white")):
+        of_state = [load for load in loads if load.lubrication == state]
+        if of_state:
+            ax.errorbar(
+                [load.load for load in of_state], [load.ratio for load in of_state],
+                [load.ratio_uncertainty for load in of_state], fmt="o", ms=4, mfc=face,
+                color="black", capsize=2, lw=0.8, label=state,
+            )  # fmt: skip
+    ax.set(title=f"{loading} loading", xlabel="load (N)", ylabel="$S_{max}/p^0_{max}$")
+
+
+fig, axes = plt.subplots(1, 2, figsize=(7.8, 3.4), sharey=True)
+for ax, loading in zip(axes, ("incremental", "total"), strict=True):
+    draw_maxima(ax, comparison, loading)
+axes[1].set_ylabel("")
+axes[1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+plt.show()
+
+
+# %%
+def with_interval(reading):
     low, high = reading.interval.low, reading.interval.high
-    within = f"{low:.2f} to {'∞' if high is None else f'{high:.2f}'}"
-    return within if reading.value is None else f"{reading.value:.2f} ({within})"
+    interval = f"{low:.2f} to {'∞' if high is None else f'{high:.2f}'}"
+    return interval if reading.value is None else f"{reading.value:.2f} ({interval})"
 
 
-def readings(found):
+def readings(comparison):
     """Tabulate effective coefficients with their intervals of 95 %."""
     rows = ["| | loading | by the maximum | by the profile |", "|-|-|-|-|"]
-    for loading, loads in found.loads.items():
+    for loading, loads in comparison.loads.items():
         rows += [
-            f"| {one.profile.label} | {loading} | {in_words(one.by_maximum)} "
-            f"| {in_words(one.by_profile)} |"
-            for one in loads
+            f"| {load.profile.label} | {loading} | {with_interval(load.by_maximum)} "
+            f"| {with_interval(load.by_profile)} |"
+            for load in loads
         ]
         rows += [
-            f"| all loads, {kind} | {loading} | | **{in_words(by_loading[loading])}** |"
-            for kind, by_loading in found.joint.items()
+            f"| all loads, {state} | {loading} | | **{with_interval(by_loading[loading])}** |"
+            for state, by_loading in comparison.joint.items()
         ]
     return Markdown("\n".join(rows))
 
 
-readings(found)
+readings(comparison)
 
 # %% [markdown]
-# *What agrees.* Dry maxima lie above one and rise with the load, lubricated ones lie on one. *What
+# *What agrees.* Dry maxima lie above one and rise with the load; lubricated ones lie on one. *What
 # does not, and why.* These contacts obey Amontons' law with a coefficient of 0.2 at every load, and
-# what is found agrees with that: 0.2 from all loads together, with an interval from 0.15 to 0.24.
-# But at single loads it is mostly a lower bound, and the paper's reading with an accuracy of 0.1
-# would not be had from its numbers: Young's modulus is known to 4.5 %, A to 1.4 %, and so the ratio
-# to 2.5 %, where full stick adds no more than 10 to 25 %. All points share this error, which is why
-# they move up and down together; differences between loads, and between dry and lubricated, are
-# known better than the bars say. The paper's lubricated maxima fall below one at the smallest
-# loads, which it ascribes to the compliance of its rough interface; ours is smooth.
+# the result agrees: 0.2 from all loads together, with an interval from 0.15 to 0.24. At single
+# loads the result is mostly a lower bound, and the accuracy of 0.1 that the paper states would not
+# follow from its numbers: Young's modulus is known to 4.5 %, A to 1.4 %, and so the ratio to 2.5 %,
+# where full stick adds at most 10 to 25 %. All points share this error, so they move up and
+# down together; differences between loads, and between dry and lubricated, are known better than
+# the bars suggest. The paper's lubricated maxima fall below one at the smallest loads, which it
+# ascribes to the compliance of its rough interface; ours is smooth.
 
 # %%
-both = found.dry_against_lubricated
-for pair in both:
+for pair in comparison.dry_against_lubricated:
     print(
         f"{pair.load:g} N: the dry maximum exceeds the lubricated one by "
         f"{pair.relative:.1%} ± {pair.relative_uncertainty:.1%} (χ² = {pair.chi_square:.0f} "
@@ -284,108 +335,111 @@ for pair in both:
     )
 
 # %% [markdown]
-# This is the firmest statement of all: dry contacts have friction, whatever A, G and the film are.
+# This result depends on neither A, G nor the film: dry contacts have friction.
 #
+# All of this on one page, as `memscal compare --figure` draws it:
+
+# %%
+comparison.plot()
+
+# %% [markdown]
 # ## An interface that yields
 #
 # The paper finds that $\mu_e$ grows with the load and stays far below the macroscopic
 # $\mu_{macro} \approx 1.6$, and ascribes both to the interface: a layer of asperities that yields
-# elastically, by about its roughness of 1.82 µm, before it slips. Now let this be the truth: a
-# friction coefficient of 1.6, reached only after 6 µm. (That is three times the roughness, so that
-# the effect is large enough to be seen.) The rod is scanned eight times and each load four times.
+# elastically, by about its roughness of 1.82 µm, before it slips. Let this be the truth: a friction
+# coefficient of 1.6, reached after 6 µm. (That is three times the roughness, so that the effect is
+# large enough to be seen.) The rod is scanned eight times and each load four times.
+#
+# With the paper's film the voltages give only bounds, at every load: a modulus of 2.2 ± 0.1 MPa
+# alone makes the calculated stresses uncertain by 1.5 %. Here the modulus is known to 0.5 % and
+# the thickness to 0.25 %.
 
 # %%
 interface = memscal.Interface(slip_length=6 * UM)
-made = memscal.simulate_experiment(
+experiment = memscal.simulate_experiment(
     friction=1.6, interface=interface, repeats=4, rod_repeats=8, load_uncertainty=0.003, seed=1
 )
-sensor = memscal.calibrate(made.rod, method="evidence").apparatus
-yielding = memscal.compare(
-    made.dry, sensor, macroscopic=1.6, loading="incremental", cache=cache.name
-)
-readings(yielding)
-
-# %% [markdown]
-# Bounds, at every load. The voltages are better than the paper's, but the film is as the paper has
-# it: a modulus of 2.2 ± 0.1 MPa alone makes the calculated stresses uncertain by 1.5 %. Now the
-# same voltages, with a film whose modulus and thickness are known to 0.5 % and 0.25 %:
-
-# %%
-known = replace(
+precise = replace(
     film,
     young_modulus_uncertainty=0.005 * film.young_modulus,
     thickness_uncertainty=0.0025 * film.thickness,
     poisson_ratio_uncertainty=0.001,
 )
-contacts = replace(made.dry, film=known)
-sensor = memscal.calibrate(replace(made.rod, film=known), method="evidence").apparatus
+sensor = memscal.calibrate(replace(experiment.rod, film=precise), method="bayesian").apparatus
 yielding = memscal.compare(
-    contacts, sensor, macroscopic=1.6, macroscopic_uncertainty=0.1, loading="incremental",
-    interface=True, cache=cache.name,
+    replace(experiment.dry, film=precise), sensor, friction=FRICTION, macroscopic=1.6,
+    loading="incremental", interface=True, cache=cache.name,
 )  # fmt: skip
-maxima_figure(yielding)
-
-# %%
 readings(yielding)
 
 # %%
-likelihood_figure(yielding)
+fig, (left, right) = plt.subplots(1, 2)
+draw_maxima(left, yielding, "incremental")
+for load, colour in zip(yielding.loads["incremental"], colours[::2], strict=False):
+    reading = load.by_profile
+    right.plot(
+        reading.values, reading.chi_square - reading.chi_square.min(), color=colour,
+        label=f"{load.load:g} N",
+    )  # fmt: skip
+right.axhline(3.84, color=GREY, ls="--", label="95 %")
+right.set(xlim=(0, 0.5), ylim=(0, 12), xlabel=r"effective coefficient $\mu_e$")
+right.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+right.legend()
+plt.show()
 
 # %% [markdown]
 # **This is the paper's Figure 5:** an effective coefficient that grows with the load and stays well
 # below 1.6, although the coefficient of the interface is 1.6 at every load. A light contact does
-# not move its film far enough to use up what the interface yields. One coefficient for all loads
-# is a poor summary: it comes out above every single one, by bending what the loads share (A, the
-# film) as far as it goes. What do the data say of the slip length?
+# not move its film far enough to reach slip. One coefficient for all loads is a poor summary: it
+# exceeds every single one, at the cost of large errors of the quantities that the loads share (A,
+# the film). The marginal likelihoods of three laws, and the slip length:
 
 # %%
-interface_figure(yielding)
-
-# %%
-law = yielding.interface.tangential
-length = law.length
-rows = ["| law | best | χ² | degrees of freedom | ln evidence, over the best |", "|-|-|-|-|-|"]
-top = max(one.log_evidence for one in law.laws)
-for one in law.laws:
-    scale, unit = (UM, " µm") if "slip length" in one.name else (1.0, "")
-    best = ", ".join(f"{value / scale:.3g}{unit}" for value in one.best)
+laws = yielding.interface.tangential
+length = laws.length
+rows = ["| law | best | χ² | degrees of freedom | ln marginal likelihood |", "|-|-|-|-|-|"]
+top = max(law.log_evidence for law in laws.laws)
+for law in laws.laws:
+    scale, unit = (UM, " µm") if "slip length" in law.name else (1.0, "")
+    best = ", ".join(f"{value / scale:.3g}{unit}" for value in law.best)
     rows.append(
-        f"| {one.name} | {best} | {one.least:.1f} | {one.degrees} | {one.log_evidence - top:.1f} |"
+        f"| {law.name} | {best} | {law.least:.1f} | {law.degrees} | {law.log_evidence - top:.1f} |"
     )
-low, high = length.interval.low, length.interval.high
-rows.append(
-    f"\nSlip length: {length.value / UM:.1f} ± {length.standard_uncertainty / UM:.1f} µm "
-    f"(95 %: {low / UM:.1f} to {high / UM:.1f} µm)"
-    if length.value is not None and high is not None
-    else f"\n{length.reason}"
-)
+if length.value is None:
+    rows.append(f"\n{length.reason}")
+else:
+    rows.append(
+        f"\nSlip length: {length.value / UM:.1f} ± {length.standard_uncertainty / UM:.1f} µm "
+        f"(95 %: {length.interval.low / UM:.1f} to {length.interval.high / UM:.1f} µm)"
+    )
 Markdown("\n".join(rows))
 
 # %% [markdown]
-# The interface that yields explains all loads with one number. One coefficient for all loads is 18
-# worse in χ²; one for each load is as good, but spends four parameters on it, and the evidence
-# counts them.
-# The slip length is known to a third. It is a product of this law: with another macroscopic
-# coefficient it would scale in proportion, because what is seen is the stiffness
+# The interface that yields explains all loads with one number. One coefficient for all loads is
+# worse by 17 in χ²; one for each load agrees as well, with four parameters, which lowers its
+# marginal likelihood. The slip length is known to a third. It belongs to this law: with another
+# macroscopic coefficient it would scale in proportion, because the data determine the stiffness
 # $\mu \bar p / \ell$ of the interface before it slips. With the modulus known to 4.5 %, as in the
 # paper, the same voltages leave all from 0.1 to 14 µm, little more than an upper bound.
 #
 # With the paper's own roughness for the slip length, 1.82 µm, the maxima would lie below full stick
 # by 1.5 % at 0.34 N and by 0.8 % at 2.75 N. Read as coefficients that is 0.17 and 0.3: it grows as
-# in the paper, and ends where the paper's Figure 4 ends. But the difference is at the edge of what
-# such an experiment sees.
+# in the paper, and ends where the paper's Figure 4 ends. The difference is at the limit of what
+# such an experiment resolves.
 #
-# ## What to take from this
+# ## Conclusions
 #
-# - The paper's figures can be built again from its method, and its main statements stand: dry
+# - The paper's figures can be built again from its method, and its main statements hold: dry
 #   profiles lie between the limits, lubricated ones on the frictionless one, and an interface
 #   that yields gives a $\mu_e$ that grows with the load and lies far below the macroscopic one.
-# - Its contact diameters are radii. Its indentation depths fit Poisson's ratio 0.495.
+# - Its contact diameters are radii. Its indentation depths agree with Poisson's ratio 0.495.
 # - Its outer region, as it describes it, follows neither from a friction coefficient nor from a
 #   slip length: here the tails leave the frictionless profile together with the centre.
-# - In a slow loading, no coefficient above about 0.3 can be told from another with this sphere and
-#   this film. A reading of 0.4 is a matter of how the load is thought to come.
-# - The modulus of the film limits what maxima can say. Compare loads, and dry with lubricated.
+# - In a slow loading, coefficients above about 0.3 cannot be distinguished with this sphere and
+#   this film. A reading of 0.4 depends on the definition of the loading.
+# - The uncertainty of the film's modulus limits what maxima can say. Compare loads, and dry with
+#   lubricated.
 
 # %%
 cache.cleanup()

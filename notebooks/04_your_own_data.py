@@ -19,13 +19,12 @@
 # # Your own data: from tables to a friction coefficient
 #
 # You have three tables: a scan with a thin rod, and scans of contacts with a sphere, dry and
-# lubricated. This notebook goes from there to the friction coefficient of the contact with its
-# interval, and stops where you should look before you go on. Replace the tables and the numbers
-# in the commands by yours.
+# lubricated. This notebook leads from there to the friction coefficient of the contact with its
+# interval, and says what to check at each step. Replace the tables and the numbers in the commands
+# by yours.
 #
-# **The tables here are synthetic.** They were calculated for a film, a sensor and a sphere that
-# exist nowhere, with a friction coefficient of 0.12; `calibration_data/make_tables.py` made them.
-# So the last section can say what is wrong when something is, because we put it in.
+# **The tables here are synthetic.** They were calculated for an invented film, sensor and sphere,
+# with a friction coefficient of 0.12; `calibration_data/make_tables.py` made them.
 
 # %%
 import shlex
@@ -39,14 +38,9 @@ import matplotlib.pyplot as plt
 from IPython.display import Markdown
 
 import memscal
-from memscal.figures.calibration import calibration_figure
-from memscal.figures.friction import maxima_figure
-from memscal.figures.friction_profiles import friction_set_figure, profile_figure
-from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
-from memscal.figures.stress import measured_stress_figure
 
 TABLES = Path("../calibration_data/tables")
-MM, MV = 1e-3, 1e-3  # memscal computes in SI units; people read these
+MM, MV = 1e-3, 1e-3  # memscal computes in SI units
 
 # %matplotlib inline
 scratch = TemporaryDirectory()  # where the files of this notebook go
@@ -68,21 +62,20 @@ print("".join((TABLES / "sphere_dry.csv").read_text().splitlines(keepends=True)[
 # %% [markdown]
 # ## 2. Import
 #
-# A table says neither its units nor what was pressed on what. The options do, and they ask for
-# more than you may expect: each *standard uncertainty* that you state here is carried to the
-# friction coefficient, and one that you leave out counts as zero. At the terminal you would type
-# what follows `memscal`.
+# A table states neither its units nor the indenter and the film; the options do. Each *standard
+# uncertainty* that you state here is propagated to the friction coefficient, and one that you leave
+# out counts as zero. At the terminal you would type what follows `memscal`.
 
 
 # %%
 def run(line):
-    """Run a command of memscal as at the terminal, and show what it says."""
-    told = subprocess.run(
+    """Run a command of memscal as at the terminal, and show its output."""
+    process = subprocess.run(
         [sys.executable, "-m", "memscal", *shlex.split(line)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
-    print(told.stdout.replace(str(folder), "."))
-    print(told.stderr.replace(str(folder), "."))
+    print(process.stdout.replace(str(folder), "."))
+    print(process.stderr.replace(str(folder), "."))
 
 
 FILM = (
@@ -111,19 +104,19 @@ run(
 )
 
 # %% [markdown]
-# Two kinds of error of the load are told apart. `--load-uncertainty` is common to all contacts, as
-# that of the balance: it moves every stress alike. It is in N at the nominal load of the scan, and
-# in proportion at the others. `--load-scatter`, in percent, is each contact's own, as of a lens
-# that is set down by hand: it is noise, and repeats average it.
+# Errors of the load are of two kinds. `--load-uncertainty` is common to all contacts, such as that
+# of the balance; it is in N at the nominal load of the scan, and in proportion at the others.
+# `--load-scatter`, in percent, is independent from contact to contact: it is noise, and repeats
+# average it.
 #
 # Read the notes. They say how many readings, lines and places the table holds, and what is
-# missing. Had the load that was set not been named among the columns of
-# `--repeat`, the contacts of three loads would stand in one line, and the import would warn of it.
+# missing. Without the load among the columns of `--repeat`, the contacts of three loads would stand
+# in one line, and the import would warn of it.
 #
 # ## 3. Look at the scans
 #
-# Before anything is calculated: a peak somewhere near the middle, both ends flat, and as much scan
-# beyond the contact as there is within it. A scan that ends on a slope cannot tell its baseline.
+# Each scan should have a peak near the middle, flat ends, and as much length beyond the contact as
+# within it. A scan that ends on a slope does not determine its baseline.
 
 # %%
 rod, dry, lubricated = (
@@ -146,39 +139,40 @@ plt.show()
 calibration = memscal.calibrate(rod)
 apparatus = calibration.apparatus
 apparatus.save(folder / "sensor.apparatus.h5")
-print(apparatus)
-calibration_figure(apparatus)
+print(calibration)
+
+# %%
+calibration.plot()
 
 # %% [markdown]
-# What to look at, in this order:
+# Check, in this order:
 #
-# - **the residuals** (b) lie within their band and show no wave;
+# - **the residuals** (b): they lie within their band and show no wave;
 # - **the resolved band** (f): what is hatched was not measured. Contacts that are wide against
 #   the film do not need it;
-# - **the uncertainty of A**: every stress inherits it. To halve it, `memscal design` says what to
-#   change;
-# - **the checks**: all passed here. `docs/quality.md` has an entry for each one that may fail.
+# - **the uncertainty of A**: every stress inherits it. `memscal design` says how to halve it;
+# - **the checks**: all passed here. `docs/quality.md` explains each one.
 #
 # ## 5. The measured stress
 #
-# Baseline and centre of every load are found, and $S_{zz} = U/A$ comes with its uncertainty by
-# source. Each profile's total force is held against the load that was applied.
+# Baseline and centre of every load are estimated, and $S_{zz} = U/A$ has its uncertainty by
+# source. Each profile's total force is compared with the load that was applied.
 
 # %%
 measured = memscal.measure_stress([dry, lubricated], apparatus)
-measured_stress_figure(measured)
+measured.plot()
 
 
 # %%
 def forces(measured):
-    """Tabulate what a profile should have in common with its load, and which checks failed."""
+    """Tabulate each profile's force over its load, and the checks that failed."""
     rows = ["| profile | force (N) | force / load | maximum (kPa) |", "|-|-|-|-|"]
-    for one in measured.profiles:
-        ratio, spread = one.force / one.load, one.force_uncertainty / one.load
+    for profile in measured.profiles:
+        ratio, spread = profile.force / profile.load, profile.force_uncertainty / profile.load
         rows.append(
-            f"| {one.label} | {one.force:.3f} ± {one.force_uncertainty:.3f} "
+            f"| {profile.label} | {profile.force:.3f} ± {profile.force_uncertainty:.3f} "
             f"| {ratio:.3f} ± {spread:.3f} "
-            f"| {one.maximum / 1e3:.2f} ± {one.maximum_uncertainty / 1e3:.2f} |"
+            f"| {profile.maximum / 1e3:.2f} ± {profile.maximum_uncertainty / 1e3:.2f} |"
         )
     failed = [f"{check.name} ({check.value:.2g})" for check in measured.checks if not check.passed]
     return Markdown("\n".join(rows) + f"\n\nFailed: {', '.join(failed) or 'none'}.")
@@ -187,110 +181,112 @@ def forces(measured):
 forces(measured)
 
 # %% [markdown]
-# **The force is the first thing to look at.** It does not depend on the shape of G, so that it
-# tests A and the loads alone. Then the logarithmic panel: the profile falls smoothly over two to
-# three decades, until the points are lost in noise.
+# **Look at the force first.** It does not depend on the shape of G, and therefore tests A and the
+# loads alone. Then the logarithmic panel: the profile falls smoothly over two to three decades,
+# until the points are lost in noise.
 #
 # ## 6. The friction coefficient
 #
-# The sphere is pressed on the film by calculation, at these loads and for friction coefficients
+# The contact of the sphere with the film is calculated at these loads for friction coefficients
 # from 0 to ∞, under both definitions of the loading: *incremental*, where a point of the film
 # sticks where it first touched, as when a load grows slowly; and *total*, where the load comes in
-# one step. What reaches the sensor is compared with what it measured.
+# one step. The calculated stress, blurred by G, is compared with the measured one.
 
 # %%
-found = memscal.compare([dry, lubricated], apparatus)
-profile_figure(found)
+FRICTION = (0.0, 0.05, 0.1, 0.2, 0.3, 0.6, float("inf"))
+comparison = memscal.compare(measured, apparatus, friction=FRICTION)
+comparison.plot()
 
 # %% [markdown]
-# The points lie between the solid curve (no friction) and the dashed one (full stick). In the
-# lower panels they leave the band for both: there is friction, and not enough to hold the film
-# everywhere. Friction keeps the film from being squeezed outward and sends more of the load to the
-# centre. What it does is a few percent, so look at it with a glass:
-
-# %%
-friction_set_figure(found)
-
-# %% [markdown]
-# The bars hold what all points of a profile have in common, too: an error of A moves all of them
-# alike. So neighbouring residuals may lean to one side together; chi-square knows.
+# The points lie between the curve without friction and the one of full stick (a). Friction keeps
+# the film from being squeezed outward and sends more of the load to the centre; the maxima (b) are
+# larger than without it by a few percent. Error bars hold what all points of a profile have in
+# common, too: an error of A moves all of them alike, so that neighbouring residuals (c) may lie to
+# one side together. Chi-square accounts for that.
 
 
 # %%
-def in_words(reading):
-    """A coefficient with its interval; or the bound, where there is no more to be had."""
+def with_interval(reading):
+    """Return a coefficient with its interval, or the interval where there is no value."""
     low, high = reading.interval.low, reading.interval.high
-    within = f"{low:.2f} to {'∞' if high is None else f'{high:.2f}'}"
-    return within if reading.value is None else f"{reading.value:.2f} ({within})"
+    interval = f"{low:.2f} to {'∞' if high is None else f'{high:.2f}'}"
+    return interval if reading.value is None else f"{reading.value:.2f} ({interval})"
 
 
-def coefficients(found):
+def coefficients(comparison):
     rows = ["| | loading | by the maximum | by the profile |", "|-|-|-|-|"]
-    for loading, loads in found.loads.items():
+    for loading, loads in comparison.loads.items():
         rows += [
-            f"| {one.profile.label} | {loading} | {in_words(one.by_maximum)} "
-            f"| {in_words(one.by_profile)} |"
-            for one in loads
+            f"| {load.profile.label} | {loading} | {with_interval(load.by_maximum)} "
+            f"| {with_interval(load.by_profile)} |"
+            for load in loads
         ]
-    for lubrication, by_loading in found.joint.items():
+    for state, by_loading in comparison.joint.items():
         rows += [
-            f"| all loads, {lubrication} | {loading} | | **{in_words(reading)}** |"
+            f"| all loads, {state} | {loading} | | **{with_interval(reading)}** |"
             for loading, reading in by_loading.items()
         ]
     return Markdown("\n".join(rows))
 
 
-coefficients(found)
-
-# %%
-effective_friction_figure(found)
+coefficients(comparison)
 
 # %% [markdown]
 # In brackets are intervals of 95 %. How to read them:
 #
 # - **An interval that ends at ∞ is a bound.** Beyond some coefficient the whole contact sticks,
-#   and a larger one changes nothing; there is no upper limit to be found in such data, whatever
-#   the noise. Quote the lower end.
-# - **An interval that begins at 0** says that no friction was seen. The lubricated contacts must
-#   be of this kind; they are your control.
+#   and a larger one changes nothing; such data have no upper limit, whatever the noise. Quote the
+#   lower end.
+# - **An interval that begins at 0** says that no friction was detected. The lubricated contacts,
+#   the control, must be of this kind.
 # - **All loads together** have one coefficient, if Amontons' law holds. If the coefficients of
 #   single loads rise or fall beyond their intervals, it does not (notebook 03).
-# - **The other definition of the loading** is no statistics: which one holds is for you to know.
-#   For small coefficients they agree.
+# - **The definition of the loading** is not a statistical question: it follows from the
+#   experiment. For small coefficients both agree.
+#
+# The likelihoods are the full answer: a parabola is a measurement; a curve that is flat to the
+# right below the level of 95 % is a lower bound.
 
 # %%
-budget = found.joint["dry"]["incremental"].budget
-for source, part in sorted(budget.items(), key=lambda item: -item[1]):
-    print(f"{source.replace('_', ' '):16} {part:.4f}")
+fig, axes = plt.subplots(1, 2, sharex=True, sharey=True)
+for ax, (state, by_loading) in zip(axes, comparison.joint.items(), strict=True):
+    curves = {
+        load.profile.label: load.by_profile
+        for load in comparison.loads["incremental"]
+        if load.lubrication == state
+    }
+    curves["all loads"] = by_loading["incremental"]
+    for label, reading in curves.items():
+        rise = reading.chi_square - reading.chi_square.min()
+        ax.plot(reading.values, rise, label=label, lw=2 if label == "all loads" else 1)
+    ax.axhline(3.84, color="0.6", ls="--", label="95 %")
+    ax.set(title=state, xlim=(0, 0.6), ylim=(0, 12), xlabel="effective friction coefficient")
+    ax.legend()
+axes[0].set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+plt.show()
+
+# %%
+budget = comparison.joint["dry"]["incremental"].budget
+for source, contribution in sorted(budget.items(), key=lambda item: -item[1]):
+    print(f"{source.replace('_', ' '):16} {contribution:.4f}")
 
 # %% [markdown]
 # This is what each source contributes to the standard uncertainty of the coefficient: the first
 # lines say what to measure better next time. The truth of these tables is 0.12.
-
-# %%
-likelihood_figure(found)
-
-# %% [markdown]
-# The likelihoods are the full answer. A parabola is a measurement; a curve that is flat to the
-# right before it reaches the level of 95 % is a lower bound. And the paper's own reading, maxima
-# over those of a frictionless contact:
-
-# %%
-maxima_figure(found)
-
-# %% [markdown]
+#
 # ## 7. The checks, and what to do when one fails
 #
-# Nothing is refused because a check failed, but look before you quote a number.
+# A failed check does not stop a comparison, but look at it before you quote a number.
 
 # %%
-told = [check for check in found.checks if check.p_value is not None]
+with_p = [check for check in comparison.checks if check.p_value is not None]
 rows = ["| check | value | limit | p | passed |", "|-|-|-|-|-|"]
 rows += [
-    f"| {one.name} | {one.value:.3g} | {one.limit:.3g} | {one.p_value:.2g} | {one.passed} |"
-    for one in sorted(told, key=lambda check: check.p_value)[:6]
+    f"| {check.name} | {check.value:.3g} | {check.limit:.3g} | {check.p_value:.2g} "
+    f"| {check.passed} |"
+    for check in sorted(with_p, key=lambda check: check.p_value)[:6]
 ]
-Markdown(f"The six least likely of {len(found.checks)}:\n\n" + "\n".join(rows))
+Markdown(f"The six least likely of {len(comparison.checks)}:\n\n" + "\n".join(rows))
 
 # %% [markdown]
 # What a failure means, and what to do:
@@ -309,9 +305,9 @@ Markdown(f"The six least likely of {len(found.checks)}:\n\n" + "\n".join(rows))
 # - `lubricated_frictionless`: the control shows friction. Do not quote the dry coefficient before
 #   it is understood: A, the film, the lubrication.
 #
-# `docs/quality.md` has all of them.
+# `docs/quality.md` explains all of them.
 #
-# Three mistakes, put in on purpose. First, an amplifier whose gain was 5 % higher in the sphere's
+# Three mistakes, made on purpose. First, an amplifier whose gain was 5 % higher in the sphere's
 # scans than in the rod's:
 
 # %%
@@ -319,11 +315,11 @@ wrong_gain = [replace(scan, u_zz=1.05 * scan.u_zz) for scan in (dry, lubricated)
 forces(memscal.measure_stress(wrong_gain, apparatus))
 
 # %% [markdown]
-# Every force is about 5 % too large. A single profile can hardly tell; all together can, and the
-# ratio says by how much. Unseen it would have passed for friction: full stick adds no more than 12
-# to 21 % to these maxima.
+# Every force is about 5 % too large. A single profile hardly shows it; all together do, and the
+# ratio says by how much. Undetected, it would look like friction: full stick adds no more than
+# 12 to 21 % to these maxima.
 #
-# Second, a film that is not as thick as was thought, in the calibration and in the measurement:
+# Second, a film whose stated thickness is 5 % too large, in the calibration and in the measurement:
 
 # %%
 thin = replace(rod.film, thickness=1.05 * rod.film.thickness)
@@ -333,18 +329,19 @@ forces(memscal.measure_stress(wrong_film[1:], assumed))
 
 # %% [markdown]
 # The forces agree: A is an integral over the plane, and the film's thickness hardly enters. A wrong
-# thickness is seen in the shapes or not at all, and then as friction:
+# thickness changes the shapes, which looks like friction:
 
 # %%
-astray = memscal.compare(wrong_film[1:], assumed, loading="total")
-print(astray)
+wrong = memscal.compare(wrong_film[1:], assumed, friction=FRICTION, loading="incremental")
+for state, by_loading in wrong.joint.items():
+    print(f"all loads, {state}: {with_interval(by_loading['incremental'])}")
+print("failed:", [check.name for check in wrong.checks if not check.passed])
 
 # %% [markdown]
 # No check failed, and the truth is no longer in the interval of the dry contacts. But the interval
 # of the lubricated ones does not begin at 0 any more: the control shows friction where there is
-# none. It is what tells a wrong film from friction, and why lubricated contacts are worth their
-# time. And the stated uncertainty of the thickness was a fifth of the error: state what you know,
-# and not less.
+# none. Lubricated contacts are what distinguishes a wrong film from friction. The stated
+# uncertainty of the thickness, 1 %, was a fifth of the error: state it in full.
 #
 # Third, the artifact of another sensor:
 
