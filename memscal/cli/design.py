@@ -106,11 +106,7 @@ class _Wish(_WishType):
     "Standard deviation of one voltage, in percent of the signal with the rod right above the "
     "sensor.",
 )
-@click.option(
-    "--noise-voltage",
-    type=Quantity("mV"),
-    help="The same in mV, in place of --noise.",
-)
+@click.option("--noise-voltage", type=Quantity("mV"), help="The same in mV, in place of --noise.")
 @number_option(
     "--centre",
     "mm",

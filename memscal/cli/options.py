@@ -126,7 +126,7 @@ def radius_options(
 ) -> Callable[[_Command], _Command]:
     """Add the indenter's radius, with or without its uncertainty."""
     entries: list[tuple[str, Quantity, str]] = [
-        ("radius", Quantity("mm"), "Radius of the rod (not its diameter), in mm."),
+        ("radius", Quantity("mm"), "Radius of the rod (not its diameter), in mm.")
     ]
     if uncertainties:
         spread = Quantity("mm", open_low=False)

@@ -32,12 +32,7 @@ if TYPE_CHECKING:
     from memscal.model.scan import Scan
     from memscal.simulation.experiment import Experiment
 
-__all__ = [
-    "FILES",
-    "NAMES",
-    "command",
-    "number_option",
-]
+__all__ = ["FILES", "NAMES", "command", "number_option"]
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 

@@ -79,10 +79,7 @@ def atomic_write_bytes(
 
 
 def _checked_target(
-    path: str | os.PathLike[str],
-    *,
-    overwrite: bool,
-    inputs: Iterable[str | os.PathLike[str]],
+    path: str | os.PathLike[str], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str]]
 ) -> Path:
     """Follow symbolic links to the real target and refuse what must not be replaced."""
     shown = os.fspath(path)

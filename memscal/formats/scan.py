@@ -25,15 +25,7 @@ from memscal.formats.groups import (
     sample_group,
 )
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import (
-    Group,
-    Node,
-    Number,
-    file_tree,
-    index_axis,
-    si,
-    write_tree,
-)
+from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, index_axis, si, write_tree
 from memscal.formats.json_text import to_json
 from memscal.formats.schema import SCAN_SCHEMA
 from memscal.formats.values import (

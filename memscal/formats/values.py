@@ -99,7 +99,7 @@ def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
     values = require_array(file, path, dimension)
     if values.size != 1:
         raise FormatError(
-            f"{file.where(path)} has {values.size} values, but one number is expected.",
+            f"{file.where(path)} has {values.size} values, but one number is expected."
         )
     return float(values.reshape(()))
 

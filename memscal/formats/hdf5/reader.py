@@ -54,11 +54,7 @@ def damage_named(
         raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
     except Exception as error:
         said = printable(" ".join(str(error).split()), 200) or type(error).__name__
-        raise FormatError(
-            f"{problem}.",
-            why=f"{why} ({said}).",
-            cure=cure,
-        ) from error
+        raise FormatError(f"{problem}.", why=f"{why} ({said}).", cure=cure) from error
 
 
 _MAX_TOTAL_BYTES = 512 * 2**20
