@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import debug_option
-from memscal.cli.options import FILE, force_option, json_option
+from memscal.cli.options import FILE, option, output_options
 from memscal.cli.output import (
     FigurePath,
     beside,
@@ -36,30 +35,16 @@ Examples:
 @click.command("apply", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
 @click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="OUT",
-    help="File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5.",
+@option("-o --output", FILE, metavar="OUT")(
+    "File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5."
 )
-@click.option(
-    "--override",
-    is_flag=True,
-    help="Go on although sensor, channel or film of artifact and scan differ: recorded in the "
-    "output.",
+@option("--override", is_flag=True)(
+    "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
-@click.option(
-    "--figure",
-    "figures",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE.png|svg|pdf",
-    help="Draw the profiles of all loads, linear and logarithmic. May be repeated.",
+@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
-@json_option
-@force_option
-@debug_option
+@output_options
 def command(
     artifact: Path,
     scans: tuple[Path, ...],

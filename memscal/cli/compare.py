@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import debug_option
-from memscal.cli.options import FILE, Quantity, force_option, json_option
+from memscal.cli.options import FILE, Quantity, option, options_of, output_options
 from memscal.cli.output import (
     FIGURE_SUFFIXES,
     FigurePath,
@@ -117,9 +116,6 @@ class FigureFiles:
             atomic_write_bytes(path, content, overwrite=force)
 
 
-_Command = TypeVar("_Command", bound=Callable[..., Any])
-
-
 def user_cache_folder() -> Path | None:
     """Return the user's folder of calculated contacts; ``None`` where there is no home.
 
@@ -135,17 +131,13 @@ def user_cache_folder() -> Path | None:
         return None
 
 
-def cache_options(command: _Command) -> _Command:
-    """Add ``--cache`` and ``--no-cache``."""
-    folder = click.option(
-        "--cache",
-        type=FILE,
-        metavar="FOLDER",
-        help="Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
-        "the user's cache folder]",
-    )
-    none = click.option("--no-cache", is_flag=True, help="Calculate anew, and keep nothing.")
-    return folder(none(command))
+cache_options = options_of(
+    option("--cache", FILE, metavar="FOLDER")(
+        "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
+        "the user's cache folder]"
+    ),
+    option("--no-cache", is_flag=True)("Calculate anew, and keep nothing."),
+)
 
 
 def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
@@ -175,83 +167,44 @@ Examples:
 @click.command("compare", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
 @click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN|STRESS...")
-@click.option(
-    "--friction",
-    "friction",
-    type=_COEFFICIENT,
-    multiple=True,
-    metavar="MU",
-    help="Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
+@option("--friction friction", _COEFFICIENT, multiple=True, metavar="MU")(
+    "Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
     "wherever it is touched); between them profiles are interpolated. Repeated: several.  "
-    "[default: nine between 0 and inf]",
+    "[default: nine between 0 and inf]"
 )
-@click.option(
-    "--loading",
-    "loadings",
-    type=click.Choice(["incremental", "total"]),
-    multiple=True,
-    help="A point sticks where it first touched (incremental), or as if loaded in one step "
-    "(total). May be repeated.  [default: both]",
+@option("--loading loadings", click.Choice(["incremental", "total"]), multiple=True)(
+    "A point sticks where it first touched (incremental), or as if loaded in one step "
+    "(total). May be repeated.  [default: both]"
 )
-@click.option(
-    "--reference",
-    "references",
-    type=FILE,
-    multiple=True,
-    metavar="FILE",
-    help="Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
-    "each load and friction coefficient. Repeated.",
+@option("--reference references", FILE, multiple=True, metavar="FILE")(
+    "Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
+    "each load and friction coefficient. Repeated."
 )
-@click.option(
-    "--macroscopic",
-    type=_COEFFICIENT,
-    metavar="MU",
-    help="Friction coefficient measured in sliding, to compare with.",
+@option("--macroscopic", _COEFFICIENT, metavar="MU")(
+    "Friction coefficient measured in sliding, to compare with."
 )
-@click.option(
-    "--macroscopic-uncertainty",
-    type=Quantity("ratio", open_low=False),
-    metavar="U",
-    help="Standard uncertainty (k = 1) of --macroscopic.",
+@option("--macroscopic-uncertainty", Quantity("ratio", open_low=False), metavar="U")(
+    "Standard uncertainty (k = 1) of --macroscopic."
 )
-@click.option(
-    "--interface",
-    is_flag=True,
-    help="Also explain the profiles by an interface that yields before it slips, at the "
-    "macroscopic friction, and say which of the two explanations is more likely.",
+@option("--interface", is_flag=True)(
+    "Also explain the profiles by an interface that yields before it slips, at the "
+    "macroscopic friction, and say which of the two explanations is more likely."
 )
-@click.option(
-    "--override",
-    is_flag=True,
-    help="Compare although sensor, channel or film of artifact and scan differ; recorded.",
+@option("--override", is_flag=True)(
+    "Compare although sensor, channel or film of artifact and scan differ; recorded."
 )
 @cache_options
-@click.option(
-    "--figure",
-    "single",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE.png|svg|pdf",
-    help="Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated.",
+@option("--figure single", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated."
 )
-@click.option(
-    "--figures",
-    "folder",
-    type=FILE,
-    metavar="FOLDER",
-    help="Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
-    "coefficients, maxima, effective friction, likelihood, interface.",
+@option("--figures folder", FILE, metavar="FOLDER")(
+    "Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
+    "coefficients, maxima, effective friction, likelihood, interface."
 )
-@click.option(
-    "--figure-format",
-    type=click.Choice([suffix.removeprefix(".") for suffix in FIGURE_SUFFIXES]),
-    default="png",
-    show_default=True,
-    help="Format of --figures.",
-)
-@json_option
-@force_option
-@debug_option
+@option(
+    "--figure-format", click.Choice([suffix.removeprefix(".") for suffix in FIGURE_SUFFIXES]), "png"
+)("Format of --figures.")
+@output_options
 def command(
     artifact: Path,
     scans: tuple[Path, ...],

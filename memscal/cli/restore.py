@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import debug_option
-from memscal.cli.options import FILE, force_option, json_option
+from memscal.cli.options import FILE, option, output_options
 from memscal.cli.output import (
     FigurePath,
     emit_json,
@@ -37,33 +36,18 @@ Examples:
 @click.command("restore", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
 @click.argument("scan", type=FILE)
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="OUT",
-    help="Reference file to write (memscal-reference): the restored stress with its uncertainty.",
+@option("-o --output", FILE, metavar="OUT")(
+    "Reference file to write (memscal-reference): the restored stress with its uncertainty."
 )
-@click.option(
-    "--expected",
-    type=FILE,
-    metavar="FILE",
-    help="A calculated stress at the base (memscal-reference), such as memscal reference writes: "
+@option("--expected", FILE, metavar="FILE")(
+    "A calculated stress at the base (memscal-reference), such as memscal reference writes: "
     "adds the check expected_stress. By default the scan's indenter is pressed on its film without "
-    "friction, to be shown beside the result.",
+    "friction, to be shown beside the result."
 )
-@click.option(
-    "--figure",
-    "figures",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE.png|svg|pdf",
-    help="Draw the restored, the measured and the calculated stress, and residuals. May be "
-    "repeated.",
+@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
-@json_option
-@force_option
-@debug_option
+@output_options
 def command(
     artifact: Path,
     scan: Path,
