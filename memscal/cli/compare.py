@@ -37,15 +37,7 @@ __all__ = [
 
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
-    """Return the stems of all figures' names: those of ``memscal.figures.friction``.
-
-    They are needed before anything is computed, without matplotlib; a test compares both.
-
-    Examples
-    --------
-    >>> figure_stems(["dry"])
-    ['profiles-dry', 'friction-set-dry', 'maxima', 'effective-friction', 'likelihood']
-    """
+    """Return the stems of all figures' names, without matplotlib; a test compares both."""
     tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
     of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
     stems = [*of_each, "maxima", "effective-friction", "likelihood"]
@@ -54,11 +46,7 @@ def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> lis
 
 @dataclass(frozen=True)
 class FigureFiles:
-    """Files of the figures: of the one that shows all at a glance, and of all others in a folder.
-
-    ``suffix`` is the others' format; of the scans' lubrications, and of laws of the interface where
-    they are compared, each has figures of its own.
-    """
+    """Files of the figures: of the one that shows all, and of all others in a folder."""
 
     single: tuple[Path, ...]
     folder: Path | None
@@ -117,11 +105,7 @@ class FigureFiles:
 
 
 def user_cache_folder() -> Path | None:
-    """Return the user's folder of calculated contacts; ``None`` where there is no home.
-
-    ``memscal/contacts`` in ``XDG_CACHE_HOME``, or else in ``~/.cache``.  A relative
-    ``XDG_CACHE_HOME`` counts as none, as its specification says.
-    """
+    """Return the user's folder of contacts; a relative XDG_CACHE_HOME counts as none."""
     named = os.environ.get("XDG_CACHE_HOME", "")
     if named and Path(named).is_absolute():
         return Path(named, "memscal", "contacts")

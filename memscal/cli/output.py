@@ -34,11 +34,7 @@ __all__ = [
 
 
 def emit(text: str) -> None:
-    """Print results.
-
-    A reader that goes away (``| head``) is no failure: the work is done, and its exit code
-    says how it went.
-    """
+    """Print results; a reader that goes away (``| head``) is no failure."""
     if sys.stdout is None:
         return
     try:
@@ -132,10 +128,7 @@ _CLEAR = "\r\x1b[K"
 
 @contextmanager
 def working(what: str) -> Iterator[Callable[[str], None]]:
-    """Show what is being done, and for how long, on a terminal and only if it takes long.
-
-    Yields a function that replaces the text.
-    """
+    """Show on a terminal what is being done, if it takes long; yield what replaces the text."""
     shown = [what]
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None

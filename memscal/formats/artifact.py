@@ -42,10 +42,7 @@ __all__ = ["artifact_tree", "read_artifact", "write_artifact"]
 
 
 def read_artifact(path: str | os.PathLike[str]) -> ApparatusData:
-    """Read an apparatus function from a memscal-artifact file, in SI units.
-
-    It refuses a file that this version cannot read, or that was changed since it was written.
-    """
+    """Read an apparatus function, in SI units; refuse a file that was changed."""
     with open_hdf5(path) as file:
         return artifact_from(file)
 
@@ -87,10 +84,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
 def write_artifact(
     data: ApparatusData, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write an apparatus function as a memscal-artifact file, whole or not at all.
-
-    The same data give the same bytes; the only time in the file is ``data.process.date``.
-    """
+    """Write an apparatus function as a memscal-artifact file; the same data, the same bytes."""
     write_tree(artifact_tree(data), path, overwrite=overwrite)
 
 

@@ -34,10 +34,7 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Kind:
-    """How a quantity that is no number is written and read.
-
-    An empty value is not written, unless ``always``; it is there if ``inside`` its group is.
-    """
+    """How a quantity that is no number is written (if not empty, or ``always``) and read."""
 
     write: Callable[[Quantity, Any], Node]
     read: Callable[[SafeFile, str], Any]
@@ -91,10 +88,7 @@ KINDS = {
 
 
 def write_record(record: Record, stated: object, **others: Node) -> Group:
-    """Return the group of an object or a mapping, with other nodes behind its quantities.
-
-    An axis that is no quantity of the record counts from 0.
-    """
+    """Return the group of an object or a mapping; an axis that is no quantity counts from 0."""
     children: dict[str, Node] = {}
     keys = {quantity.key for quantity in record.quantities}
     for quantity in record.quantities:
@@ -122,11 +116,7 @@ def read_record(
     defaults: Mapping[str, Any] = _NOTHING,
     sizes: Mapping[str, int] = _NOTHING,
 ) -> dict[str, Any]:
-    """Return the values at a path, in SI units, by the names of the quantities.
-
-    What a file need not state is left out, or taken from ``defaults`` where they name it.
-    Arrays have the shape of their axes, those in ``sizes`` or in the group.
-    """
+    """Return the values at a path, in SI units, by name; ``sizes`` are of axes known before."""
     values = dict(defaults)
     lengths = dict(sizes)
     for at, quantity in _paths(record, path):

@@ -261,10 +261,7 @@ def read_profile(
     film: ElasticFilm | None = None,
     indenter: Indenter | None = None,
 ) -> StressProfile:
-    """Read a stress profile, by default that of a scan or an artifact.
-
-    Load, film and indenter are those given where it names none.
-    """
+    """Read a stress profile; load, film and indenter are those given where it names none."""
     if file.has(f"{parameters}/film"):
         film = read_film(file, f"{parameters}/film")
     if file.has(f"{parameters}/indenter"):

@@ -92,12 +92,7 @@ class Finding:
 
 
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return what a file of memscal holds, in plain values that JSON can say.
-
-    Quantities (with path, value, standard uncertainty or ``None``, unit) and arrays (with path,
-    shape, unit, minimum, maximum, missing) are in the units of the file.  It raises a
-    :class:`FormatError` if it is not a file of memscal, or not a sound one.
-    """
+    """Return what a file of memscal holds, in its units and in plain values that JSON can say."""
     with open_hdf5(path) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
@@ -120,11 +115,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """Check a file step by step: safety, schema, digest, completeness.
-
-    It stops at the first step that fails, because what follows would rest on it; the file is in
-    order if every finding passed.
-    """
+    """Check a file step by step (safety, schema, digest, content) up to the first that fails."""
     findings: list[Finding] = []
     step = "safety"
     try:

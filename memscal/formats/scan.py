@@ -291,10 +291,7 @@ def ensure_folder_writable(
 def write_scans(
     scans: Mapping[str, Scan], folder: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write scans as memscal-scan files of one folder, all of them or none.
-
-    All are written whole under other names first, and only then take their own.
-    """
+    """Write scans as memscal-scan files of one folder, all of them or none."""
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
     made = not target.exists()

@@ -1,8 +1,6 @@
 """Units, converted here and nowhere else: SI inside Python, any right unit in files.
 
-The canonical strings are looked up in a table of powers of ten, which keeps the conversion
-correctly rounded (0.25 mm is read as exactly ``0.25e-3``).  Anything else is left to pint,
-which is imported only then.
+Canonical units are powers of ten, so that 0.25 mm is exactly 0.25e-3; others are left to pint.
 """
 
 from __future__ import annotations
@@ -57,10 +55,7 @@ _MAX_LENGTH = 64
 
 
 def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> FloatArray:
-    """Convert values from a file's unit to SI; ``where`` names them in a message.
-
-    Only a dimensionless quantity may have no unit (``None``).
-    """
+    """Convert values from a file's unit to SI; only a dimensionless quantity may have no unit."""
     numbers = np.asarray(values, dtype=np.float64)
     if unit is None:
         if dimension == "dimensionless":

@@ -66,18 +66,11 @@ def read_scan_table(
     delimiter: str | None = None,
     decimal: str | None = None,
 ) -> ImportedScan:
-    """Read a scan from a table with one row per reading.
-
-    Positions and readings are kept as they are, in the order of the file.  Without ``y`` and
-    ``repeat`` they are a line; repeats over exactly the same positions become rows of one array
-    (repeat, x); all else is a scan of single points.
+    """Read a scan from a table with one row per reading, in the order of the file.
 
     Columns are names, or numbers counted from 1; ``x_unit`` holds for ``y`` too, ``u_unit`` for
-    all channels.  Several columns ``repeat`` number the lines together.  ``load`` is the median
-    of ``load_column`` by default; ``load_uncertainty``, in N, is common to all points,
-    ``load_scatter``, relative, and ``x_error``, in m, are independent from point to point.
-    ``u_scale`` is the volts per unit of a sensor whose output is no voltage; ``u_sign`` is -1
-    where u falls under compression.  The notes of the scan record both.
+    all channels.  ``load_uncertainty``, in N, is common to all points; ``load_scatter``, relative,
+    and ``x_error``, in m, are independent.  ``u_scale`` is in volts per unit of the readings.
     """
     if u_sign not in (1, -1):
         raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
