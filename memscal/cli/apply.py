@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -15,12 +14,11 @@ from memscal.cli.output import (
     emit_tables,
     message,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
-
-if TYPE_CHECKING:
-    from memscal.model.measured_stress import MeasuredStress
 
 __all__ = ["command"]
 
@@ -76,13 +74,9 @@ def command(
     with working("Measuring"):
         stress = measure_stress(data, artifact, override=override)
     with working("Drawing"):
-        drawn = _rendered(stress, figures)
+        drawn = rendered(stress.plot, figures)
     stress.save(written, overwrite=force)
-    if drawn:
-        from memscal.formats.files import atomic_write_bytes
-
-        for path, content in drawn.items():
-            atomic_write_bytes(path, content, overwrite=force)
+    write_files(drawn, force=force)
     if as_json:
         emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
     else:
@@ -91,12 +85,3 @@ def command(
     for path in (written, *figures):
         message(f"Written: {path}")
     return exit_code_of(stress.checks)
-
-
-def _rendered(stress: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, bytes]:
-    if not figures:
-        return {}
-    from memscal.figures.style import figure_format, render_figure
-
-    figure = stress.plot()
-    return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}

@@ -20,13 +20,13 @@ from memscal.cli.output import (
     message,
     note,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from memscal.calibration.calibrate import Calibration
     from memscal.calibration.monte_carlo import MonteCarlo
     from memscal.calibration.sweep import Sweep
@@ -91,18 +91,10 @@ class Outputs:
             from memscal.figures.report import html_report
 
             contents[self.report] = html_report(calibration.apparatus).encode("utf-8")
-        if self.figures:
-            figure = calibration.plot()
-            contents |= {path: _rendered(figure, path) for path in self.figures}
+        contents |= rendered(calibration.plot, self.figures)
         if self.sweep_figure is not None and sweep is not None:
-            contents[self.sweep_figure] = _rendered(sweep.plot(), self.sweep_figure)
+            contents |= rendered(sweep.plot, [self.sweep_figure])
         return contents
-
-
-def _rendered(figure: Figure, path: Path) -> bytes:
-    from memscal.figures.style import figure_format, render_figure
-
-    return render_figure(figure, figure_format(path.suffix))
 
 
 def _artifact_beside(scan: Path, channel: str) -> Path:
@@ -297,13 +289,10 @@ def command(
     if draws is not None:
         drawn = _drawn(calibration, draws, seed or 0)
         _show_disagreements(drawn)
-    from memscal.formats.files import atomic_write_bytes
-
     with working("Drawing"):
         contents = outputs.rendered(calibration, sweep)
     calibration.apparatus.save(output, overwrite=force)
-    for path, content in contents.items():
-        atomic_write_bytes(path, content, overwrite=force)
+    write_files(contents, force=force)
     return _show(calibration, sweep, drawn, outputs, as_json)
 
 

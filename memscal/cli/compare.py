@@ -18,8 +18,10 @@ from memscal.cli.output import (
     emit_json,
     message,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
 
 if TYPE_CHECKING:
@@ -81,13 +83,9 @@ class FigureFiles:
         if not self.paths:
             return {}
         from memscal.figures.friction import comparison_figures
-        from memscal.figures.style import figure_format, render_figure
+        from memscal.figures.style import render_figure
 
-        ready: dict[Path, bytes] = {}
-        if self.single:
-            figure = comparison.plot()
-            for path in self.single:
-                ready[path] = render_figure(figure, figure_format(path.suffix))
+        ready = rendered(comparison.plot, self.single)
         if self.folder is not None:
             named = self.in_folder
             for stem, draw in comparison_figures(comparison).items():
@@ -96,12 +94,9 @@ class FigureFiles:
 
     def write(self, ready: dict[Path, bytes], *, force: bool) -> None:
         """Write what was rendered."""
-        from memscal.formats.files import atomic_write_bytes
-
         if self.folder is not None:
             self.folder.mkdir(exist_ok=True)
-        for path, content in ready.items():
-            atomic_write_bytes(path, content, overwrite=force)
+        write_files(ready, force=force)
 
 
 def user_cache_folder() -> Path | None:
@@ -238,7 +233,7 @@ def command(
         comparison = compare(
             data,
             apparatus,
-            friction=_coefficients(friction),
+            friction=tuple(sorted({0.0, *friction, math.inf})) if friction else None,
             loading=loadings or ("incremental", "total"),
             references=profiles or None,
             macroscopic=macroscopic,
@@ -246,7 +241,7 @@ def command(
             interface=interface,
             override=override,
             cache=kept,
-            workers=_workers(),
+            workers=min(2, os.cpu_count() or 1),
         )
     with working("Drawing"):
         ready = files.rendered(comparison)
@@ -259,18 +254,6 @@ def command(
         for kind, checks in failures(comparison.checks).items()
     ]
     return exit_code_of(comparison.checks, failed)
-
-
-def _coefficients(friction: tuple[float, ...]) -> tuple[float, ...] | None:
-    """Return coefficients in their order, from none to full stick; ``None`` for the usual ones."""
-    return tuple(sorted({0.0, *friction, math.inf})) if friction else None
-
-
-def _workers() -> int:
-    """Return how many processes calculate contacts: two where there are two cores."""
-    import os
-
-    return min(2, os.cpu_count() or 1)
 
 
 def _check_usage(

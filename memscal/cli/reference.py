@@ -28,7 +28,9 @@ from memscal.cli.output import (
     emit_tables,
     message,
     prove_writable,
+    rendered,
     show_messages,
+    write_files,
 )
 
 if TYPE_CHECKING:
@@ -260,14 +262,11 @@ def _write(
     force: bool,
 ) -> None:
     """Write the files; what is drawn is drawn before the first of them is there."""
-    rendered: dict[Path, bytes] = {}
+    drawn: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.stress import contact_figure
-        from memscal.figures.style import figure_format, render_figure
 
-        figure = contact_figure(contacts)
-        for path in figures:
-            rendered[path] = render_figure(figure, figure_format(path.suffix))
+        drawn = rendered(lambda: contact_figure(contacts), figures)
     if output is not None:
         from memscal.formats.reference import write_reference
 
@@ -276,11 +275,7 @@ def _write(
         from memscal.formats.meshes.mesh_files import write_mesh
 
         write_mesh(contacts[0].mesh(), mesh, overwrite=force)
-    if rendered:
-        from memscal.formats.files import atomic_write_bytes
-
-        for path, data in rendered.items():
-            atomic_write_bytes(path, data, overwrite=force)
+    write_files(drawn, force=force)
 
 
 def _print(

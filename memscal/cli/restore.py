@@ -16,8 +16,10 @@ from memscal.cli.output import (
     message,
     note,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
 
 if TYPE_CHECKING:
@@ -83,16 +85,12 @@ def command(
         if stress is None:
             restored = _beside_calculated(restored)
     with working("Drawing"):
-        drawn = _rendered(restored, figures)
+        drawn = rendered(restored.plot, figures)
     if output is not None:
         from memscal.formats.reference import write_reference
 
         write_reference(restored.profile(), output, overwrite=force)
-    if drawn:
-        from memscal.formats.files import atomic_write_bytes
-
-        for path, content in drawn.items():
-            atomic_write_bytes(path, content, overwrite=force)
+    write_files(drawn, force=force)
     if as_json:
         written = None if output is None else str(output)
         emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
@@ -116,12 +114,3 @@ def _beside_calculated(restored: Restoration) -> Restoration:
     except MemscalError as failure:
         note(f"No contact is shown beside the result: {failure.problem}")
         return restored
-
-
-def _rendered(restored: Restoration, figures: tuple[Path, ...]) -> dict[Path, bytes]:
-    if not figures:
-        return {}
-    from memscal.figures.style import figure_format, render_figure
-
-    figure = restored.plot()
-    return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}
