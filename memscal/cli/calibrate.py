@@ -97,11 +97,6 @@ class Outputs:
         return contents
 
 
-def _artifact_beside(scan: Path, channel: str) -> Path:
-    """Return the usual name of the artifact of a scan's channel."""
-    return beside(scan, ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5")
-
-
 def _chosen_method(
     method: str | None, options: tuple[str, ...], seed: int | None, channel: str = "zz"
 ) -> Regulariser:
@@ -258,7 +253,8 @@ def command(
 
     A failed quality check is exit code 1: the artifact is written and says so.
     """
-    output = output or _artifact_beside(scans[0], channel)
+    ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
+    output = output or beside(scans[0], ending)
     outputs = Outputs(output, report, figures, sweep_figure)
     regulariser = _chosen_method(method, options, seed, channel)
     pairs = [_correlation(text) for text in correlations]

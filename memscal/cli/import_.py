@@ -226,14 +226,8 @@ def command(
     _write(imported, output, force)
     warnings = [note for note in imported.notes if note.severity == "warning"]
     if as_json:
-        emit_json(
-            {
-                "schema_version": "1",
-                "output": str(output),
-                "format": kind,
-                "notes": marked_texts(imported.notes),
-            }
-        )
+        head = {"schema_version": "1", "output": str(output), "format": kind}
+        emit_json({**head, "notes": marked_texts(imported.notes)})
     else:
         emit(readable("\n".join(note.text for note in imported.notes if note not in warnings)))
     show_messages(warnings)

@@ -45,12 +45,8 @@ _RADIUS = {"rod": 0.25, "sphere": 128.8}
 SHAPES = ("rod", "sphere", "cone", "profile")
 
 # What each shape is described by; every other of these options belongs to another shape.
-_DESCRIBED_BY = {
-    "rod": "radius",
-    "sphere": "radius",
-    "cone": "inclination",
-    "profile": "profile_table",
-}
+_DESCRIBED_BY = {"rod": "radius", "sphere": "radius"}
+_DESCRIBED_BY |= {"cone": "inclination", "profile": "profile_table"}
 
 
 _ASPERITIES = (Quantity("um"), Quantity("1/mm^2"), Quantity("um"))
@@ -236,12 +232,8 @@ def _check_usage(
 def _pressed(
     indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], options: dict[str, Any]
 ) -> list[Contact]:
-    film, body, interface = (
-        film_from(options),
-        indenter_of(indenter, options),
-        interface_of(options),
-    )
-
+    film, body = film_from(options), indenter_of(indenter, options)
+    interface = interface_of(options)
     from memscal.mechanics.indent import indent
 
     settings: dict[str, Any] = {

@@ -152,18 +152,14 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
 
 
 def _described(scan: Scan, path: Path) -> dict[str, Any]:
+    truth = {k: "inf" if v == math.inf else v for k, v in (scan.synthetic or {}).items()}
     return {
         "scan": str(path),
         "synthetic": True,
         "kind": scan.kind,
         "shape": list(scan.u_zz.shape),
-        "truth_si": {name: _standard(value) for name, value in (scan.synthetic or {}).items()},
+        "truth_si": truth,
     }
-
-
-def _standard(value: float | str) -> float | str:
-    """Return a value of standard JSON: infinite friction is ``"inf"``."""
-    return "inf" if value == float("inf") else value
 
 
 def _entry(name: str, value: float | str) -> tuple[str, str]:

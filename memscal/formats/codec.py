@@ -14,7 +14,7 @@ from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import Attribute, Group, Node, count, index_axis, note, si
 from memscal.formats.json_text import to_json
 from memscal.formats.values import json_value, require_array, require_scalar, require_text
-from memscal.model.checks import Message, messages_from_json, messages_to_json
+from memscal.model.checks import messages_from_json, messages_to_json
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Quantity, Record
 
@@ -59,29 +59,23 @@ def read_source(file: SafeFile, path: str) -> SourceFile:
     return SourceFile(name, checksum)
 
 
-def _read_mapping(file: SafeFile, path: str) -> dict[str, Any]:
-    mapping: dict[str, Any] = json_value(file, path, dict, {})
-    return mapping
-
-
-def _write_messages(quantity: Quantity, messages: tuple[Message, ...]) -> Group:
-    return _write_json_note(quantity, messages_to_json(messages))
-
-
-def _read_messages(file: SafeFile, path: str) -> tuple[Message, ...]:
-    return messages_from_json(json_value(file, path, list, []))
-
-
-def _read_truth(file: SafeFile, path: str) -> bool:
-    return bool(require_scalar(file, path, "dimensionless"))
-
-
 KINDS = {
     "text": Kind(lambda _, text: str(text), require_text),
     "note": Kind(lambda _, text: note(text), require_text, inside="/data"),
-    "truth": Kind(lambda _, truth: count(int(truth)), _read_truth, always=True),
-    "mapping": Kind(_write_json_note, _read_mapping, always=True, inside="/data"),
-    "messages": Kind(_write_messages, _read_messages, always=True, inside="/data"),
+    "truth": Kind(
+        lambda _, truth: count(int(truth)),
+        lambda file, path: bool(require_scalar(file, path, "dimensionless")),
+        always=True,
+    ),
+    "mapping": Kind(
+        _write_json_note, lambda file, path: json_value(file, path, dict, {}), True, "/data"
+    ),
+    "messages": Kind(
+        lambda quantity, messages: _write_json_note(quantity, messages_to_json(messages)),
+        lambda file, path: messages_from_json(json_value(file, path, list, [])),
+        True,
+        "/data",
+    ),
     "file": Kind(lambda _, source: write_source(source), read_source),
 }
 """Kinds of quantity beside the numbers, by :attr:`Quantity.dimension`."""

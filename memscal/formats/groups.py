@@ -72,7 +72,8 @@ def parameter_dimension(name: str, unit: str = "") -> str:
 
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
-    dimensions = _dimensions(parameters)
+    stated = parameters.units or ("",) * len(parameters.names)
+    dimensions = [parameter_dimension(n, u) for n, u in zip(parameters.names, stated, strict=True)]
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
         raise InputError(
@@ -148,11 +149,6 @@ def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
         }
         for quantity in json_value(file, f"{path}/names", list, [])
     }
-
-
-def _dimensions(parameters: ParameterSet) -> list[str]:
-    units = parameters.units or ("",) * len(parameters.names)
-    return [parameter_dimension(n, u) for n, u in zip(parameters.names, units, strict=True)]
 
 
 def _unit_scale(file: SafeFile, path: str) -> float:

@@ -28,7 +28,7 @@ from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.values import altered, require_schema, units_of
 from memscal.model import records
-from memscal.model.quantities import Quantity, Record, record
+from memscal.model.quantities import Record, record
 
 __all__ = ["Finding", "check", "describe"]
 
@@ -97,7 +97,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
-        paths = list(_listed(file, schema))
+        paths = [item for at, layout in _layout(file, schema) for item in listed(layout, file, at)]
         numbers = [(at, q) for at, q in paths if not q.axes and not q.origin]
         return {
             "file": file.name,
@@ -169,12 +169,6 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS
         yield path, records.STRESS_PROFILE
-
-
-def _listed(file: SafeFile, schema: str) -> Iterator[tuple[str, Quantity]]:
-    """Yield the path of every quantity that is declared and there."""
-    for path, layout in _layout(file, schema):
-        yield from listed(layout, file, path)
 
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:

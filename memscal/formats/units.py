@@ -111,9 +111,10 @@ def _pint_factor(unit: str, dimension: str, where: str) -> float:
     import pint
 
     registry = _registry()
+    target = dimension if dimension == "dimensionless" else SI_UNITS[dimension]
     try:
         quantity = registry.Quantity(1.0, registry.parse_units(unit))
-        return float(quantity.to(_PINT_SI.get(dimension, SI_UNITS[dimension])).magnitude)
+        return float(quantity.to(target).magnitude)
     except pint.DimensionalityError as error:
         raise _wrong_dimension(where, unit, dimension) from error
     except Exception as error:  # pint raises what its parser happens to meet
@@ -122,9 +123,6 @@ def _pint_factor(unit: str, dimension: str, where: str) -> float:
             why=f"It is a {dimension}.",
             cure=f'Write it like "{FILE_UNITS[dimension]}".',
         ) from error
-
-
-_PINT_SI = {"dimensionless": "dimensionless"}
 
 
 @functools.cache

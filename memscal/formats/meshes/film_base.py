@@ -63,7 +63,7 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     if up not in varying:
         raise InputError(
             f"The vertical axis is {vertical!r}, but the mesh in {name} extends along "
-            f"{_listed(varying)}.",
+            f"{' and '.join(AXES[i] for i in varying)}.",
             cure="Name the axis that points across the film, from base to surface.",
         )
     radial = tuple(i for i in varying if i != up)
@@ -163,7 +163,3 @@ def average_over_circles(
         f"mean by up to {spread / peak if peak else 0:.2g} of the maximum."
     )
     return {"r": r[kept], **means}, note
-
-
-def _listed(axes: list[int] | tuple[int, ...]) -> str:
-    return " and ".join(AXES[i] for i in axes)

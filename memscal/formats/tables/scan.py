@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError, UnitError
-from memscal.formats.tables.reference import ImportedProfile, read_reference_table
 from memscal.formats.tables.text_table import Table, read_table
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
@@ -19,7 +18,7 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.places import places_of
 from memscal.model.scan import Scan, StressSensor
 
-__all__ = ["ImportedProfile", "ImportedScan", "read_reference_table", "read_scan_table"]
+__all__ = ["ImportedScan", "read_scan_table"]
 
 Column = str | int
 
