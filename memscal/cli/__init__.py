@@ -1,8 +1,4 @@
-"""The command line: parse, call the library, print.
-
-Each command has a module of its own, which is imported when the command is used; the libraries
-that do the work are imported inside the commands.  Asking for help imports click alone.
-"""
+"""The command line: each command has a module of its own, imported when it is used."""
 
 from __future__ import annotations
 
@@ -16,11 +12,7 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command ``memscal`` and return its exit code.
-
-    0 done; 1 done, but a quality check failed; 2 usage; 3 input refused; 4 output not written;
-    70 internal error; 130 interrupted.
-    """
+    """Run the command ``memscal`` and return its exit code, as ``memscal --help`` lists them."""
 
     def run(session: Session) -> int:
         args = None if arguments is None else list(arguments)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import debug_option
-from memscal.cli.options import FILE, force_option, json_option
+from memscal.cli.options import FILE, option, output_options
 from memscal.cli.output import (
     FigurePath,
     beside,
@@ -16,12 +14,11 @@ from memscal.cli.output import (
     emit_tables,
     message,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
-
-if TYPE_CHECKING:
-    from memscal.model.measured_stress import MeasuredStress
 
 __all__ = ["command"]
 
@@ -36,30 +33,16 @@ Examples:
 @click.command("apply", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
 @click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="OUT",
-    help="File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5.",
+@option("-o --output", FILE, metavar="OUT")(
+    "File to write (memscal-stress). By default beside the first scan: SCAN.stress.h5."
 )
-@click.option(
-    "--override",
-    is_flag=True,
-    help="Go on although sensor, channel or film of artifact and scan differ: recorded in the "
-    "output.",
+@option("--override", is_flag=True)(
+    "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
-@click.option(
-    "--figure",
-    "figures",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE.png|svg|pdf",
-    help="Draw the profiles of all loads, linear and logarithmic. May be repeated.",
+@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
-@json_option
-@force_option
-@debug_option
+@output_options
 def command(
     artifact: Path,
     scans: tuple[Path, ...],
@@ -91,13 +74,9 @@ def command(
     with working("Measuring"):
         stress = measure_stress(data, artifact, override=override)
     with working("Drawing"):
-        drawn = _rendered(stress, figures)
+        drawn = rendered(stress.plot, figures)
     stress.save(written, overwrite=force)
-    if drawn:
-        from memscal.formats.files import atomic_write_bytes
-
-        for path, content in drawn.items():
-            atomic_write_bytes(path, content, overwrite=force)
+    write_files(drawn, force=force)
     if as_json:
         emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
     else:
@@ -106,12 +85,3 @@ def command(
     for path in (written, *figures):
         message(f"Written: {path}")
     return exit_code_of(stress.checks)
-
-
-def _rendered(stress: MeasuredStress, figures: tuple[Path, ...]) -> dict[Path, bytes]:
-    if not figures:
-        return {}
-    from memscal.figures.style import figure_format, render_figure
-
-    figure = stress.plot()
-    return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}

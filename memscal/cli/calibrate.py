@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from memscal.cli.failures import DONE, debug_option
-from memscal.cli.options import FILE, force_option, json_option
+from memscal.cli.options import FILE, force_option, json_option, option
 from memscal.cli.output import (
     FigurePath,
     beside,
@@ -20,13 +20,13 @@ from memscal.cli.output import (
     message,
     note,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from memscal.calibration.calibrate import Calibration
     from memscal.calibration.monte_carlo import MonteCarlo
     from memscal.calibration.sweep import Sweep
@@ -91,23 +91,10 @@ class Outputs:
             from memscal.figures.report import html_report
 
             contents[self.report] = html_report(calibration.apparatus).encode("utf-8")
-        if self.figures:
-            figure = calibration.plot()
-            contents |= {path: _rendered(figure, path) for path in self.figures}
+        contents |= rendered(calibration.plot, self.figures)
         if self.sweep_figure is not None and sweep is not None:
-            contents[self.sweep_figure] = _rendered(sweep.plot(), self.sweep_figure)
+            contents |= rendered(sweep.plot, [self.sweep_figure])
         return contents
-
-
-def _rendered(figure: Figure, path: Path) -> bytes:
-    from memscal.figures.style import figure_format, render_figure
-
-    return render_figure(figure, figure_format(path.suffix))
-
-
-def _artifact_beside(scan: Path, channel: str) -> Path:
-    """Return the usual name of the artifact of a scan's channel."""
-    return beside(scan, ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5")
 
 
 def _chosen_method(
@@ -187,97 +174,53 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
 
 @click.command("calibrate", epilog=EXAMPLES)
 @click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN...")
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="OUT",
-    help="Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5.",
+@option("-o --output", FILE, metavar="OUT")(
+    "Artifact to write; by default SCAN.apparatus.h5 beside SCAN.h5."
 )
-@click.option(
-    "--reference",
-    type=FILE,
-    metavar="FILE",
-    help="Stress at the base of the film (memscal-reference). By default the one in the scan, or "
-    "else the rod is solved on the film.",
+@option("--reference", FILE, metavar="FILE")(
+    "Stress at the base of the film (memscal-reference). By default the one in the scan, or "
+    "else the rod is solved on the film."
 )
-@click.option(
-    "--alternative",
-    type=FILE,
-    metavar="FILE",
-    help="The same stress by another model of the film (memscal-reference), such as finite strain: "
-    "its difference is counted as an uncertainty of the model's form.",
+@option("--alternative", FILE, metavar="FILE")(
+    "The same stress by another model of the film (memscal-reference), such as finite strain: "
+    "its difference is counted as an uncertainty of the model's form."
 )
-@click.option(
-    "--correlation",
-    "correlations",
-    multiple=True,
-    metavar="INPUT,INPUT=R",
-    help="Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable.",
+@option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
+    "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."
 )
-@click.option(
-    "--channel",
-    type=click.Choice(("zz", "xz", "yz")),
-    default="zz",
-    show_default=True,
-    help="Which voltage is calibrated. xz, yz: the shear, experimental, by method bayesian, to "
-    "SCAN.xz.apparatus.h5.",
+@option("--channel", click.Choice(("zz", "xz", "yz")), "zz")(
+    "Which voltage is calibrated. xz, yz: the shear, experimental, by method bayesian, to "
+    "SCAN.xz.apparatus.h5."
 )
-@click.option(
-    "--method",
-    metavar="NAME",
-    shell_complete=_complete_method,
-    help="How G is found: bayesian (from the scan's points, the most accurate), or by a division "
+@option("--method", metavar="NAME", shell_complete=_complete_method)(
+    "How G is found: bayesian (from the scan's points, the most accurate), or by a division "
     "of fields: white-noise (its exact expectation), white-noise-draw (one "
     "seeded draw, as published), tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a "
-    "plug-in's.  [default: white-noise]",
+    "plug-in's.  [default: white-noise]"
 )
-@click.option(
-    "--option",
-    "options",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
-    "the rule chooses). May be repeated.",
+@option("--option options", multiple=True, metavar="NAME=VALUE")(
+    "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
+    "the rule chooses). May be repeated."
 )
-@click.option(
-    "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of random numbers.  [default: 0]"
-)
+@option("--seed", click.IntRange(min=0), metavar="N")("Seed of random numbers.  [default: 0]")
 @json_option
-@click.option("--report", type=FILE, metavar="FILE.html", help="Write a report as one HTML page.")
-@click.option(
-    "--figure",
-    "figures",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE.png|svg|pdf",
-    help="Draw scan, apparatus function and transfer function. May be repeated.",
+@option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
+@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Draw scan, apparatus function and transfer function. May be repeated."
 )
-@click.option(
-    "--sweep",
-    "sweeping",
-    is_flag=True,
-    help="Show how the results depend on the noise amplitude, over two decades and eight seeds.",
+@option("--sweep sweeping", is_flag=True)(
+    "Show how the results depend on the noise amplitude, over two decades and eight seeds."
 )
-@click.option(
-    "--sweep-figure",
-    type=FigurePath(),
-    metavar="FILE.png|svg|pdf",
-    help="Draw the sweep; implies --sweep.",
+@option("--sweep-figure", FigurePath(), metavar="FILE.png|svg|pdf")(
+    "Draw the sweep; implies --sweep."
 )
-@click.option(
-    "--monte-carlo",
-    "draws",
-    type=click.IntRange(min=2),
-    metavar="DRAWS",
-    help="Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
-    "scatters with the budget of uncertainties. Each draw is calibrated like the scan.",
+@option("--monte-carlo draws", click.IntRange(min=2), metavar="DRAWS")(
+    "Draw noise and all uncertain inputs this many times (1000 is usual), and compare what "
+    "scatters with the budget of uncertainties. Each draw is calibrated like the scan."
 )
 @force_option
-@click.option(
-    "--dry-run",
-    is_flag=True,
-    help="Read and check every input, say what would be done, and write nothing.",
+@option("--dry-run", is_flag=True)(
+    "Read and check every input, say what would be done, and write nothing."
 )
 @debug_option
 def command(
@@ -310,7 +253,8 @@ def command(
 
     A failed quality check is exit code 1: the artifact is written and says so.
     """
-    output = output or _artifact_beside(scans[0], channel)
+    ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
+    output = output or beside(scans[0], ending)
     outputs = Outputs(output, report, figures, sweep_figure)
     regulariser = _chosen_method(method, options, seed, channel)
     pairs = [_correlation(text) for text in correlations]
@@ -341,13 +285,10 @@ def command(
     if draws is not None:
         drawn = _drawn(calibration, draws, seed or 0)
         _show_disagreements(drawn)
-    from memscal.formats.files import atomic_write_bytes
-
     with working("Drawing"):
         contents = outputs.rendered(calibration, sweep)
     calibration.apparatus.save(output, overwrite=force)
-    for path, content in contents.items():
-        atomic_write_bytes(path, content, overwrite=force)
+    write_files(contents, force=force)
     return _show(calibration, sweep, drawn, outputs, as_json)
 
 

@@ -99,10 +99,7 @@ def memscal() -> None:
 
 
 def _check_clock() -> None:
-    """Refuse a wrong SOURCE_DATE_EPOCH here: numpy reads it too, and fails on it in its own words.
-
-    An empty one counts as none, as it does for the files.
-    """
+    """Refuse a wrong SOURCE_DATE_EPOCH before numpy does; an empty one counts as none."""
     from memscal.model.provenance import timestamp
 
     timestamp()

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import debug_option
-from memscal.cli.options import FILE, Quantity, force_option, json_option
+from memscal.cli.options import FILE, Quantity, option, options_of, output_options
 from memscal.cli.output import (
     FIGURE_SUFFIXES,
     FigurePath,
     emit_json,
     message,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
 
 if TYPE_CHECKING:
@@ -38,15 +39,7 @@ __all__ = [
 
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
-    """Return the stems of all figures' names: those of ``memscal.figures.friction``.
-
-    They are needed before anything is computed, without matplotlib; a test compares both.
-
-    Examples
-    --------
-    >>> figure_stems(["dry"])
-    ['profiles-dry', 'friction-set-dry', 'maxima', 'effective-friction', 'likelihood']
-    """
+    """Return the stems of all figures' names, without matplotlib; a test compares both."""
     tails = [f"-{name}" if name else "" for name in dict.fromkeys(lubrications)]
     of_each = [f"{stem}{tail}" for tail in tails for stem in ("profiles", "friction-set")]
     stems = [*of_each, "maxima", "effective-friction", "likelihood"]
@@ -55,11 +48,7 @@ def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> lis
 
 @dataclass(frozen=True)
 class FigureFiles:
-    """Files of the figures: of the one that shows all at a glance, and of all others in a folder.
-
-    ``suffix`` is the others' format; of the scans' lubrications, and of laws of the interface where
-    they are compared, each has figures of its own.
-    """
+    """Files of the figures: of the one that shows all, and of all others in a folder."""
 
     single: tuple[Path, ...]
     folder: Path | None
@@ -94,13 +83,9 @@ class FigureFiles:
         if not self.paths:
             return {}
         from memscal.figures.friction import comparison_figures
-        from memscal.figures.style import figure_format, render_figure
+        from memscal.figures.style import render_figure
 
-        ready: dict[Path, bytes] = {}
-        if self.single:
-            figure = comparison.plot()
-            for path in self.single:
-                ready[path] = render_figure(figure, figure_format(path.suffix))
+        ready = rendered(comparison.plot, self.single)
         if self.folder is not None:
             named = self.in_folder
             for stem, draw in comparison_figures(comparison).items():
@@ -109,23 +94,13 @@ class FigureFiles:
 
     def write(self, ready: dict[Path, bytes], *, force: bool) -> None:
         """Write what was rendered."""
-        from memscal.formats.files import atomic_write_bytes
-
         if self.folder is not None:
             self.folder.mkdir(exist_ok=True)
-        for path, content in ready.items():
-            atomic_write_bytes(path, content, overwrite=force)
-
-
-_Command = TypeVar("_Command", bound=Callable[..., Any])
+        write_files(ready, force=force)
 
 
 def user_cache_folder() -> Path | None:
-    """Return the user's folder of calculated contacts; ``None`` where there is no home.
-
-    ``memscal/contacts`` in ``XDG_CACHE_HOME``, or else in ``~/.cache``.  A relative
-    ``XDG_CACHE_HOME`` counts as none, as its specification says.
-    """
+    """Return the user's folder of contacts; a relative XDG_CACHE_HOME counts as none."""
     named = os.environ.get("XDG_CACHE_HOME", "")
     if named and Path(named).is_absolute():
         return Path(named, "memscal", "contacts")
@@ -135,17 +110,13 @@ def user_cache_folder() -> Path | None:
         return None
 
 
-def cache_options(command: _Command) -> _Command:
-    """Add ``--cache`` and ``--no-cache``."""
-    folder = click.option(
-        "--cache",
-        type=FILE,
-        metavar="FOLDER",
-        help="Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
-        "the user's cache folder]",
-    )
-    none = click.option("--no-cache", is_flag=True, help="Calculate anew, and keep nothing.")
-    return folder(none(command))
+cache_options = options_of(
+    option("--cache", FILE, metavar="FOLDER")(
+        "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
+        "the user's cache folder]"
+    ),
+    option("--no-cache", is_flag=True)("Calculate anew, and keep nothing."),
+)
 
 
 def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
@@ -175,83 +146,44 @@ Examples:
 @click.command("compare", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
 @click.argument("scans", type=FILE, nargs=-1, required=True, metavar="SCAN|STRESS...")
-@click.option(
-    "--friction",
-    "friction",
-    type=_COEFFICIENT,
-    multiple=True,
-    metavar="MU",
-    help="Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
+@option("--friction friction", _COEFFICIENT, multiple=True, metavar="MU")(
+    "Friction coefficient to calculate profiles for, beside 0 and inf (the film sticks "
     "wherever it is touched); between them profiles are interpolated. Repeated: several.  "
-    "[default: nine between 0 and inf]",
+    "[default: nine between 0 and inf]"
 )
-@click.option(
-    "--loading",
-    "loadings",
-    type=click.Choice(["incremental", "total"]),
-    multiple=True,
-    help="A point sticks where it first touched (incremental), or as if loaded in one step "
-    "(total). May be repeated.  [default: both]",
+@option("--loading loadings", click.Choice(["incremental", "total"]), multiple=True)(
+    "A point sticks where it first touched (incremental), or as if loaded in one step "
+    "(total). May be repeated.  [default: both]"
 )
-@click.option(
-    "--reference",
-    "references",
-    type=FILE,
-    multiple=True,
-    metavar="FILE",
-    help="Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
-    "each load and friction coefficient. Repeated.",
+@option("--reference references", FILE, multiple=True, metavar="FILE")(
+    "Profiles calculated elsewhere (memscal-reference), in place of memscal's: one file for "
+    "each load and friction coefficient. Repeated."
 )
-@click.option(
-    "--macroscopic",
-    type=_COEFFICIENT,
-    metavar="MU",
-    help="Friction coefficient measured in sliding, to compare with.",
+@option("--macroscopic", _COEFFICIENT, metavar="MU")(
+    "Friction coefficient measured in sliding, to compare with."
 )
-@click.option(
-    "--macroscopic-uncertainty",
-    type=Quantity("ratio", open_low=False),
-    metavar="U",
-    help="Standard uncertainty (k = 1) of --macroscopic.",
+@option("--macroscopic-uncertainty", Quantity("ratio", open_low=False), metavar="U")(
+    "Standard uncertainty (k = 1) of --macroscopic."
 )
-@click.option(
-    "--interface",
-    is_flag=True,
-    help="Also explain the profiles by an interface that yields before it slips, at the "
-    "macroscopic friction, and say which of the two explanations is more likely.",
+@option("--interface", is_flag=True)(
+    "Also explain the profiles by an interface that yields before it slips, at the "
+    "macroscopic friction, and say which of the two explanations is more likely."
 )
-@click.option(
-    "--override",
-    is_flag=True,
-    help="Compare although sensor, channel or film of artifact and scan differ; recorded.",
+@option("--override", is_flag=True)(
+    "Compare although sensor, channel or film of artifact and scan differ; recorded."
 )
 @cache_options
-@click.option(
-    "--figure",
-    "single",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE.png|svg|pdf",
-    help="Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated.",
+@option("--figure single", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated."
 )
-@click.option(
-    "--figures",
-    "folder",
-    type=FILE,
-    metavar="FOLDER",
-    help="Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
-    "coefficients, maxima, effective friction, likelihood, interface.",
+@option("--figures folder", FILE, metavar="FOLDER")(
+    "Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
+    "coefficients, maxima, effective friction, likelihood, interface."
 )
-@click.option(
-    "--figure-format",
-    type=click.Choice([suffix.removeprefix(".") for suffix in FIGURE_SUFFIXES]),
-    default="png",
-    show_default=True,
-    help="Format of --figures.",
-)
-@json_option
-@force_option
-@debug_option
+@option(
+    "--figure-format", click.Choice([suffix.removeprefix(".") for suffix in FIGURE_SUFFIXES]), "png"
+)("Format of --figures.")
+@output_options
 def command(
     artifact: Path,
     scans: tuple[Path, ...],
@@ -301,7 +233,7 @@ def command(
         comparison = compare(
             data,
             apparatus,
-            friction=_coefficients(friction),
+            friction=tuple(sorted({0.0, *friction, math.inf})) if friction else None,
             loading=loadings or ("incremental", "total"),
             references=profiles or None,
             macroscopic=macroscopic,
@@ -309,7 +241,7 @@ def command(
             interface=interface,
             override=override,
             cache=kept,
-            workers=_workers(),
+            workers=min(2, os.cpu_count() or 1),
         )
     with working("Drawing"):
         ready = files.rendered(comparison)
@@ -322,18 +254,6 @@ def command(
         for kind, checks in failures(comparison.checks).items()
     ]
     return exit_code_of(comparison.checks, failed)
-
-
-def _coefficients(friction: tuple[float, ...]) -> tuple[float, ...] | None:
-    """Return coefficients in their order, from none to full stick; ``None`` for the usual ones."""
-    return tuple(sorted({0.0, *friction, math.inf})) if friction else None
-
-
-def _workers() -> int:
-    """Return how many processes calculate contacts: two where there are two cores."""
-    import os
-
-    return min(2, os.cpu_count() or 1)
 
 
 def _check_usage(

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import DONE
 from memscal.cli.options import (
     Quantity,
     film_from,
     film_options,
-    force_option,
     indenter_from,
-    json_option,
     kernel_from,
     kernel_options,
+    option,
+    output_options,
     radius_options,
     require_one_kernel,
     si,
 )
 from memscal.cli.output import FigurePath, emit_json, emit_tables, message, note, prove_writable
-from memscal.cli.simulate import FILM, number_option
+from memscal.cli.simulate import FILM
 
 if TYPE_CHECKING:
     from memscal.planning.expected import Design
@@ -80,75 +80,37 @@ class _Wish(_WishType):
 
 @click.command("design", epilog=EXAMPLES)
 @kernel_options
-@number_option("--load", "N", 1.0, "Normal load, in N.")
-@number_option(
-    "--load-uncertainty",
-    "percent",
-    1.0,
-    "Standard uncertainty (k = 1) of the load, in percent.",
-    open_low=False,
+@option("--load", Quantity("N"), 1.0)("Normal load, in N.")
+@option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
+    "Standard uncertainty (k = 1) of the load, in percent."
 )
 @radius_options(default=0.25, uncertainty=0.0025)
 @film_options(defaults=FILM)
-@number_option("--step", "mm", 0.25, "Distance of neighbouring positions, in mm.")
-@number_option("--half-range", "mm", 8.0, "Positions run from minus to plus this, in mm.")
-@click.option(
-    "--repeats",
-    type=click.IntRange(min=1),
-    default=1,
-    show_default=True,
-    help="How often the line is scanned.",
-)
-@number_option(
-    "--noise",
-    "percent",
-    0.5,
+@option("--step", Quantity("mm"), 0.25)("Distance of neighbouring positions, in mm.")
+@option("--half-range", Quantity("mm"), 8.0)("Positions run from minus to plus this, in mm.")
+@option("--repeats", click.IntRange(min=1), 1)("How often the line is scanned.")
+@option("--noise", Quantity("percent"), 0.5)(
     "Standard deviation of one voltage, in percent of the signal with the rod right above the "
-    "sensor.",
+    "sensor."
 )
-@click.option(
-    "--noise-voltage",
-    type=Quantity("mV"),
-    help="The same in mV, in place of --noise.",
+@option("--noise-voltage", Quantity("mV"))("The same in mV, in place of --noise.")
+@option("--centre", Quantity("mm", low=-float("inf")), 0.0)(
+    "Expected position of the sensor along the scan, in mm."
 )
-@number_option(
-    "--centre",
-    "mm",
-    0.0,
-    "Expected position of the sensor along the scan, in mm.",
-    low=-float("inf"),
+@option("--method", default="bayesian")(
+    "Method of memscal calibrate with which the scan would be evaluated."
 )
-@click.option(
-    "--method",
-    default="bayesian",
-    show_default=True,
-    help="Method of memscal calibrate with which the scan would be evaluated.",
+@option("--want wishes", _Wish(), multiple=True, metavar="WISH")(
+    "What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
+    "uncertainty, or resolved=4 at least, in rad/mm. May be repeated: all of them."
 )
-@click.option(
-    "--want",
-    "wishes",
-    type=_Wish(),
-    multiple=True,
-    metavar="WISH",
-    help="What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
-    "uncertainty, or resolved=4 at least, in rad/mm. May be repeated: all of them.",
+@option("--vary", click.Choice(_VARIED))(
+    "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
 )
-@click.option(
-    "--vary",
-    type=click.Choice(_VARIED),
-    help="What to vary for --want: the coarsest step, shortest range or fewest repeats is found.",
+@option("--figure figures", FigurePath(), multiple=True, metavar="FILE")(
+    "Figure of the expected result (.png, .svg or .pdf). May be repeated."
 )
-@click.option(
-    "--figure",
-    "figures",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE",
-    help="Figure of the expected result (.png, .svg or .pdf). May be repeated.",
-)
-@json_option
-@force_option
-@debug_option
+@output_options
 def command(
     figures: tuple[Path, ...],
     wishes: tuple[tuple[str, float], ...],

@@ -115,10 +115,7 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
 def exit_code_of(
     checks: Sequence[QualityCheck], named: Sequence[str] | None = None, then: str = ""
 ) -> int:
-    """Return the exit code that quality checks give; warn of those that failed.
-
-    ``named`` are the words for those, by default their names; ``then`` follows them.
-    """
+    """Return the exit code of quality checks; warn of those that failed, ``named`` so."""
     failed = [check.name for check in checks if not check.passed]
     if not failed:
         return DONE

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     FILM,
     Quantity,
     film_from,
     film_options,
-    force_option,
     indenter_from,
-    json_option,
+    option,
+    options_of,
+    output_options,
     radius_options,
     si,
 )
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_Command = TypeVar("_Command", bound=Callable[..., Any])
-
 _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "solver")
 _OF_TABLES = ("r",)
 _OF_MESHES = ("vertical", "base", "centre")
@@ -43,64 +42,40 @@ _READING = ("delimiter", "decimal")
 _POSITION = Quantity("mm", low=-float("inf"))
 
 
-def reference_options(command: _Command) -> _Command:
-    """Add the options that say what a table or a mesh of stress at the base holds."""
-    signs = click.Choice(["1", "-1"])
-    options = [
-        click.option("--r", metavar="COLUMN", help="Reference: column of the radius."),
-        click.option(
-            "--r-unit",
-            metavar="UNIT",
-            help="Reference: unit of the radius, or of a mesh's coordinates, such as mm.",
-        ),
-        click.option(
-            "--sigma",
-            metavar="COLUMN|FIELD",
-            help="Reference: column of the normal stress at the base; in a mesh the field of it, "
-            "or of the stress tensor, and FIELD:2 is its component 2.",
-        ),
-        click.option(
-            "--sigma-unit", metavar="UNIT", help="Reference: unit of the stresses, such as MPa."
-        ),
-        click.option(
-            "--shear",
-            metavar="COLUMN|FIELD",
-            help="Reference: the radial shear stress; in a mesh a stress tensor's own by default.",
-        ),
-        click.option(
-            "--sign",
-            type=signs,
-            help="Reference: -1 where compression is negative.  [default: 1 for a table, -1 for a "
-            "mesh]",
-        ),
-        click.option(
-            "--shear-sign",
-            type=signs,
-            help="Reference: -1 where the shear is the stress component S13 with axis 3 from the "
-            "base to the surface; 1 where it is the base's traction on the film, positive outward."
-            "  [default: 1 for a table; for a mesh S13, whichever way its axis points]",
-        ),
-        click.option("--solver", metavar="TEXT", help="Reference: the program that calculated it."),
-        click.option(
-            "--vertical",
-            type=click.Choice(["x", "y", "z"]),
-            help="Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]",
-        ),
-        click.option(
-            "--base",
-            type=_POSITION,
-            help="Mesh: position of the base on that axis, in mm.  [default: the lowest]",
-        ),
-        click.option(
-            "--centre",
-            type=(_POSITION, _POSITION),
-            metavar="MM MM",
-            help="Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]",
-        ),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+_SIGN = click.Choice(["1", "-1"])
+reference_options = options_of(
+    option("--r", metavar="COLUMN")("Reference: column of the radius."),
+    option("--r-unit", metavar="UNIT")(
+        "Reference: unit of the radius, or of a mesh's coordinates, such as mm."
+    ),
+    option("--sigma", metavar="COLUMN|FIELD")(
+        "Reference: column of the normal stress at the base; in a mesh the field of it, "
+        "or of the stress tensor, and FIELD:2 is its component 2."
+    ),
+    option("--sigma-unit", metavar="UNIT")("Reference: unit of the stresses, such as MPa."),
+    option("--shear", metavar="COLUMN|FIELD")(
+        "Reference: the radial shear stress; in a mesh a stress tensor's own by default."
+    ),
+    option("--sign", _SIGN)(
+        "Reference: -1 where compression is negative.  [default: 1 for a table, -1 for a mesh]"
+    ),
+    option("--shear-sign", _SIGN)(
+        "Reference: -1 where the shear is the stress component S13 with axis 3 from the "
+        "base to the surface; 1 where it is the base's traction on the film, positive outward."
+        "  [default: 1 for a table; for a mesh S13, whichever way its axis points]"
+    ),
+    option("--solver", metavar="TEXT")("Reference: the program that calculated it."),
+    option("--vertical", click.Choice(["x", "y", "z"]))(
+        "Mesh: axis across the film.  [default: the second of a section's two; z in 3-D]"
+    ),
+    option("--base", _POSITION)(
+        "Mesh: position of the base on that axis, in mm.  [default: the lowest]"
+    ),
+    option("--centre", (_POSITION, _POSITION), metavar="MM MM")(
+        "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
+    ),
+)
+"""The options that say what a table or a mesh of stress at the base holds."""
 
 
 def needed(path: Path) -> tuple[str, ...]:
@@ -185,96 +160,55 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 
 @click.command("import", epilog=EXAMPLES)
 @click.argument("table", type=FILE)
-@click.option(
-    "-o", "--output", type=FILE, required=True, metavar="OUT", help="Scan or reference to write."
+@option("-o --output", FILE, required=True, metavar="OUT")("Scan or reference to write.")
+@option("--format kind", click.Choice(["scan", "reference"]), "scan")(
+    "What it holds: measured points, or the base stress of a FEM calculation."
 )
-@click.option(
-    "--format",
-    "kind",
-    type=click.Choice(["scan", "reference"]),
-    default="scan",
-    show_default=True,
-    help="What it holds: measured points, or the base stress of a FEM calculation.",
+@option("--x", metavar="COLUMN")("Scan: column of the position.")
+@option("--x-unit", metavar="UNIT")("Scan: unit of the positions, such as mm.")
+@option("--u", metavar="COLUMN")("Scan: column of the normal channel's voltage.")
+@option("--u-unit", metavar="UNIT")("Scan: unit of the voltages, such as mV.")
+@option("--y", metavar="COLUMN")("Scan: column of the second position, of points in a plane.")
+@option("--repeat", metavar="COLUMN", multiple=True)(
+    "Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
+    "line, such as of the load that was set and of the pass."
 )
-@click.option("--x", metavar="COLUMN", help="Scan: column of the position.")
-@click.option("--x-unit", metavar="UNIT", help="Scan: unit of the positions, such as mm.")
-@click.option("--u", metavar="COLUMN", help="Scan: column of the normal channel's voltage.")
-@click.option("--u-unit", metavar="UNIT", help="Scan: unit of the voltages, such as mV.")
-@click.option(
-    "--y", metavar="COLUMN", help="Scan: column of the second position, of points in a plane."
+@option("--u-xz", metavar="COLUMN")("Scan: column of the channel xz.")
+@option("--u-yz", metavar="COLUMN")("Scan: column of the channel yz.")
+@option("--load", Quantity("N"))("Normal load, in N.")
+@option("--load-column", metavar="COLUMN")("Scan: column of the load at each point.")
+@option("--load-unit", metavar="UNIT")("Scan: unit of the column of loads.  [default: N]")
+@option("--load-uncertainty", Quantity("N", open_low=False))(
+    "Scan: standard uncertainty of the load common to all points, in N."
 )
-@click.option(
-    "--repeat",
-    metavar="COLUMN",
-    multiple=True,
-    help="Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
-    "line, such as of the load that was set and of the pass.",
+@option("--load-scatter", Quantity("percent", open_low=False))(
+    "Scan: standard uncertainty of each point's own load, independent from point to point, "
+    "in percent: a weight set down by hand."
 )
-@click.option("--u-xz", metavar="COLUMN", help="Scan: column of the channel xz.")
-@click.option("--u-yz", metavar="COLUMN", help="Scan: column of the channel yz.")
-@click.option("--load", type=Quantity("N"), help="Normal load, in N.")
-@click.option("--load-column", metavar="COLUMN", help="Scan: column of the load at each point.")
-@click.option(
-    "--load-unit", metavar="UNIT", help="Scan: unit of the column of loads.  [default: N]"
+@option("--position-error", Quantity("um", open_low=False))(
+    "Scan: standard uncertainty of each position, independent from point to point, in um."
 )
-@click.option(
-    "--load-uncertainty",
-    type=Quantity("N", open_low=False),
-    help="Scan: standard uncertainty of the load common to all points, in N.",
+@option("--lubrication", click.Choice(["dry", "lubricated"]))(
+    "Scan: what was between indenter and film."
 )
-@click.option(
-    "--load-scatter",
-    type=Quantity("percent", open_low=False),
-    help="Scan: standard uncertainty of each point's own load, independent from point to point, "
-    "in percent: a weight set down by hand.",
+@option("--lubricant", metavar="TEXT")("Scan: name of the lubricant.")
+@option("--u-scale", float, metavar="V")(
+    "Scan: volts per unit of the readings, for a sensor whose output is not a voltage."
 )
-@click.option(
-    "--position-error",
-    type=Quantity("um", open_low=False),
-    help="Scan: standard uncertainty of each position, independent from point to point, in um.",
+@option("--u-sign", _SIGN)(
+    "Scan: -1 where the voltage falls when the indenter presses.  [default: 1]"
 )
-@click.option(
-    "--lubrication",
-    type=click.Choice(["dry", "lubricated"]),
-    help="Scan: what was between indenter and film.",
-)
-@click.option("--lubricant", metavar="TEXT", help="Scan: name of the lubricant.")
-@click.option(
-    "--u-scale",
-    type=float,
-    metavar="V",
-    help="Scan: volts per unit of the readings, for a sensor whose output is not a voltage.",
-)
-@click.option(
-    "--u-sign",
-    type=click.Choice(["1", "-1"]),
-    help="Scan: -1 where the voltage falls when the indenter presses.  [default: 1]",
-)
-@click.option("--sensor-name", metavar="TEXT", help="Scan: name of the sensor.")
-@click.option("--sensor-model", metavar="TEXT", help="Scan: model of the sensor.")
-@click.option("--channel", metavar="TEXT", help="Scan: name of the channel.  [default: zz]")
-@click.option("--title", metavar="TEXT", help="Scan: title.")
+@option("--sensor-name", metavar="TEXT")("Scan: name of the sensor.")
+@option("--sensor-model", metavar="TEXT")("Scan: model of the sensor.")
+@option("--channel", metavar="TEXT")("Scan: name of the channel.  [default: zz]")
+@option("--title", metavar="TEXT")("Scan: title.")
 @reference_options
-@click.option(
-    "--indenter",
-    type=click.Choice(["rod", "sphere"]),
-    default="rod",
-    show_default=True,
-    help="Shape of the indenter.",
-)
+@option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
 @radius_options()
 @film_options()
-@click.option(
-    "--delimiter", metavar="CHAR", help="What separates columns; found from the table by default."
-)
-@click.option(
-    "--decimal",
-    type=click.Choice([".", ","]),
-    help="Decimal mark; found from the table by default.",
-)
-@json_option
-@force_option
-@debug_option
+@option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
+@option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
+@output_options
 def command(
     table: Path, output: Path, kind: str, as_json: bool, force: bool, **options: Any
 ) -> int:
@@ -292,14 +226,8 @@ def command(
     _write(imported, output, force)
     warnings = [note for note in imported.notes if note.severity == "warning"]
     if as_json:
-        emit_json(
-            {
-                "schema_version": "1",
-                "output": str(output),
-                "format": kind,
-                "notes": marked_texts(imported.notes),
-            }
-        )
+        head = {"schema_version": "1", "output": str(output), "format": kind}
+        emit_json({**head, "notes": marked_texts(imported.notes)})
     else:
         emit(readable("\n".join(note.text for note in imported.notes if note not in warnings)))
     show_messages(warnings)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 import click
+
+from memscal.cli.failures import debug_option
 
 if TYPE_CHECKING:
     from memscal.axisymmetry.kernels import RadialKernel
@@ -29,6 +31,9 @@ __all__ = [
     "json_option",
     "kernel_from",
     "kernel_options",
+    "option",
+    "options_of",
+    "output_options",
     "radius_options",
     "require_one_kernel",
     "si",
@@ -90,10 +95,33 @@ class Quantity(_Number):
         return "a number " + " and ".join(bounds)
 
 
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print one JSON object in place of tables."
-)
-force_option = click.option("--force", is_flag=True, help="Replace outputs that exist.")
+class _Adder(Protocol):
+    def __call__(self, command: _Command, /) -> _Command: ...
+
+
+def option(
+    names: str, kind: Any = None, default: Any = None, *, show_default: bool = True, **settings: Any
+) -> Callable[[str], _Adder]:
+    """Return what makes an option of its help text; blanks part its names."""
+    if default is not None:
+        settings |= {"default": default, "show_default": show_default}
+    return lambda about: click.option(*names.split(), type=kind, help=about, **settings)
+
+
+def options_of(*options: _Adder) -> _Adder:
+    """Return the options as one, in their order."""
+
+    def add(command: _Command) -> _Command:
+        for adder in reversed(options):
+            command = adder(command)
+        return command
+
+    return add
+
+
+json_option = option("--json as_json", is_flag=True)("Print one JSON object in place of tables.")
+force_option = option("--force", is_flag=True)("Replace outputs that exist.")
+output_options = options_of(json_option, force_option, debug_option)
 
 FILM = ("young_modulus", "poisson_ratio", "thickness")
 """What describes a film, by the names of its options."""
@@ -103,8 +131,8 @@ _UNCERTAINTY = "Standard uncertainty (k = 1) of "
 
 def film_options(
     *, defaults: Mapping[str, float] | None = None, uncertainties: bool = True
-) -> Callable[[_Command], _Command]:
-    """Add the film: modulus, Poisson's ratio, thickness, with or without their uncertainties."""
+) -> _Adder:
+    """Return the film's options, with or without those of the uncertainties."""
     values = {} if defaults is None else defaults
     ratio = Quantity("ratio", high=0.5, open_low=False)
     entries: list[tuple[str, Quantity, str]] = [
@@ -123,10 +151,10 @@ def film_options(
 
 def radius_options(
     *, default: float | None = None, uncertainty: float | None = None, uncertainties: bool = True
-) -> Callable[[_Command], _Command]:
-    """Add the indenter's radius, with or without its uncertainty."""
+) -> _Adder:
+    """Return the option of the indenter's radius, with or without its uncertainty."""
     entries: list[tuple[str, Quantity, str]] = [
-        ("radius", Quantity("mm"), "Radius of the rod (not its diameter), in mm."),
+        ("radius", Quantity("mm"), "Radius of the rod (not its diameter), in mm.")
     ]
     if uncertainties:
         spread = Quantity("mm", open_low=False)
@@ -135,20 +163,10 @@ def radius_options(
     return _all_of(entries, {name: v for name, v in values.items() if v is not None})
 
 
-def _all_of(
-    entries: list[tuple[str, Quantity, str]], defaults: Mapping[str, float]
-) -> Callable[[_Command], _Command]:
-    def add(command: _Command) -> _Command:
-        for name, kind, about in reversed(entries):
-            default = defaults.get(name)
-            shown = default is not None
-            option = click.option(
-                f"--{name}", type=kind, default=default, show_default=shown, help=about
-            )
-            command = option(command)
-        return command
-
-    return add
+def _all_of(entries: list[tuple[str, Quantity, str]], defaults: Mapping[str, float]) -> _Adder:
+    return options_of(
+        *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in entries)
+    )
 
 
 @overload
@@ -195,45 +213,21 @@ def _require(subject: str, options: Mapping[str, Any], names: tuple[str, ...]) -
         raise click.UsageError(f"{subject} is not fully given: add {', '.join(missing)}.")
 
 
-_OPTIONS = (
-    click.option(
-        "--sigma",
-        "sigmas",
-        type=Quantity("um"),
-        multiple=True,
-        default=(561.0,),
-        show_default=True,
-        help="Standard deviation of the Gaussian apparatus function, in um. Repeated with "
-        "--weight: a sum of Gaussians.",
+kernel_options = options_of(
+    option("--sigma sigmas", Quantity("um"), (561.0,), multiple=True)(
+        "Standard deviation of the Gaussian apparatus function, in um. Repeated with "
+        "--weight: a sum of Gaussians."
     ),
-    click.option(
-        "--weight",
-        "weights",
-        type=Quantity("ratio", low=-math.inf),
-        multiple=True,
-        help="Share of each Gaussian, in the order of --sigma; they add up to 1.",
+    option("--weight weights", Quantity("ratio", low=-math.inf), multiple=True)(
+        "Share of each Gaussian, in the order of --sigma; they add up to 1."
     ),
-    click.option(
-        "--disc-radius",
-        type=Quantity("um"),
-        help="Radius of a uniform disc, in um: the apparatus function is this disc, blurred by a "
-        "Gaussian of --sigma.",
+    option("--disc-radius", Quantity("um"))(
+        "Radius of a uniform disc, in um: the apparatus function is this disc, blurred by a "
+        "Gaussian of --sigma."
     ),
-    click.option(
-        "--conversion-constant",
-        type=Quantity("mV/Pa"),
-        default=1e-4,
-        show_default=True,
-        help="Conversion constant A, in mV/Pa.",
-    ),
+    option("--conversion-constant", Quantity("mV/Pa"), 1e-4)("Conversion constant A, in mV/Pa."),
 )
-
-
-def kernel_options(command: _Command) -> _Command:
-    """Add the apparatus function and the conversion constant."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+"""The apparatus function and the conversion constant."""
 
 
 def require_one_kernel(options: Mapping[str, Any]) -> None:

@@ -8,13 +8,16 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from memscal.errors import OutputError
 from memscal.model.checks import Message
 from memscal.summaries.table import Table, readable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "FIGURE_SUFFIXES",
@@ -27,18 +30,16 @@ __all__ = [
     "message",
     "note",
     "prove_writable",
+    "rendered",
     "show_messages",
     "warn",
     "working",
+    "write_files",
 ]
 
 
 def emit(text: str) -> None:
-    """Print results.
-
-    A reader that goes away (``| head``) is no failure: the work is done, and its exit code
-    says how it went.
-    """
+    """Print results; a reader that goes away (``| head``) is no failure."""
     if sys.stdout is None:
         return
     try:
@@ -132,10 +133,7 @@ _CLEAR = "\r\x1b[K"
 
 @contextmanager
 def working(what: str) -> Iterator[Callable[[str], None]]:
-    """Show what is being done, and for how long, on a terminal and only if it takes long.
-
-    Yields a function that replaces the text.
-    """
+    """Show on a terminal what is being done, if it takes long; yield what replaces the text."""
     shown = [what]
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None
@@ -253,3 +251,21 @@ def prove_writable(outputs: Sequence[Path], *, force: bool, inputs: Sequence[Pat
         seen[real] = output
     for output in outputs:
         ensure_writable(output, overwrite=force, inputs=inputs)
+
+
+def rendered(draw: Callable[[], Figure], paths: Sequence[Path]) -> dict[Path, bytes]:
+    """Return a figure as the bytes of files; without files it is not drawn."""
+    if not paths:
+        return {}
+    from memscal.figures.style import figure_format, render_figure
+
+    figure = draw()
+    return {path: render_figure(figure, figure_format(path.suffix)) for path in paths}
+
+
+def write_files(contents: Mapping[Path, bytes], *, force: bool) -> None:
+    """Write files whole, each by its name."""
+    from memscal.formats.files import atomic_write_bytes
+
+    for path, content in contents.items():
+        atomic_write_bytes(path, content, overwrite=force)

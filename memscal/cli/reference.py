@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     Quantity,
     film_from,
     film_options,
-    force_option,
     indenter_from,
-    json_option,
+    option,
+    options_of,
+    output_options,
     radius_options,
     si,
 )
@@ -27,7 +28,9 @@ from memscal.cli.output import (
     emit_tables,
     message,
     prove_writable,
+    rendered,
     show_messages,
+    write_files,
 )
 
 if TYPE_CHECKING:
@@ -37,45 +40,32 @@ if TYPE_CHECKING:
 
 __all__ = ["SHAPES", "command", "interface_of", "interface_options"]
 
-_Command = TypeVar("_Command", bound=Callable[..., Any])
-
 #: The paper's rod and sphere, in mm.
 _RADIUS = {"rod": 0.25, "sphere": 128.8}
 SHAPES = ("rod", "sphere", "cone", "profile")
 
 # What each shape is described by; every other of these options belongs to another shape.
-_DESCRIBED_BY = {
-    "rod": "radius",
-    "sphere": "radius",
-    "cone": "inclination",
-    "profile": "profile_table",
-}
+_DESCRIBED_BY = {"rod": "radius", "sphere": "radius"}
+_DESCRIBED_BY |= {"cone": "inclination", "profile": "profile_table"}
 
 
-def interface_options(command: _Command) -> _Command:
-    """Add the options of a rough interface."""
-    slip = click.option(
-        "--slip-length",
-        type=Quantity("um", open_low=False),
-        default=0.0,
-        help="Elastic tangential displacement of the interface before it slips, in um.  "
-        "[default: 0, rigid]",
-    )
-    greenwood = click.option(
-        "--greenwood-tripp",
-        type=(Quantity("um"), Quantity("1/mm^2"), Quantity("um")),
-        metavar="UM 1/MM^2 UM",
-        help="Rough interface: rms height of the asperities (um), their number per mm^2, and the "
-        "radius of their tips (um).",
-    )
-    exponential = click.option(
-        "--exponential",
-        type=(Quantity("um"), Quantity("MPa")),
-        metavar="UM MPa",
-        help="Rough interface: pressure that falls by e within a length (um), and its value where "
-        "the mean planes meet (MPa).",
-    )
-    return slip(greenwood(exponential(command)))
+_ASPERITIES = (Quantity("um"), Quantity("1/mm^2"), Quantity("um"))
+
+interface_options = options_of(
+    option("--slip-length", Quantity("um", open_low=False), 0.0, show_default=False)(
+        "Elastic tangential displacement of the interface before it slips, in um.  "
+        "[default: 0, rigid]"
+    ),
+    option("--greenwood-tripp", _ASPERITIES, metavar="UM 1/MM^2 UM")(
+        "Rough interface: rms height of the asperities (um), their number per mm^2, and the "
+        "radius of their tips (um)."
+    ),
+    option("--exponential", (Quantity("um"), Quantity("MPa")), metavar="UM MPa")(
+        "Rough interface: pressure that falls by e within a length (um), and its value where "
+        "the mean planes meet (MPa)."
+    ),
+)
+"""The options of a rough interface."""
 
 
 def indenter_of(shape: str, options: Mapping[str, Any]) -> Indenter:
@@ -142,103 +132,54 @@ Examples:
 
 @click.command("reference", epilog=EXAMPLES)
 @click.argument("indenter", type=click.Choice(SHAPES))
-@click.option(
-    "--load",
-    "loads",
-    type=Quantity("N"),
-    multiple=True,
-    help="Normal load, in N. Repeated, a path: visited in the order given.  [default: 1, without "
-    "--depth]",
+@option("--load loads", Quantity("N"), multiple=True)(
+    "Normal load, in N. Repeated, a path: visited in the order given.  [default: 1, without "
+    "--depth]"
 )
-@click.option(
-    "--depth",
-    "depths",
-    type=Quantity("um"),
-    multiple=True,
-    help="Indentation depth, in um, in place of a load. May be repeated.",
+@option("--depth depths", Quantity("um"), multiple=True)(
+    "Indentation depth, in um, in place of a load. May be repeated."
 )
 @radius_options(uncertainties=False)
-@click.option(
-    "--inclination",
-    type=Quantity("deg", high=89.0),
-    help="Cone: angle between its face and the film, in degrees.",
+@option("--inclination", Quantity("deg", high=89.0))(
+    "Cone: angle between its face and the film, in degrees."
 )
-@click.option(
-    "--profile-table",
-    type=FILE,
-    metavar="TABLE",
-    help="Profile: a delimited table of radius and height, from the axis outward.",
+@option("--profile-table", FILE, metavar="TABLE")(
+    "Profile: a delimited table of radius and height, from the axis outward."
 )
-@click.option("--r-unit", default="mm", show_default=True, help="Profile: unit of the radii.")
-@click.option("--z-unit", default="um", show_default=True, help="Profile: unit of the heights.")
-@click.option(
-    "--friction",
-    type=Quantity("ratio", open_low=False, infinite=True),
-    default=0.0,
-    show_default=True,
-    metavar="MU",
-    help="Friction coefficient between indenter and film; inf: it sticks wherever it touches.",
+@option("--r-unit", default="mm")("Profile: unit of the radii.")
+@option("--z-unit", default="um")("Profile: unit of the heights.")
+@option("--friction", Quantity("ratio", open_low=False, infinite=True), 0.0, metavar="MU")(
+    "Friction coefficient between indenter and film; inf: it sticks wherever it touches."
 )
-@click.option(
-    "--loading",
-    type=click.Choice(["incremental", "total"]),
-    default="incremental",
-    show_default=True,
-    help="A point sticks where it first touched, or as if loaded in one step. The same under a "
-    "rod.",
+@option("--loading", click.Choice(["incremental", "total"]), "incremental")(
+    "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
 @film_options(defaults=FILM, uncertainties=False)
-@click.option(
-    "--backend",
-    type=click.Choice(["hankel", "fem"]),
-    default="hankel",
-    show_default=True,
-    help="Hankel transforms on an infinite film, or finite elements on one with a free edge.",
+@option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
+    "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
-@click.option(
-    "--strain",
-    type=click.Choice(["linear", "finite"]),
-    default="linear",
-    show_default=True,
-    help="finite: a neo-Hookean film, by finite elements; friction 0 or inf.",
+@option("--strain", click.Choice(["linear", "finite"]), "linear")(
+    "finite: a neo-Hookean film, by finite elements; friction 0 or inf."
 )
-@click.option(
-    "--film-radius",
-    type=Quantity("mm"),
-    help="Radius of the film's free edge, in mm, for finite elements.  [default: 12 thicknesses "
-    "from the contact]",
+@option("--film-radius", Quantity("mm"))(
+    "Radius of the film's free edge, in mm, for finite elements.  [default: 12 thicknesses "
+    "from the contact]"
 )
-@click.option(
-    "--rings",
-    type=click.IntRange(min=16),
-    help="Rings from the axis to the largest contact.  [default: as many as it takes]",
+@option("--rings", click.IntRange(min=16))(
+    "Rings from the axis to the largest contact.  [default: as many as it takes]"
 )
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="OUT",
-    help="Reference file to write (memscal-reference); for one load or depth.",
+@option("-o --output", FILE, metavar="OUT")(
+    "Reference file to write (memscal-reference); for one load or depth."
 )
-@click.option(
-    "--figure",
-    "figures",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE",
-    help="Figure of the contacts (.png, .svg or .pdf). May be repeated.",
+@option("--figure figures", FigurePath(), multiple=True, metavar="FILE")(
+    "Figure of the contacts (.png, .svg or .pdf). May be repeated."
 )
-@click.option(
-    "--mesh",
-    type=FILE,
-    metavar="FILE.vtu",
-    help="Displacement and stress in the film, for ParaView (needs meshio); for finite elements "
-    "and one load or depth.",
+@option("--mesh", FILE, metavar="FILE.vtu")(
+    "Displacement and stress in the film, for ParaView (needs meshio); for finite elements "
+    "and one load or depth."
 )
-@json_option
-@force_option
-@debug_option
+@output_options
 def command(
     indenter: str,
     loads: tuple[float, ...],
@@ -291,12 +232,8 @@ def _check_usage(
 def _pressed(
     indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], options: dict[str, Any]
 ) -> list[Contact]:
-    film, body, interface = (
-        film_from(options),
-        indenter_of(indenter, options),
-        interface_of(options),
-    )
-
+    film, body = film_from(options), indenter_of(indenter, options)
+    interface = interface_of(options)
     from memscal.mechanics.indent import indent
 
     settings: dict[str, Any] = {
@@ -317,14 +254,11 @@ def _write(
     force: bool,
 ) -> None:
     """Write the files; what is drawn is drawn before the first of them is there."""
-    rendered: dict[Path, bytes] = {}
+    drawn: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.stress import contact_figure
-        from memscal.figures.style import figure_format, render_figure
 
-        figure = contact_figure(contacts)
-        for path in figures:
-            rendered[path] = render_figure(figure, figure_format(path.suffix))
+        drawn = rendered(lambda: contact_figure(contacts), figures)
     if output is not None:
         from memscal.formats.reference import write_reference
 
@@ -333,11 +267,7 @@ def _write(
         from memscal.formats.meshes.mesh_files import write_mesh
 
         write_mesh(contacts[0].mesh(), mesh, overwrite=force)
-    if rendered:
-        from memscal.formats.files import atomic_write_bytes
-
-        for path, data in rendered.items():
-            atomic_write_bytes(path, data, overwrite=force)
+    write_files(drawn, force=force)
 
 
 def _print(

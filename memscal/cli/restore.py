@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from memscal.cli.failures import debug_option
-from memscal.cli.options import FILE, force_option, json_option
+from memscal.cli.options import FILE, option, output_options
 from memscal.cli.output import (
     FigurePath,
     emit_json,
@@ -17,8 +16,10 @@ from memscal.cli.output import (
     message,
     note,
     prove_writable,
+    rendered,
     show_messages,
     working,
+    write_files,
 )
 
 if TYPE_CHECKING:
@@ -37,33 +38,18 @@ Examples:
 @click.command("restore", epilog=EXAMPLES)
 @click.argument("artifact", type=FILE)
 @click.argument("scan", type=FILE)
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="OUT",
-    help="Reference file to write (memscal-reference): the restored stress with its uncertainty.",
+@option("-o --output", FILE, metavar="OUT")(
+    "Reference file to write (memscal-reference): the restored stress with its uncertainty."
 )
-@click.option(
-    "--expected",
-    type=FILE,
-    metavar="FILE",
-    help="A calculated stress at the base (memscal-reference), such as memscal reference writes: "
+@option("--expected", FILE, metavar="FILE")(
+    "A calculated stress at the base (memscal-reference), such as memscal reference writes: "
     "adds the check expected_stress. By default the scan's indenter is pressed on its film without "
-    "friction, to be shown beside the result.",
+    "friction, to be shown beside the result."
 )
-@click.option(
-    "--figure",
-    "figures",
-    type=FigurePath(),
-    multiple=True,
-    metavar="FILE.png|svg|pdf",
-    help="Draw the restored, the measured and the calculated stress, and residuals. May be "
-    "repeated.",
+@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+    "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
-@json_option
-@force_option
-@debug_option
+@output_options
 def command(
     artifact: Path,
     scan: Path,
@@ -99,16 +85,12 @@ def command(
         if stress is None:
             restored = _beside_calculated(restored)
     with working("Drawing"):
-        drawn = _rendered(restored, figures)
+        drawn = rendered(restored.plot, figures)
     if output is not None:
         from memscal.formats.reference import write_reference
 
         write_reference(restored.profile(), output, overwrite=force)
-    if drawn:
-        from memscal.formats.files import atomic_write_bytes
-
-        for path, content in drawn.items():
-            atomic_write_bytes(path, content, overwrite=force)
+    write_files(drawn, force=force)
     if as_json:
         written = None if output is None else str(output)
         emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
@@ -132,12 +114,3 @@ def _beside_calculated(restored: Restoration) -> Restoration:
     except MemscalError as failure:
         note(f"No contact is shown beside the result: {failure.problem}")
         return restored
-
-
-def _rendered(restored: Restoration, figures: tuple[Path, ...]) -> dict[Path, bytes]:
-    if not figures:
-        return {}
-    from memscal.figures.style import figure_format, render_figure
-
-    figure = restored.plot()
-    return {path: render_figure(figure, figure_format(path.suffix)) for path in figures}

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
     Quantity,
     film_from,
     film_options,
-    force_option,
     indenter_from,
-    json_option,
     kernel_from,
     kernel_options,
+    option,
+    options_of,
+    output_options,
     radius_options,
     require_one_kernel,
     si,
@@ -32,14 +33,7 @@ if TYPE_CHECKING:
     from memscal.model.scan import Scan
     from memscal.simulation.experiment import Experiment
 
-__all__ = [
-    "FILES",
-    "NAMES",
-    "command",
-    "number_option",
-]
-
-_Command = TypeVar("_Command", bound=Callable[..., Any])
+__all__ = ["FILES", "NAMES", "command"]
 
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with what the laboratory names."""
@@ -54,104 +48,44 @@ NAMES = (
 _LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
-def number_option(
-    name: str, unit: str, default: float, about: str, **limits: Any
-) -> Callable[[_Command], _Command]:
-    """Return the option of a number in a unit, whose default is shown."""
-    kind = Quantity(unit, **limits)
-    return click.option(name, type=kind, default=default, show_default=True, help=about)
-
-
-_OPTIONS = (
-    click.option(
-        "--lubricated-load",
-        "lubricated_loads",
-        type=Quantity("N"),
-        multiple=True,
-        default=(0.69, 2.75),
-        show_default=True,
-        help="Sphere: load of the lubricated contacts, in N. May be repeated.",
+_sphere_options = options_of(
+    option("--lubricated-load lubricated_loads", Quantity("N"), (0.69, 2.75), multiple=True)(
+        "Sphere: load of the lubricated contacts, in N. May be repeated."
     ),
-    number_option("--sphere-radius", "mm", 128.8, "Sphere: radius of curvature, in mm."),
-    number_option(
-        "--sphere-radius-uncertainty",
-        "mm",
-        0.5,
-        "Sphere: standard uncertainty (k = 1) of its radius, in mm.",
-        open_low=False,
+    option("--sphere-radius", Quantity("mm"), 128.8)("Sphere: radius of curvature, in mm."),
+    option("--sphere-radius-uncertainty", Quantity("mm", open_low=False), 0.5)(
+        "Sphere: standard uncertainty (k = 1) of its radius, in mm."
     ),
-    click.option(
-        "--friction",
-        type=Quantity("ratio", open_low=False, infinite=True),
-        default=0.2,
-        show_default=True,
-        metavar="MU",
-        help="Sphere: friction coefficient of the dry contacts; inf: they stick wherever they "
-        "touch.",
+    option("--friction", Quantity("ratio", open_low=False, infinite=True), 0.2, metavar="MU")(
+        "Sphere: friction coefficient of the dry contacts; inf: they stick wherever they touch."
     ),
-    click.option(
-        "--loading",
-        type=click.Choice(["incremental", "total"]),
-        default="incremental",
-        show_default=True,
-        help="Sphere: a point sticks where it first touched, or as if loaded in one step.",
+    option("--loading", click.Choice(["incremental", "total"]), "incremental")(
+        "Sphere: a point sticks where it first touched, or as if loaded in one step."
     ),
     interface_options,
-    click.option(
-        "--contacts",
-        type=click.IntRange(min=2, max=4096),
-        default=33,
-        show_default=True,
-        help="Sphere: contacts in a row.",
+    option("--contacts", click.IntRange(min=2, max=4096), 33)("Sphere: contacts in a row."),
+    option("--spacing", Quantity("mm"), 0.5)("Sphere: distance of neighbouring contacts, in mm."),
+    option("--load-scatter", Quantity("percent", high=10.0, open_low=False), 2.0)(
+        "Sphere: standard deviation of each contact's own load, in percent."
     ),
-    number_option("--spacing", "mm", 0.5, "Sphere: distance of neighbouring contacts, in mm."),
-    number_option(
-        "--load-scatter",
-        "percent",
-        2.0,
-        "Sphere: standard deviation of each contact's own load, in percent.",
-        high=10.0,
-        open_low=False,
+    option("--record-loads", is_flag=True)(
+        "Sphere: record the load that each contact had, read to 0.2 percent, in place of "
+        "the nominal one."
     ),
-    click.option(
-        "--record-loads",
-        is_flag=True,
-        help="Sphere: record the load that each contact had, read to 0.2 percent, in place of "
-        "the nominal one.",
+    option("--position-error", Quantity("um", open_low=False), 10.0)(
+        "Sphere: standard deviation of each contact's own position, in um."
     ),
-    number_option(
-        "--position-error",
-        "um",
-        10.0,
-        "Sphere: standard deviation of each contact's own position, in um.",
-        open_low=False,
+    option("--draw-inputs", is_flag=True)(
+        "Sphere: draw the true film, radii and loads from their uncertainties; the files "
+        "state the nominal ones, and the truth beside."
     ),
-    click.option(
-        "--draw-inputs",
-        is_flag=True,
-        help="Sphere: draw the true film, radii and loads from their uncertainties; the files "
-        "state the nominal ones, and the truth beside.",
+    option("--gain", Quantity("ratio"), 1.0)(
+        "Sphere: a mistake to be found, a factor on the voltages of the sphere's scans only."
     ),
-    number_option(
-        "--gain",
-        "ratio",
-        1.0,
-        "Sphere: a mistake to be found, a factor on the voltages of the sphere's scans only.",
-    ),
-    number_option(
-        "--thickness-factor",
-        "ratio",
-        1.0,
-        "Sphere: a mistake to be found, the film's true thickness over the one stated.",
+    option("--thickness-factor", Quantity("ratio"), 1.0)(
+        "Sphere: a mistake to be found, the film's true thickness over the one stated."
     ),
 )
-
-
-def _sphere_options(command: _Command) -> _Command:
-    """Add the options of an experiment with a sphere."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
 
 
 def _experiment_from(options: Mapping[str, Any]) -> Experiment:
@@ -218,18 +152,14 @@ def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
 
 
 def _described(scan: Scan, path: Path) -> dict[str, Any]:
+    truth = {k: "inf" if v == math.inf else v for k, v in (scan.synthetic or {}).items()}
     return {
         "scan": str(path),
         "synthetic": True,
         "kind": scan.kind,
         "shape": list(scan.u_zz.shape),
-        "truth_si": {name: _standard(value) for name, value in (scan.synthetic or {}).items()},
+        "truth_si": truth,
     }
-
-
-def _standard(value: float | str) -> float | str:
-    """Return a value of standard JSON: infinite friction is ``"inf"``."""
-    return "inf" if value == float("inf") else value
 
 
 def _entry(name: str, value: float | str) -> tuple[str, str]:
@@ -276,101 +206,51 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 
 
 @click.command("simulate", epilog=EXAMPLES)
-@click.option(
-    "--experiment",
-    type=click.Choice(["rod", "sphere"]),
-    default="rod",
-    show_default=True,
-    help="A rod scan; or a whole experiment with a sphere: a rod scan, and scans of the sphere's "
-    "contacts, dry and lubricated.",
+@option("--experiment", click.Choice(["rod", "sphere"]), "rod")(
+    "A rod scan; or a whole experiment with a sphere: a rod scan, and scans of the sphere's "
+    "contacts, dry and lubricated."
 )
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="SCAN|FOLDER",
-    help="Scan to write (memscal-scan), or the folder of an experiment's three scans.  "
-    "[default: synthetic_scan.h5, or synthetic_experiment]",
+@option("-o --output", FILE, metavar="SCAN|FOLDER")(
+    "Scan to write (memscal-scan), or the folder of an experiment's three scans.  "
+    "[default: synthetic_scan.h5, or synthetic_experiment]"
 )
 @kernel_options
-@click.option(
-    "--load",
-    "loads",
-    type=Quantity("N"),
-    multiple=True,
-    help="Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
-    "0.34, 0.69, 1.37 and 2.75]",
+@option("--load loads", Quantity("N"), multiple=True)(
+    "Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
+    "0.34, 0.69, 1.37 and 2.75]"
 )
 @radius_options(default=0.25, uncertainty=0.0025)
 @film_options(defaults=FILM)
-@number_option(
-    "--half-range", "mm", 8.0, "Rod scan alone: positions run from minus to plus this, in mm."
+@option("--half-range", Quantity("mm"), 8.0)(
+    "Rod scan alone: positions run from minus to plus this, in mm."
 )
-@click.option(
-    "--points",
-    type=click.IntRange(min=2, max=4096),
-    default=65,
-    show_default=True,
-    help="Positions of the rod along each axis.",
+@option("--points", click.IntRange(min=2, max=4096), 65)("Positions of the rod along each axis.")
+@option("--repeats", click.IntRange(min=1, max=4096), 1)(
+    "Repeats at each load; with a sphere, of its contacts."
 )
-@click.option(
-    "--repeats",
-    type=click.IntRange(min=1, max=4096),
-    default=1,
-    show_default=True,
-    help="Repeats at each load; with a sphere, of its contacts.",
+@option("--raster", is_flag=True)("Rod scan alone: a square instead of a line.")
+@option("--noise", Quantity("percent", open_low=False), 0.5)(
+    "Standard deviation of the noise, in percent of the largest signal."
 )
-@click.option("--raster", is_flag=True, help="Rod scan alone: a square instead of a line.")
-@number_option(
-    "--noise",
-    "percent",
-    0.5,
-    "Standard deviation of the noise, in percent of the largest signal.",
-    open_low=False,
+@option("--centre", Quantity("mm", low=-math.inf), 0.14)(
+    "Position of the sensor along the scan, in mm."
 )
-@number_option(
-    "--centre", "mm", 0.14, "Position of the sensor along the scan, in mm.", low=-math.inf
+@option("--centre-y", Quantity("mm", low=-math.inf), 0.0)("Its position across the scan, in mm.")
+@option("--baseline", Quantity("percent", low=-math.inf), 1.0)(
+    "Offset of the voltage, in percent of the largest signal."
 )
-@number_option("--centre-y", "mm", 0.0, "Its position across the scan, in mm.", low=-math.inf)
-@number_option(
-    "--baseline",
-    "percent",
-    1.0,
-    "Offset of the voltage, in percent of the largest signal.",
-    low=-math.inf,
+@option("--drift", Quantity("percent", low=-math.inf), 0.5)(
+    "Change of the offset across the scan, in percent of the largest signal."
 )
-@number_option(
-    "--drift",
-    "percent",
-    0.5,
-    "Change of the offset across the scan, in percent of the largest signal.",
-    low=-math.inf,
+@option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
+    "Standard uncertainty to state for the load, in percent."
 )
-@number_option(
-    "--load-uncertainty",
-    "percent",
-    1.0,
-    "Standard uncertainty to state for the load, in percent.",
-    open_low=False,
+@option("--state-noise/--no-state-noise", default=True)(
+    "Whether the scan states its noise (u_zz_errors)."
 )
-@click.option(
-    "--state-noise/--no-state-noise",
-    default=True,
-    show_default=True,
-    help="Whether the scan states its noise (u_zz_errors).",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    metavar="N",
-    help="Seed of the noise.",
-)
+@option("--seed", click.IntRange(min=0), 0, metavar="N")("Seed of the noise.")
 @_sphere_options
-@json_option
-@force_option
-@debug_option
+@output_options
 def command(
     experiment: str, output: Path | None, as_json: bool, force: bool, **options: Any
 ) -> int:

@@ -7,24 +7,8 @@ import os
 import numpy as np
 
 from memscal.errors import FormatError
+from memscal.formats import groups
 from memscal.formats.codec import read_record, write_record
-from memscal.formats.groups import (
-    indenter_group,
-    instrument_group,
-    parameter_group,
-    process_group,
-    quality_group,
-    read_budget,
-    read_film,
-    read_parameters,
-    read_process,
-    read_profile,
-    read_quality,
-    read_round_indenter,
-    read_sensor,
-    reference_groups,
-    sample_group,
-)
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, file_tree, write_tree
 from memscal.formats.schema import ARTIFACT_SCHEMA
@@ -42,10 +26,7 @@ __all__ = ["artifact_tree", "read_artifact", "write_artifact"]
 
 
 def read_artifact(path: str | os.PathLike[str]) -> ApparatusData:
-    """Read an apparatus function from a memscal-artifact file, in SI units.
-
-    It refuses a file that this version cannot read, or that was changed since it was written.
-    """
+    """Read an apparatus function, in SI units; refuse a file that was changed."""
     with open_hdf5(path) as file:
         return artifact_from(file)
 
@@ -61,8 +42,8 @@ def artifact_from(file: SafeFile) -> ApparatusData:
             cure="Get the original file, or run the calibration again.",
         )
     load = require_scalar(file, "/entry/indenter/load", "force")
-    film = read_film(file, "/entry/sample/film")
-    indenter = read_round_indenter(file, "/entry/indenter")
+    film = groups.read_film(file, "/entry/sample/film")
+    indenter = groups.read_round_indenter(file, "/entry/indenter")
     return ApparatusData(
         field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
@@ -72,25 +53,22 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         reconvolution=Reconvolution(
             **read_record(records.RECONVOLUTION, file, "/entry/reconvolution")
         ),
-        parameters=read_parameters(file, "/entry/parameters"),
-        budget=read_budget(file, "/entry/parameters/budget"),
-        checks=read_quality(file, "/entry/quality"),
+        parameters=groups.read_parameters(file, "/entry/parameters"),
+        budget=groups.read_budget(file, "/entry/parameters/budget"),
+        checks=groups.read_quality(file, "/entry/quality"),
         film=film,
         indenter=indenter,
-        sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
+        sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
         load=load,
-        reference=read_profile(file, load=load, film=film, indenter=indenter),
-        process=read_process(file, "/entry/process"),
+        reference=groups.read_profile(file, load=load, film=film, indenter=indenter),
+        process=groups.read_process(file, "/entry/process"),
     )
 
 
 def write_artifact(
     data: ApparatusData, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write an apparatus function as a memscal-artifact file, whole or not at all.
-
-    The same data give the same bytes; the only time in the file is ``data.process.date``.
-    """
+    """Write an apparatus function as a memscal-artifact file; the same data, the same bytes."""
     write_tree(artifact_tree(data), path, overwrite=overwrite)
 
 
@@ -108,13 +86,13 @@ def _entry(data: ApparatusData) -> Group:
         "radial_covariance": write_record(records.RADIAL_COVARIANCE, data.radial_profile),
         "transfer_function": write_record(records.TRANSFER, data.transfer),
         "reconvolution": write_record(records.RECONVOLUTION, data.reconvolution),
-        "parameters": parameter_group(data.parameters, data.budget),
-        "quality": quality_group(data.checks),
-        "sample": sample_group(data.film),
-        "instrument": instrument_group(data.sensor),
-        "indenter": indenter_group(data.indenter, data.load),
-        **reference_groups(data.reference),
-        "process": process_group(data.process),
+        "parameters": groups.parameter_group(data.parameters, data.budget),
+        "quality": groups.quality_group(data.checks),
+        "sample": groups.sample_group(data.film),
+        "instrument": groups.instrument_group(data.sensor),
+        "indenter": groups.indenter_group(data.indenter, data.load),
+        **groups.reference_groups(data.reference),
+        "process": groups.process_group(data.process),
     }
     return Group("NXentry", children, {"default": "apparatus_function"})
 

@@ -1,10 +1,7 @@
 """memscal-contact-table: calculated contacts that are kept from one run to the next.
 
-A folder of such files is a cache: each is named after the SHA-256 of everything that its numbers
-depend on, so that an entry is either right or not found.  A damaged, foreign or older file counts
-as not found.  Files are written whole or not at all, so that any number of programs may share a
-folder; the entries that were used longest ago are removed when there are too many.  Numbers are
-in SI units, bit for bit as they were calculated.
+A folder of such files is a cache.  Each is named after the SHA-256 of everything that its numbers
+depend on (SI units, bit for bit); a damaged, foreign or older file counts as not found.
 """
 
 from __future__ import annotations
@@ -59,21 +56,15 @@ _OTHERS = {
 
 
 def table_key(content: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of what a table depends on, in plain values that JSON can say.
-
-    >>> table_key({"load": 0.34}) == table_key({"load": 0.34000000000000002})
-    True
-    """
+    """Return the SHA-256 of what a table depends on, in plain values that JSON can say."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
 def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, FloatArray]) -> bool:
-    """Write arrays into a folder under their key, and remove the oldest beyond its limit.
+    """Write arrays under their key, remove the oldest; return whether the disk took them.
 
-    They are ``value`` (M,), ``load`` (L,) and ``k`` (K,), ``depths``, ``contact_radii`` and
-    ``convergence`` (M, L), and transforms (M, L, K) in N.  Whether they were written is returned:
-    a full or read-only disk costs time in the next run, no more.
+    ``value`` (M,), ``load`` (L,), ``k`` (K,), transforms (M, L, K) in N, all others (M, L).
     """
     if folder is None:
         return False

@@ -14,7 +14,7 @@ from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import Attribute, Group, Node, count, index_axis, note, si
 from memscal.formats.json_text import to_json
 from memscal.formats.values import json_value, require_array, require_scalar, require_text
-from memscal.model.checks import Message, messages_from_json, messages_to_json
+from memscal.model.checks import messages_from_json, messages_to_json
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Quantity, Record
 
@@ -34,10 +34,7 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Kind:
-    """How a quantity that is no number is written and read.
-
-    An empty value is not written, unless ``always``; it is there if ``inside`` its group is.
-    """
+    """How a quantity that is no number is written (if not empty, or ``always``) and read."""
 
     write: Callable[[Quantity, Any], Node]
     read: Callable[[SafeFile, str], Any]
@@ -62,39 +59,30 @@ def read_source(file: SafeFile, path: str) -> SourceFile:
     return SourceFile(name, checksum)
 
 
-def _read_mapping(file: SafeFile, path: str) -> dict[str, Any]:
-    mapping: dict[str, Any] = json_value(file, path, dict, {})
-    return mapping
-
-
-def _write_messages(quantity: Quantity, messages: tuple[Message, ...]) -> Group:
-    return _write_json_note(quantity, messages_to_json(messages))
-
-
-def _read_messages(file: SafeFile, path: str) -> tuple[Message, ...]:
-    return messages_from_json(json_value(file, path, list, []))
-
-
-def _read_truth(file: SafeFile, path: str) -> bool:
-    return bool(require_scalar(file, path, "dimensionless"))
-
-
 KINDS = {
     "text": Kind(lambda _, text: str(text), require_text),
     "note": Kind(lambda _, text: note(text), require_text, inside="/data"),
-    "truth": Kind(lambda _, truth: count(int(truth)), _read_truth, always=True),
-    "mapping": Kind(_write_json_note, _read_mapping, always=True, inside="/data"),
-    "messages": Kind(_write_messages, _read_messages, always=True, inside="/data"),
+    "truth": Kind(
+        lambda _, truth: count(int(truth)),
+        lambda file, path: bool(require_scalar(file, path, "dimensionless")),
+        always=True,
+    ),
+    "mapping": Kind(
+        _write_json_note, lambda file, path: json_value(file, path, dict, {}), True, "/data"
+    ),
+    "messages": Kind(
+        lambda quantity, messages: _write_json_note(quantity, messages_to_json(messages)),
+        lambda file, path: messages_from_json(json_value(file, path, list, [])),
+        True,
+        "/data",
+    ),
     "file": Kind(lambda _, source: write_source(source), read_source),
 }
 """Kinds of quantity beside the numbers, by :attr:`Quantity.dimension`."""
 
 
 def write_record(record: Record, stated: object, **others: Node) -> Group:
-    """Return the group of an object or a mapping, with other nodes behind its quantities.
-
-    An axis that is no quantity of the record counts from 0.
-    """
+    """Return the group of an object or a mapping; an axis that is no quantity counts from 0."""
     children: dict[str, Node] = {}
     keys = {quantity.key for quantity in record.quantities}
     for quantity in record.quantities:
@@ -122,11 +110,7 @@ def read_record(
     defaults: Mapping[str, Any] = _NOTHING,
     sizes: Mapping[str, int] = _NOTHING,
 ) -> dict[str, Any]:
-    """Return the values at a path, in SI units, by the names of the quantities.
-
-    What a file need not state is left out, or taken from ``defaults`` where they name it.
-    Arrays have the shape of their axes, those in ``sizes`` or in the group.
-    """
+    """Return the values at a path, in SI units, by name; ``sizes`` are of axes known before."""
     values = dict(defaults)
     lengths = dict(sizes)
     for at, quantity in _paths(record, path):

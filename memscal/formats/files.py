@@ -35,11 +35,7 @@ def ensure_writable(
     overwrite: bool = False,
     inputs: Iterable[str | os.PathLike[str]] = (),
 ) -> None:
-    """Prove that an output can be written, before the work that produces it begins.
-
-    A small file is written beside the target and removed again: permissions alone do not
-    say whether a disk is full or read-only.
-    """
+    """Prove that an output can be written: permissions do not say that a disk is full."""
     target = _checked_target(path, overwrite=overwrite, inputs=inputs)
     temporary = _temporary_name(target)
     try:
@@ -57,12 +53,7 @@ def atomic_write_bytes(
     overwrite: bool = False,
     inputs: Iterable[str | os.PathLike[str]] = (),
 ) -> None:
-    """Write a file whole or not at all.
-
-    The bytes go to a temporary file beside the target, are flushed to the disk, and take
-    the target's name in one step; the temporary file is removed on any failure.  A process
-    that is killed half-way leaves the old target as it was.
-    """
+    """Write a file whole or not at all: beside the target, flushed, then renamed in one step."""
     target = _checked_target(path, overwrite=overwrite, inputs=inputs)
     temporary = _temporary_name(target)
     try:
@@ -79,10 +70,7 @@ def atomic_write_bytes(
 
 
 def _checked_target(
-    path: str | os.PathLike[str],
-    *,
-    overwrite: bool,
-    inputs: Iterable[str | os.PathLike[str]],
+    path: str | os.PathLike[str], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str]]
 ) -> Path:
     """Follow symbolic links to the real target and refuse what must not be replaced."""
     shown = os.fspath(path)

@@ -72,7 +72,8 @@ def parameter_dimension(name: str, unit: str = "") -> str:
 
 def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, float]]) -> Group:
     """Return the parameters as an NXcollection."""
-    dimensions = _dimensions(parameters)
+    stated = parameters.units or ("",) * len(parameters.names)
+    dimensions = [parameter_dimension(n, u) for n, u in zip(parameters.names, stated, strict=True)]
     reserved = {"names", "covariance", "budget", *_AXES}.intersection(parameters.names)
     if reserved:
         raise InputError(
@@ -148,11 +149,6 @@ def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
         }
         for quantity in json_value(file, f"{path}/names", list, [])
     }
-
-
-def _dimensions(parameters: ParameterSet) -> list[str]:
-    units = parameters.units or ("",) * len(parameters.names)
-    return [parameter_dimension(n, u) for n, u in zip(parameters.names, units, strict=True)]
 
 
 def _unit_scale(file: SafeFile, path: str) -> float:
@@ -261,10 +257,7 @@ def read_profile(
     film: ElasticFilm | None = None,
     indenter: Indenter | None = None,
 ) -> StressProfile:
-    """Read a stress profile, by default that of a scan or an artifact.
-
-    Load, film and indenter are those given where it names none.
-    """
+    """Read a stress profile; load, film and indenter are those given where it names none."""
     if file.has(f"{parameters}/film"):
         film = read_film(file, f"{parameters}/film")
     if file.has(f"{parameters}/indenter"):

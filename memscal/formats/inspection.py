@@ -28,7 +28,7 @@ from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.values import altered, require_schema, units_of
 from memscal.model import records
-from memscal.model.quantities import Quantity, Record, record
+from memscal.model.quantities import Record, record
 
 __all__ = ["Finding", "check", "describe"]
 
@@ -92,17 +92,12 @@ class Finding:
 
 
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return what a file of memscal holds, in plain values that JSON can say.
-
-    Quantities (with path, value, standard uncertainty or ``None``, unit) and arrays (with path,
-    shape, unit, minimum, maximum, missing) are in the units of the file.  It raises a
-    :class:`FormatError` if it is not a file of memscal, or not a sound one.
-    """
+    """Return what a file of memscal holds, in its units and in plain values that JSON can say."""
     with open_hdf5(path) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
         _READERS[schema](file)
-        paths = list(_listed(file, schema))
+        paths = [item for at, layout in _layout(file, schema) for item in listed(layout, file, at)]
         numbers = [(at, q) for at, q in paths if not q.axes and not q.origin]
         return {
             "file": file.name,
@@ -120,11 +115,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """Check a file step by step: safety, schema, digest, completeness.
-
-    It stops at the first step that fails, because what follows would rest on it; the file is in
-    order if every finding passed.
-    """
+    """Check a file step by step (safety, schema, digest, content) up to the first that fails."""
     findings: list[Finding] = []
     step = "safety"
     try:
@@ -178,12 +169,6 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
     for path in profile_paths(file):
         yield path, records.STRESS_NUMBERS
         yield path, records.STRESS_PROFILE
-
-
-def _listed(file: SafeFile, schema: str) -> Iterator[tuple[str, Quantity]]:
-    """Yield the path of every quantity that is declared and there."""
-    for path, layout in _layout(file, schema):
-        yield from listed(layout, file, path)
 
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:

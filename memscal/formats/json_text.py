@@ -15,11 +15,7 @@ __all__ = ["from_json", "to_json"]
 
 
 def to_json(subject: str, value: Any) -> str:
-    """Write plain values as JSON; the same values always give the same text.
-
-    Numbers that are not finite become the strings ``"nan"``, ``"inf"`` and ``"-inf"``:
-    standard JSON has no others.
-    """
+    """Write plain values as JSON; numbers that are not finite become strings."""
     return json.dumps(_plain(subject, value), sort_keys=True, allow_nan=False)
 
 

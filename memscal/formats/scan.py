@@ -11,29 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from memscal.errors import FormatError, OutputError
+from memscal.formats import groups
 from memscal.formats.codec import read_record, write_record
 from memscal.formats.files import ensure_writable
-from memscal.formats.groups import (
-    indenter_group,
-    instrument_group,
-    parameter_dimension,
-    read_film,
-    read_profile,
-    read_round_indenter,
-    read_sensor,
-    reference_groups,
-    sample_group,
-)
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import (
-    Group,
-    Node,
-    Number,
-    file_tree,
-    index_axis,
-    si,
-    write_tree,
-)
+from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, index_axis, si, write_tree
 from memscal.formats.json_text import to_json
 from memscal.formats.schema import SCAN_SCHEMA
 from memscal.formats.values import (
@@ -107,22 +89,24 @@ def scan_from(file: SafeFile) -> Scan:
     """Read the scan of an open memscal-scan file."""
     require_schema(file, SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter")
-    film = read_film(file, f"{_SAMPLE}/film")
-    indenter = read_round_indenter(file, "/entry/indenter")
+    film = groups.read_film(file, f"{_SAMPLE}/film")
+    indenter = groups.read_round_indenter(file, "/entry/indenter")
     axes = _check_axes(file)
     only_y = axes == _POINTS and not file.has(f"{_DATA}/x")
     along = "y" if only_y or axes in _ALONG_Y.values() else "x"
     arrays = _read_arrays(file, along)
+    # Each point has the number of its pass; elsewhere ``repeat`` only counts rows.
+    numbered = axes == _POINTS and file.has(f"{_DATA}/repeat")
     reference = None
     if file.has("/entry/reference"):
-        reference = read_profile(file, load=load["load"], film=film, indenter=indenter)
+        reference = groups.read_profile(file, load=load["load"], film=film, indenter=indenter)
     contact = read_record(records.SAMPLE, file, _SAMPLE)
     contact["lubrication"] = contact.get("lubrication", "").strip().lower()
     return Scan(
         x=arrays.pop(along),
         y=arrays.pop("y", None),
         x_errors=arrays.pop(f"{along}_errors", None),
-        repeat=file.array(f"{_DATA}/repeat") if _numbered(file, axes) else None,
+        repeat=file.array(f"{_DATA}/repeat") if numbered else None,
         direction=along,
         channels={name: arrays.pop(name) for name in _CHANNELS if name in arrays},
         **arrays,
@@ -130,7 +114,7 @@ def scan_from(file: SafeFile) -> Scan:
         indenter=indenter,
         film=film,
         **contact,
-        sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
+        sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
         title=optional_text(file, "/entry/title"),
         **read_record(records.EXPERIMENT, file, "/entry"),
         reference=reference,
@@ -182,13 +166,13 @@ def _entry(scan: Scan) -> Group:
     children |= {
         **texts,
         "data": _data_group(scan),
-        "indenter": indenter_group(scan.indenter, scan.load, scan.load_uncertainty),
-        "sample": sample_group(scan.film, scan.lubrication, scan.lubricant),
-        "instrument": instrument_group(scan.sensor),
+        "indenter": groups.indenter_group(scan.indenter, scan.load, scan.load_uncertainty),
+        "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
+        "instrument": groups.instrument_group(scan.sensor),
         **notes,
     }
     if scan.reference is not None:
-        children |= reference_groups(scan.reference)
+        children |= groups.reference_groups(scan.reference)
     if scan.synthetic is not None:
         children["synthetic"] = _synthetic_group(scan.synthetic)
     return Group("NXentry", children, {"default": "data"})
@@ -251,18 +235,13 @@ def _check_axes(file: SafeFile) -> tuple[str, ...] | None:
     return axes
 
 
-def _numbered(file: SafeFile, axes: tuple[str, ...] | None) -> bool:
-    """Whether each point has the number of its pass; else ``repeat`` only counts rows."""
-    return axes == _POINTS and file.has(f"{_DATA}/repeat")
-
-
 def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
     children: dict[str, Node] = {"description": _SYNTHETIC}
     for name, value in truth.items():
         if isinstance(value, str):
             children[name] = value
         else:
-            children[name] = si(value, parameter_dimension(name))
+            children[name] = si(value, groups.parameter_dimension(name))
     children["names"] = to_json("names of the synthetic truth", list(truth))
     return Group("NXcollection", children)
 
@@ -299,10 +278,7 @@ def ensure_folder_writable(
 def write_scans(
     scans: Mapping[str, Scan], folder: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
-    """Write scans as memscal-scan files of one folder, all of them or none.
-
-    All are written whole under other names first, and only then take their own.
-    """
+    """Write scans as memscal-scan files of one folder, all of them or none."""
     target = Path(folder)
     ensure_folder_writable(target, tuple(scans), overwrite=overwrite)
     made = not target.exists()

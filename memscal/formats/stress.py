@@ -10,21 +10,8 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import FormatError
+from memscal.formats import groups
 from memscal.formats.codec import read_record, read_source, write_record, write_source
-from memscal.formats.groups import (
-    budget_group,
-    indenter_group,
-    instrument_group,
-    process_group,
-    quality_group,
-    read_budget,
-    read_film,
-    read_process,
-    read_quality,
-    read_round_indenter,
-    read_sensor,
-    sample_group,
-)
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, count, file_tree, si, write_tree
 from memscal.formats.json_text import to_json
@@ -54,14 +41,6 @@ _CHANNELS = ("zz", "xz", "yz")
 _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 
-def _points_groups(points: Mapping[str, MeasuredPoints]) -> dict[str, Node]:
-    """Return the points of each channel as an NXdata of its own: ``points_zz`` and so on."""
-    return {
-        f"points_{channel}": write_record(records.points_record(channel), values)
-        for channel, values in points.items()
-    }
-
-
 def _read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
     return {
@@ -76,8 +55,8 @@ def _read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
 
 def _scans_group(scans: Sequence[MeasuredScan]) -> Group:
     """Return what was scanned as an NXcollection, one group for each scan."""
-    groups: dict[str, Node] = {f"scan_{i + 1}": _scan_group(scan) for i, scan in enumerate(scans)}
-    return Group("NXcollection", {"names": to_json("scans", list(groups)), **groups})
+    nodes: dict[str, Node] = {f"scan_{i + 1}": _scan_group(scan) for i, scan in enumerate(scans)}
+    return Group("NXcollection", {"names": to_json("scans", list(nodes)), **nodes})
 
 
 def _read_scans(
@@ -105,9 +84,9 @@ def _read_scans(
 
 def _scan_group(scan: MeasuredScan) -> Group:
     children: dict[str, Node] = {
-        "sample": sample_group(scan.film, scan.lubrication),
-        "indenter": indenter_group(scan.indenter),
-        "instrument": instrument_group(scan.sensor),
+        "sample": groups.sample_group(scan.film, scan.lubrication),
+        "indenter": groups.indenter_group(scan.indenter),
+        "instrument": groups.instrument_group(scan.sensor),
         **write_record(records.MEASURED_SCAN, scan).children,
     }
     return Group("NXcollection", children)
@@ -115,9 +94,9 @@ def _scan_group(scan: MeasuredScan) -> Group:
 
 def _read_scan(file: SafeFile, path: str, source: SourceFile | None) -> MeasuredScan:
     return MeasuredScan(
-        film=read_film(file, f"{path}/sample/film"),
-        indenter=read_round_indenter(file, f"{path}/indenter"),
-        sensor=read_sensor(file, f"{path}/instrument/stress_sensor"),
+        film=groups.read_film(file, f"{path}/sample/film"),
+        indenter=groups.read_round_indenter(file, f"{path}/indenter"),
+        sensor=groups.read_sensor(file, f"{path}/instrument/stress_sensor"),
         lubrication=optional_text(file, f"{path}/sample/lubrication"),
         **read_record(records.MEASURED_SCAN, file, path),
         source=source,
@@ -127,9 +106,9 @@ def _read_scan(file: SafeFile, path: str, source: SourceFile | None) -> Measured
 def _old_scan(file: SafeFile, profile: str, source: SourceFile | None) -> MeasuredScan:
     x, y = (require_array(file, f"{profile}/{name}", "length") for name in ("x", "y"))
     return MeasuredScan(
-        film=read_film(file, "/entry/sample/film"),
-        indenter=read_round_indenter(file, "/entry/indenter"),
-        sensor=read_sensor(file, "/entry/instrument/stress_sensor"),
+        film=groups.read_film(file, "/entry/sample/film"),
+        indenter=groups.read_round_indenter(file, "/entry/indenter"),
+        sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
         width=float(np.hypot(np.ptp(x), np.ptp(y))),
         lubrication=optional_text(file, f"{profile}/lubrication"),
         source=source,
@@ -182,7 +161,8 @@ def stress_from(file: SafeFile) -> MeasuredStress:
             f"{file.where('/entry/profiles')} names no profile.",
             why="It lists the groups that hold one.",
         )
-    sources = _read_sources(file)
+    inputs = json_value(file, "/entry/inputs/names", list, [])
+    sources = {str(name): read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
     return MeasuredStress(
@@ -192,9 +172,9 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         ),
         scans=scans,
         **read_record(records.CONVERSION, file, "/entry/sensor"),
-        checks=read_quality(file, "/entry/quality"),
+        checks=groups.read_quality(file, "/entry/quality"),
         overridden=tuple(str(text) for text in json_value(file, "/entry/overridden", list, [])),
-        process=read_process(file, "/entry/process"),
+        process=groups.read_process(file, "/entry/process"),
         artifact=sources.get("artifact"),
         artifact_digest=optional_text(file, "/entry/sensor/content_sha256"),
     )
@@ -227,15 +207,15 @@ def _entry(measured: MeasuredStress) -> Group:
             for name, profile in zip(names, measured.profiles, strict=True)
         },
         "sensor": write_record(records.CONVERSION, measured, **digest),
-        "quality": quality_group(measured.checks),
+        "quality": groups.quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
         # Those of the first scan; each scan states its own beside them.
-        "sample": sample_group(first.film),
-        "instrument": instrument_group(first.sensor),
-        "indenter": indenter_group(first.indenter),
+        "sample": groups.sample_group(first.film),
+        "instrument": groups.instrument_group(first.sensor),
+        "indenter": groups.indenter_group(first.indenter),
         "scans": _scans_group(measured.scans),
         "inputs": _inputs_group(measured),
-        "process": process_group(measured.process),
+        "process": groups.process_group(measured.process),
     }
     return Group("NXentry", children, {"default": names[-1]})
 
@@ -243,17 +223,10 @@ def _entry(measured: MeasuredStress) -> Group:
 def _inputs_group(measured: MeasuredStress) -> Group:
     sources = {"artifact": measured.artifact}
     sources |= {f"scan_{i + 1}": scan.source for i, scan in enumerate(measured.scans)}
-    groups: dict[str, Node] = {
+    nodes: dict[str, Node] = {
         name: write_source(source) for name, source in sources.items() if source is not None
     }
-    return Group("NXcollection", {"names": to_json("inputs", list(groups)), **groups})
-
-
-def _read_sources(file: SafeFile) -> dict[str, SourceFile]:
-    return {
-        str(name): read_source(file, f"/entry/inputs/{name}")
-        for name in json_value(file, "/entry/inputs/names", list, [])
-    }
+    return Group("NXcollection", {"names": to_json("inputs", list(nodes)), **nodes})
 
 
 def _scan_number(file: SafeFile, path: str) -> int:
@@ -284,10 +257,13 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
         },
         "scan": count(scans.index(profile.scan) + 1),
         **numbers,
-        "budget": budget_group(
+        "budget": groups.budget_group(
             {"force": profile.force_budget, "maximum": profile.maximum_budget}, _BUDGET
         ),
-        **_points_groups(profile.points),
+        **{
+            f"points_{channel}": write_record(records.points_record(channel), points)
+            for channel, points in profile.points.items()
+        },
         **rest,
     }
     return replace(arrays, children=children)
@@ -313,7 +289,7 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
         for source in sources
     )
     stored = read_record(record("NXdata", *declared), file, path, sizes={"r": n})
-    budget = read_budget(file, f"{path}/budget")
+    budget = groups.read_budget(file, f"{path}/budget")
     if not sources or not budget.keys() >= _BUDGET.keys():
         raise FormatError(
             f"{file.where(path)} states no covariance of its stress, or no budget.",

@@ -1,8 +1,6 @@
 """Units, converted here and nowhere else: SI inside Python, any right unit in files.
 
-The canonical strings are looked up in a table of powers of ten, which keeps the conversion
-correctly rounded (0.25 mm is read as exactly ``0.25e-3``).  Anything else is left to pint,
-which is imported only then.
+Canonical units are powers of ten, so that 0.25 mm is exactly 0.25e-3; others are left to pint.
 """
 
 from __future__ import annotations
@@ -57,10 +55,7 @@ _MAX_LENGTH = 64
 
 
 def to_si(values: ArrayLike, unit: str | None, dimension: str, where: str) -> FloatArray:
-    """Convert values from a file's unit to SI; ``where`` names them in a message.
-
-    Only a dimensionless quantity may have no unit (``None``).
-    """
+    """Convert values from a file's unit to SI; only a dimensionless quantity may have no unit."""
     numbers = np.asarray(values, dtype=np.float64)
     if unit is None:
         if dimension == "dimensionless":
@@ -116,9 +111,10 @@ def _pint_factor(unit: str, dimension: str, where: str) -> float:
     import pint
 
     registry = _registry()
+    target = dimension if dimension == "dimensionless" else SI_UNITS[dimension]
     try:
         quantity = registry.Quantity(1.0, registry.parse_units(unit))
-        return float(quantity.to(_PINT_SI.get(dimension, SI_UNITS[dimension])).magnitude)
+        return float(quantity.to(target).magnitude)
     except pint.DimensionalityError as error:
         raise _wrong_dimension(where, unit, dimension) from error
     except Exception as error:  # pint raises what its parser happens to meet
@@ -127,9 +123,6 @@ def _pint_factor(unit: str, dimension: str, where: str) -> float:
             why=f"It is a {dimension}.",
             cure=f'Write it like "{FILE_UNITS[dimension]}".',
         ) from error
-
-
-_PINT_SI = {"dimensionless": "dimensionless"}
 
 
 @functools.cache

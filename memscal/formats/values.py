@@ -99,7 +99,7 @@ def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
     values = require_array(file, path, dimension)
     if values.size != 1:
         raise FormatError(
-            f"{file.where(path)} has {values.size} values, but one number is expected.",
+            f"{file.where(path)} has {values.size} values, but one number is expected."
         )
     return float(values.reshape(()))
 
@@ -145,8 +145,7 @@ _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 def altered(file: SafeFile) -> str:
     """Return how a file differs from what was written, or ``""`` where it does not.
 
-    A file without a digest counts as altered: every file of ours has one.  Of one that is not
-    altered only what it lists can be read from here on; what was added is refused by its path.
+    From then on only what the file lists can be read from it.
     """
     stated = file.attribute("/", DIGEST_ATTRIBUTE)
     if stated is None:

@@ -45,10 +45,7 @@ def _claim(file: bytes, data: bytes, position: int) -> int:
 
 
 def _check_heap(file: bytes, address: int) -> None:
-    """Refuse a global heap through which HDF5 would walk for ever, or out of the file.
-
-    Every object says how far it is to the next; free space (index 0) counts its own header.
-    """
+    """Refuse a global heap through which HDF5 would walk for ever, or out of the file."""
     if address > len(file) - 16 or file[address : address + 4] != b"GCOL":
         raise ValueError("the text lies in no heap")
     end = address + int.from_bytes(file[address + 8 : address + 16], "little")
@@ -64,10 +61,7 @@ def _check_heap(file: bytes, address: int) -> None:
 
 
 def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -> list[int]:
-    """Return the lengths, in bytes, that the descriptors of an object's attribute claim.
-
-    ``header`` is the address of the object's header; the attribute holds ``number`` texts.
-    """
+    """Return the lengths, in bytes, that an object's attribute of texts claims."""
     try:
         for kind, flags, message in _messages(data, header):
             if kind != _ATTRIBUTE or flags & _SHARED:
@@ -87,8 +81,7 @@ def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -
 def _dense_lengths(data: bytes, name: bytes, number: int) -> Iterator[int]:
     """Yield the claims of every attribute of this name and of variable length, in any object.
 
-    Where an object has many attributes they lie in a heap of their own; its structure need
-    not be followed, because a message stands there as it would in the header.
+    In a heap of many attributes a message stands as it would in the header.
     """
     terminated = name + b"\0"
     position = data.find(terminated)
@@ -186,10 +179,7 @@ def check_type(where: str, kind: Any, *, text: bool) -> None:
 
 
 def check_layout(where: str, dataset: Any, *, text: bool) -> None:
-    """Refuse a dataset whose storage could read other files, run code or exhaust memory.
-
-    ``dataset`` is a low-level ``h5py.h5d.DatasetID``; only its header is looked at.
-    """
+    """Refuse a dataset whose storage could read other files, run code or exhaust memory."""
     if dataset.get_space().get_simple_extent_type() == h5py.h5s.NULL:
         raise refuse(where, "has a null dataspace", "It holds no value.")
     check_type(where, dataset.get_type(), text=text)

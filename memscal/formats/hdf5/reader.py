@@ -1,9 +1,7 @@
 """The one safe HDF5 reader: for files that come from anywhere, in any state.
 
-The file is read once into memory and hashed; HDF5 sees those bytes and never the disk.
-Only known paths are opened, along hard links; nothing is listed or visited.  Every dataset
-is checked (:mod:`memscal.formats.hdf5.limits`) before it is read, and whatever the library
-raises on damaged bytes becomes a :class:`~memscal.errors.FormatError`.
+HDF5 sees bytes in memory and never the disk; only known paths are opened, along hard links, and
+every dataset is checked before it is read.
 """
 
 from __future__ import annotations
@@ -42,10 +40,7 @@ def damage_named(
     why: str = "The file is damaged or incomplete",
     cure: str = "Get the file again from where it came from.",
 ) -> Iterator[None]:
-    """Turn whatever a library raises on damaged bytes into a :class:`FormatError`.
-
-    ``problem`` and ``why`` come without a full stop: the library's own words follow.
-    """
+    """Turn what a library raises on damaged bytes into a FormatError; add its words to ``why``."""
     try:
         yield
     except MemscalError:
@@ -54,11 +49,7 @@ def damage_named(
         raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
     except Exception as error:
         said = printable(" ".join(str(error).split()), 200) or type(error).__name__
-        raise FormatError(
-            f"{problem}.",
-            why=f"{why} ({said}).",
-            cure=cure,
-        ) from error
+        raise FormatError(f"{problem}.", why=f"{why} ({said}).", cure=cure) from error
 
 
 _MAX_TOTAL_BYTES = 512 * 2**20

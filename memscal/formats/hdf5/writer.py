@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
-from memscal.formats.files import atomic_write_bytes, ensure_writable
+from memscal.formats.files import atomic_write_bytes
 from memscal.formats.json_text import to_json
 from memscal.formats.schema import (
     DIGEST_ATTRIBUTE,
@@ -35,7 +35,6 @@ __all__ = [
     "content_digest",
     "contents_of",
     "count",
-    "ensure_writable",
     "file_tree",
     "index_axis",
     "note",
@@ -217,7 +216,8 @@ def tree_to_bytes(root: Group) -> bytes:
             elif isinstance(node, Number):
                 _write_number(file, path, node)
             else:
-                _write_text(file, path, node)
+                text = _plain_text(node)
+                file.create_dataset(path, data=text, dtype=_text_type(), track_times=False)
         _attach_scales(file, root)
     return memory.getvalue()
 
@@ -246,10 +246,6 @@ def _write_number(file: Any, path: str, node: Number) -> None:
     dataset = file.create_dataset(path, data=node.values, track_times=False, **storage)
     for name, value in {"units": node.units, **node.attributes}.items():
         _write_attribute(dataset, name, value)
-
-
-def _write_text(file: Any, path: str, text: str) -> None:
-    file.create_dataset(path, data=_plain_text(text), dtype=_text_type(), track_times=False)
 
 
 def _write_attribute(item: Any, name: str, value: Attribute) -> None:

@@ -1,8 +1,7 @@
 """The guard around meshio: a child process with limits of time and memory that sees one file.
 
-A mesh can come from anywhere, and meshio trusts what a file says.  So meshio runs in a child
-process, :mod:`memscal.formats.meshes.worker`, on a copy of the file in a folder of its own; what it
-gives back are plain arrays, never pickles, in a file of limited size.
+Meshio trusts what a file says.  So it runs on a copy in a folder of its own, and gives back plain
+arrays, never pickles.
 """
 
 from __future__ import annotations
@@ -79,12 +78,7 @@ def heavy_arrays(
 def run_meshio(
     data: bytes, kind: str, name: str, heavy: Mapping[str, np.ndarray[Any, Any]]
 ) -> tuple[dict[str, Any], list[np.ndarray[Any, Any]]]:
-    """Return what meshio makes of a mesh: a header, and the arrays that it numbers.
-
-    ``heavy`` are the arrays that an XDMF file refers to, by addresses such as ``film.h5:/data0``.
-    What cannot be read is a FormatError; what asks for another file, or for more memory or time
-    than it may have, is an UnsafeFileError.
-    """
+    """Return what meshio makes of a mesh: a header, and the arrays that it numbers."""
     size = len(data) + sum(values.nbytes for values in heavy.values())
     seconds = _SECONDS + size / _BYTES_PER_SECOND
     request = {

@@ -24,11 +24,7 @@ _DIRECTIONS = 72
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """How a mesh lies in space: ``points`` (n, 3) and ``tolerance`` in m.
-
-    ``radial`` is the axis along the radius of a section, or both axes of the base's plane in 3-D;
-    ``vertical`` is the axis across the film.
-    """
+    """How a mesh lies in space: ``points`` (n, 3) and ``tolerance`` in m, and its axes."""
 
     points: FloatArray
     radial: tuple[int, ...]
@@ -44,10 +40,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """Nodes on the base of the film, and its cells with a side there and that side's middle.
-
-    ``outward`` is the direction, 1 or -1, of the vertical axis out of the film through its base.
-    """
+    """Nodes on the base, cells with a side there and that side's middle; 1 or -1 is outward."""
 
     nodes: NDArray[np.int64]
     cells: tuple[tuple[Cells, NDArray[np.int64], FloatArray], ...]
@@ -56,10 +49,7 @@ class Base:
 
 
 def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
-    """Find out which coordinates are radial and which is vertical; ``points`` (n, 3) are in m.
-
-    The vertical axis is by default the second of a section's two, and z in 3-D.
-    """
+    """Find which coordinates are radial and which is vertical; ``points`` (n, 3) are in m."""
     name = mesh.source.file_name
     inside = points[mesh.used]
     tolerance = _TOLERANCE * float(np.abs(inside).max())
@@ -73,7 +63,7 @@ def find_frame(mesh: Mesh, points: FloatArray, vertical: str | None) -> Frame:
     if up not in varying:
         raise InputError(
             f"The vertical axis is {vertical!r}, but the mesh in {name} extends along "
-            f"{_listed(varying)}.",
+            f"{' and '.join(AXES[i] for i in varying)}.",
             cure="Name the axis that points across the film, from base to surface.",
         )
     radial = tuple(i for i in varying if i != up)
@@ -133,12 +123,9 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
 def average_over_circles(
     places: FloatArray, columns: dict[str, FloatArray]
 ) -> tuple[dict[str, FloatArray], str]:
-    """Interpolate linearly between scattered places and average over circles about the origin.
+    """Interpolate between places (n, 2), in m from the axis, and average over circles.
 
-    Places (n, 2) are in m from the axis; the first column is the normal stress.  Returned are the
-    columns with ``r`` in m, and a note.  A half or a quarter of a film will do: where nothing is
-    known, nothing is averaged.  Circles of which less than half as much is inside as of others
-    are left out: they are at the corners.
+    Circles of which less than half as much is inside as of others are left out: the corners.
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
@@ -176,7 +163,3 @@ def average_over_circles(
         f"mean by up to {spread / peak if peak else 0:.2g} of the maximum."
     )
     return {"r": r[kept], **means}, note
-
-
-def _listed(axes: list[int] | tuple[int, ...]) -> str:
-    return " and ".join(AXES[i] for i in axes)

@@ -55,8 +55,7 @@ class Cells:
 class Mesh:
     """A mesh and its fields as stored: ``points`` (n, 3), ``point_data`` (n, components).
 
-    ``sources`` are the file and those it draws numbers from; ``tensor_order`` says whether six
-    components are known to be a tensor's in VTK's order.
+    ``tensor_order``: whether six components are known to be a tensor's in VTK's order.
     """
 
     points: FloatArray
@@ -89,11 +88,7 @@ class Mesh:
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
-    """Read a mesh and its fields from a VTU, legacy VTK or XDMF file.
-
-    An XDMF file's numbers may be in the HDF5 file of the same name beside it.  Whatever is no
-    such mesh, is damaged, or could read or exhaust something is a FormatError.
-    """
+    """Read a mesh and its fields from a VTU, legacy VTK or XDMF file."""
     shown = os.fspath(path)
     name, ending = os.path.basename(shown), os.path.splitext(shown)[1].lower()
     if ending not in _KINDS:
@@ -193,13 +188,9 @@ def _unusable(source: SourceFile, what: str) -> FormatError:
 
 
 def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    r"""Write displacement and stress on a mesh as a VTU file, whole or not at all.
+    """Write displacement and stress on a mesh as a VTU file, whole or not at all.
 
-    The section lies in the plane of x (the radius) and y (the height), in mm.  At the points
-    there are the vector ``displacement_mm``, by which ParaView can warp the mesh as it is, and
-    ``stress_Pa``, tension positive, in VTK's order of a symmetric tensor: XX
-    (:math:`\sigma_{rr}`), YY (:math:`\sigma_{zz}`), ZZ (:math:`\sigma_{\theta\theta}`), XY
-    (:math:`\sigma_{rz}`), and zeros for YZ and XZ.
+    x is the radius and y the height, in mm; ``stress_Pa`` is in VTK's order, tension positive.
     """
     _require_meshio()
     import meshio

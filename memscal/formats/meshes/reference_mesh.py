@@ -52,16 +52,11 @@ def read_reference_mesh(
     indenter: Indenter | None = None,
     solver: str = "",
 ) -> ImportedProfile:
-    r"""Read the stress at the base of the film from a mesh with a stress field.
+    """Read the stress at the base of the film from a mesh: a section, or a film in 3-D.
 
-    The mesh is an axisymmetric section with the axis at radius 0, or a film in 3-D, which is
-    averaged over circles around ``centre``, in m.  ``sigma`` names a field of the normal stress,
-    or of a tensor of 4 components (radial, vertical, hoop, shear), 6 (xx, yy, zz, xy, yz, xz) or
-    9; ``"name:2"`` is component 2.  ``shear`` names the field of a section's radial shear stress,
-    by default the tensor's.  ``sign`` is -1 where compression is negative; ``shear_sign`` is 1
-    where the shear is the radial traction of the base on the film, and by default the shear is
-    taken for the component :math:`\sigma_{rz}`.  ``base`` is the base's position on the axis
-    ``vertical``, in m, by default the lowest; ``load`` is in N.
+    ``sigma`` is a field of the normal stress or of a tensor of 4, 6 or 9 components, ``"name:2"``
+    component 2.  ``base`` and ``centre`` are in m, ``load`` in N.  Without ``shear_sign`` the shear
+    is taken for the stress component rz; with 1, for the radial traction of the base on the film.
     """
     require_sign("sign", sign)
     if shear_sign is not None:

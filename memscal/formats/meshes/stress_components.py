@@ -36,17 +36,13 @@ class Component:
 
 
 def find_normal(mesh: Mesh, frame: Frame, field: str) -> Component:
-    """Return the normal stress across the film in the field ``wanted``.
-
-    The field has one component or is a stress tensor; ``name:number`` takes a component of it,
-    counted from 1.
-    """
+    """Return the normal stress across the film; ``name:number`` takes a component, from 1."""
     up = frame.vertical
     return _find(mesh, frame, field, (up, up))
 
 
 def find_shear(mesh: Mesh, frame: Frame, field: str) -> Component:
-    """Return the radial shear stress of a section in the field ``wanted``; see above."""
+    """Return the radial shear stress of a section."""
     return _find(mesh, frame, field, (frame.radial[0], frame.vertical))
 
 

@@ -1,8 +1,7 @@
 """The child process that reads a mesh with meshio, within limits, and sees no other file.
 
-:mod:`memscal.formats.meshes.child` starts this file by its path, in a folder that holds the mesh,
-and gives it a request on standard input.  It imports nothing of memscal, so that it starts fast.
-The answer is a file of arrays in numpy's format, the first of which is text in JSON.
+It imports nothing of memscal.  The request comes on standard input; the answer is a file of arrays
+in numpy's format, the first of which is text in JSON.
 """
 
 from __future__ import annotations
@@ -191,12 +190,7 @@ def _tidy_vtu(data: bytes) -> Element:
 
 
 def _put_inline(root: Element, raw: bytes) -> None:
-    """Move raw bytes as base64 into the arrays that they belong to.
-
-    Without compression the header is the number of bytes that follow; with it, the number of
-    blocks, two sizes before compression, and the compressed size of each block (VTK File
-    Formats, section "XML formats").
-    """
+    """Move raw bytes as base64 into their arrays (VTK File Formats, section "XML formats")."""
     import numpy as np
 
     order = ">" if root.get("byte_order") == "BigEndian" else "<"

@@ -48,8 +48,7 @@ class ImportedProfile:
 class Samples:
     """Stress at the base as a file states it, in SI, and the words for it in messages.
 
-    ``columns`` (n,) are ``r``, ``sigma_zz`` (positive in compression) and, if stated, ``sigma_rz``;
-    radii within ``spacing``, in m, are the same; ``kind`` is what the file is, ``item`` a sample.
+    ``columns`` (n,) are ``r``, ``sigma_zz`` and perhaps ``sigma_rz``; ``spacing`` is in m.
     """
 
     columns: dict[str, FloatArray]
@@ -216,11 +215,8 @@ def read_reference_table(
 ) -> ImportedProfile:
     """Read the stress at the base of the film from a table with one row per radius.
 
-    Columns are names, or numbers counted from 1; ``sigma_unit`` holds for ``shear`` too; ``load``
-    is in N.  ``sign`` is -1 where compression is negative, and turns the normal stress only;
-    ``shear_sign`` is 1 where the shear is the radial traction of the base on the film, positive
-    outward, and -1 where it is the component S13 (S_rz) with the third axis from the base to the
-    surface.
+    ``load`` is in N; ``sign`` is -1 where compression is negative, and turns the normal stress;
+    ``shear_sign`` is -1 where the shear is S13 with axis 3 from the base to the surface.
     """
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)

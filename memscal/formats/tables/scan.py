@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError, UnitError
-from memscal.formats.tables.reference import ImportedProfile, read_reference_table
 from memscal.formats.tables.text_table import Table, read_table
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
@@ -19,7 +18,7 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.places import places_of
 from memscal.model.scan import Scan, StressSensor
 
-__all__ = ["ImportedProfile", "ImportedScan", "read_reference_table", "read_scan_table"]
+__all__ = ["ImportedScan", "read_scan_table"]
 
 Column = str | int
 
@@ -66,18 +65,11 @@ def read_scan_table(
     delimiter: str | None = None,
     decimal: str | None = None,
 ) -> ImportedScan:
-    """Read a scan from a table with one row per reading.
-
-    Positions and readings are kept as they are, in the order of the file.  Without ``y`` and
-    ``repeat`` they are a line; repeats over exactly the same positions become rows of one array
-    (repeat, x); all else is a scan of single points.
+    """Read a scan from a table with one row per reading, in the order of the file.
 
     Columns are names, or numbers counted from 1; ``x_unit`` holds for ``y`` too, ``u_unit`` for
-    all channels.  Several columns ``repeat`` number the lines together.  ``load`` is the median
-    of ``load_column`` by default; ``load_uncertainty``, in N, is common to all points,
-    ``load_scatter``, relative, and ``x_error``, in m, are independent from point to point.
-    ``u_scale`` is the volts per unit of a sensor whose output is no voltage; ``u_sign`` is -1
-    where u falls under compression.  The notes of the scan record both.
+    all channels.  ``load_uncertainty``, in N, is common to all points; ``load_scatter``, relative,
+    and ``x_error``, in m, are independent.  ``u_scale`` is in volts per unit of the readings.
     """
     if u_sign not in (1, -1):
         raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")

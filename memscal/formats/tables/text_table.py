@@ -88,11 +88,9 @@ class Table:
 def read_table(
     path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None
 ) -> Table:
-    """Read a delimited text file.
+    """Read a delimited text file; ``#`` or ``%`` begin a comment.
 
-    Lines that begin with ``#`` or ``%`` are comments, and those above the table are kept in
-    its notes; the first line with a cell that is no number is the header, and without one the
-    columns have numbers only.
+    The first line with a cell that is no number is the header.
     """
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
