@@ -176,10 +176,7 @@ _SAID_OF_ALL = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 
 @single_threaded()
 def measure_stress(
-    scan: Scans,
-    apparatus: ApparatusFunction | str | PathLike[str],
-    *,
-    override: bool = False,
+    scan: Scans, apparatus: ApparatusFunction | str | PathLike[str], *, override: bool = False
 ) -> MeasuredStress:
     r"""Turn contact scans into measured stress, load by load.
 

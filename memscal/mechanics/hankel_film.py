@@ -104,11 +104,7 @@ class HankelField:
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
         layer = _layer_integrals(
-            self.film,
-            x,
-            (k, weights),
-            traction.pressure_transform(k),
-            traction.shear_transform(k),
+            self.film, x, (k, weights), traction.pressure_transform(k), traction.shear_transform(k)
         )
         return _displacements(self.film, traction.half_space_integrals(x), layer)
 

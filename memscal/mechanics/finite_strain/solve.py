@@ -32,11 +32,7 @@ from memscal.mechanics.finite_strain.pressing import (
     Step,
     follow,
 )
-from memscal.mechanics.finite_strain.state import (
-    FiniteStrainField,
-    interface_traction,
-    outermost,
-)
+from memscal.mechanics.finite_strain.state import FiniteStrainField, interface_traction, outermost
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.problem import Depth, Load, Target
 from memscal.mechanics.solver.refinement import relative_change
