@@ -87,11 +87,8 @@ def constrained_kernel(
 
 
 def _taper(radius: FloatArray, support: float) -> FloatArray:
-    """One up to half of the support, then falling as a cosine to zero at its edge.
-
-    A sharp edge would cut the ripples of G at full height: their integral, and with it A, would
-    depend on where it lies.
-    """
+    """One up to half of the support, then a cosine that falls to zero at its edge."""
+    # A sharp edge would cut G's ripples at full height, and A would depend on where it lies.
     phase = np.clip(2 * radius / support - 1, 0.0, 1.0)
     return np.asarray((1 + np.cos(np.pi * phase)) / 2)
 
@@ -174,11 +171,7 @@ class RasterFields:
 
     @classmethod
     def place(cls, estimate: ProfileEstimate, choice: GridChoice, *, divided: bool) -> RasterFields:
-        """Place the raster, and continue it by the fitted profile.
-
-        ``divided``: whether its field is divided, and so needs an even lattice; else points off
-        any lattice get one of their own step, which the fitted profile fills alone.
-        """
+        """Place the raster, continued by the fitted profile; a field that is divided is even."""
         points = estimate.points
         lattice = even_lattice(points.x, points.y, points.places[0].count)
         if lattice is None and divided:

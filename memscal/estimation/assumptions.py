@@ -1,8 +1,7 @@
-r"""Tests of the model's assumptions: symmetry, linearity in load, a round and Gaussian sensor.
+"""Tests of the model's assumptions: symmetry, linearity in load, a round and Gaussian sensor.
 
-Some add a few columns to the fitted model and test by how much the misfit falls.  With
-:math:`m` columns that should not be needed, the fall of chi-square follows the chi-square
-distribution of :math:`m` degrees of freedom.  Others predict a group of points from the rest.
+Some add m columns to the fitted model: chi-square falls by a chi-square variable of m degrees
+of freedom.  Others predict a group of points from the rest.
 """
 
 from __future__ import annotations
@@ -58,10 +57,7 @@ def load_groups(load: FloatArray) -> NDArray[np.intp]:
 
 
 def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | None:
-    """Hold out each group of points in turn, and predict it from the others.
-
-    ``None`` where there are fewer than two groups that can be predicted.
-    """
+    """Predict each group of points from the others; ``None`` with fewer than two such groups."""
     if np.unique(group).size < 2:
         return None
     # Clipped: many outliers in one group count together, and a single one counts little.
@@ -162,11 +158,7 @@ def departure_test(estimate: ProfileEstimate) -> Departure:
 
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
-    """Compare the left and right halves of a line scan.
-
-    The columns are odd in the distance from the centre, at three widths of the profile; even for
-    a tangential channel, whose signal is odd.
-    """
+    """Compare the left and right halves of a line scan by odd columns (even for a shear)."""
     points = estimate.points
     dx, dy = estimate.offset
     side = np.where(points.free[points.scan, 0], dx, dy)

@@ -77,10 +77,7 @@ class ForwardModel:
 
     @cached_property
     def drift_columns(self) -> FloatArray:
-        """Constant baseline and its linear drift along each scan, shape (n, 2 or 3 a scan).
-
-        The drift's coordinates run from -1 to 1, so that every coefficient is in V.
-        """
+        """Baseline and drift (from -1 to 1) along each scan, shape (n, 2 or 3 a scan)."""
         columns = []
         for i, free in enumerate(self.points.free):
             inside = self.points.scan == i
@@ -132,10 +129,8 @@ class ForwardModel:
         return self._times_load(-self._summed(geometry.bessel1, kernel))
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
-        r"""Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m.
-
-        A vector's component :math:`f\cos\theta` changes by :math:`f/R` across its direction, too.
-        """
+        """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
+        # A vector's component changes by f/R across its direction, too.
         if self.order == 0:
             return np.asarray(geometry.towards * self.radial_derivative(geometry, kernel))
         slope, turn = self._vector_slopes(geometry, kernel)
@@ -250,10 +245,7 @@ def _response(
 def _bessel(
     bessel0: FloatArray, bessel1: FloatArray, radius: FloatArray, k: FloatArray
 ) -> list[FloatArray]:
-    """Bessel functions of even order, by recurrence upwards from orders zero and one.
-
-    At small arguments, where the recurrence loses digits, the power series' first term is used.
-    """
+    """Bessel functions of even order by upward recurrence; at small arguments their first term."""
     # Repeats share their positions.
     unique, first, back = np.unique(radius, return_index=True, return_inverse=True)
     x = np.multiply.outer(unique, k)

@@ -1,7 +1,6 @@
-r"""The Gaussian apparatus function that fits the scan best, in data space.
+"""The Gaussian apparatus function that fits the scan best, in data space.
 
-It is the paper's approximation, convolved with the reference stress and fitted to the voltages
-by weighted least squares, together with conversion constant, centre, baseline and linear drift.
+It is fitted by weighted least squares, with A, centre, baseline and linear drift.
 """
 
 from __future__ import annotations
@@ -33,11 +32,8 @@ Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 def gauss_newton(
     linearise: Linearised, start: FloatArray, *, tolerance: float, knee: float = np.inf
 ) -> FloatArray | None:
-    """Minimise the loss of the residuals, shape (n,), of a model that is nearly linear.
-
-    Parameters are scaled to numbers near one.  From the residual ``knee`` on, the loss is linear.
-    ``None`` if the steps do not settle downhill: a search with a trust region is then needed.
-    """
+    """Minimise the loss of the residuals (n,) of a nearly linear model; ``None`` if it fails."""
+    # Parameters are scaled to numbers near one; the loss is linear from the residual ``knee`` on.
     place: FloatArray = start
     step: FloatArray = np.zeros_like(start)
     cost, halvings = np.inf, 0
@@ -70,10 +66,8 @@ _CLEARLY = 0.7
 def _require_parity(
     points: ScanPoints, odd: tuple[FloatArray, FloatArray], even: tuple[FloatArray, FloatArray]
 ) -> None:
-    """Refuse a voltage that a shear of the other sign, or an even signal, fits far better.
-
-    ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
-    """
+    """Refuse a voltage that a shear of the other sign, or an even signal, fits far better."""
+    # ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
     amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
     turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
@@ -115,10 +109,8 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
 
 
 def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Best of a grid of centres and widths, by the sum of absolute residuals.
-
-    A single outlier can be the largest voltage of a scan: positions are tried, not read off.
-    """
+    """Best of a grid of centres and widths, by the sum of absolute residuals."""
+    # A single outlier can be the largest voltage of a scan: positions are tried, not read off.
     points = model.points
     centres = _trial_centres(model)
     distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])

@@ -67,11 +67,7 @@ class ProfileEstimate:
 
     @property
     def noise_scale(self) -> float:
-        """Noise of a point (V); or, with stated uncertainties, the factor they must grow by.
-
-        Stated uncertainties are adopted unless the residuals exceed them (Birge's ratio).  A
-        scatter is never less than the model's own numerical error.
-        """
+        """Noise of a point (V); with stated uncertainties, the factor they must grow by (Birge)."""
         scatter = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
@@ -241,11 +237,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
 
 
 def _outlier_weight(standardised: FloatArray, threshold: float) -> FloatArray:
-    """Weights that leave ordinary points at one and fall fast beyond the threshold.
-
-    The influence w z of a point falls as 1/z^3 beyond the threshold, so a gross outlier
-    moves nothing, yet no point is ever dropped.
-    """
+    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
     scale = 1.4826 * np.median(np.abs(standardised))
     z = np.abs(standardised) / max(scale, np.finfo(float).tiny)
     return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))

@@ -1,15 +1,11 @@
 r"""Measured profiles: the lines of each load of a scan, and their profile with its covariance.
 
-A measured voltage less baseline and drift, over A.  What is uncertain besides the noise: A, the
-same for all; and centre, baseline and drift, with their joint covariance :math:`\Sigma` and the
-columns :math:`J = -[\partial U/\partial c,\ 1,\ \xi]/A`.  Of :math:`J\Sigma J^T` what the centre
-explains is the centre's, the rest the baseline's: both are covariances and their sum is exact.
-That baseline and centre come from the same voltages is not counted: where the stress has decayed
-it would make the uncertainties a little smaller.
-
-The stress on the axis is the restored one, blurred by G.  An error of A or G changes what is
-restored so that it still meets the voltages: blurred again, nothing is left of an error of G but
-what the scan does not determine, and an error of A is left whole.
+A measured voltage less baseline and drift, over A.  Uncertain besides the noise are A, and
+centre, baseline and drift with joint covariance :math:`\Sigma` and the columns
+:math:`J = -[\partial U/\partial c,\ 1,\ \xi]/A`.  Of :math:`J\Sigma J^T` what the centre explains
+is the centre's, the rest the baseline's.  That both come from the same voltages is not counted.
+The stress on the axis is the restored one, blurred by G: an error of A is left whole, one of G
+only where the scan does not determine it.
 """
 
 from __future__ import annotations
@@ -57,11 +53,7 @@ _SCATTER = 0.15
 
 @dataclass(frozen=True, eq=False)
 class SingleLoad:
-    """The lines of a scan that were made at one nominal load, in N.
-
-    ``scan``: their voltages, with the nominal ``load`` and the recorded ``normal_load``;
-    ``lubrication``: ``"dry"``, ``"lubricated"`` or empty.
-    """
+    """The lines of a scan that were made at one nominal load, in N."""
 
     scan: Scan
     load: float
@@ -74,12 +66,9 @@ class SingleLoad:
 
 
 def single_loads(scan: Scan) -> tuple[SingleLoad, ...]:
-    """Split a scan by load, the smallest first; one that records no loads stays whole.
-
-    Lines (rows of ``u_zz``, or points of one ``repeat``) whose median loads lie within 5 % of
-    each other are repeats of one load; its nominal value is the median of all of their recorded
-    loads.  A line at several loads, or without any, raises an InputError.
-    """
+    """Split a scan by load, the smallest first; one that records no loads stays whole."""
+    # Lines whose median loads lie within 5 % of each other are repeats of one load, the median of
+    # all recorded ones.  A line at several loads, or without any, raises an InputError.
     if scan.normal_load is None:
         return (SingleLoad(scan, scan.load, scan.lubrication),)
     passes = scan.passes
@@ -142,31 +131,20 @@ _LARGEST_END = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ContactSignal:
-    """The contact at a nominal load as the sensor reports it, without friction and sticking.
+    """The contact at a nominal load as the sensor reports it, without friction and sticking."""
 
-    ``r`` (n,): distances from the centre, in m; ``voltage`` and ``by_load`` (2, n): the voltages of
-    both and their derivatives by the logarithm of the load, in V; ``contact_radius`` in m, without
-    friction.
-    """
-
-    r: FloatArray
-    voltage: FloatArray
-    by_load: FloatArray
-    contact_radius: float
+    r: FloatArray  # (n,): distances from the centre, in m
+    voltage: FloatArray  # (2, n), in V
+    by_load: FloatArray  # (2, n): derivative by the logarithm of the load, in V
+    contact_radius: float  # in m, without friction
 
     def slope(self, distance: FloatArray, sticking: float = 0.0) -> FloatArray:
-        """Derivative of the voltage by the logarithm of the load, at distances in m, in V.
-
-        ``sticking``: how far from the frictionless contact to the one that sticks.
-        """
+        """Derivative of the voltage (V) by the logarithm of the load; ``sticking`` from 0 to 1."""
         between = (1 - sticking) * self.by_load[0] + sticking * self.by_load[1]
         return np.asarray(np.interp(distance, self.r, between))
 
     def sticking(self, distance: float, voltage: float) -> float:
-        """How far from the frictionless voltage to the sticking one a measured one is, 0 to 1.
-
-        At a distance in m near the axis, where friction raises the stress.
-        """
+        """How far from the frictionless voltage to the sticking one a measured one is, 0 to 1."""
         free, stuck = (float(np.interp(distance, self.r, curve)) for curve in self.voltage)
         return min(max((voltage - free) / (stuck - free), 0.0), 1.0) if stuck > free else 0.0
 
@@ -177,11 +155,8 @@ class ContactSignal:
 
 
 def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactSignal:
-    """Calculate the contacts of one nominal load, and near it.
-
-    A lubricated contact, and a rod's, is taken as frictionless.  A load beyond the model of the
-    contact raises a DomainError.
-    """
+    """Calculate the contacts of one nominal load and near it, or raise a DomainError."""
+    # A lubricated contact, and a rod's, is taken as frictionless.
     scan, load = single.scan, single.load
     loads = load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
     slides = single.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
@@ -240,10 +215,7 @@ def require_points(single: SingleLoad, signal: ContactSignal) -> None:
 
 
 def require_ends(single: SingleLoad, signal: ContactSignal, centre: FloatArray) -> None:
-    """Refuse a scan that ends where the calculated profile exceeds 5 % of its maximum.
-
-    The baseline would be undetermined.
-    """
+    """Refuse a scan whose profile exceeds 5 % at its ends: its baseline is undetermined."""
     scan = single.scan
     measured = np.isfinite(scan.u_zz)
     if scan.y is None:
@@ -275,16 +247,11 @@ _TRIED = np.geomspace(0.02, 2.0, 120)
 
 @dataclass(frozen=True, eq=False)
 class PreparedScan:
-    """A scan at one load, and the noise that its voltages have.
+    """A scan at one load, and the noise that its voltages have."""
 
-    ``scan``: voltages for the nominal load, ``u_zz_errors`` with the scatter of the loads;
-    ``electronic``: electronic noise of each voltage, in V, zero where it is not stated;
-    ``noise_estimated``: whether it was estimated here.
-    """
-
-    scan: Scan
-    electronic: FloatArray
-    noise_estimated: bool
+    scan: Scan  # voltages for the nominal load, errors with the scatter of the loads
+    electronic: FloatArray  # noise of each voltage, in V; zero where it is not stated
+    noise_estimated: bool  # whether it was estimated here
 
 
 def prepared_scan(

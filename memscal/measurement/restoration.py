@@ -42,23 +42,16 @@ _NEGLIGIBLE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """How a calculated stress agrees with a scan and with the stress restored from it.
-
-    ``sigma_zz`` (n,): the calculated ``stress`` at the restoration's radii, in Pa; ``chi_square``:
-    reduced chi-square of the scan against the calculated stress convolved with A G, of so many
-    ``degrees``, with its ``limit`` (exceeded by chance once in a thousand) and ``p_value``;
-    ``difference``: largest difference of the restored from the calculated stress, over the largest
-    stress; ``within``: share of the radii at which they agree within 1.96 standard uncertainties.
-    """
+    """How a calculated stress agrees with a scan and with the stress restored from it."""
 
     stress: StressProfile | Contact
-    sigma_zz: FloatArray
-    chi_square: float
+    sigma_zz: FloatArray  # (n,): calculated, at the restoration's radii, in Pa
+    chi_square: float  # reduced, of the scan against the calculated stress convolved with A G
     degrees: int
-    limit: float
+    limit: float  # exceeded by chance once in a thousand
     p_value: float
-    difference: float
-    within: float
+    difference: float  # largest, over the largest stress
+    within: float  # share of the radii at which they agree within 1.96 standard uncertainties
 
 
 def compare_stress(

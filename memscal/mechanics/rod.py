@@ -1,28 +1,22 @@
 r"""Rigid flat rod on a bonded film: the mixed boundary-value problem, frictionless or sticking.
 
-Under the rod (:math:`r < a`) the surface goes down by the depth :math:`\delta`; outside it is
-free.  Pressure and shear are sought as series whose Hankel transforms are spherical Bessel
-functions,
+Pressure and shear are sought as series whose Hankel transforms are spherical Bessel functions,
 
 .. math::
 
     \hat p(k) = \frac{P}{2\pi} \sum_n a_n\, j_{2n}(ka), \qquad
     \hat q(k) = \frac{P}{2\pi} \sum_n b_n\, j_{2n+1}(ka),
 
-which vanish outside the rod by construction and carry the edge's square-root singularity:
-with :math:`m = \sqrt{1 - r^2/a^2}` they are :math:`P_{2n}(m)/m` and
-:math:`(r/a)P'_{2n+1}(m)/m`.  Requiring the surface displacement to be :math:`\delta` (and the
-radial displacement to vanish, if the film sticks) when weighted with each of these functions
-gives a symmetric, positive definite system: the stationary point of the complementary energy.
-Its frictionless part is the Legendre form of the usual Fredholm equation of the second kind for
-:math:`\hat p(k) \propto \int_0^a \varphi(t) \cos kt\,dt`.  The half-space's share of the matrix
-is known in closed form; the layer's share decays like :math:`e^{-2kh}` and is summed by Gauss
-quadrature.
+which vanish outside the rod and carry the edge's square-root singularity: with
+:math:`m = \sqrt{1 - r^2/a^2}` they are :math:`P_{2n}(m)/m` and :math:`(r/a)P'_{2n+1}(m)/m`.
+Requiring the surface displacement to be :math:`\delta` (and the radial one to vanish, if the film
+sticks) when weighted with each of these functions gives a symmetric, positive definite system.
+The half-space's share of the matrix is known in closed form; the layer's share decays like
+:math:`e^{-2kh}` and is summed by Gauss quadrature.
 
 Convergence is exponential where the edge's singularity is the square root (frictionless, or
 incompressible).  A sticking compressible film has an oscillating edge, exponents
-:math:`-1/2 \pm i\ln(3-4\nu)/2\pi`; there the number of terms is doubled until the stress at the
-base, which does not see the edge, has settled.
+:math:`-1/2 \pm i\ln(3-4\nu)/2\pi`: the number of terms is doubled until the base stress settles.
 """
 
 from __future__ import annotations

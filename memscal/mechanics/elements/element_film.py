@@ -1,12 +1,8 @@
 """Bonded film by finite elements: compliance of its surface, and the field below it.
 
-Static condensation: the equations of the film (:mod:`memscal.mechanics.elements.mixed`) are
-factorised once and solved for a unit traction on every ring.  Of each solution, the displacement
-of the surface and the traction of the base are kept, which is all that a contact asks for.
-
-The traction of the base is found from the forces that hold its nodes: it does the same work as
-they on the displacements of these nodes, and its integral is the load to rounding.  The film
-passes nothing to the base that varies fast; a smooth spline takes what the elements add.
+The equations (:mod:`memscal.mechanics.elements.mixed`) are factorised once and solved for a unit
+traction on every ring.  The traction of the base does the same work as the forces that hold its
+nodes, and its integral is the load to rounding.
 """
 
 from __future__ import annotations

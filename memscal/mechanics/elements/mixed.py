@@ -8,14 +8,10 @@ With the strain :math:`\varepsilon`, its deviator :math:`e` and the mean pressur
     \qquad
     \int \left(\mathrm{div}\,u + P/K\right) Q\,r\,dr\,dz = 0,
 
-with the bulk modulus :math:`1/K = 3(1-2\nu)/2G(1+\nu)`, which vanishes where the film is
-incompressible: the same equations hold for every Poisson's ratio.  The pair is Taylor and Hood's
-of fourth order, which does not lock (Boffi, Brezzi and Fortin 2013, chapter 8).
-
-Lengths are in film thicknesses and stresses in shear moduli: in SI units, pressures and
-displacements would differ by 12 orders of magnitude, and the direct solver would lose digits.
-The second coordinate is the depth below the surface, so that the second displacement is the
-depression.
+with :math:`1/K = 3(1-2\nu)/2G(1+\nu)`, which vanishes where the film is incompressible.  The pair
+is Taylor and Hood's of fourth order, which does not lock (Boffi, Brezzi and Fortin 2013, chapter
+8).  Lengths are in film thicknesses and stresses in shear moduli, or the direct solver would lose
+digits.  The second coordinate is the depth, and the second displacement the depression.
 """
 
 from __future__ import annotations

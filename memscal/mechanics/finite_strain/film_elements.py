@@ -6,13 +6,8 @@ the neo-Hookean energy per undeformed volume is
 .. math:: W = G\left[\tfrac12(F:F - 3) - (J - 1)\right] + \tfrac{K}{2}(J - 1)^2 .
 
 A share :math:`\kappa` of the bulk modulus acts directly, the rest by a pressure
-:math:`p = (\kappa - K)(J - 1)`, which stays finite where :math:`K` does not.
-
-Displacement is quadratic and pressure linear on triangles of the undeformed cross-section
-(Taylor and Hood), a pair that neither locks nor oscillates at :math:`\nu = 1/2`.  The nodal forces
-are the derivatives of the energy by the nodal displacements, and the tangent is theirs: Newton's
-method converges quadratically.
-
+:math:`p = (\kappa - K)(J - 1)`, which stays finite where :math:`K` does not.  Displacement is
+quadratic and pressure linear on triangles of the undeformed cross-section (Taylor and Hood).
 Lengths are in mm, stresses in MPa, forces in N; in SI units the direct solver loses digits.
 """
 

@@ -1,17 +1,11 @@
 r"""Contact of the film at finite strain with a rigid face: exact constraints, Newton's method.
 
 A node of the surface that touches lies on the indenter's contour *where it has moved to*,
-
-.. math::
-
-    R + u_r = r(s), \qquad u_z = z(s) - \delta.
-
-Its displacements are no unknowns then, but the arc length s is one, along which it slides without
-friction; where the contact sticks, s stays what it was at first touch.  They are eliminated with
-first and second derivatives, so that the constraint holds exactly (no penalty) and the forces are
-normal to the face where it slides.  The depth :math:`\delta` is one more unknown, whose force is
-the load: load and depth can be prescribed alike.  Which nodes touch is found by an active set: a
-node that is pulled leaves, and one that lies inside the indenter is taken in.
+:math:`R + u_r = r(s),\ u_z = z(s) - \delta`: the arc length s is its only unknown, or stays what
+it was at first touch where the contact sticks.  Its displacements are eliminated with first and
+second derivatives, so that the forces are normal to the face where it slides.  The depth
+:math:`\delta` is one more unknown, whose force is the load.  Which nodes touch is found by an
+active set: a node that is pulled leaves, and one that lies inside the indenter is taken in.
 """
 
 from __future__ import annotations

@@ -1,9 +1,6 @@
 """Neo-Hookean film at finite strain under a rigid rod or sphere, by finite elements.
 
-The linear model is formal where an indenter sinks by a good part of the film's thickness.  Here
-the film is neo-Hookean, displacement and pressure are quadratic and linear on triangles of the
-undeformed cross-section (:mod:`memscal.mechanics.finite_strain.film_elements`), and the surface
-touches the indenter where it has moved to (:mod:`memscal.mechanics.finite_strain.pressing`).
+The linear model is formal where an indenter sinks by a good part of the film's thickness.
 """
 
 from __future__ import annotations
@@ -112,11 +109,9 @@ def solve_finite_strain(
     refinement: float = 1.0,
     edge: float | None = None,
 ) -> tuple[Contact, ...]:
-    """Press a rod (its edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m).
-
-    Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
-    the wall; under a sphere that sticks nothing in the contact moves radially.
-    """
+    """Press a rod (edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m)."""
+    # Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
+    # the wall; under a sphere that sticks nothing in the contact moves radially.
     by_load = isinstance(targets[0], Load)
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
