@@ -187,8 +187,7 @@ class ApparatusFunction(Result, ApparatusData):
             raise InputError("A radius is not a number.", cure="Leave missing radii out.")
         support = self.radial_profile.r
         spline = radial_spline(support, values)
-        inside = radii <= support[-1]
-        return np.where(inside, spline(np.minimum(radii, support[-1])), 0.0)
+        return np.where(radii <= support[-1], spline(np.minimum(radii, support[-1])), 0.0)
 
     def _checked(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
         radii, stress = finite_vector("r", r), finite_vector("sigma_zz", sigma_zz)

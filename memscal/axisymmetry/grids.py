@@ -149,8 +149,7 @@ class Lattice:
         """Modulus of each wave vector, shape (m, n // 2 + 1), in rad/m."""
         dy, dx = self.spacing
         ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
-        kx = 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx)
-        return np.hypot.outer(ky, kx)
+        return np.hypot.outer(ky, 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx))
 
     @property
     def cell_area(self) -> float:
@@ -234,8 +233,7 @@ def on_grid(
     """Values of a radial function on a grid, by an even spline through it every ``step`` (m)."""
     reach = float(np.max(grid.radius))
     table = np.linspace(0.0, reach, int(np.ceil(reach / step)) + 4)
-    spline = radial_spline(table, profile(table))
-    return spline(grid.radius)
+    return radial_spline(table, profile(table))(grid.radius)
 
 
 def cut(field: FloatArray, grid: EvenGrid, r: FloatArray) -> FloatArray:

@@ -70,8 +70,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = support / np.ceil(support / spacing)
     span = max(float(np.ptp(offset)) for offset in estimate.offset)
-    extent = max(span, 1.25 * support)
-    return GridChoice(spacing=float(spacing), support=support, extent=extent)
+    return GridChoice(spacing=float(spacing), support=support, extent=max(span, 1.25 * support))
 
 
 def constrained_kernel(
@@ -89,8 +88,7 @@ def constrained_kernel(
 def _taper(radius: FloatArray, support: float) -> FloatArray:
     """One up to half of the support, then a cosine that falls to zero at its edge."""
     # A sharp edge would cut G's ripples at full height, and A would depend on where it lies.
-    phase = np.clip(2 * radius / support - 1, 0.0, 1.0)
-    return np.asarray((1 + np.cos(np.pi * phase)) / 2)
+    return np.asarray((1 + np.cos(np.pi * np.clip(2 * radius / support - 1, 0.0, 1.0))) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,8 +197,7 @@ class RasterFields:
             voltage += _mean_at(voltage.shape, (rows, columns), departure / points.load)
         stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
         oval = _Oval(estimate.gaussian)
-        index = (rows, columns)
-        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, index)
+        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, (rows, columns))
 
     @property
     def confinement(self) -> FloatArray:

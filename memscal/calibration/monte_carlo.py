@@ -139,8 +139,7 @@ class DrawnScans:
         for source, effect in self.effects.items():
             # An effect is that of a larger value in the analysis, so its sign is turned.
             if source not in exact:
-                change = effect.voltage + effect.scaling * signal
-                voltages = voltages - standard[source] * change
+                voltages = voltages - standard[source] * (effect.voltage + effect.scaling * signal)
         if exact:
             model = replace(estimate.model, references=self._reference_changes(standard))
             voltages = voltages + model.signal(self._geometry, estimate.kernel)

@@ -135,8 +135,7 @@ def input_effects(
     # Scans share the error of a common film or rod, of the balance and of the stage.
     model = estimate.model
     changes: dict[str, list[FloatArray]] = {}
-    shared = [("film", film_sensitivities), ("indenter", rod_sensitivities)]
-    for attribute, sensitivities in shared:
+    for attribute, sensitivities in [("film", film_sensitivities), ("indenter", rod_sensitivities)]:
         owners = [getattr(scan, attribute) for scan in scans]
         distinct = list(dict.fromkeys(owners))
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):

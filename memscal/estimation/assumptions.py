@@ -169,8 +169,7 @@ def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Test whether a raster is elliptic: columns that vary as cos 2a and sin 2a."""
     dx, dy = estimate.offset
     quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy], axis=1)
-    shapes = _widened(estimate, (0.5, 1.0))
-    columns = [quadrupole * shape[:, None] for shape in shapes.T]
+    columns = [quadrupole * shape[:, None] for shape in _widened(estimate, (0.5, 1.0)).T]
     return _add(estimate, np.concatenate(columns, axis=1))
 
 
@@ -207,9 +206,8 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     free = scaled - base @ (base.T @ scaled)
     information = np.linalg.pinv(free.T @ free, hermitian=True)
     coefficients = information @ (free.T @ residual)
-    fall = float(residual @ free @ coefficients)
     return ExtraColumns(
-        fall=fall,
+        fall=float(residual @ free @ coefficients),
         count=columns.shape[1],
         coefficients=coefficients / scale,
         errors=np.sqrt(np.diag(information)) / scale,

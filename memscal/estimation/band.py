@@ -90,8 +90,7 @@ def _ring_noise(estimate: ProfileEstimate, k: FloatArray) -> FloatArray:
     signal = (estimate.predicted - estimate.background) / points.load
     noise = estimate.noise / points.load
     share = signal**2 / (signal**2 + noise**2) * estimate.outlier_weight
-    area = _ring_areas(radius, tolerance=0.25 * points.step)
-    weighted = area * share * noise
+    weighted = _ring_areas(radius, tolerance=0.25 * points.step) * share * noise
     bessel = j1 if estimate.model.order else j0
     return np.asarray(np.sqrt(bessel(np.multiply.outer(k, radius)) ** 2 @ weighted**2))
 

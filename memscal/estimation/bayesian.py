@@ -247,8 +247,7 @@ class _LinearModel:
         left, singular, right = np.linalg.svd(free, full_matrices=False)
         along = left.T @ self.rest
         # Of a vector that meets the flat columns, only what lies beside them carries noise.
-        free_share = 1 - np.sum((self.q.T @ left) ** 2, axis=0)
-        power = along**2 + self.added * free_share
+        power = along**2 + self.added * (1 - np.sum((self.q.T @ left) ** 2, axis=0))
         return _Design(block, columns, left, singular, right, along, power)
 
     def gaussian(self) -> _Conditional:

@@ -96,8 +96,7 @@ class ForwardModel:
         # Repeats share their positions: each Bessel function is computed once.
         unique, back = np.unique(radius, return_inverse=True)
         argument = np.multiply.outer(unique, self.k)
-        safe = np.where(radius > 0, radius, 1.0)
-        towards = -np.stack([dx, dy]) / safe
+        towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
         return Geometry(radius, towards, j0(argument)[back], j1(argument)[back])
 
     def cosines(self, centres: FloatArray) -> FloatArray:
@@ -237,8 +236,7 @@ def _response(
     for m, bessel in enumerate(harmonics):
         kernel = ive(m, half * e) * np.exp(-half * (1 - e))
         around = Geometry(geometry.radius, geometry.towards, bessel, bessel)
-        signal = model.signal(around, kernel)
-        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * signal
+        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * model.signal(around, kernel)
     return total
 
 

@@ -133,8 +133,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
         amplitudes, costs = _amplitudes(shapes, data, drift)
         i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
         if amplitudes[i] > 0 and costs[i] < best_cost:
-            left = data - amplitudes[i] * shapes[i]
-            baseline = np.linalg.lstsq(drift, left, rcond=None)[0]
+            baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
             best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
             best_cost = float(costs[i])
     if model.order:
@@ -177,8 +176,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
         inner(positions) if free else np.zeros(1)
         for free, positions in zip(points.free[0], (points.x, points.y), strict=True)
     ]
-    mesh = np.meshgrid(*along)
-    return np.stack([axis.ravel() for axis in mesh], axis=1)
+    return np.stack([axis.ravel() for axis in np.meshgrid(*along)], axis=1)
 
 
 def _smoothing_length(model: ForwardModel) -> float:
@@ -245,8 +243,7 @@ def fit_gaussian(
         return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
     shape = [start.conversion_constant, start.sigma]
-    ellipse = start.ellipticity[: model.points.ellipse]
-    theta = np.concatenate([shape, centres, start.drift, ellipse])
+    theta = np.concatenate([shape, centres, start.drift, start.ellipticity[: model.points.ellipse]])
     return _solve(model, weights, theta, loss="linear")
 
 

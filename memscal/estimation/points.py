@@ -275,8 +275,7 @@ def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> FloatArray | None:
     repeats = scan.u_zz.size // scan.u_zz_correlation.shape[0]
     whole = np.kron(np.eye(repeats), scan.u_zz_correlation)
     kept = keep.ravel()
-    factor = np.linalg.cholesky(whole[np.ix_(kept, kept)])
-    return np.asarray(np.linalg.inv(factor))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(whole[np.ix_(kept, kept)])))
 
 
 def _stated_errors(

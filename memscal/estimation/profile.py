@@ -55,8 +55,7 @@ class ProfileEstimate:
     @property
     def noise(self) -> FloatArray:
         """Adopted noise of each voltage, shape (n,), in V, uncertain positions included."""
-        stated = self.weights / self.outlier_weight
-        return np.asarray(self.noise_scale / np.sqrt(stated))
+        return np.asarray(self.noise_scale / np.sqrt(self.weights / self.outlier_weight))
 
     @property
     def noise_root(self) -> FloatArray:

@@ -239,9 +239,7 @@ def _difference(
     k = reference.wavenumbers.k
 
     def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
-        contact = reference_contact(film, rod, scan.load)
-        return _base_spectrum(contact, k.tobytes(), reference.order)
+        return _base_spectrum(reference_contact(film, rod, scan.load), k.tobytes(), reference.order)
 
     upper, lower = (transform(film, rod) for film, rod in zip(films, rods, strict=True))
-    scale = reference.values / transform(scan.film, scan.indenter)
-    return np.asarray((upper - lower) * scale)
+    return np.asarray((upper - lower) * (reference.values / transform(scan.film, scan.indenter)))

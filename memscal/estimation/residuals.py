@@ -85,8 +85,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None
-    noise = 1.0 if stated else estimate.noise_scale
-    resolved = singular > _SHARE_OF_NOISE * noise
+    resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
     return FreeModel(
         data=standardised(u - estimate.gaussian.predicted),
         design=np.hstack([flat, left[:, resolved] * singular[resolved]]),
@@ -275,8 +274,7 @@ def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
 def orthonormal(design: FloatArray) -> FloatArray:
     """Orthonormal basis of the columns' span; they are scaled first, and zeros are skipped."""
     size = np.linalg.norm(design, axis=0)
-    scaled = design[:, size > 0] / size[size > 0]
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
+    left, singular, _ = np.linalg.svd(design[:, size > 0] / size[size > 0], full_matrices=False)
     return np.asarray(left[:, singular > 1e-10 * singular[0]])
 
 

@@ -179,8 +179,7 @@ def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactS
     voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T.reshape(-1, loads.size, r.size)
     # Without friction both are the frictionless contact.
     below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
-    slope = (above - below) / (2 * _LOAD_STEP)
-    return ContactSignal(r, at, slope, contacts[0][1].contact_radius)
+    return ContactSignal(r, at, (above - below) / (2 * _LOAD_STEP), contacts[0][1].contact_radius)
 
 
 def require_points(single: SingleLoad, signal: ContactSignal) -> None:
@@ -263,14 +262,12 @@ def prepared_scan(
     if scan.normal_load is None:
         return prepared
     for _ in range(_ROUNDS):
-        points = measured_points(prepared.scan)
-        estimate, _ = gaussian_pressure(prepared.scan, apparatus, points)
+        estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
         slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
         of_load = _load_noise(single, slope)
         electronic, estimated = _stated(scan), False
         if scan.u_zz_errors is None and of_load.any():
-            kept = np.isfinite(prepared.scan.u_zz)
-            noise = _noise_of_load(estimate, of_load[kept])
+            noise = _noise_of_load(estimate, of_load[np.isfinite(prepared.scan.u_zz)])
             electronic, estimated = np.full_like(slope, noise), True
         level = _at_nominal(single, slope)
         prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, estimated)
@@ -299,8 +296,7 @@ def _at_nominal(single: SingleLoad, slope: FloatArray) -> Scan:
 
 def _load_noise(single: SingleLoad, slope: FloatArray) -> FloatArray:
     errors = single.scan.normal_load_errors
-    share = 0.0 if errors is None else np.nan_to_num(errors) / single.load
-    return np.abs(slope) * share
+    return np.abs(slope) * (0.0 if errors is None else np.nan_to_num(errors) / single.load)
 
 
 def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan:
@@ -325,8 +321,7 @@ def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
     taken = 3 + estimate.model.drift_columns.shape[1]
     square = weight * residual**2 * residual.size / max(residual.size - taken, 1)
     scatter = 1.4826 * float(np.median(np.abs(residual)))
-    least = NUMERICAL_FLOOR * estimate.largest_signal
-    tried = np.maximum(_TRIED * scatter, least)
+    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * estimate.largest_signal)
     variance = tried[:, None] ** 2 + of_load**2
     deviance = np.sum(np.log(variance) + square / variance, axis=1)
     return float(tried[np.argmin(deviance)])
@@ -367,8 +362,7 @@ def measured_profile(
 ) -> MeasuredProfile:
     """Return the measured profile of one load of a scan from its restored stress."""
     a, estimate = restored.apparatus.conversion_constant, restored.posterior.estimate
-    noise = restored.noise / np.sqrt(estimate.outlier_weight)
-    average, x, y = _averaging(restored, noise)
+    average, x, y = _averaging(restored, restored.noise / np.sqrt(estimate.outlier_weight))
     level = average @ (restored.points.u - _background(restored))
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")

@@ -96,8 +96,7 @@ class PressureShape:
             return np.asarray(slope)
         m = self.exponent
         ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
-        second = self._order(2, k, width)
-        rise = k * first - ratio * width**2 * k**3 * second
+        rise = k * first - ratio * width**2 * k**3 * self._order(2, k, width)
         return np.asarray(slope - 0.5 * self._share(k) * rise)
 
     def _order(self, further: int, k: FloatArray, width: float) -> FloatArray:
@@ -109,14 +108,12 @@ class PressureShape:
 
     def _share(self, k: FloatArray) -> FloatArray:
         x, nu = k * self.film.thickness, self.film.poisson_ratio
-        ratio = base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu)
-        return self.shear * ratio
+        return self.shear * (base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu))
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
     """Return the shapes that a restoration weighs against each other."""
-    flowing = film.poisson_ratio > _FLOWING
-    shears = _SHEARS_INCOMPRESSIBLE if flowing else _SHEARS_COMPRESSIBLE
+    shears = _SHEARS_INCOMPRESSIBLE if (film.poisson_ratio > _FLOWING) else _SHEARS_COMPRESSIBLE
     return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
 
 
@@ -163,8 +160,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, shape)
-    count = float(start.outlier_weight.sum())
-    weighed = weigh_departures(model, fit, basis, weights, count)
+    weighed = weigh_departures(model, fit, basis, weights, float(start.outlier_weight.sum()))
     rows = _state_rows(model.k, basis)
     kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)
     first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
@@ -188,8 +184,7 @@ def _fit(
     force, width = start.conversion_constant, max(start.sigma, _NARROWEST * model.points.step)
     theta = np.concatenate([[force, width], start.centre[free], start.drift])
     widths = np.full(1 + int(free.sum()), width)
-    drifts = np.full(start.drift.size, np.ptp(model.points.u))
-    scale = np.concatenate([[force], widths, drifts])
+    scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
 
     def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
         fit = _linearise(shape, model, scaled * scale)
@@ -214,9 +209,8 @@ def _linearise(shape: PressureShape, model: ForwardModel, theta: FloatArray) -> 
     shift = model.centre_derivative(geometry, force * kernel)
     jacobian = np.column_stack([signal, force * widening, shift, model.drift_columns])
     predicted = force * signal + model.drift_columns @ drift
-    round_ = np.zeros(2)
     return GaussianFit(
-        force, width, centres, drift, round_, model.points, geometry, jacobian, predicted
+        force, width, centres, drift, np.zeros(2), model.points, geometry, jacobian, predicted
     )
 
 
@@ -385,8 +379,7 @@ def _film_changes(film: ElasticFilm, k: FloatArray) -> FloatArray:
         # One-sided at nu = 1/2.
         above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
         upper, lower = (replace(film, poisson_ratio=nu) for nu in (above, below))
-        difference = film_transfer(upper, k) - film_transfer(lower, k)
-        columns.append(difference * u / (above - below))
+        columns.append((film_transfer(upper, k) - film_transfer(lower, k)) * u / (above - below))
     return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
 
 

@@ -107,13 +107,11 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     # The film is not part of the direct way: the calculated stress is at its base already.
     added = np.hstack([posterior.shifts["apparatus"], posterior.shifts["position_scale"]])
     if scan.load_uncertainty is not None:
-        share = scan.load_uncertainty / scan.load
-        added = np.column_stack([added, share * signal])
+        added = np.column_stack([added, (scan.load_uncertainty / scan.load) * signal])
     # The stated noise as it is: raised by a misfit, it would hide it.
     stated = points.u_errors is not None
     root = estimate.noise_root * (1 / estimate.noise_scale if stated else posterior.noise_ratio)
-    covariance = root @ root.T + added @ added.T
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+    whiten = np.linalg.inv(np.linalg.cholesky(root @ root.T + added @ added.T))
     flat = np.linalg.qr(whiten @ np.hstack(columns))[0]
     left = whiten @ (points.u - signal)
     left = left - flat @ (flat.T @ left)
@@ -196,8 +194,7 @@ class Restoration(Result):
         InputError
             If a radius is beyond 1.5 times the scan's width, where nothing was computed.
         """
-        nodes = self.posterior.nodes
-        return np.asarray(self._synthesis(r) @ self.posterior.state[:nodes])
+        return np.asarray(self._synthesis(r) @ self.posterior.state[: self.posterior.nodes])
 
     def stress_uncertainty(self, r: ArrayLike) -> FloatArray:
         """Return the standard uncertainty (k = 1) of :meth:`stress`, in Pa."""

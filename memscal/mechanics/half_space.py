@@ -43,8 +43,7 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     measure = s * lengths[:, None] * weights / 2
     kernels = _kernels(x[:, None, None], s[None], np.abs(x[:, None, None] - s))
     rising, falling = measure * share, measure * (1 - share)
-    away = np.maximum(starts - x[:, None], x[:, None] - ends)
-    near = away < lengths
+    near = np.maximum(starts - x[:, None], x[:, None] - ends) < lengths
 
     integrals = []
     corrections = _near_integrals(x, starts, ends, near)

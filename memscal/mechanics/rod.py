@@ -135,8 +135,7 @@ class RodTraction:
         # c_n = sqrt(pi) n! / Gamma(n + 1/2) gives each term the transform j_2n.
         series = np.zeros(2 * self.pressure_terms.size)
         series[::2] = self.pressure_terms * _term_scale(self.pressure_terms.size)
-        values = legendre.legval(m, series) / m
-        return np.where(under, values * self._mean_scale(), 0.0)
+        return np.where(under, (legendre.legval(m, series) / m) * self._mean_scale(), 0.0)
 
     def shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction at ``r`` (m) in Pa; zero from the edge outward."""
@@ -263,8 +262,7 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
 
 def _half_space_diagonal(first: int, terms: int) -> FloatArray:
     r"""Return :math:`\int_0^\infty j_l^2\,d\xi = \pi/2(2l+1)` for ``l = first, first + 2, ...``."""
-    order = first + 2 * np.arange(terms)
-    return np.asarray(np.pi / (2 * (2 * order + 1)), dtype=np.float64)
+    return np.asarray(np.pi / (2 * (2 * (first + 2 * np.arange(terms)) + 1)), dtype=np.float64)
 
 
 def _half_space_coupling_matrix(terms: int) -> FloatArray:

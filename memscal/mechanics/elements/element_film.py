@@ -52,8 +52,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     displacement[index, 1] = -solution[inward]
 
     def averaged(values: FloatArray) -> FloatArray:
-        count = np.bincount(index.ravel())
-        return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / count)
+        return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel()))
 
     radial, vertical = averaged(gradient[0][0]), averaged(gradient[1][1])
     hoop = np.where(r > 0, displacement[:, 0] / np.where(r > 0, r, 1.0), radial)
@@ -149,8 +148,7 @@ class ElementFilm:
         for source, unknowns in enumerate((inward, outward)):
             for start in range(0, rings.size, _BATCH):
                 batch = slice(start, start + _BATCH)
-                loads = hats[:, batch].toarray()
-                solution = system.solve(unknowns, loads)
+                solution = system.solve(unknowns, hats[:, batch].toarray())
                 moved[source, 0, :, batch] = scale * (seen @ solution[inward])
                 moved[source, 1, :, batch] = scale * (seen @ solution[outward])
         return SurfaceCompliance(
@@ -200,14 +198,12 @@ class ElementField:
     def base_spectrum(self, k: FloatArray) -> FloatArray:
         """Return the transform of the base stress at ``k`` (rad/m), in N, to 1e-5 of the load."""
         r = self._fine_radii
-        spectrum = hankel_transform(r, self.base_normal(r), np.ravel(k))
-        return spectrum.reshape(np.shape(k))
+        return hankel_transform(r, self.base_normal(r), np.ravel(k)).reshape(np.shape(k))
 
     def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
         r = self._fine_radii
-        spectrum = hankel_transform(r, self.base_shear(r), np.ravel(k), order=1)
-        return spectrum.reshape(np.shape(k))
+        return hankel_transform(r, self.base_shear(r), np.ravel(k), order=1).reshape(np.shape(k))
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""

@@ -141,8 +141,7 @@ class MixedSystem:
         mesh = skfem.MeshTri(
             np.ascontiguousarray(self.mesh.points.T), np.ascontiguousarray(self.mesh.triangles.T)
         )
-        element = skfem.ElementVector(skfem.ElementTriP4())
-        return skfem.Basis(mesh, element, intorder=_QUADRATURE)
+        return skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP4()), intorder=_QUADRATURE)
 
     @cached_property
     def pressure(self) -> Any:
@@ -196,8 +195,7 @@ class MixedSystem:
         """Nothing moves at the base, and nothing outward on the axis."""
         deepest = self.mesh.points[:, 1].max()
         base = self.displacement.get_dofs(lambda x: x[1] == deepest).all()
-        axis = self.displacement.get_dofs(lambda x: x[0] == 0).all(["u^1"])
-        return np.union1d(base, axis)
+        return np.union1d(base, self.displacement.get_dofs(lambda x: x[0] == 0).all(["u^1"]))
 
     def side(self, depth: float) -> tuple[QuarticLine, NDArray[np.int64], NDArray[np.int64]]:
         """Return the side of the mesh at a depth, with its outward and inward unknowns."""

@@ -149,8 +149,7 @@ def mesh_below_a_sphere(
     """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
     near = _WIDEST_BELOW_A_SPHERE * thickness / refinement
     side = min(_SHARE_OF_CONTACT * contact / refinement, near)
-    count = int(np.ceil(contact / side))
-    even = np.linspace(0.0, contact, count + 1)
+    even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
     return _tensor(even, (side, near), contact, thickness, radius, refinement)
 
 

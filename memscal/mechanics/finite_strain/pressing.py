@@ -53,8 +53,7 @@ class RodFace:
         s = np.where(wall, self.flat + np.pi / 2 * self.edge - y, r)
         turning = (x > 0) & (y > 0)
         s = np.where(turning, self.flat + self.edge * np.arctan2(x, y), s)
-        straight = np.where(wall, x, y)
-        return s, np.where(turning, np.hypot(x, y), straight) - self.edge
+        return s, np.where(turning, np.hypot(x, y), np.where(wall, x, y)) - self.edge
 
 
 @dataclass(frozen=True)

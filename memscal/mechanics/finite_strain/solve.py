@@ -207,8 +207,7 @@ class _Request:
             reach = 0.8 * self._hertz_radius(goal)
             depth = reach**2 / (self.indenter.extent * _MM)
         chosen = r <= reach * (1 + 1e-9)
-        place = pressing.place_at(r[chosen])
-        return Pressed(np.zeros(elements.size), depth, nodes[chosen], place)
+        return Pressed(np.zeros(elements.size), depth, nodes[chosen], pressing.place_at(r[chosen]))
 
     def _contact(self, pressing: Pressing, step: Step) -> Contact:
         """Return a state in SI units, of unknown convergence."""
