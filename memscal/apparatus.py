@@ -19,8 +19,6 @@ from memscal.model.arrays import FloatArray, finite_vector, require_increasing
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Result
 
-__all__ = ["ApparatusFunction", "load_apparatus", "opened_apparatus"]
-
 #: A base stress reaches no farther than this, in m; a larger radius is in another unit.
 _LARGEST_RADIUS = 1.0
 #: What may be left of a stress at the end of its table.

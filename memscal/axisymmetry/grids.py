@@ -19,8 +19,6 @@ from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
-__all__ = ["EvenGrid", "FieldGrid", "Lattice", "cut", "on_grid"]
-
 #: Directions over which a field of a lattice is averaged.
 _DIRECTIONS = 64
 

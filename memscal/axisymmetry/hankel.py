@@ -34,16 +34,6 @@ from scipy.special import j0, j1
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "RadialSpectrum",
-    "Wavenumbers",
-    "gauss_between",
-    "gauss_panels",
-    "hankel_transform",
-    "radial_spline",
-    "ring_areas",
-]
-
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
     """Nodes and weights on [0, upper], in panels up to ``longest`` with ``order`` nodes each."""

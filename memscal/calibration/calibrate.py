@@ -45,15 +45,6 @@ from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
 
-__all__ = [
-    "Calibration",
-    "Reference",
-    "assemble",
-    "calibrate",
-    "calibration_messages",
-    "uncertainties",
-]
-
 
 def assemble(
     solution: Solution,

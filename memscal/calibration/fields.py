@@ -21,15 +21,6 @@ from memscal.estimation.profile import ProfileEstimate, constrained_profile
 from memscal.model.arrays import FloatArray
 from memscal.model.places import EvenAxis, even_lattice
 
-__all__ = [
-    "Fields",
-    "GridChoice",
-    "LineFields",
-    "RasterFields",
-    "choose_grid",
-    "constrained_kernel",
-]
-
 _POINTS_PER_WIDTH = 6.0
 
 

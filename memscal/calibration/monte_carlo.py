@@ -35,15 +35,6 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, single_threaded, worker_pool
 
-__all__ = [
-    "Comparison",
-    "DrawnScans",
-    "MonteCarlo",
-    "SolvedInput",
-    "monte_carlo",
-    "shortest_interval",
-]
-
 #: Draws that a process takes at a time.
 _LARGEST_BLOCK = 8
 

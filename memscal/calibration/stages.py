@@ -39,18 +39,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "Deconvolution",
-    "FieldNoise",
-    "Misfit",
-    "Solution",
-    "deconvolve",
-    "field_noise",
-    "prepare_fields",
-    "require_channel_method",
-    "solve",
-]
-
 #: A shear's integral is summed out to this multiple of the scan's reach, at this many radii.
 _FAR = 2.0
 _RADII = 2001

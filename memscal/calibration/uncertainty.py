@@ -31,18 +31,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "BUDGETED",
-    "NOT_RANDOM",
-    "Functional",
-    "InputEffect",
-    "Results",
-    "correlation_matrix",
-    "input_effects",
-    "kernel_functionals",
-    "propagate",
-]
-
 #: Points per step of the profile between which the half maximum is interpolated.
 _FINE = 20
 #: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.

@@ -27,24 +27,6 @@ from memscal.model.arrays import FloatArray
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = [
-    "ENTRY_POINT_GROUP",
-    "Bayesian",
-    "Division",
-    "DivisionProblem",
-    "KernelProfile",
-    "Regulariser",
-    "Tikhonov",
-    "WhiteNoise",
-    "WhiteNoiseDraw",
-    "create_regulariser",
-    "filtered_division",
-    "image_division",
-    "regulariser_names",
-    "require_amplitude",
-    "require_count",
-]
-
 #: The paper adds white noise "ten times weaker than the weakest relevant spectral component".
 NOISE_RATIO = 0.1
 

@@ -17,8 +17,6 @@ from memscal.deconvolution.division import (
 )
 from memscal.model.arrays import FloatArray
 
-__all__ = ["RichardsonLucy", "UnsupervisedWiener", "Wiener"]
-
 
 @dataclass(frozen=True, eq=False)
 class _Images:

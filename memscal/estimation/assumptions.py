@@ -19,18 +19,6 @@ from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
-__all__ = [
-    "Departure",
-    "ExtraColumns",
-    "HeldOut",
-    "axisymmetry_test",
-    "departure_test",
-    "hold_out",
-    "linearity_test",
-    "load_groups",
-    "symmetry_test",
-]
-
 #: More groups than this are held out several at a time.
 _MOST_FOLDS = 10
 #: Loads that differ by less of their mean are one load, recorded with scatter.

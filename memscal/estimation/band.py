@@ -19,8 +19,6 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.model.arrays import FloatArray
 
-__all__ = ["Band", "find_band", "transfer_uncertainty"]
-
 #: A spectral component is relevant while it stands this many times above its noise...
 RELEVANT = 10.0
 #: ...and resolved while the Gaussian's transfer function is this many standard uncertainties.

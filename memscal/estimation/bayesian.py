@@ -31,17 +31,6 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "HYPOTHESES",
-    "SHAPES",
-    "DepartureBasis",
-    "Rings",
-    "Shape",
-    "WeighedFit",
-    "departure_basis",
-    "weigh_departures",
-]
-
 #: Rings are never narrower than this many steps: a width below the sampling is not resolved.
 _SMALLEST_WIDTH_IN_STEPS = 0.5
 #: Neighbouring rings overlap: this share of their blur apart.

@@ -30,8 +30,6 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.estimation.points import ScanPoints, channel_axis
 from memscal.model.arrays import FloatArray
 
-__all__ = ["ForwardModel", "Geometry", "elliptic_columns", "elliptic_departure"]
-
 
 @dataclass(frozen=True, eq=False)
 class Geometry:

@@ -17,8 +17,6 @@ from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
-__all__ = ["GaussianFit", "fit_gaussian", "gauss_newton", "linearise"]
-
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
 #: Steps end here, in units of the parameters' typical sizes: the model is no longer linear.

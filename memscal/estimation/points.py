@@ -14,18 +14,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.places import Places, places_of
 from memscal.model.scan import Scan
 
-__all__ = [
-    "CHANNELS",
-    "TANGENTIAL",
-    "ScanPoints",
-    "channel_axis",
-    "channel_order",
-    "channel_signal",
-    "joined_points",
-    "measured_mask",
-    "measured_points",
-]
-
 #: Channels that measure the shear along x and along y.
 TANGENTIAL = ("xz", "yz")
 #: All, the normal one first.

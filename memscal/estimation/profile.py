@@ -21,8 +21,6 @@ from memscal.estimation.gaussian import GaussianFit, fit_gaussian
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
-__all__ = ["CentreError", "ProfileEstimate", "constrained_profile", "estimate_profile"]
-
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
 #: Error of the reference and of its transforms, relative to the largest signal.

@@ -19,18 +19,6 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "carried_force",
-    "film_sensitivities",
-    "reference_contact",
-    "reference_profile",
-    "reference_spectra",
-    "reference_spectrum",
-    "require_calibration_rod",
-    "require_one_sensor",
-    "rod_sensitivities",
-]
-
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
 #: A table that ends inside the scan must have decayed to this share of its maximum.

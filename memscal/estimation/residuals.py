@@ -30,19 +30,6 @@ from memscal.model.checks import FALSE_ALARM, chi_square_limit
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-__all__ = [
-    "FreeModel",
-    "Residuals",
-    "TestOutcome",
-    "chi_square_test",
-    "free_model",
-    "neighbour_correlation_test",
-    "orthonormal",
-    "pure_error_test",
-    "residuals_of",
-    "runs_test",
-]
-
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
 #: A point of less weight is an outlier and is left out.

@@ -54,16 +54,6 @@ from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 from memscal.version import __version__
 
-__all__ = [
-    "SHARED_SOURCES",
-    "check_of_all_forces",
-    "checks_of_restoration",
-    "joined_stress",
-    "measure_stress",
-    "pooled_force",
-    "stress_checks",
-]
-
 #: Sources of a force's uncertainty that all profiles have in common.
 SHARED_SOURCES = ("apparatus", "film", "position_scale")
 

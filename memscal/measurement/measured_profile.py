@@ -31,20 +31,6 @@ from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
-__all__ = [
-    "ContactSignal",
-    "PreparedScan",
-    "SingleLoad",
-    "contact_signal",
-    "measured_profile",
-    "measured_scan",
-    "place_of",
-    "prepared_scan",
-    "require_ends",
-    "require_points",
-    "single_loads",
-]
-
 #: Lines whose loads differ by less than this are repeats of one load.
 _SAME_LOAD = 0.05
 #: Recorded loads of one line scatter by less than this about their median.

@@ -46,20 +46,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.scan import Scan
 
-__all__ = [
-    "Posterior",
-    "PressureShape",
-    "ShapeFit",
-    "adopted_noise",
-    "apparatus_changes",
-    "film_transfer",
-    "fit_shape",
-    "pressure_shapes",
-    "reach_of",
-    "restore_posterior",
-    "sensor_transfer",
-]
-
 _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
 #: Shears from none to full stick: spheres of a contact radius from half to twice the thickness.
 _SHEARS_INCOMPRESSIBLE = (0.0, -0.2, -0.4)

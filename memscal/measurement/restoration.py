@@ -25,8 +25,6 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = ["SAME_LOAD", "Comparison", "Expected", "Restoration", "compare_stress", "read_expected"]
-
 #: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
 SAME_LOAD = 0.01
 

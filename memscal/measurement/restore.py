@@ -43,18 +43,6 @@ from memscal.model.records import FILM
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 
-__all__ = [
-    "accept_mismatches",
-    "failed_calibration_messages",
-    "gaussian_pressure",
-    "noise_unstated_message",
-    "require_covariance",
-    "restoration_checks",
-    "restoration_messages",
-    "restore",
-    "restore_known",
-]
-
 #: Properties of one film agree within this share where no uncertainty is stated ...
 _SAME = 0.02
 #: ... and within this many standard uncertainties of their difference where it is.

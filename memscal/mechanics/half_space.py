@@ -24,8 +24,6 @@ from scipy.special import ellipkm1, elliprd
 
 from memscal.model.arrays import FloatArray
 
-__all__ = ["coupling_integrals", "on_hats", "singular_integrals"]
-
 # Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.
 _ORDER = 8
 # Crowding: nodes v^5 with 24 Gauss points in v take the logarithm to 1e-12.

@@ -29,8 +29,6 @@ from memscal.mechanics.surface import SurfaceCompliance
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
-__all__ = ["HankelField", "HankelFilm"]
-
 # x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
 _LARGEST_KH = 22.0
 # Phase, in rad, that one panel of the k-quadrature may span.

@@ -18,8 +18,6 @@ from scipy.special import gamma, pbdv
 from memscal.model.arrays import FloatArray, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 
-__all__ = ["ExponentialCompliance", "GreenwoodTripp", "Interface", "NormalLaw"]
-
 # Separations, in units of the law's length, between which a law is inverted.
 _CLOSEST = -60.0
 _FARTHEST = 12.0

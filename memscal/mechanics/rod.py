@@ -35,8 +35,6 @@ from memscal.mechanics.base_stress import HalfSpaceIntegrals, base_normal_stress
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
-__all__ = ["RodSolution", "RodTraction", "rod_integrals", "solve_rod", "spherical_bessel"]
-
 
 def rod_integrals(
     rho: FloatArray, pressure_terms: FloatArray, shear_terms: FloatArray

@@ -17,8 +17,6 @@ import numpy as np
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 
-__all__ = ["FilmField", "MeshedField", "SurfaceCompliance"]
-
 
 @dataclass(frozen=True, eq=False)
 class SurfaceCompliance:

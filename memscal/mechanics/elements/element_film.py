@@ -26,8 +26,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 
-__all__ = ["ElementField", "ElementFilm", "field_mesh"]
-
 # A quartic triangle has 15 nodes, at quarters of its sides and of the lines between them: they
 # are the nodes of four quadratic triangles.
 _QUARTERS = 4

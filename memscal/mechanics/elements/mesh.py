@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.model.arrays import FloatArray
 
-__all__ = ["TriangleMesh", "film_triangles"]
-
 # Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
 _INTERVALS = 2

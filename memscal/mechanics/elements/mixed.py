@@ -29,8 +29,6 @@ from memscal.axisymmetry.hankel import gauss_between
 from memscal.mechanics.elements.mesh import TriangleMesh
 from memscal.model.arrays import FloatArray
 
-__all__ = ["MixedSystem", "QuarticLine", "smooth"]
-
 _DEGREE = 4
 _SMOOTH_DEGREE = 5
 # Exact for the product of two quartics and r.

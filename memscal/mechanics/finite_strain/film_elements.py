@@ -24,16 +24,6 @@ from scipy import sparse
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
-__all__ = [
-    "FilmElements",
-    "IntArray",
-    "NeoHookean",
-    "cofactor",
-    "determinant",
-    "mesh_below_a_rod",
-    "mesh_below_a_sphere",
-]
-
 _PASCAL_TO_MPA = 1e-6
 # Share of the bulk modulus that does not go through the pressure, in shear moduli: enough to keep
 # elements from buckling, and too little to make them lock.

@@ -21,8 +21,6 @@ from memscal.errors import ConvergenceError
 from memscal.mechanics.finite_strain.film_elements import FilmElements, IntArray
 from memscal.model.arrays import FloatArray
 
-__all__ = ["Goal", "NewtonError", "Pressed", "Pressing", "RodFace", "SphereFace", "Step", "follow"]
-
 
 @dataclass(frozen=True)
 class RodFace:

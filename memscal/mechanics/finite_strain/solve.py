@@ -36,8 +36,6 @@ from memscal.mechanics.solver.refinement import relative_change
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod, Sphere
 
-__all__ = ["press_at_finite_strain", "solve_finite_strain"]
-
 _MM = 1e3
 # The mesh that tells the convergence has sides longer by this factor.
 _COARSER = 1.5

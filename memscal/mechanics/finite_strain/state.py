@@ -15,8 +15,6 @@ from memscal.mechanics.rings import RingTraction
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 
-__all__ = ["FiniteStrainField", "interface_traction", "outermost"]
-
 _MM = 1e-3
 _MPA = 1e6
 
