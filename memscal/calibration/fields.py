@@ -104,8 +104,7 @@ class LineFields:
         wavenumbers = reference.wavenumbers
         both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
-        support = round(choice.support / choice.spacing)
-        return cls(grid, voltage, stress, support, estimate.distance)
+        return cls(grid, voltage, stress, round(choice.support / choice.spacing), estimate.distance)
 
     @property
     def confinement(self) -> FloatArray:

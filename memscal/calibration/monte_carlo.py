@@ -174,9 +174,7 @@ class DrawnScans:
         result, radii = solution.deconvolution, first.deconvolution.g.r
         r, g = result.g.r, result.g.radial
         g = np.where(radii <= r[-1], radial_spline(r, g)(np.minimum(radii, r[-1])), 0.0)
-        numbers = (
-            functional.value for functional in kernel_functionals(result.g, result.gaussian_sigma)
-        )
+        numbers = (f.value for f in kernel_functionals(result.g, result.gaussian_sigma))
         sigma = solution.estimate.gaussian.sigma
         return np.array([result.conversion_constant, sigma, *numbers, *g])
 
@@ -415,6 +413,8 @@ def _compared(
     same_mean = abs(mean - value) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
     low, high = np.quantile(column, _TAILS)
     first, last = shortest_interval(column)
+    agrees = same_spread and same_mean
+    reason = "" if agrees else _reason(spread, mean - value, u, budget, solved)
     return Comparison(
         name=name,
         value=value,
@@ -425,9 +425,7 @@ def _compared(
         shortest=(float(first), float(last)),
         first_order=u,
         stated=parameters.uncertainty(name),
-        reason=""
-        if same_spread and same_mean
-        else _reason(spread, mean - value, u, budget, solved),
+        reason=reason,
     )
 
 
@@ -447,8 +445,7 @@ def _reason(
     """Return by how much draws and budget disagree, and whether a distribution is cut off."""
     text = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
     for item in solved:
-        quantiles = ndtri((np.arange(1000) + 0.5) / 1000)
-        kept = float(item.truncated(quantiles).std())
+        kept = float(item.truncated(ndtri((np.arange(1000) + 0.5) / 1000)).std())
         if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:
             return (
                 f"{text} The {item.source.replace('_', ' ')} is cut off at {item.bounds[1]:g}: its "

@@ -199,13 +199,8 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     stated = estimate.points.u_errors
     noise = estimate.noise if stated is None else stated
     degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]
-    return Misfit(
-        relative_rms=float(
-            np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal
-        ),
-        chi2_reduced=float(np.sum(weight * (residual / noise) ** 2) / degrees),
-        degrees=degrees,
-    )
+    rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
+    return Misfit(rms, float(np.sum(weight * (residual / noise) ** 2) / degrees), degrees)
 
 
 @dataclass(frozen=True, eq=False)

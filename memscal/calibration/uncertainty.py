@@ -310,10 +310,8 @@ def _budget(
 
 
 def _input_column(rows: _Rows, estimate: ProfileEstimate, effect: InputEffect) -> FloatArray:
-    shift = np.concatenate(
-        [estimate.weighed.gain @ effect.voltage, estimate.gaussian_gain @ effect.voltage]
-    )
-    column = rows.matrix @ shift
+    gain = np.vstack([estimate.weighed.gain, estimate.gaussian_gain])
+    column = rows.matrix @ (gain @ effect.voltage)
     scales = np.array([name.startswith("conversion_constant") for name in rows.names])
     column[: scales.size] += np.where(scales, rows.values, 0.0) * effect.scaling
     return np.asarray(column[:, None])
@@ -341,12 +339,11 @@ def _rows(
     hidden_scalars = np.zeros(len(names))
     for functional in functionals:
         hidden_scalars[names.index(functional.name)] = functional.row @ hidden_radial
-    profiles = np.vstack([radial, transfer])
     return _Rows(
         names=names,
         values=values,
         radii=r.size,
-        matrix=np.vstack([scalars, np.pad(profiles, ((0, 0), (0, fitted)))]),
+        matrix=np.vstack([scalars, np.pad(np.vstack([radial, transfer]), ((0, 0), (0, fitted)))]),
         hidden=np.concatenate([hidden_scalars, hidden_radial, np.interp(wavenumbers, k, hidden)]),
         opened=opened,
     )

@@ -191,7 +191,6 @@ class Tikhonov:
 
     # Its window closes more slowly than the white noise's, at the same wavenumber: sqrt(alpha) is
     # the paper's noise amplitude.
-
     amplitude: float = 1.0  # root of alpha over a tenth of the weakest relevant component
     name: ClassVar[str] = "tikhonov"
     assumes: ClassVar[str] = "G has little power; all wavenumbers are equally likely to carry it."
@@ -264,8 +263,7 @@ def create_regulariser(name: str, /, **options: Any) -> Regulariser:
     if "seed" not in accepted:
         options = {key: value for key, value in options.items() if key != "seed"}
     unknown = sorted(set(options) - set(accepted))
-    takes_any = any(p.kind is p.VAR_KEYWORD for p in accepted.values())
-    if unknown and not takes_any:
+    if unknown and not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
         raise InputError(
             f"Method {name} has no option {', '.join(unknown)}.",
             cure=f"Its options are: {', '.join(accepted) or 'none'}.",

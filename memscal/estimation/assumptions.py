@@ -186,8 +186,7 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     round_ = estimate.gaussian.jacobian[:, : estimate.basis.flat - estimate.points.ellipse]
-    jacobian = round_ / np.linalg.norm(round_, axis=0)
-    base = np.linalg.qr(standardised(jacobian, weights))[0]
+    base = np.linalg.qr(standardised(round_ / np.linalg.norm(round_, axis=0), weights))[0]
     scaled = standardised(columns, weights)
     residual = standardised(estimate.weighed.residual + estimate.oval, weights)
     residual = residual - base @ (base.T @ residual)

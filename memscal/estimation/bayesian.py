@@ -388,6 +388,7 @@ def _average(
             _add_covariance(covariance, linear, conditional, q, least_variance)
     variance = np.array([c.variance for c in conditionals])
     possible = prior > 0
+    likelihood = float(np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible])))
     return WeighedFit(
         mean=mean,
         covariance=covariance,
@@ -395,9 +396,7 @@ def _average(
         noise=float(np.sqrt(estimate @ variance)),
         probability=estimate,
         residual=linear.data,
-        log_marginal_likelihood=float(
-            np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible]))
-        ),
+        log_marginal_likelihood=likelihood,
     )
 
 

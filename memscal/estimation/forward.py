@@ -228,8 +228,7 @@ def _response(
     e = float(np.hypot(e1, e2))
     half = 0.5 * (sigma * model.k) ** 2
     # The derivatives of the radius by the centre point to it: their angle is the direction's.
-    direction = np.arctan2(-geometry.towards[1], -geometry.towards[0])
-    angle = direction - 0.5 * np.arctan2(e2, e1)
+    angle = np.arctan2(-geometry.towards[1], -geometry.towards[0]) - 0.5 * np.arctan2(e2, e1)
     total = np.zeros_like(geometry.radius)
     for m, bessel in enumerate(harmonics):
         kernel = ive(m, half * e) * np.exp(-half * (1 - e))
@@ -252,8 +251,7 @@ def _bessel(
         safe = np.where(small, 1.0, x)
         factorial *= order
         series = (x / 2) ** order / factorial
-        upward = 2 * (order - 1) / safe * above - below
-        below, above = above, np.where(small, series, upward)
+        below, above = above, np.where(small, series, 2 * (order - 1) / safe * above - below)
         if order % 2 == 0:
             even.append(above[back])
     return even

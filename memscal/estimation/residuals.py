@@ -165,10 +165,8 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
 
     def within(columns: FloatArray) -> FloatArray:
         """Subtract from each column its weighted mean at each place."""
-        mean = (
-            np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1) / square[:, None]
-        )
-        return np.asarray(columns - weight[:, None] * mean[group])
+        sums = np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1)
+        return np.asarray(columns - weight[:, None] * (sums / square[:, None])[group])
 
     basis = orthonormal(model.design)
     left_over = model.data - basis @ (basis.T @ model.data)

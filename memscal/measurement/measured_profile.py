@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
-from memscal.estimation.points import TANGENTIAL, ScanPoints, channel_signal, measured_points
+from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.measurement.posterior import apparatus_changes, film_transfer, sensor_transfer
 from memscal.measurement.restoration import Restoration
@@ -392,7 +392,7 @@ def _points(
     """Return the points of one load by channel, as they were measured."""
     normal = measured_points(scan)
     weight = restored.posterior.estimate.outlier_weight
-    noise = _noise_in_shape(prepared, restored)[_kept(scan, "zz")]
+    noise = _noise_in_shape(prepared, restored)[measured_mask(scan)]
     points = {"zz": _of_channel(scan, normal, noise, weight)}
     for channel in TANGENTIAL:
         try:
@@ -409,7 +409,7 @@ def _of_channel(
 ) -> MeasuredPoints:
     load_errors = np.zeros_like(points.u)
     if scan.normal_load_errors is not None:
-        load_errors = np.nan_to_num(scan.normal_load_errors[_kept(scan, points.channel)])
+        load_errors = np.nan_to_num(scan.normal_load_errors[measured_mask(scan, points.channel)])
     correlation = None
     if points.decorrelation is not None:
         root = np.linalg.inv(points.decorrelation)
@@ -425,16 +425,6 @@ def _of_channel(
         x_errors=points.x_errors,
         correlation=correlation,
     )
-
-
-def _kept(scan: Scan, channel: str) -> NDArray[np.bool_]:
-    """Which points of a channel were measured, shape of ``u_zz``."""
-    u, errors = channel_signal(scan, channel)
-    kept: NDArray[np.bool_] = np.isfinite(u)
-    for other in (scan.normal_load, errors):
-        if other is not None:
-            kept &= np.isfinite(other)
-    return kept
 
 
 def _averaging(
@@ -458,18 +448,16 @@ def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatA
     posterior, model = restored.posterior, restored.posterior.estimate.model
     nodes, free = posterior.nodes, restored.points.free
     geometry = model.geometry(np.atleast_2d(restored.centre))
-    pressure = (
-        posterior.state[:nodes] / restored.scan.load / film_transfer(restored.scan.film, model.k)
-    )
+    film = film_transfer(restored.scan.film, model.k)
+    pressure = posterior.state[:nodes] / restored.scan.load / film
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
     columns = [average @ column / restored.apparatus.conversion_constant for column in columns]
     sigma, n = posterior.covariance[nodes:, nodes:], int(free.sum())
     carried = np.linalg.solve(sigma[:n, :n], sigma[:n, n:])
     of_centre = columns[0] + columns[1] @ carried.T
-    rest = sigma[n:, n:] - sigma[n:, :n] @ carried
     return {
         "centre": of_centre @ sigma[:n, :n] @ of_centre.T,
-        "baseline": columns[1] @ rest @ columns[1].T,
+        "baseline": columns[1] @ (sigma[n:, n:] - sigma[n:, :n] @ carried) @ columns[1].T,
     }
 
 

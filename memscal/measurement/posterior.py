@@ -129,7 +129,6 @@ class ShapeFit:
     """The fit of one shape of pressure and of departures from it."""
 
     # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
-
     shape: PressureShape
     state: FloatArray  # (s,): posterior mean
     covariance: FloatArray  # (s, s): expected squared error

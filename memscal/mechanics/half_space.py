@@ -65,8 +65,7 @@ def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
         lengths * (starts * falling + lengths * (reach**2 / 2 - reach**3 / 3)),
         lengths * (starts * rising + lengths * reach**3 / 3),
     )
-    inverse = np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
-    return beyond, within * inverse
+    return beyond, within * np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
 
 
 def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:

@@ -47,8 +47,7 @@ def rod_integrals(
     # t = c sin(theta) below c = min(rho, 1): the root sqrt(rho^2 - t^2) cancels against dt.
     inner = np.minimum(rho, 1.0)
     angle = np.arcsin(np.divide(inner, rho, out=np.ones_like(rho), where=rho > 0))
-    theta = angle[:, None] * share
-    t = rho[:, None] * np.sin(theta)
+    t = rho[:, None] * np.sin(angle[:, None] * share)
     d_theta = angle[:, None] * weights
     pressed, sheared = legendre.legval(t, even), legendre.legval(t, odd)
     w_by_p = np.sum(d_theta * pressed, axis=1)
@@ -242,8 +241,7 @@ def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> _
 def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> FloatArray:
     r"""Return :math:`\int j_m(\xi) j_n(\xi) \{W, X, Y\}(\xi h/a)\,d\xi`, even rows before odd."""
     # The integrand turns at the rate 2 a in k, and the poles lie 0.74/h off the axis.
-    longest = min(1.5 * ratio, 6.0)
-    xi, weights = gauss_panels(_LARGEST_KH * ratio, longest, order)
+    xi, weights = gauss_panels(_LARGEST_KH * ratio, min(1.5 * ratio, 6.0), order)
     x = xi / ratio
     orders = spherical_bessel(2 * terms, xi)
     even, odd = orders[::2], orders[1::2]

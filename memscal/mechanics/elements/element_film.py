@@ -239,8 +239,7 @@ class ElementField:
 
     def _at_base(self, component: int, r: FloatArray) -> FloatArray:
         flat = np.ravel(np.asarray(r, dtype=np.float64))
-        inside = np.minimum(flat, self.radius) / self.film.thickness
-        values = self._base[component](inside)
+        values = self._base[component](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
     def _at_surface(self, unknowns: NDArray[np.int64], r: FloatArray) -> FloatArray:

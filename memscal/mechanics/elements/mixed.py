@@ -174,14 +174,8 @@ class MixedSystem:
             return -softness * p * q * w.x[0]
 
         coupled = squeeze.assemble(self.displacement, self.pressure)
-        return csr_array(
-            block_array(
-                [
-                    [distortion.assemble(self.displacement), coupled.T],
-                    [coupled, compression.assemble(self.pressure)],
-                ]
-            )
-        )
+        stiff, soft = distortion.assemble(self.displacement), compression.assemble(self.pressure)
+        return csr_array(block_array([[stiff, coupled.T], [coupled, soft]]))
 
     @cached_property
     def free(self) -> NDArray[np.int64]:

@@ -280,13 +280,7 @@ class FilmElements:
         couple = -pressures.transpose(0, 2, 1) @ squeeze[:, :, 0]
         weighted = pressures * (self.material.softness * volumes)[..., None]
         soft = -pressures.transpose(0, 2, 1) @ weighted
-        whole = np.concatenate(
-            [
-                np.concatenate([stiff, couple.transpose(0, 2, 1)], axis=2),
-                np.concatenate([couple, soft], axis=2),
-            ],
-            axis=1,
-        )
+        whole = np.block([[stiff, couple.transpose(0, 2, 1)], [couple, soft]])
         dofs = np.concatenate([moving, pressing], axis=1)
         rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
         columns = np.tile(dofs, (1, dofs.shape[1])).ravel()

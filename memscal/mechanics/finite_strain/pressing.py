@@ -299,9 +299,8 @@ class _Path:
             pieces = max(1.0, np.ceil(abs(left) / self.length - 1e-9))
             ahead = goal.value if pieces == 1 else begin + left / pieces
             try:
-                state = self.pressing.press(
-                    self._guess(Goal(ahead, goal.is_load)), Goal(ahead, goal.is_load)
-                )
+                stage = Goal(ahead, goal.is_load)
+                state = self.pressing.press(self._guess(stage), stage)
             except NewtonError:
                 self.length = abs(ahead - begin) / 2
                 halvings += 1
@@ -340,10 +339,8 @@ class _Path:
         ahead = (goal.value - new) / (new - old)
         place = last.place.copy()
         if not self.pressing.sticking:
-            was, now = (
-                np.isin(before.touching, last.touching),
-                np.isin(last.touching, before.touching),
-            )
+            was = np.isin(before.touching, last.touching)
+            now = np.isin(last.touching, before.touching)
             place[now] += ahead * (place[now] - before.place[was])
         return replace(
             last,

@@ -25,7 +25,6 @@ class FiniteStrainField:
 
     # An element of the bonded base does not deform: its Cauchy traction is the nominal one.
     # ``depression`` and ``outward`` are functions of a point's radius *before* the deformation.
-
     pressing: Pressing
     pressed: Pressed
 
