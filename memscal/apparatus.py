@@ -19,8 +19,6 @@ from memscal.model.arrays import FloatArray, finite_vector, require_increasing
 from memscal.model.provenance import SourceFile
 from memscal.model.result import Result
 
-__all__ = ["ApparatusFunction", "load_apparatus", "opened_apparatus"]
-
 #: A base stress reaches no farther than this, in m; a larger radius is in another unit.
 _LARGEST_RADIUS = 1.0
 #: What may be left of a stress at the end of its table.
@@ -187,8 +185,7 @@ class ApparatusFunction(Result, ApparatusData):
             raise InputError("A radius is not a number.", cure="Leave missing radii out.")
         support = self.radial_profile.r
         spline = radial_spline(support, values)
-        inside = radii <= support[-1]
-        return np.where(inside, spline(np.minimum(radii, support[-1])), 0.0)
+        return np.where(radii <= support[-1], spline(np.minimum(radii, support[-1])), 0.0)
 
     def _checked(self, r: ArrayLike, sigma_zz: ArrayLike) -> tuple[FloatArray, FloatArray]:
         radii, stress = finite_vector("r", r), finite_vector("sigma_zz", sigma_zz)

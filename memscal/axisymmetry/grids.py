@@ -19,8 +19,6 @@ from memscal.axisymmetry.hankel import radial_spline
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
-__all__ = ["EvenGrid", "FieldGrid", "Lattice", "cut", "on_grid"]
-
 #: Directions over which a field of a lattice is averaged.
 _DIRECTIONS = 64
 
@@ -149,8 +147,7 @@ class Lattice:
         """Modulus of each wave vector, shape (m, n // 2 + 1), in rad/m."""
         dy, dx = self.spacing
         ky = 2 * np.pi * scipy.fft.fftfreq(self.y.size, dy)
-        kx = 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx)
-        return np.hypot.outer(ky, kx)
+        return np.hypot.outer(ky, 2 * np.pi * scipy.fft.rfftfreq(self.x.size, dx))
 
     @property
     def cell_area(self) -> float:
@@ -234,8 +231,7 @@ def on_grid(
     """Values of a radial function on a grid, by an even spline through it every ``step`` (m)."""
     reach = float(np.max(grid.radius))
     table = np.linspace(0.0, reach, int(np.ceil(reach / step)) + 4)
-    spline = radial_spline(table, profile(table))
-    return spline(grid.radius)
+    return radial_spline(table, profile(table))(grid.radius)
 
 
 def cut(field: FloatArray, grid: EvenGrid, r: FloatArray) -> FloatArray:

@@ -34,22 +34,11 @@ from scipy.special import j0, j1
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "RadialSpectrum",
-    "Wavenumbers",
-    "gauss_between",
-    "gauss_panels",
-    "hankel_transform",
-    "radial_spline",
-    "ring_areas",
-]
-
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
     """Nodes and weights on [0, upper], in panels up to ``longest`` with ``order`` nodes each."""
     # To rounding 16 nodes integrate up to 16 rad of phase, 64 up to 100 rad.
-    count = max(1, math.ceil(upper / longest))
-    return gauss_between(np.linspace(0.0, upper, count + 1), order)
+    return gauss_between(np.linspace(0.0, upper, max(1, math.ceil(upper / longest)) + 1), order)
 
 
 def gauss_between(edges: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
@@ -99,8 +88,7 @@ class Wavenumbers:
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
-        radii = np.asarray(r, dtype=np.float64)
-        matrix = _bessel(order, np.multiply.outer(radii, self.k))
+        matrix = _bessel(order, np.multiply.outer(np.asarray(r, dtype=np.float64), self.k))
         return np.asarray(matrix @ (spectrum.T * self.weights).T)
 
 

@@ -17,15 +17,6 @@ from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, require_positive
 
-__all__ = [
-    "GaussianMixture",
-    "RadialKernel",
-    "SmoothedDisc",
-    "gaussian_transfer",
-    "unit_gaussian",
-    "unit_gaussian_slope",
-]
-
 
 def gaussian_transfer(k: FloatArray, sigma: float) -> FloatArray:
     r"""Transform :math:`\exp(-\sigma^2 k^2 / 2)` of the Gaussian of unit integral."""

@@ -45,15 +45,6 @@ from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
 
-__all__ = [
-    "Calibration",
-    "Reference",
-    "assemble",
-    "calibrate",
-    "calibration_messages",
-    "uncertainties",
-]
-
 
 def assemble(
     solution: Solution,
@@ -120,8 +111,7 @@ def _further_scans(solution: Solution) -> dict[str, Any]:
 def _field(solution: Solution, results: Results) -> ApparatusField:
     g = solution.deconvolution.g
     errors = np.sqrt(np.diag(results.radial_covariance))
-    radius = np.hypot.outer(g.y, g.x)
-    return ApparatusField(g.x, g.y, g.image, np.interp(radius, g.r, errors))
+    return ApparatusField(g.x, g.y, g.image, np.interp(np.hypot.outer(g.y, g.x), g.r, errors))
 
 
 def _radial(solution: Solution, results: Results) -> ApparatusRadial:
@@ -436,8 +426,7 @@ def calibrate(
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     regulariser = chosen_method(method, seed, options)
     solution = solve(scans, stresses, regulariser, channel)
-    others = None if alternative is None else _references(alternative, scans)
-    effects = _effects(solution, others)
+    effects = _effects(solution, None if alternative is None else _references(alternative, scans))
     results = uncertainties(solution, effects, correlations or {})
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)

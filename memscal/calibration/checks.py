@@ -42,8 +42,6 @@ from memscal.model.checks import (
     chi_square_limit,
 )
 
-__all__ = ["model_checks", "quality_checks"]
-
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
 _LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))

@@ -21,15 +21,6 @@ from memscal.estimation.profile import ProfileEstimate, constrained_profile
 from memscal.model.arrays import FloatArray
 from memscal.model.places import EvenAxis, even_lattice
 
-__all__ = [
-    "Fields",
-    "GridChoice",
-    "LineFields",
-    "RasterFields",
-    "choose_grid",
-    "constrained_kernel",
-]
-
 _POINTS_PER_WIDTH = 6.0
 
 
@@ -70,8 +61,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     spacing = min(width / _POINTS_PER_WIDTH, np.pi / (2 * last))
     spacing = support / np.ceil(support / spacing)
     span = max(float(np.ptp(offset)) for offset in estimate.offset)
-    extent = max(span, 1.25 * support)
-    return GridChoice(spacing=float(spacing), support=support, extent=extent)
+    return GridChoice(spacing=float(spacing), support=support, extent=max(span, 1.25 * support))
 
 
 def constrained_kernel(
@@ -87,13 +77,9 @@ def constrained_kernel(
 
 
 def _taper(radius: FloatArray, support: float) -> FloatArray:
-    """One up to half of the support, then falling as a cosine to zero at its edge.
-
-    A sharp edge would cut the ripples of G at full height: their integral, and with it A, would
-    depend on where it lies.
-    """
-    phase = np.clip(2 * radius / support - 1, 0.0, 1.0)
-    return np.asarray((1 + np.cos(np.pi * phase)) / 2)
+    """One up to half of the support, then a cosine that falls to zero at its edge."""
+    # A sharp edge would cut G's ripples at full height, and A would depend on where it lies.
+    return np.asarray((1 + np.cos(np.pi * np.clip(2 * radius / support - 1, 0.0, 1.0))) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +104,7 @@ class LineFields:
         wavenumbers = reference.wavenumbers
         both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
-        support = round(choice.support / choice.spacing)
-        return cls(grid, voltage, stress, support, estimate.distance)
+        return cls(grid, voltage, stress, round(choice.support / choice.spacing), estimate.distance)
 
     @property
     def confinement(self) -> FloatArray:
@@ -174,11 +159,7 @@ class RasterFields:
 
     @classmethod
     def place(cls, estimate: ProfileEstimate, choice: GridChoice, *, divided: bool) -> RasterFields:
-        """Place the raster, and continue it by the fitted profile.
-
-        ``divided``: whether its field is divided, and so needs an even lattice; else points off
-        any lattice get one of their own step, which the fitted profile fills alone.
-        """
+        """Place the raster, continued by the fitted profile; a field that is divided is even."""
         points = estimate.points
         lattice = even_lattice(points.x, points.y, points.places[0].count)
         if lattice is None and divided:
@@ -206,8 +187,7 @@ class RasterFields:
             voltage += _mean_at(voltage.shape, (rows, columns), departure / points.load)
         stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
         oval = _Oval(estimate.gaussian)
-        index = (rows, columns)
-        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, index)
+        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, (rows, columns))
 
     @property
     def confinement(self) -> FloatArray:

@@ -16,8 +16,6 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, worker_pool
 
-__all__ = ["FleetCalibration", "calibrate_many"]
-
 #: One item: a scan, its file, or several scans that are fitted together.
 FleetScan = Scan | str | PathLike[str] | Sequence[Scan]
 #: Scans that a process takes at a time.

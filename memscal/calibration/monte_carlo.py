@@ -1,9 +1,6 @@
 """Monte Carlo propagation of distributions (JCGM 101:2008), compared with the first-order budget.
 
-Each draw is a scan of the calibrated sensor with new noise.  The true values of
-all inputs whose uncertainty is stated are drawn; the scan states the nominal ones, and is
-calibrated like any other.  What scatters is compared with the same part of the budget: noise and
-inputs.
+Each draw is a scan with new noise and other true inputs; it states the nominal ones.
 """
 
 from __future__ import annotations
@@ -38,15 +35,6 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, single_threaded, worker_pool
 
-__all__ = [
-    "Comparison",
-    "DrawnScans",
-    "MonteCarlo",
-    "SolvedInput",
-    "monte_carlo",
-    "shortest_interval",
-]
-
 #: Draws that a process takes at a time.
 _LARGEST_BLOCK = 8
 
@@ -71,11 +59,7 @@ class SolvedInput:
 
 @dataclass(frozen=True, eq=False)
 class DrawnScans:
-    """Model that turns random numbers into scans of a calibrated sensor, and calibrates them.
-
-    ``solution``, ``effects`` and ``correlations`` are the calibration's; every draw has a seed of
-    its own, spawned from ``seed``.
-    """
+    """Model that turns random numbers into scans of a calibrated sensor, and calibrates them."""
 
     solution: Solution
     effects: Mapping[str, InputEffect]
@@ -101,11 +85,7 @@ class DrawnScans:
         return rows, failures
 
     def results(self, first: int, last: int) -> tuple[list[FloatArray], list[str]]:
-        """Calibrate the draws from ``first`` up to, not including, ``last``.
-
-        Returns the budgeted parameters and G at the radii, in one row for each draw, and why
-        draws could not be calibrated.
-        """
+        """Parameters and G of draws ``first`` to ``last`` - 1, in rows, and why some failed."""
         rows, failures = [], []
         for index in range(first, last):
             try:
@@ -143,18 +123,14 @@ class DrawnScans:
         return joined | {item.source: item.truncated(joined[item.source]) for item in self.solved}
 
     def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
-        """Voltages without noise, shape (n,), in V, for the true values of the inputs.
-
-        They are those of the calibration's A and G, convolved with the stress of the true inputs.
-        """
+        """Voltages without noise (n,), in V: A G convolved with the stress of the true inputs."""
         estimate, voltages = self.solution.estimate, self.solution.deconvolution.predicted
         signal = voltages - estimate.background
         exact = {item.source for item in self.solved}
         for source, effect in self.effects.items():
             # An effect is that of a larger value in the analysis, so its sign is turned.
             if source not in exact:
-                change = effect.voltage + effect.scaling * signal
-                voltages = voltages - standard[source] * change
+                voltages = voltages - standard[source] * (effect.voltage + effect.scaling * signal)
         if exact:
             model = replace(estimate.model, references=self._reference_changes(standard))
             voltages = voltages + model.signal(self._geometry, estimate.kernel)
@@ -198,9 +174,7 @@ class DrawnScans:
         result, radii = solution.deconvolution, first.deconvolution.g.r
         r, g = result.g.r, result.g.radial
         g = np.where(radii <= r[-1], radial_spline(r, g)(np.minimum(radii, r[-1])), 0.0)
-        numbers = (
-            functional.value for functional in kernel_functionals(result.g, result.gaussian_sigma)
-        )
+        numbers = (f.value for f in kernel_functionals(result.g, result.gaussian_sigma))
         sigma = solution.estimate.gaussian.sigma
         return np.array([result.conversion_constant, sigma, *numbers, *g])
 
@@ -249,25 +223,18 @@ _CUT, _COUNTS = 0.05, 0.2
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One parameter by draws and by the first-order budget, in its SI unit.
-
-    ``value`` is the calibration's; ``mean``, ``uncertainty`` (standard deviation) and the coverage
-    intervals of 95 % are the draws'; ``sampling_error`` is the standard uncertainty of
-    ``uncertainty`` for their number.  ``first_order`` is the budget's standard uncertainty by noise
-    and inputs, ``stated`` that with what regularisation hides.  ``reason`` says why draws and
-    budget do not agree; it is empty where they do.
-    """
+    """One parameter by draws and by the first-order budget, in its SI unit."""
 
     name: str
-    value: float
-    mean: float
-    uncertainty: float
-    sampling_error: float
-    symmetric: tuple[float, float]
+    value: float  # the calibration's
+    mean: float  # of the draws, like the next four
+    uncertainty: float  # standard deviation
+    sampling_error: float  # standard uncertainty of ``uncertainty`` for the number of draws
+    symmetric: tuple[float, float]  # coverage intervals of 95 %
     shortest: tuple[float, float]
-    first_order: float
-    stated: float
-    reason: str = ""
+    first_order: float  # the budget's standard uncertainty by noise and inputs
+    stated: float  # the same with what regularisation hides
+    reason: str = ""  # why draws and budget do not agree, or empty
 
     @property
     def ratio(self) -> float:
@@ -276,12 +243,9 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the budget may be used in place of draws.
-
-        Their standard uncertainties differ by no more than a tenth, and the mean of the draws
-        from the calibration's value by no more than a quarter of one, beyond what the number of
-        draws allows (two standard errors).
-        """
+        """Whether the budget may be used in place of draws."""
+        # The standard uncertainties may differ by a tenth, and the mean of the draws from the value
+        # by a quarter of one, beyond what the number of draws allows (two standard errors).
         return not self.reason
 
 
@@ -449,6 +413,8 @@ def _compared(
     same_mean = abs(mean - value) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
     low, high = np.quantile(column, _TAILS)
     first, last = shortest_interval(column)
+    agrees = same_spread and same_mean
+    reason = "" if agrees else _reason(spread, mean - value, u, budget, solved)
     return Comparison(
         name=name,
         value=value,
@@ -459,9 +425,7 @@ def _compared(
         shortest=(float(first), float(last)),
         first_order=u,
         stated=parameters.uncertainty(name),
-        reason=""
-        if same_spread and same_mean
-        else _reason(spread, mean - value, u, budget, solved),
+        reason=reason,
     )
 
 
@@ -481,8 +445,7 @@ def _reason(
     """Return by how much draws and budget disagree, and whether a distribution is cut off."""
     text = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
     for item in solved:
-        quantiles = ndtri((np.arange(1000) + 0.5) / 1000)
-        kept = float(item.truncated(quantiles).std())
+        kept = float(item.truncated(ndtri((np.arange(1000) + 0.5) / 1000)).std())
         if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:
             return (
                 f"{text} The {item.source.replace('_', ' ')} is cut off at {item.bounds[1]:g}: its "

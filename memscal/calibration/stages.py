@@ -1,13 +1,7 @@
-r"""The paper's steps from scans to A and G, without their uncertainty.
+"""The paper's steps from scans to A and G, without their uncertainty.
 
-.. math::
-
-    U_{zz} = A\,G \otimes \sigma_{zz}, \qquad
-    A\,G = \mathcal F^{-1}\left\{\frac{\mathcal F\{U_{zz}\}}{\mathcal F\{\sigma_{zz}\}}\right\},
-    \qquad A = \int A\,G\,dx\,dy
-
-(the paper's Eq. 1 to 3).  :func:`solve` makes the two fields of a scan and its reference, and
-:func:`deconvolve` divides them.
+:func:`solve` makes the two fields of a scan and its reference, and :func:`deconvolve` divides
+them by the functions of :mod:`memscal.deconvolution.fourier_ratio`.
 """
 
 from __future__ import annotations
@@ -44,18 +38,6 @@ from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-
-__all__ = [
-    "Deconvolution",
-    "FieldNoise",
-    "Misfit",
-    "Solution",
-    "deconvolve",
-    "field_noise",
-    "prepare_fields",
-    "require_channel_method",
-    "solve",
-]
 
 #: A shear's integral is summed out to this multiple of the scan's reach, at this many radii.
 _FAR = 2.0
@@ -125,10 +107,7 @@ def require_channel_method(channel: str, regulariser: Regulariser) -> None:
 def prepare_fields(
     estimate: ProfileEstimate, choice: GridChoice, *, divided: bool = True
 ) -> Fields:
-    """Lift the profile of lines or of several scans, or place a raster as it was measured.
-
-    ``divided``: whether a raster's field is divided, for which it needs an even lattice.
-    """
+    """Lift the profile of lines or several scans, or place a raster (evenly if it is divided)."""
     if estimate.points.as_raster:
         return RasterFields.place(estimate, choice, divided=divided)
     return LineFields.lift(estimate, choice)
@@ -181,20 +160,13 @@ class Solution:
 
     @property
     def window_at_nodes(self) -> FloatArray:
-        """The regularisation's window at the quadrature nodes of the estimate.
-
-        It is zero beyond the grid's last wavenumber.
-        """
+        """The regularisation's window at the estimate's nodes; zero beyond the grid."""
         k, window = self.fields.along_axis(self.deconvolution.quotient.window)
         return np.interp(self.estimate.model.k, k, window, right=0.0)
 
     @property
     def tail_share(self) -> float:
-        r"""Share of the voltage's integral beyond the scan's reach.
-
-        Within a radius R the integral is :math:`R \int \hat U(k) J_1(kR)\,dk`.  Of a tangential
-        channel it is that of the radial component's modulus, summed over radii.
-        """
+        """Share of the voltage's integral beyond the scan's reach R; of a shear, of its modulus."""
         spectrum, reach = self.estimate.spectrum, self.choice.support
         if spectrum.order:
             r = np.linspace(0.0, _FAR * reach, _RADII)
@@ -227,13 +199,8 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     stated = estimate.points.u_errors
     noise = estimate.noise if stated is None else stated
     degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]
-    return Misfit(
-        relative_rms=float(
-            np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal
-        ),
-        chi2_reduced=float(np.sum(weight * (residual / noise) ** 2) / degrees),
-        degrees=degrees,
-    )
+    rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
+    return Misfit(rms, float(np.sum(weight * (residual / noise) ** 2) / degrees), degrees)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,6 @@ from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
 from memscal.model.result import Result
 
-__all__ = ["Sweep", "sweep_noise"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Result):

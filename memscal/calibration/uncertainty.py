@@ -1,18 +1,13 @@
 r"""First-order propagation of noise, regularisation and uncertain inputs to A, G and its widths.
 
-Every result is a linear function of the posterior of the profile's parameters (:math:`w`)
-and of the Gaussian fit's (:math:`f`).  What scatters of them from scan to scan, by their
-derivatives by the voltages, is ``noise``; the rest of the expected squared error of :math:`w`,
-which does not scatter, is ``regularisation``.  What a window hides beyond that is counted as an
-error of the size that the profile's own continuation has there.
-
-Inputs add one column each, the change of all results by one standard uncertainty, and their
-correlations combine these.  An input that is larger than stated changes the estimate as
-voltages would: by :math:`-A\,G\otimes\delta\sigma_{zz}` for a change of the base stress, by
-:math:`-U'(R)\,\delta R` for one of the positions.  A change of the load scales A alone.
-
-Numbers read off G(r) are functionals of it: their derivative is a row that multiplies a change
-of G at the radii of the profile.
+Every result is a linear function of the posterior of the profile's parameters (:math:`w`) and of
+the Gaussian fit's (:math:`f`).  What scatters from scan to scan, by their derivatives by the
+voltages, is ``noise``; the rest of the expected squared error of :math:`w` is ``regularisation``,
+with what a window hides beyond it.  Inputs add one column each, the change of all results by one
+standard uncertainty.  An input that is larger than stated changes the estimate as voltages would:
+by :math:`-A\,G\otimes\delta\sigma_{zz}` for the base stress, by :math:`-U'(R)\,\delta R` for the
+positions.  A change of the load scales A alone.  Numbers read off G(r) are functionals of it:
+their derivative is a row that multiplies a change of G.
 """
 
 from __future__ import annotations
@@ -35,18 +30,6 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-
-__all__ = [
-    "BUDGETED",
-    "NOT_RANDOM",
-    "Functional",
-    "InputEffect",
-    "Results",
-    "correlation_matrix",
-    "input_effects",
-    "kernel_functionals",
-    "propagate",
-]
 
 #: Points per step of the profile between which the half maximum is interpolated.
 _FINE = 20
@@ -82,10 +65,8 @@ def kernel_functionals(field: Field, sigma: float) -> tuple[Functional, ...]:
 
 
 def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
-    """Width of the Gaussian u nearest to G over the plane.
-
-    Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
-    """
+    """Width of the Gaussian u nearest to G over the plane."""
+    # Where the sum of r (u - G) u' vanishes: its change by G over its change by the width.
     slope, step = unit_gaussian_slope(r, sigma), 1e-4 * sigma
     bend = unit_gaussian_slope(r, sigma + step) - unit_gaussian_slope(r, sigma - step)
     left = unit_gaussian(r, sigma) - g
@@ -94,10 +75,8 @@ def _gaussian_width(r: FloatArray, g: FloatArray, sigma: float) -> Functional:
 
 
 def _half_width(r: FloatArray, g: FloatArray) -> Functional:
-    """Diameter of the outermost circle where G is half of its maximum.
-
-    With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
-    """
+    """Diameter of the outermost circle where G is half of its maximum."""
+    # With G(q) = G(m)/2, a change of G moves q by -(dG(q) - dG(m)/2) / G'(q).
     fine = np.linspace(r[0], r[-1], _FINE * r.size)
     values = radial_spline(r, g)(fine)
     top = int(np.argmax(values))
@@ -140,15 +119,11 @@ def input_effects(
     estimate: ProfileEstimate,
     alternatives: Sequence[RadialSpectrum] | None = None,
 ) -> Mapping[str, InputEffect]:
-    """Return the effect of every input whose uncertainty is stated, by its name.
-
-    Scans that share a film, or a rod, share its error; the load is read from one balance, and
-    the positions from one stage.
-    """
+    """Return the effect of every input whose uncertainty is stated, by its name."""
+    # Scans share the error of a common film or rod, of the balance and of the stage.
     model = estimate.model
     changes: dict[str, list[FloatArray]] = {}
-    shared = [("film", film_sensitivities), ("indenter", rod_sensitivities)]
-    for attribute, sensitivities in shared:
+    for attribute, sensitivities in [("film", film_sensitivities), ("indenter", rod_sensitivities)]:
         owners = [getattr(scan, attribute) for scan in scans]
         distinct = list(dict.fromkeys(owners))
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
@@ -262,10 +237,7 @@ class Results:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Derivatives of all results by (w, f), and what the window hides of each.
-
-    Rows are the parameters, then G at its radii, then the transfer function at its wavenumbers.
-    """
+    """Derivatives by (w, f) of the parameters, G and the transfer function, and what is hidden."""
 
     names: tuple[str, ...]  # of the parameters
     values: FloatArray
@@ -289,11 +261,7 @@ def propagate(
     correlations: Mapping[tuple[str, str], float],
     raster: FieldNoise | None = None,
 ) -> Results:
-    """Propagate all stated uncertainties to the results.
-
-    ``window``: the regularisation's, at the quadrature nodes; ``wavenumbers``: where the transfer
-    function is stated, in rad/m.
-    """
+    """Propagate all stated uncertainties: ``window`` at the nodes, ``wavenumbers`` in rad/m."""
     rows = _rows(estimate, deconvolution, window, wavenumbers)
     random, fixed = _noise_roots(estimate)
     columns = {
@@ -342,10 +310,8 @@ def _budget(
 
 
 def _input_column(rows: _Rows, estimate: ProfileEstimate, effect: InputEffect) -> FloatArray:
-    shift = np.concatenate(
-        [estimate.weighed.gain @ effect.voltage, estimate.gaussian_gain @ effect.voltage]
-    )
-    column = rows.matrix @ shift
+    gain = np.vstack([estimate.weighed.gain, estimate.gaussian_gain])
+    column = rows.matrix @ (gain @ effect.voltage)
     scales = np.array([name.startswith("conversion_constant") for name in rows.names])
     column[: scales.size] += np.where(scales, rows.values, 0.0) * effect.scaling
     return np.asarray(column[:, None])
@@ -373,12 +339,11 @@ def _rows(
     hidden_scalars = np.zeros(len(names))
     for functional in functionals:
         hidden_scalars[names.index(functional.name)] = functional.row @ hidden_radial
-    profiles = np.vstack([radial, transfer])
     return _Rows(
         names=names,
         values=values,
         radii=r.size,
-        matrix=np.vstack([scalars, np.pad(profiles, ((0, 0), (0, fitted)))]),
+        matrix=np.vstack([scalars, np.pad(np.vstack([radial, transfer]), ((0, 0), (0, fitted)))]),
         hidden=np.concatenate([hidden_scalars, hidden_radial, np.interp(wavenumbers, k, hidden)]),
         opened=opened,
     )
@@ -467,10 +432,8 @@ def _unit(count: int, index: int) -> FloatArray:
 
 
 def _noise_roots(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray]:
-    """Square roots of the joint covariance of (w, f): what scatters, and what does not.
-
-    A Gaussian fit has no prior: all of its error scatters.
-    """
+    """Square roots of the joint covariance of (w, f): what scatters, and what does not."""
+    # A Gaussian fit has no prior: all of its error scatters.
     covariance, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
     fitted = estimate.gaussian_gain @ estimate.noise_root
     fixed = _root(covariance - random @ random.T, np.sqrt(np.maximum(np.diag(covariance), 0.0)))

@@ -27,24 +27,6 @@ from memscal.model.arrays import FloatArray
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = [
-    "ENTRY_POINT_GROUP",
-    "Bayesian",
-    "Division",
-    "DivisionProblem",
-    "KernelProfile",
-    "Regulariser",
-    "Tikhonov",
-    "WhiteNoise",
-    "WhiteNoiseDraw",
-    "create_regulariser",
-    "filtered_division",
-    "image_division",
-    "regulariser_names",
-    "require_amplitude",
-    "require_count",
-]
-
 #: The paper adds white noise "ten times weaker than the weakest relevant spectral component".
 NOISE_RATIO = 0.1
 
@@ -63,12 +45,7 @@ class KernelProfile(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class DivisionProblem:
-    """The two fields of the paper's Eq. (2), and which of their components are relevant.
-
-    ``posterior`` returns A G (V/Pa/m^2) as estimated from the scan's points, and the same on the
-    grid: the posterior mean, or the MAP estimate that is not negative (first argument) or does
-    not rise with the radius (second).
-    """
+    """The two fields of the paper's Eq. (2), and which of their components are relevant."""
 
     grid: FieldGrid
     voltage: FloatArray  # lifted voltage per newton, in V/N
@@ -76,6 +53,7 @@ class DivisionProblem:
     # Moduli of the fields' transforms where the voltage's is ten times its noise, V m^2/N and 1.
     weakest_voltage: float
     weakest_reference: float
+    # A G (V/Pa/m^2) of the points, and on the grid: not negative, not rising with the radius.
     posterior: Callable[[bool, bool], tuple[KernelProfile, FloatArray]] | None = None
 
     @cached_property
@@ -133,11 +111,7 @@ def require_count(method: str, name: str, value: Any, least: int) -> None:
 
 
 def filtered_division(problem: DivisionProblem, window: FloatArray) -> Division:
-    """Divide the spectra wherever the window is open.
-
-    Components whose window is below 1e-9 are left out: there the quotient of two
-    transforms that have both vanished is rounding, not information.
-    """
+    """Divide the spectra where the window exceeds 1e-9; beyond, the quotient is rounding."""
     window = np.where(window > _CLOSED, window, 0.0)
     quotient = np.zeros_like(problem.voltage_spectrum)
     np.divide(problem.voltage_spectrum, problem.reference_spectrum, out=quotient, where=window > 0)
@@ -158,12 +132,7 @@ def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
 
 @dataclass(frozen=True, kw_only=True)
 class WhiteNoise:
-    r"""Expectation of the paper's method over all draws of its noise.
-
-    White noise added to both fields leaves the numerator's mean as it is and turns the
-    denominator's reciprocal, for circular complex noise of variance :math:`s^2`, into
-    :math:`E[1/(z + n)] = (1 - \exp(-|z|^2/s^2))/z`: a smooth spectral window.
-    """
+    """Expectation of the paper's method over all draws of its complex noise, of variance s^2."""
 
     amplitude: float = 1.0  # of the noise: s over a tenth of the weakest relevant component
     name: ClassVar[str] = "white-noise"
@@ -186,11 +155,7 @@ class WhiteNoise:
 
 @dataclass(frozen=True, kw_only=True)
 class WhiteNoiseDraw:
-    """One seeded draw of the paper's method, as published.
-
-    White noise is added to both fields before the transform.  The quotient of two
-    components lost in noise has no finite variance: single draws carry rare, large ripples.
-    """
+    """One seeded draw of the paper's method: its quotient has no finite variance."""
 
     amplitude: float = 1.0  # of the noise, as in WhiteNoise
     seed: int = 0
@@ -222,12 +187,10 @@ class WhiteNoiseDraw:
 
 @dataclass(frozen=True, kw_only=True)
 class Tikhonov:
-    r"""Minimiser of :math:`|\hat\sigma \hat g - \hat u|^2 + \alpha |\hat g|^2`.
+    r"""Minimiser of :math:`|\hat\sigma \hat g - \hat u|^2 + \alpha |\hat g|^2`."""
 
-    Its window :math:`|\hat\sigma|^2 / (|\hat\sigma|^2 + \alpha)` closes more slowly than
-    the white noise's, at the same wavenumber: :math:`\sqrt\alpha` is the paper's noise amplitude.
-    """
-
+    # Its window closes more slowly than the white noise's, at the same wavenumber: sqrt(alpha) is
+    # the paper's noise amplitude.
     amplitude: float = 1.0  # root of alpha over a tenth of the weakest relevant component
     name: ClassVar[str] = "tikhonov"
     assumes: ClassVar[str] = "G has little power; all wavenumbers are equally likely to carry it."
@@ -245,12 +208,7 @@ class Tikhonov:
 
 @dataclass(frozen=True, kw_only=True)
 class Bayesian:
-    """Bayesian model averaging of radial departures from a Gaussian: the posterior mean of A G.
-
-    The estimate from the scan's points in data space (:mod:`memscal.estimation.bayesian`) is
-    returned as it is: nothing is lost to a window, and beyond the resolved band the prior
-    determines G.  With a constraint it is the MAP estimate.
-    """
+    """Bayesian model averaging in data space: the posterior mean of A G, or its MAP estimate."""
 
     nonnegative: bool = False  # G is nowhere negative
     monotone: bool = False  # G nowhere rises with the radius (a ring's does)
@@ -299,17 +257,13 @@ def regulariser_names() -> tuple[str, ...]:
 
 
 def create_regulariser(name: str, /, **options: Any) -> Regulariser:
-    """Create a regulariser by its name, or a former one, with its options.
-
-    ``seed`` is passed on only to those that draw random numbers.
-    """
+    """Create a regulariser by its present or former name; ``seed`` only for those that draw."""
     factory = _factory(_ALIASES.get(name, name))
     accepted = inspect.signature(factory).parameters
     if "seed" not in accepted:
         options = {key: value for key, value in options.items() if key != "seed"}
     unknown = sorted(set(options) - set(accepted))
-    takes_any = any(p.kind is p.VAR_KEYWORD for p in accepted.values())
-    if unknown and not takes_any:
+    if unknown and not any(p.kind is p.VAR_KEYWORD for p in accepted.values()):
         raise InputError(
             f"Method {name} has no option {', '.join(unknown)}.",
             cure=f"Its options are: {', '.join(accepted) or 'none'}.",

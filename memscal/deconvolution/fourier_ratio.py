@@ -32,8 +32,6 @@ from memscal.errors import FitError, InputError
 from memscal.estimation.gaussian import gauss_newton
 from memscal.model.arrays import FloatArray
 
-__all__ = ["Field", "Quotient", "divide", "fit_gaussian", "lift", "normalise", "reconvolve"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Field:

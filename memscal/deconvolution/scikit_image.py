@@ -17,8 +17,6 @@ from memscal.deconvolution.division import (
 )
 from memscal.model.arrays import FloatArray
 
-__all__ = ["RichardsonLucy", "UnsupervisedWiener", "Wiener"]
-
 
 @dataclass(frozen=True, eq=False)
 class _Images:
@@ -115,9 +113,8 @@ class RichardsonLucy:
         from skimage.restoration import richardson_lucy
 
         images = _Images.of(problem)
-        positive = np.maximum(images.image, 0.0)
         restored = richardson_lucy(
-            positive,
+            np.maximum(images.image, 0.0),
             images.point_spread,
             num_iter=self.iterations,
             clip=False,

@@ -1,8 +1,7 @@
-r"""Tests of the model's assumptions: symmetry, linearity in load, a round and Gaussian sensor.
+"""Tests of the model's assumptions: symmetry, linearity in load, a round and Gaussian sensor.
 
-Some add a few columns to the fitted model and test by how much the misfit falls.  With
-:math:`m` columns that should not be needed, the fall of chi-square follows the chi-square
-distribution of :math:`m` degrees of freedom.  Others predict a group of points from the rest.
+Some add m columns to the fitted model: chi-square falls by a chi-square variable of m degrees
+of freedom.  Others predict a group of points from the rest.
 """
 
 from __future__ import annotations
@@ -19,18 +18,6 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model, orthonormal
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
-
-__all__ = [
-    "Departure",
-    "ExtraColumns",
-    "HeldOut",
-    "axisymmetry_test",
-    "departure_test",
-    "hold_out",
-    "linearity_test",
-    "load_groups",
-    "symmetry_test",
-]
 
 #: More groups than this are held out several at a time.
 _MOST_FOLDS = 10
@@ -58,10 +45,7 @@ def load_groups(load: FloatArray) -> NDArray[np.intp]:
 
 
 def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | None:
-    """Hold out each group of points in turn, and predict it from the others.
-
-    ``None`` where there are fewer than two groups that can be predicted.
-    """
+    """Predict each group of points from the others; ``None`` with fewer than two such groups."""
     if np.unique(group).size < 2:
         return None
     # Clipped: many outliers in one group count together, and a single one counts little.
@@ -162,11 +146,7 @@ def departure_test(estimate: ProfileEstimate) -> Departure:
 
 
 def symmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
-    """Compare the left and right halves of a line scan.
-
-    The columns are odd in the distance from the centre, at three widths of the profile; even for
-    a tangential channel, whose signal is odd.
-    """
+    """Compare the left and right halves of a line scan by odd columns (even for a shear)."""
     points = estimate.points
     dx, dy = estimate.offset
     side = np.where(points.free[points.scan, 0], dx, dy)
@@ -177,8 +157,7 @@ def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     """Test whether a raster is elliptic: columns that vary as cos 2a and sin 2a."""
     dx, dy = estimate.offset
     quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy], axis=1)
-    shapes = _widened(estimate, (0.5, 1.0))
-    columns = [quadrupole * shape[:, None] for shape in shapes.T]
+    columns = [quadrupole * shape[:, None] for shape in _widened(estimate, (0.5, 1.0)).T]
     return _add(estimate, np.concatenate(columns, axis=1))
 
 
@@ -207,17 +186,15 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
     round_ = estimate.gaussian.jacobian[:, : estimate.basis.flat - estimate.points.ellipse]
-    jacobian = round_ / np.linalg.norm(round_, axis=0)
-    base = np.linalg.qr(standardised(jacobian, weights))[0]
+    base = np.linalg.qr(standardised(round_ / np.linalg.norm(round_, axis=0), weights))[0]
     scaled = standardised(columns, weights)
     residual = standardised(estimate.weighed.residual + estimate.oval, weights)
     residual = residual - base @ (base.T @ residual)
     free = scaled - base @ (base.T @ scaled)
     information = np.linalg.pinv(free.T @ free, hermitian=True)
     coefficients = information @ (free.T @ residual)
-    fall = float(residual @ free @ coefficients)
     return ExtraColumns(
-        fall=fall,
+        fall=float(residual @ free @ coefficients),
         count=columns.shape[1],
         coefficients=coefficients / scale,
         errors=np.sqrt(np.diag(information)) / scale,

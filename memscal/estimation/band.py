@@ -1,20 +1,11 @@
-r"""The band of wavenumbers in which the scan determines the apparatus function.
+"""The band of wavenumbers in which the scan determines the apparatus function.
 
 G is resolved while the posterior standard uncertainty of its transfer function stays below a
-third of the fitted Gaussian's transfer function,
-
-.. math::
-
-    u[\hat G(k)] < \tfrac13\,e^{-\sigma^2k^2/2}.
-
-The Gaussian's has no zeros and no lobes, unlike that of a ring or a disc: where it has fallen
-below three times the uncertainty, G is determined by the prior.
-
-Components are relevant to a division of fields while the voltage stands above its noise.  The
-measured points are rings: the transform of the voltage at :math:`k` is a sum
-:math:`\sum_i a_i u_i J_0(kR_i)` with ring areas :math:`a_i` (of a tangential channel with
-:math:`J_1`), and its noise is the same sum in quadrature.  Points whose signal is lost in noise
-carry the profile's tail instead, and count as :math:`u_i^2/(u_i^2 + s_i^2)`.
+third of the fitted Gaussian's, which has no zeros and no lobes.  Components are relevant to a
+division of fields while the voltage stands above its noise.  The measured points are rings: the
+voltage's transform is a sum of :math:`a_i u_i J_0(kR_i)` with ring areas :math:`a_i` (of a
+tangential channel with :math:`J_1`), and its noise is the same sum in quadrature.  Points whose
+signal is lost in noise count as :math:`u_i^2/(u_i^2 + s_i^2)`.
 """
 
 from __future__ import annotations
@@ -27,8 +18,6 @@ from scipy.special import j0, j1
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import ProfileEstimate
 from memscal.model.arrays import FloatArray
-
-__all__ = ["Band", "find_band", "transfer_uncertainty"]
 
 #: A spectral component is relevant while it stands this many times above its noise...
 RELEVANT = 10.0
@@ -69,11 +58,7 @@ def find_band(estimate: ProfileEstimate) -> Band:
 
 
 def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
-    r"""Posterior standard uncertainty of the transfer function at the quadrature nodes.
-
-    That of :math:`\hat K(k)/\hat K(0)` for the posterior of :math:`K = A\,G`; without the
-    uncertainty of the reference.
-    """
+    """Posterior standard uncertainty of K(k)/K(0) at the nodes, K = A G; the reference is exact."""
     basis, a = estimate.basis, estimate.conversion_constant
     rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
@@ -88,10 +73,8 @@ def _first_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
 
 
 def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
-    """Return where a ratio falls below a threshold for good, log-interpolated.
-
-    The transform of a ring-shaped G passes through zero and comes back: such a gap ends no band.
-    """
+    """Return where a ratio falls below a threshold for good, log-interpolated."""
+    # The transform of a ring-shaped G passes through zero and comes back: such a gap ends no band.
     i = int(np.flatnonzero(ratio >= threshold).max(initial=-1)) + 1
     if i in (0, k.size):
         return float(k[max(i - 1, 0)])
@@ -105,8 +88,7 @@ def _ring_noise(estimate: ProfileEstimate, k: FloatArray) -> FloatArray:
     signal = (estimate.predicted - estimate.background) / points.load
     noise = estimate.noise / points.load
     share = signal**2 / (signal**2 + noise**2) * estimate.outlier_weight
-    area = _ring_areas(radius, tolerance=0.25 * points.step)
-    weighted = area * share * noise
+    weighted = _ring_areas(radius, tolerance=0.25 * points.step) * share * noise
     bessel = j1 if estimate.model.order else j0
     return np.asarray(np.sqrt(bessel(np.multiply.outer(k, radius)) ** 2 @ weighted**2))
 
@@ -125,10 +107,7 @@ def _ring_areas(radius: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _planar_noise(estimate: ProfileEstimate) -> FloatArray:
-    """Noise of one component of a raster's transform: the same at every wavenumber.
-
-    A raster is used as it is, so that every point brings its noise, be there signal or not.
-    """
+    """Noise of a component of a raster's transform, of all points: equal at all wavenumbers."""
     points = estimate.points
     share = points.cell / points.of_places("readings")
     noise = estimate.noise / points.load * estimate.outlier_weight

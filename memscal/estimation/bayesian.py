@@ -8,18 +8,12 @@ amplitudes; each has a closed form on both sides of the Hankel transform,
     a\,(\delta_q \otimes g_b)(r) = \frac{a}{2\pi b^2}\,e^{-(r^2+q^2)/2b^2} I_0(rq/b^2),
     \qquad a\,J_0(kq)\,e^{-b^2k^2/2} .
 
-Rings of one blur make a random radial field of correlation length :math:`\sqrt2\,b` within an
-extent w; rings of radius zero and many widths, one that varies fast at the axis and slowly far
-from it.  Lengths are in units of the width of the best Gaussian; the strength is the expected
-size over the Gaussian's, both as L2 norms over the plane.
-
-A hypothesis is a shape of departure and its strength.  Given one, the model is linear, with
-Gaussian priors for the amplitudes and flat ones for the nuisance parameters: its marginal
-likelihood and its posterior are in closed form.  There are two sets of prior probabilities.  The
-estimate is the posterior mean under one that gives the Gaussian itself 0.4, so that a Gaussian
-sensor loses little precision.  Its uncertainty is the mean squared error under another that
-allows departures only, rougher ones among them: what regularisation hides is counted as what
-such fields have there.
+Lengths are in units of the width of the best Gaussian; the strength is the expected size over
+the Gaussian's, both as L2 norms over the plane.  For a shape and strength (a hypothesis) the
+model is linear, with Gaussian priors for the amplitudes and flat ones for the nuisance parameters:
+marginal likelihood and posterior are in closed form.  The estimate is the posterior mean with a
+prior probability of 0.4 for the Gaussian itself; its uncertainty is the mean squared error with
+priors that allow departures only, rougher ones among them.
 """
 
 from __future__ import annotations
@@ -36,17 +30,6 @@ from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian, unit_g
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray
-
-__all__ = [
-    "HYPOTHESES",
-    "SHAPES",
-    "DepartureBasis",
-    "Rings",
-    "Shape",
-    "WeighedFit",
-    "departure_basis",
-    "weigh_departures",
-]
 
 #: Rings are never narrower than this many steps: a width below the sampling is not resolved.
 _SMALLEST_WIDTH_IN_STEPS = 0.5
@@ -96,10 +79,7 @@ class Shape:
     scales: bool = False  # Gaussians of all widths from blur to extent, not rings of one blur
 
     def rings(self, width: float, amplitude: float) -> Rings:
-        """Return its components about a Gaussian of a width (m) and an amplitude (V/Pa).
-
-        They are scaled to the Gaussian's own L2 norm, so that a strength of one is as large.
-        """
+        """Components about a Gaussian of a width (m) and amplitude (V/Pa), by its L2 norm."""
         if self.scales:
             blur = width * np.geomspace(self.blur, self.extent, _SCALES)
             plain = Rings(np.zeros(_SCALES), blur, np.ones(_SCALES))
@@ -143,11 +123,8 @@ class DepartureBasis:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     def kernels(self, k: FloatArray) -> FloatArray:
-        """Transforms of all columns at ``k`` (rad/m), shape (k, p).
-
-        The first two are the derivatives of the Gaussian's by A and width; the other parameters
-        without prior move no kernel and hold zeros.
-        """
+        """Transforms of all columns at ``k`` (rad/m), shape (k, p)."""
+        # The first two are by A and width; parameters that move no kernel hold zeros.
         gaussian = gaussian_transfer(k, self.sigma)
         widening = -self.conversion_constant * self.sigma * k**2 * gaussian
         return self._columns(gaussian, widening, [ring.transform(k) for ring in self.rings])
@@ -259,8 +236,7 @@ class _LinearModel:
         left, singular, right = np.linalg.svd(free, full_matrices=False)
         along = left.T @ self.rest
         # Of a vector that meets the flat columns, only what lies beside them carries noise.
-        free_share = 1 - np.sum((self.q.T @ left) ** 2, axis=0)
-        power = along**2 + self.added * free_share
+        power = along**2 + self.added * (1 - np.sum((self.q.T @ left) ** 2, axis=0))
         return _Design(block, columns, left, singular, right, along, power)
 
     def gaussian(self) -> _Conditional:
@@ -354,13 +330,10 @@ def weigh_departures(
     expected_noise: float = 0.0,
     least_noise: float = 0.0,
 ) -> WeighedFit:
-    """Average departures from a Gaussian fit over the hypotheses.
-
-    ``effective_count``: how many points the data are worth, outliers down-weighted; more than
-    there are if each stands for the mean of several repeats to come.  Of a point of weight one,
-    ``expected_noise`` is the noise to be expected of voltages that have none (zero for data), and
-    ``least_noise`` the least that the covariance counts, though the data scatter less.
-    """
+    """Average departures from a Gaussian fit over the hypotheses."""
+    # ``effective_count``: how many points the data are worth; more than there are if each is a mean
+    # of repeats.  Of a point of weight one, ``expected_noise`` is that of voltages that have none
+    # (zero for data), ``least_noise`` the least that the covariance counts.
     standardised, flat = model.points.standardised, basis.flat
     voltages = model.signal(fit.geometry, basis.kernels(model.k)[:, flat:])
     unexplained = model.points.u - fit.predicted
@@ -386,10 +359,8 @@ def weigh_departures(
 def _average(
     linear: _LinearModel, conditionals: list[_Conditional], count: int, least_variance: float
 ) -> WeighedFit:
-    """Average mean and gain by one set of probabilities, squared errors by the other.
-
-    The gain is that of the standardised data, and the residual is left to be computed.
-    """
+    """Average mean and gain by one set of probabilities, squared errors by the other."""
+    # The gain is that of the standardised data, and the residual is left to be computed.
     log_marginal = np.array([c.log_marginal for c in conditionals])
     prior = np.array([h.estimate for h in HYPOTHESES])
     estimate = _posterior(log_marginal, prior)
@@ -417,6 +388,7 @@ def _average(
             _add_covariance(covariance, linear, conditional, q, least_variance)
     variance = np.array([c.variance for c in conditionals])
     possible = prior > 0
+    likelihood = float(np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible])))
     return WeighedFit(
         mean=mean,
         covariance=covariance,
@@ -424,9 +396,7 @@ def _average(
         noise=float(np.sqrt(estimate @ variance)),
         probability=estimate,
         residual=linear.data,
-        log_marginal_likelihood=float(
-            np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible]))
-        ),
+        log_marginal_likelihood=likelihood,
     )
 
 

@@ -30,8 +30,6 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.estimation.points import ScanPoints, channel_axis
 from memscal.model.arrays import FloatArray
 
-__all__ = ["ForwardModel", "Geometry", "elliptic_columns", "elliptic_departure"]
-
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
@@ -77,10 +75,7 @@ class ForwardModel:
 
     @cached_property
     def drift_columns(self) -> FloatArray:
-        """Constant baseline and its linear drift along each scan, shape (n, 2 or 3 a scan).
-
-        The drift's coordinates run from -1 to 1, so that every coefficient is in V.
-        """
+        """Baseline and drift (from -1 to 1) along each scan, shape (n, 2 or 3 a scan)."""
         columns = []
         for i, free in enumerate(self.points.free):
             inside = self.points.scan == i
@@ -99,8 +94,7 @@ class ForwardModel:
         # Repeats share their positions: each Bessel function is computed once.
         unique, back = np.unique(radius, return_inverse=True)
         argument = np.multiply.outer(unique, self.k)
-        safe = np.where(radius > 0, radius, 1.0)
-        towards = -np.stack([dx, dy]) / safe
+        towards = -np.stack([dx, dy]) / np.where(radius > 0, radius, 1.0)
         return Geometry(radius, towards, j0(argument)[back], j1(argument)[back])
 
     def cosines(self, centres: FloatArray) -> FloatArray:
@@ -132,10 +126,8 @@ class ForwardModel:
         return self._times_load(-self._summed(geometry.bessel1, kernel))
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
-        r"""Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m.
-
-        A vector's component :math:`f\cos\theta` changes by :math:`f/R` across its direction, too.
-        """
+        """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
+        # A vector's component changes by f/R across its direction, too.
         if self.order == 0:
             return np.asarray(geometry.towards * self.radial_derivative(geometry, kernel))
         slope, turn = self._vector_slopes(geometry, kernel)
@@ -236,24 +228,19 @@ def _response(
     e = float(np.hypot(e1, e2))
     half = 0.5 * (sigma * model.k) ** 2
     # The derivatives of the radius by the centre point to it: their angle is the direction's.
-    direction = np.arctan2(-geometry.towards[1], -geometry.towards[0])
-    angle = direction - 0.5 * np.arctan2(e2, e1)
+    angle = np.arctan2(-geometry.towards[1], -geometry.towards[0]) - 0.5 * np.arctan2(e2, e1)
     total = np.zeros_like(geometry.radius)
     for m, bessel in enumerate(harmonics):
         kernel = ive(m, half * e) * np.exp(-half * (1 - e))
         around = Geometry(geometry.radius, geometry.towards, bessel, bessel)
-        signal = model.signal(around, kernel)
-        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * signal
+        total += (1 if m == 0 else 2) * np.cos(2 * m * angle) * model.signal(around, kernel)
     return total
 
 
 def _bessel(
     bessel0: FloatArray, bessel1: FloatArray, radius: FloatArray, k: FloatArray
 ) -> list[FloatArray]:
-    """Bessel functions of even order, by recurrence upwards from orders zero and one.
-
-    At small arguments, where the recurrence loses digits, the power series' first term is used.
-    """
+    """Bessel functions of even order by upward recurrence; at small arguments their first term."""
     # Repeats share their positions.
     unique, first, back = np.unique(radius, return_index=True, return_inverse=True)
     x = np.multiply.outer(unique, k)
@@ -264,8 +251,7 @@ def _bessel(
         safe = np.where(small, 1.0, x)
         factorial *= order
         series = (x / 2) ** order / factorial
-        upward = 2 * (order - 1) / safe * above - below
-        below, above = above, np.where(small, series, upward)
+        below, above = above, np.where(small, series, 2 * (order - 1) / safe * above - below)
         if order % 2 == 0:
             even.append(above[back])
     return even

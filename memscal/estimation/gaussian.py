@@ -1,7 +1,6 @@
-r"""The Gaussian apparatus function that fits the scan best, in data space.
+"""The Gaussian apparatus function that fits the scan best, in data space.
 
-It is the paper's approximation, convolved with the reference stress and fitted to the voltages
-by weighted least squares, together with conversion constant, centre, baseline and linear drift.
+It is fitted by weighted least squares, with A, centre, baseline and linear drift.
 """
 
 from __future__ import annotations
@@ -18,8 +17,6 @@ from memscal.estimation.forward import ForwardModel, Geometry, elliptic_columns
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
-__all__ = ["GaussianFit", "fit_gaussian", "gauss_newton", "linearise"]
-
 _MOST_STEPS = 20
 _MOST_HALVINGS = 5
 #: Steps end here, in units of the parameters' typical sizes: the model is no longer linear.
@@ -33,11 +30,8 @@ Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 def gauss_newton(
     linearise: Linearised, start: FloatArray, *, tolerance: float, knee: float = np.inf
 ) -> FloatArray | None:
-    """Minimise the loss of the residuals, shape (n,), of a model that is nearly linear.
-
-    Parameters are scaled to numbers near one.  From the residual ``knee`` on, the loss is linear.
-    ``None`` if the steps do not settle downhill: a search with a trust region is then needed.
-    """
+    """Minimise the loss of the residuals (n,) of a nearly linear model; ``None`` if it fails."""
+    # Parameters are scaled to numbers near one; the loss is linear from the residual ``knee`` on.
     place: FloatArray = start
     step: FloatArray = np.zeros_like(start)
     cost, halvings = np.inf, 0
@@ -70,10 +64,8 @@ _CLEARLY = 0.7
 def _require_parity(
     points: ScanPoints, odd: tuple[FloatArray, FloatArray], even: tuple[FloatArray, FloatArray]
 ) -> None:
-    """Refuse a voltage that a shear of the other sign, or an even signal, fits far better.
-
-    ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
-    """
+    """Refuse a voltage that a shear of the other sign, or an even signal, fits far better."""
+    # ``odd`` and ``even``: amplitudes of trial signals, and sums of absolute residuals, shape (m,).
     amplitudes, costs = odd
     right = float(np.min(costs, where=amplitudes > 0, initial=np.inf))
     turned = float(np.min(costs, where=amplitudes < 0, initial=np.inf))
@@ -115,10 +107,8 @@ def _robust_start(model: ForwardModel, weights: FloatArray) -> FloatArray:
 
 
 def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArray:
-    """Best of a grid of centres and widths, by the sum of absolute residuals.
-
-    A single outlier can be the largest voltage of a scan: positions are tried, not read off.
-    """
+    """Best of a grid of centres and widths, by the sum of absolute residuals."""
+    # A single outlier can be the largest voltage of a scan: positions are tried, not read off.
     points = model.points
     centres = _trial_centres(model)
     distances = np.hypot(points.x - centres[:, :1], points.y - centres[:, 1:])
@@ -141,8 +131,7 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
         amplitudes, costs = _amplitudes(shapes, data, drift)
         i = int(np.argmin(np.where(amplitudes > 0, costs, np.inf)))
         if amplitudes[i] > 0 and costs[i] < best_cost:
-            left = data - amplitudes[i] * shapes[i]
-            baseline = np.linalg.lstsq(drift, left, rcond=None)[0]
+            baseline = np.linalg.lstsq(drift, data - amplitudes[i] * shapes[i], rcond=None)[0]
             best = np.concatenate([[amplitudes[i], sigma], centres[i][points.free[0]], baseline])
             best_cost = float(costs[i])
     if model.order:
@@ -185,8 +174,7 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
         inner(positions) if free else np.zeros(1)
         for free, positions in zip(points.free[0], (points.x, points.y), strict=True)
     ]
-    mesh = np.meshgrid(*along)
-    return np.stack([axis.ravel() for axis in mesh], axis=1)
+    return np.stack([axis.ravel() for axis in np.meshgrid(*along)], axis=1)
 
 
 def _smoothing_length(model: ForwardModel) -> float:
@@ -253,8 +241,7 @@ def fit_gaussian(
         return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
     centres = start.centre[model.points.free]
     shape = [start.conversion_constant, start.sigma]
-    ellipse = start.ellipticity[: model.points.ellipse]
-    theta = np.concatenate([shape, centres, start.drift, ellipse])
+    theta = np.concatenate([shape, centres, start.drift, start.ellipticity[: model.points.ellipse]])
     return _solve(model, weights, theta, loss="linear")
 
 

@@ -14,18 +14,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.places import Places, places_of
 from memscal.model.scan import Scan
 
-__all__ = [
-    "CHANNELS",
-    "TANGENTIAL",
-    "ScanPoints",
-    "channel_axis",
-    "channel_order",
-    "channel_signal",
-    "joined_points",
-    "measured_mask",
-    "measured_points",
-]
-
 #: Channels that measure the shear along x and along y.
 TANGENTIAL = ("xz", "yz")
 #: All, the normal one first.
@@ -275,8 +263,7 @@ def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> FloatArray | None:
     repeats = scan.u_zz.size // scan.u_zz_correlation.shape[0]
     whole = np.kron(np.eye(repeats), scan.u_zz_correlation)
     kept = keep.ravel()
-    factor = np.linalg.cholesky(whole[np.ix_(kept, kept)])
-    return np.asarray(np.linalg.inv(factor))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(whole[np.ix_(kept, kept)])))
 
 
 def _stated_errors(

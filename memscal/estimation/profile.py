@@ -21,8 +21,6 @@ from memscal.estimation.gaussian import GaussianFit, fit_gaussian
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
-__all__ = ["CentreError", "ProfileEstimate", "constrained_profile", "estimate_profile"]
-
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
 #: Error of the reference and of its transforms, relative to the largest signal.
@@ -55,8 +53,7 @@ class ProfileEstimate:
     @property
     def noise(self) -> FloatArray:
         """Adopted noise of each voltage, shape (n,), in V, uncertain positions included."""
-        stated = self.weights / self.outlier_weight
-        return np.asarray(self.noise_scale / np.sqrt(stated))
+        return np.asarray(self.noise_scale / np.sqrt(self.weights / self.outlier_weight))
 
     @property
     def noise_root(self) -> FloatArray:
@@ -67,11 +64,7 @@ class ProfileEstimate:
 
     @property
     def noise_scale(self) -> float:
-        """Noise of a point (V); or, with stated uncertainties, the factor they must grow by.
-
-        Stated uncertainties are adopted unless the residuals exceed them (Birge's ratio).  A
-        scatter is never less than the model's own numerical error.
-        """
+        """Noise of a point (V); with stated uncertainties, the factor they must grow by (Birge)."""
         scatter = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
@@ -241,11 +234,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
 
 
 def _outlier_weight(standardised: FloatArray, threshold: float) -> FloatArray:
-    """Weights that leave ordinary points at one and fall fast beyond the threshold.
-
-    The influence w z of a point falls as 1/z^3 beyond the threshold, so a gross outlier
-    moves nothing, yet no point is ever dropped.
-    """
+    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
     scale = 1.4826 * np.median(np.abs(standardised))
     z = np.abs(standardised) / max(scale, np.finfo(float).tiny)
     return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))

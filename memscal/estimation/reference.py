@@ -19,18 +19,6 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "carried_force",
-    "film_sensitivities",
-    "reference_contact",
-    "reference_profile",
-    "reference_spectra",
-    "reference_spectrum",
-    "require_calibration_rod",
-    "require_one_sensor",
-    "rod_sensitivities",
-]
-
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
 #: A table that ends inside the scan must have decayed to this share of its maximum.
@@ -86,10 +74,7 @@ def require_calibration_rod(scan: Scan) -> None:
 
 @lru_cache(maxsize=64)
 def reference_contact(film: ElasticFilm, indenter: RoundIndenter, load: float) -> Contact:
-    """Solve the rod of a scan, frictionless: friction changes its base stress by about 1e-3.
-
-    A contact keeps what was computed of it, and the scans of a series share theirs.
-    """
+    """Solve the rod of a scan, frictionless: friction changes its base stress by about 1e-3."""
     return indent(film, indenter, load=load)
 
 
@@ -178,10 +163,7 @@ def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
 
 
 def carried_force(stress: StressProfile | Contact, reference: RadialSpectrum) -> float:
-    """Force that a reference carries, over the load it was made for: one if it is sound.
-
-    A shear's transform does not contain it: there it is that of the normal stress beside it.
-    """
+    """Force that a reference (a shear: its normal stress) carries, over its load."""
     if reference.order == 0:
         return reference.integral
     return 1.0 if isinstance(stress, Contact) else stress.force / stress.load
@@ -207,12 +189,9 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
 
 
 def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
-    """Change of the reference's transform by one standard uncertainty of each film property.
-
-    The rod's solution is varied by centred differences (one-sided at nu = 1/2); for a reference
-    from elsewhere, the relative change is taken over.  At a given load the base stress of a
-    linear film does not depend on Young's modulus: its contribution is zero, and is stated.
-    """
+    """Change of the reference's transform by one standard uncertainty of each film property."""
+    # Centred differences of the rod's solution (one-sided at nu = 1/2), or its relative change
+    # for a reference from elsewhere.  Young's modulus does not change the stress at a given load.
     film = scan.film
     changes: dict[str, FloatArray] = {}
     if film.young_modulus_uncertainty is not None:
@@ -248,9 +227,7 @@ def _difference(
     k = reference.wavenumbers.k
 
     def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
-        contact = reference_contact(film, rod, scan.load)
-        return _base_spectrum(contact, k.tobytes(), reference.order)
+        return _base_spectrum(reference_contact(film, rod, scan.load), k.tobytes(), reference.order)
 
     upper, lower = (transform(film, rod) for film, rod in zip(films, rods, strict=True))
-    scale = reference.values / transform(scan.film, scan.indenter)
-    return np.asarray((upper - lower) * scale)
+    return np.asarray((upper - lower) * (reference.values / transform(scan.film, scan.indenter)))

@@ -30,19 +30,6 @@ from memscal.model.checks import FALSE_ALARM, chi_square_limit
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-__all__ = [
-    "FreeModel",
-    "Residuals",
-    "TestOutcome",
-    "chi_square_test",
-    "free_model",
-    "neighbour_correlation_test",
-    "orthonormal",
-    "pure_error_test",
-    "residuals_of",
-    "runs_test",
-]
-
 #: A departure of the expected size that moves no voltage by this share of its noise is left out.
 _SHARE_OF_NOISE = 0.1
 #: A point of less weight is an outlier and is left out.
@@ -63,10 +50,8 @@ class FreeModel:
 
 
 def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> FreeModel:
-    """Linearise the model about the best Gaussian, with every departure that can be resolved.
-
-    ``clip_outliers`` keeps outliers, with residuals cut to four times their noise.
-    """
+    """Linearise about the best Gaussian with all departures that can be resolved."""
+    # ``clip_outliers`` keeps outliers, with residuals cut to four times their noise.
     points, basis = estimate.points, estimate.basis
     ordinary = estimate.outlier_weight >= _OUTLIER
     weights, u = estimate.weights / estimate.outlier_weight, points.u
@@ -87,8 +72,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None
-    noise = 1.0 if stated else estimate.noise_scale
-    resolved = singular > _SHARE_OF_NOISE * noise
+    resolved = singular > _SHARE_OF_NOISE * (1.0 if stated else estimate.noise_scale)
     return FreeModel(
         data=standardised(u - estimate.gaussian.predicted),
         design=np.hstack([flat, left[:, resolved] * singular[resolved]]),
@@ -137,10 +121,7 @@ class Residuals:
 
     @cached_property
     def independent(self) -> tuple[FloatArray, NDArray[np.intp]]:
-        """Independent residuals of the same sum of squares, and which of the points they are.
-
-        Of equal variance and in the order of the scan: one for each degree of freedom.
-        """
+        """Independent residuals of equal variance and the same sum of squares, and their points."""
         from scipy.linalg import qr
 
         # The points that determine the parameters best are dropped: what is left of the others
@@ -170,14 +151,10 @@ def chi_square_test(residuals: Residuals) -> TestOutcome:
 
 
 def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
-    r"""Test the misfit against the scatter of repeats: F of lack of fit over pure error.
-
-    Repeats at one place and load scatter by noise alone, whatever G.  With a mean of its own for
-    each place beside the design, what is left has :math:`m` degrees and the mean square
-    :math:`s^2`; what the means took, of :math:`l` degrees, gives :math:`F(l, m)`.  That is exact
-    also where the repeats lie only near each other (Christensen, Ann. Stat. 17, 1989): the design
-    contains their difference.
-    """
+    """Test the misfit against the scatter of repeats: F(l, m) of lack of fit over pure error."""
+    # Repeats at one place and load scatter by noise alone.  A mean for each place beside the design
+    # leaves m degrees of pure error; the means take l.  This is exact also where repeats lie only
+    # near each other (Christensen, Ann. Stat. 17, 1989): the design contains their difference.
     model, points = free_model(estimate), estimate.points
     place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.kept]
     group = np.unique(place, axis=0, return_inverse=True)[1].ravel()
@@ -188,10 +165,8 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
 
     def within(columns: FloatArray) -> FloatArray:
         """Subtract from each column its weighted mean at each place."""
-        mean = (
-            np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1) / square[:, None]
-        )
-        return np.asarray(columns - weight[:, None] * mean[group])
+        sums = np.stack([np.bincount(group, weight * c) for c in columns.T], axis=1)
+        return np.asarray(columns - weight[:, None] * (sums / square[:, None])[group])
 
     basis = orthonormal(model.design)
     left_over = model.data - basis @ (basis.T @ model.data)
@@ -211,13 +186,9 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
 
 
 def runs_test(residuals: Residuals) -> TestOutcome:
-    r"""Test the residuals' signs along the scan: the share of neighbours that have the same.
-
-    Independent residuals change sign with a probability of one half: with a median of zero, the
-    number of changes is binomial (Wald and Wolfowitz, Ann. Math. Stat. 11, 1940, count runs for
-    an unknown median).  The p-value is one-sided, for too few runs; it is discrete, and below a
-    level at most as often as the level.
-    """
+    """Test the share of neighbours along the scan whose residuals have the same sign."""
+    # The number of changes is binomial with probability 1/2 (Wald and Wolfowitz, Ann. Math. Stat.
+    # 11, 1940, count runs for an unknown median).  One-sided, for too few; the p-value is discrete.
     values, rest = residuals.independent
     same_pass = np.diff(residuals.sequence[rest]) == 0
     changed = np.diff(values > 0) & same_pass
@@ -230,17 +201,11 @@ def runs_test(residuals: Residuals) -> TestOutcome:
 
 
 def neighbour_correlation_test(residuals: Residuals) -> TestOutcome:
-    r"""Test whether neighbouring residuals are alike, whatever the size of the noise.
-
-    The statistic, near one for residuals that are smooth along the scan, is
-    :math:`T = \sum_{l \ge 1} 2^{-l} \sum_i e_i e_{i+l} / \sum_i e_i^2 = e^T W e / e^T e`, as
-    Durbin and Watson's (Biometrika 37, 1950) with more than one lag; what is returned is its
-    excess over its mean.  With :math:`S_1 = \mathrm{tr}\,(1 - QQ^T) W` and
-    :math:`S_p = \mathrm{tr}\,[(1 - QQ^T)(W - S_1/\nu)]^p`, independent normal noise gives it the
-    mean :math:`S_1/\nu` and the moments :math:`2 S_2/\nu(\nu+2)` and
-    :math:`8 S_3/\nu(\nu+2)(\nu+4)` about it; the p-value is that of the gamma distribution
-    (Pearson's type III) with these moments.  One-sided.
-    """
+    """Test whether neighbouring residuals are alike, whatever the size of the noise."""
+    # T = sum_l 2^-l sum_i e_i e_(i+l) / sum_i e_i^2 = e'We / e'e (Durbin and Watson, Biometrika 37,
+    # 1950, with more lags).  Normal noise of nu degrees gives it the mean S1/nu and the central
+    # moments 2 S2 / nu(nu+2) and 8 S3 / nu(nu+2)(nu+4), where S1 = tr (1 - QQ')W and
+    # Sp = tr [(1 - QQ')(W - S1/nu)]^p; the p-value is that of a gamma distribution (Pearson III).
     nu, values = residuals.degrees, residuals.values
     neighbours = _neighbours(residuals)
     first, second, third = _traces(neighbours, residuals.basis)
@@ -294,8 +259,7 @@ def _traces(matrix: csr_array, basis: FloatArray) -> tuple[float, float, float]:
 def orthonormal(design: FloatArray) -> FloatArray:
     """Orthonormal basis of the columns' span; they are scaled first, and zeros are skipped."""
     size = np.linalg.norm(design, axis=0)
-    scaled = design[:, size > 0] / size[size > 0]
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
+    left, singular, _ = np.linalg.svd(design[:, size > 0] / size[size > 0], full_matrices=False)
     return np.asarray(left[:, singular > 1e-10 * singular[0]])
 
 

@@ -54,16 +54,6 @@ from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 from memscal.version import __version__
 
-__all__ = [
-    "SHARED_SOURCES",
-    "check_of_all_forces",
-    "checks_of_restoration",
-    "joined_stress",
-    "measure_stress",
-    "pooled_force",
-    "stress_checks",
-]
-
 #: Sources of a force's uncertainty that all profiles have in common.
 SHARED_SOURCES = ("apparatus", "film", "position_scale")
 
@@ -91,10 +81,7 @@ _OF_STATED_NOISE = ("noise_as_stated", "chi_square")
 def stress_checks(
     profiles: Sequence[MeasuredProfile], restored: Sequence[Sequence[QualityCheck]]
 ) -> tuple[QualityCheck, ...]:
-    """Return the checks of each profile, numbered from one, then those of all together.
-
-    ``restored``: :func:`checks_of_restoration` of each profile.
-    """
+    """Return each profile's checks (``restored``), numbered from one, then that of all."""
     checks = [
         replace(check, name=f"{check.name}_{i + 1}", meaning=f"{profile.label}: {check.meaning}")
         for i, (profile, others) in enumerate(zip(profiles, restored, strict=True))
@@ -106,10 +93,8 @@ def stress_checks(
 
 
 def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
-    """Return the mean of force over load of all profiles, and its standard uncertainty.
-
-    The load's common uncertainty counts; that of each load of one profile does not.
-    """
+    """Return the mean of force over load of all profiles, and its standard uncertainty."""
+    # The load's common uncertainty counts; that of each load of one profile does not.
     budgets = [_relative(profile) for profile in profiles]
     scan = np.array([budget["scan"] for budget in budgets])
     weight = scan**-2 / np.sum(scan**-2)
@@ -127,10 +112,7 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
 
 
 def checks_of_restoration(restoration: Restoration, *, stated: bool) -> tuple[QualityCheck, ...]:
-    """Return the checks of a restoration that hold for its profile.
-
-    ``stated``: whether the noise is, or was estimated from the scatter.
-    """
+    """Return the checks of a restoration that hold for its profile; ``stated``: the noise is."""
     left_out = {_REPLACED} if stated else {_REPLACED, *_OF_STATED_NOISE}
     return tuple(check for check in restoration.checks if check.name not in left_out)
 
@@ -176,10 +158,7 @@ _SAID_OF_ALL = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 
 @single_threaded()
 def measure_stress(
-    scan: Scans,
-    apparatus: ApparatusFunction | str | PathLike[str],
-    *,
-    override: bool = False,
+    scan: Scans, apparatus: ApparatusFunction | str | PathLike[str], *, override: bool = False
 ) -> MeasuredStress:
     r"""Turn contact scans into measured stress, load by load.
 

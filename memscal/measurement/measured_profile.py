@@ -1,15 +1,11 @@
 r"""Measured profiles: the lines of each load of a scan, and their profile with its covariance.
 
-A measured voltage less baseline and drift, over A.  What is uncertain besides the noise: A, the
-same for all; and centre, baseline and drift, with their joint covariance :math:`\Sigma` and the
-columns :math:`J = -[\partial U/\partial c,\ 1,\ \xi]/A`.  Of :math:`J\Sigma J^T` what the centre
-explains is the centre's, the rest the baseline's: both are covariances and their sum is exact.
-That baseline and centre come from the same voltages is not counted: where the stress has decayed
-it would make the uncertainties a little smaller.
-
-The stress on the axis is the restored one, blurred by G.  An error of A or G changes what is
-restored so that it still meets the voltages: blurred again, nothing is left of an error of G but
-what the scan does not determine, and an error of A is left whole.
+A measured voltage less baseline and drift, over A.  Uncertain besides the noise are A, and
+centre, baseline and drift with joint covariance :math:`\Sigma` and the columns
+:math:`J = -[\partial U/\partial c,\ 1,\ \xi]/A`.  Of :math:`J\Sigma J^T` what the centre explains
+is the centre's, the rest the baseline's.  That both come from the same voltages is not counted.
+The stress on the axis is the restored one, blurred by G: an error of A is left whole, one of G
+only where the scan does not determine it.
 """
 
 from __future__ import annotations
@@ -24,7 +20,7 @@ from numpy.typing import NDArray
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
-from memscal.estimation.points import TANGENTIAL, ScanPoints, channel_signal, measured_points
+from memscal.estimation.points import TANGENTIAL, ScanPoints, measured_mask, measured_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.measurement.posterior import apparatus_changes, film_transfer, sensor_transfer
 from memscal.measurement.restoration import Restoration
@@ -35,20 +31,6 @@ from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredPoints, MeasuredProfile, MeasuredScan
 from memscal.model.scan import Scan
 
-__all__ = [
-    "ContactSignal",
-    "PreparedScan",
-    "SingleLoad",
-    "contact_signal",
-    "measured_profile",
-    "measured_scan",
-    "place_of",
-    "prepared_scan",
-    "require_ends",
-    "require_points",
-    "single_loads",
-]
-
 #: Lines whose loads differ by less than this are repeats of one load.
 _SAME_LOAD = 0.05
 #: Recorded loads of one line scatter by less than this about their median.
@@ -57,11 +39,7 @@ _SCATTER = 0.15
 
 @dataclass(frozen=True, eq=False)
 class SingleLoad:
-    """The lines of a scan that were made at one nominal load, in N.
-
-    ``scan``: their voltages, with the nominal ``load`` and the recorded ``normal_load``;
-    ``lubrication``: ``"dry"``, ``"lubricated"`` or empty.
-    """
+    """The lines of a scan that were made at one nominal load, in N."""
 
     scan: Scan
     load: float
@@ -74,12 +52,9 @@ class SingleLoad:
 
 
 def single_loads(scan: Scan) -> tuple[SingleLoad, ...]:
-    """Split a scan by load, the smallest first; one that records no loads stays whole.
-
-    Lines (rows of ``u_zz``, or points of one ``repeat``) whose median loads lie within 5 % of
-    each other are repeats of one load; its nominal value is the median of all of their recorded
-    loads.  A line at several loads, or without any, raises an InputError.
-    """
+    """Split a scan by load, the smallest first; one that records no loads stays whole."""
+    # Lines whose median loads lie within 5 % of each other are repeats of one load, the median of
+    # all recorded ones.  A line at several loads, or without any, raises an InputError.
     if scan.normal_load is None:
         return (SingleLoad(scan, scan.load, scan.lubrication),)
     passes = scan.passes
@@ -142,31 +117,20 @@ _LARGEST_END = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ContactSignal:
-    """The contact at a nominal load as the sensor reports it, without friction and sticking.
+    """The contact at a nominal load as the sensor reports it, without friction and sticking."""
 
-    ``r`` (n,): distances from the centre, in m; ``voltage`` and ``by_load`` (2, n): the voltages of
-    both and their derivatives by the logarithm of the load, in V; ``contact_radius`` in m, without
-    friction.
-    """
-
-    r: FloatArray
-    voltage: FloatArray
-    by_load: FloatArray
-    contact_radius: float
+    r: FloatArray  # (n,): distances from the centre, in m
+    voltage: FloatArray  # (2, n), in V
+    by_load: FloatArray  # (2, n): derivative by the logarithm of the load, in V
+    contact_radius: float  # in m, without friction
 
     def slope(self, distance: FloatArray, sticking: float = 0.0) -> FloatArray:
-        """Derivative of the voltage by the logarithm of the load, at distances in m, in V.
-
-        ``sticking``: how far from the frictionless contact to the one that sticks.
-        """
+        """Derivative of the voltage (V) by the logarithm of the load; ``sticking`` from 0 to 1."""
         between = (1 - sticking) * self.by_load[0] + sticking * self.by_load[1]
         return np.asarray(np.interp(distance, self.r, between))
 
     def sticking(self, distance: float, voltage: float) -> float:
-        """How far from the frictionless voltage to the sticking one a measured one is, 0 to 1.
-
-        At a distance in m near the axis, where friction raises the stress.
-        """
+        """How far from the frictionless voltage to the sticking one a measured one is, 0 to 1."""
         free, stuck = (float(np.interp(distance, self.r, curve)) for curve in self.voltage)
         return min(max((voltage - free) / (stuck - free), 0.0), 1.0) if stuck > free else 0.0
 
@@ -177,11 +141,8 @@ class ContactSignal:
 
 
 def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactSignal:
-    """Calculate the contacts of one nominal load, and near it.
-
-    A lubricated contact, and a rod's, is taken as frictionless.  A load beyond the model of the
-    contact raises a DomainError.
-    """
+    """Calculate the contacts of one nominal load and near it, or raise a DomainError."""
+    # A lubricated contact, and a rod's, is taken as frictionless.
     scan, load = single.scan, single.load
     loads = load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
     slides = single.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
@@ -204,8 +165,7 @@ def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactS
     voltages = nodes.synthesise(np.stack(spectra, axis=1), r).T.reshape(-1, loads.size, r.size)
     # Without friction both are the frictionless contact.
     below, at, above = np.moveaxis(voltages[[0, -1]], 1, 0)
-    slope = (above - below) / (2 * _LOAD_STEP)
-    return ContactSignal(r, at, slope, contacts[0][1].contact_radius)
+    return ContactSignal(r, at, (above - below) / (2 * _LOAD_STEP), contacts[0][1].contact_radius)
 
 
 def require_points(single: SingleLoad, signal: ContactSignal) -> None:
@@ -240,10 +200,7 @@ def require_points(single: SingleLoad, signal: ContactSignal) -> None:
 
 
 def require_ends(single: SingleLoad, signal: ContactSignal, centre: FloatArray) -> None:
-    """Refuse a scan that ends where the calculated profile exceeds 5 % of its maximum.
-
-    The baseline would be undetermined.
-    """
+    """Refuse a scan whose profile exceeds 5 % at its ends: its baseline is undetermined."""
     scan = single.scan
     measured = np.isfinite(scan.u_zz)
     if scan.y is None:
@@ -275,16 +232,11 @@ _TRIED = np.geomspace(0.02, 2.0, 120)
 
 @dataclass(frozen=True, eq=False)
 class PreparedScan:
-    """A scan at one load, and the noise that its voltages have.
+    """A scan at one load, and the noise that its voltages have."""
 
-    ``scan``: voltages for the nominal load, ``u_zz_errors`` with the scatter of the loads;
-    ``electronic``: electronic noise of each voltage, in V, zero where it is not stated;
-    ``noise_estimated``: whether it was estimated here.
-    """
-
-    scan: Scan
-    electronic: FloatArray
-    noise_estimated: bool
+    scan: Scan  # voltages for the nominal load, errors with the scatter of the loads
+    electronic: FloatArray  # noise of each voltage, in V; zero where it is not stated
+    noise_estimated: bool  # whether it was estimated here
 
 
 def prepared_scan(
@@ -296,14 +248,12 @@ def prepared_scan(
     if scan.normal_load is None:
         return prepared
     for _ in range(_ROUNDS):
-        points = measured_points(prepared.scan)
-        estimate, _ = gaussian_pressure(prepared.scan, apparatus, points)
+        estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
         slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
         of_load = _load_noise(single, slope)
         electronic, estimated = _stated(scan), False
         if scan.u_zz_errors is None and of_load.any():
-            kept = np.isfinite(prepared.scan.u_zz)
-            noise = _noise_of_load(estimate, of_load[kept])
+            noise = _noise_of_load(estimate, of_load[np.isfinite(prepared.scan.u_zz)])
             electronic, estimated = np.full_like(slope, noise), True
         level = _at_nominal(single, slope)
         prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, estimated)
@@ -332,8 +282,7 @@ def _at_nominal(single: SingleLoad, slope: FloatArray) -> Scan:
 
 def _load_noise(single: SingleLoad, slope: FloatArray) -> FloatArray:
     errors = single.scan.normal_load_errors
-    share = 0.0 if errors is None else np.nan_to_num(errors) / single.load
-    return np.abs(slope) * share
+    return np.abs(slope) * (0.0 if errors is None else np.nan_to_num(errors) / single.load)
 
 
 def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan:
@@ -358,8 +307,7 @@ def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
     taken = 3 + estimate.model.drift_columns.shape[1]
     square = weight * residual**2 * residual.size / max(residual.size - taken, 1)
     scatter = 1.4826 * float(np.median(np.abs(residual)))
-    least = NUMERICAL_FLOOR * estimate.largest_signal
-    tried = np.maximum(_TRIED * scatter, least)
+    tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * estimate.largest_signal)
     variance = tried[:, None] ** 2 + of_load**2
     deviance = np.sum(np.log(variance) + square / variance, axis=1)
     return float(tried[np.argmin(deviance)])
@@ -400,8 +348,7 @@ def measured_profile(
 ) -> MeasuredProfile:
     """Return the measured profile of one load of a scan from its restored stress."""
     a, estimate = restored.apparatus.conversion_constant, restored.posterior.estimate
-    noise = restored.noise / np.sqrt(estimate.outlier_weight)
-    average, x, y = _averaging(restored, noise)
+    average, x, y = _averaging(restored, restored.noise / np.sqrt(estimate.outlier_weight))
     level = average @ (restored.points.u - _background(restored))
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
@@ -445,7 +392,7 @@ def _points(
     """Return the points of one load by channel, as they were measured."""
     normal = measured_points(scan)
     weight = restored.posterior.estimate.outlier_weight
-    noise = _noise_in_shape(prepared, restored)[_kept(scan, "zz")]
+    noise = _noise_in_shape(prepared, restored)[measured_mask(scan)]
     points = {"zz": _of_channel(scan, normal, noise, weight)}
     for channel in TANGENTIAL:
         try:
@@ -462,7 +409,7 @@ def _of_channel(
 ) -> MeasuredPoints:
     load_errors = np.zeros_like(points.u)
     if scan.normal_load_errors is not None:
-        load_errors = np.nan_to_num(scan.normal_load_errors[_kept(scan, points.channel)])
+        load_errors = np.nan_to_num(scan.normal_load_errors[measured_mask(scan, points.channel)])
     correlation = None
     if points.decorrelation is not None:
         root = np.linalg.inv(points.decorrelation)
@@ -478,16 +425,6 @@ def _of_channel(
         x_errors=points.x_errors,
         correlation=correlation,
     )
-
-
-def _kept(scan: Scan, channel: str) -> NDArray[np.bool_]:
-    """Which points of a channel were measured, shape of ``u_zz``."""
-    u, errors = channel_signal(scan, channel)
-    kept: NDArray[np.bool_] = np.isfinite(u)
-    for other in (scan.normal_load, errors):
-        if other is not None:
-            kept &= np.isfinite(other)
-    return kept
 
 
 def _averaging(
@@ -511,18 +448,16 @@ def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatA
     posterior, model = restored.posterior, restored.posterior.estimate.model
     nodes, free = posterior.nodes, restored.points.free
     geometry = model.geometry(np.atleast_2d(restored.centre))
-    pressure = (
-        posterior.state[:nodes] / restored.scan.load / film_transfer(restored.scan.film, model.k)
-    )
+    film = film_transfer(restored.scan.film, model.k)
+    pressure = posterior.state[:nodes] / restored.scan.load / film
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
     columns = [average @ column / restored.apparatus.conversion_constant for column in columns]
     sigma, n = posterior.covariance[nodes:, nodes:], int(free.sum())
     carried = np.linalg.solve(sigma[:n, :n], sigma[:n, n:])
     of_centre = columns[0] + columns[1] @ carried.T
-    rest = sigma[n:, n:] - sigma[n:, :n] @ carried
     return {
         "centre": of_centre @ sigma[:n, :n] @ of_centre.T,
-        "baseline": columns[1] @ rest @ columns[1].T,
+        "baseline": columns[1] @ (sigma[n:, n:] - sigma[n:, :n] @ carried) @ columns[1].T,
     }
 
 

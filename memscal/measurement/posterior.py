@@ -46,20 +46,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.scan import Scan
 
-__all__ = [
-    "Posterior",
-    "PressureShape",
-    "ShapeFit",
-    "adopted_noise",
-    "apparatus_changes",
-    "film_transfer",
-    "fit_shape",
-    "pressure_shapes",
-    "reach_of",
-    "restore_posterior",
-    "sensor_transfer",
-]
-
 _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
 #: Shears from none to full stick: spheres of a contact radius from half to twice the thickness.
 _SHEARS_INCOMPRESSIBLE = (0.0, -0.2, -0.4)
@@ -75,14 +61,10 @@ def film_transfer(film: ElasticFilm, k: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class PressureShape:
-    """A pressure of unit force with its shear, as an equivalent pressure on a film.
+    """A pressure of unit force with its shear, as an equivalent pressure on a film."""
 
-    ``exponent``: m, how softly the pressure ends, infinite for a Gaussian; ``shear``: c, outward
-    shear over pressure at the radius of two widths; ``film``: what is pressed.
-    """
-
-    exponent: float
-    shear: float
+    exponent: float  # m, how softly the pressure ends; infinite for a Gaussian
+    shear: float  # c, outward shear over pressure at the radius of two widths
     film: ElasticFilm
 
     def transform(self, k: FloatArray, width: float) -> FloatArray:
@@ -100,8 +82,7 @@ class PressureShape:
             return np.asarray(slope)
         m = self.exponent
         ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
-        second = self._order(2, k, width)
-        rise = k * first - ratio * width**2 * k**3 * second
+        rise = k * first - ratio * width**2 * k**3 * self._order(2, k, width)
         return np.asarray(slope - 0.5 * self._share(k) * rise)
 
     def _order(self, further: int, k: FloatArray, width: float) -> FloatArray:
@@ -113,14 +94,12 @@ class PressureShape:
 
     def _share(self, k: FloatArray) -> FloatArray:
         x, nu = k * self.film.thickness, self.film.poisson_ratio
-        ratio = base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu)
-        return self.shear * ratio
+        return self.shear * (base_normal_from_shear(x, nu) / base_normal_from_pressure(x, nu))
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
     """Return the shapes that a restoration weighs against each other."""
-    flowing = film.poisson_ratio > _FLOWING
-    shears = _SHEARS_INCOMPRESSIBLE if flowing else _SHEARS_COMPRESSIBLE
+    shears = _SHEARS_INCOMPRESSIBLE if (film.poisson_ratio > _FLOWING) else _SHEARS_COMPRESSIBLE
     return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
 
 
@@ -147,23 +126,16 @@ class _Basis(DepartureBasis):
 
 @dataclass(frozen=True, eq=False)
 class ShapeFit:
-    """The fit of one shape of pressure and of departures from it.
+    """The fit of one shape of pressure and of departures from it."""
 
-    The state is the pressure's transform per newton at the model's nodes, the free coordinates of
-    the centre (m), baseline and drift (V): ``state`` (s,) is its posterior mean, ``covariance``
-    (s, s) its expected squared error, ``gain`` (s, n) its derivative by the voltages.
-    ``residual`` (n,): voltages that are not explained, in V; ``noise`` of a point of weight one,
-    in V, or over the stated uncertainties; ``log_evidence``: log marginal likelihood of the shape
-    with all departures, up to a constant of the scan.
-    """
-
+    # State: pressure's transform per newton at the nodes, free centre (m), baseline and drift (V).
     shape: PressureShape
-    state: FloatArray
-    covariance: FloatArray
-    gain: FloatArray
-    residual: FloatArray
-    noise: float
-    log_evidence: float
+    state: FloatArray  # (s,): posterior mean
+    covariance: FloatArray  # (s, s): expected squared error
+    gain: FloatArray  # (s, n): derivative of the state by the voltages
+    residual: FloatArray  # (n,), in V
+    noise: float  # of a point of weight one, in V, or over the stated uncertainties
+    log_evidence: float  # log marginal likelihood up to a constant of the scan
 
 
 def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
@@ -173,8 +145,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     rings = departure_basis(model, fit)
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, shape)
-    count = float(start.outlier_weight.sum())
-    weighed = weigh_departures(model, fit, basis, weights, count)
+    weighed = weigh_departures(model, fit, basis, weights, float(start.outlier_weight.sum()))
     rows = _state_rows(model.k, basis)
     kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)
     first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
@@ -198,8 +169,7 @@ def _fit(
     force, width = start.conversion_constant, max(start.sigma, _NARROWEST * model.points.step)
     theta = np.concatenate([[force, width], start.centre[free], start.drift])
     widths = np.full(1 + int(free.sum()), width)
-    drifts = np.full(start.drift.size, np.ptp(model.points.u))
-    scale = np.concatenate([[force], widths, drifts])
+    scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
 
     def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
         fit = _linearise(shape, model, scaled * scale)
@@ -224,9 +194,8 @@ def _linearise(shape: PressureShape, model: ForwardModel, theta: FloatArray) -> 
     shift = model.centre_derivative(geometry, force * kernel)
     jacobian = np.column_stack([signal, force * widening, shift, model.drift_columns])
     predicted = force * signal + model.drift_columns @ drift
-    round_ = np.zeros(2)
     return GaussianFit(
-        force, width, centres, drift, round_, model.points, geometry, jacobian, predicted
+        force, width, centres, drift, np.zeros(2), model.points, geometry, jacobian, predicted
     )
 
 
@@ -239,10 +208,7 @@ def _state_rows(k: FloatArray, basis: _Basis) -> FloatArray:
 
 
 def _log_information(model: ForwardModel, weights: FloatArray, fit: GaussianFit) -> float:
-    """Log determinant of the parameters' information, for flat priors alike of all shapes.
-
-    They are flat in the logarithms of force and width, in centre, baseline and drift.
-    """
+    """Log determinant of the information; priors flat in log force, log width and the others."""
     scale = np.ones(fit.jacobian.shape[1])
     scale[:2] = fit.conversion_constant, fit.sigma
     scaled = model.points.standardised(fit.jacobian * scale, weights)
@@ -266,27 +232,17 @@ _REACH = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Base stress, centre and baseline as one state with its covariance.
+    """Base stress, centre and baseline as one state with its covariance."""
 
-    ``estimate``: the best Gaussian pressure, the noise and the outliers; ``state`` (s,):
-    transform of the base stress at the model's nodes (N), free coordinates of the centre (m),
-    baseline and drift (V); ``covariances`` (s, s) by source, which are independent; ``shifts``
-    (n, q) and ``changes`` (s, q): what each input's standard uncertainties do to the predicted
-    voltages, in V, and to the state; ``residual`` (n,): voltages that are not explained, in V;
-    ``found_noise`` of a point of weight one, in V, or over the stated uncertainties; ``shares``:
-    posterior probability of each shape, by its exponent and shear; ``resolved_wavenumber``: where
-    the transform's standard uncertainty reaches a third of the best Gaussian pressure's, in rad/m.
-    """
-
-    estimate: ProfileEstimate
-    state: FloatArray
-    covariances: Mapping[str, FloatArray]
-    shifts: Mapping[str, FloatArray]
-    changes: Mapping[str, FloatArray]
-    residual: FloatArray
-    found_noise: float
-    shares: Mapping[tuple[float, float], float]
-    resolved_wavenumber: float
+    estimate: ProfileEstimate  # the best Gaussian pressure, noise and outliers
+    state: FloatArray  # (s,): stress at the nodes (N), free centre (m), baseline, drift (V)
+    covariances: Mapping[str, FloatArray]  # (s, s) by source, independent
+    shifts: Mapping[str, FloatArray]  # (n, q) by source: change of the voltages, in V
+    changes: Mapping[str, FloatArray]  # (s, q) by source: change of the state
+    residual: FloatArray  # (n,), in V
+    found_noise: float  # of a point of weight one, in V, or over the stated uncertainties
+    shares: Mapping[tuple[float, float], float]  # posterior probability by exponent and shear
+    resolved_wavenumber: float  # where the uncertainty is a third of the Gaussian's, rad/m
 
     @property
     def covariance(self) -> FloatArray:
@@ -317,10 +273,7 @@ def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
 def restore_posterior(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
-    """Average the shapes of pressure by their marginal likelihood, and propagate the inputs.
-
-    ``estimate``: the best Gaussian pressure; ``transfer``: transform of A G at its nodes, in V/Pa.
-    """
+    """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
     fits = [fit_shape(shape, estimate) for shape in pressure_shapes(scan.film)]
     shares = _shares(fits)
     mean = _sum_of(shares, [fit.state for fit in fits])
@@ -385,10 +338,7 @@ def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) 
 
 
 def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
-    """Return independent changes of the transform of A G by one standard uncertainty, in V/Pa.
-
-    At ``k`` (n,) in rad/m, shape (n, q): one column for each change; at zero the change of A.
-    """
+    """Return independent changes (n, q) of the transform of A G by one uncertainty, in V/Pa."""
     profile, a = apparatus.radial_profile, apparatus.conversion_constant
     u_a = apparatus.parameters.uncertainty("conversion_constant")
     covariance = a**2 * profile.g_covariance + np.outer(profile.g, profile.g) * u_a**2
@@ -414,8 +364,7 @@ def _film_changes(film: ElasticFilm, k: FloatArray) -> FloatArray:
         # One-sided at nu = 1/2.
         above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
         upper, lower = (replace(film, poisson_ratio=nu) for nu in (above, below))
-        difference = film_transfer(upper, k) - film_transfer(lower, k)
-        columns.append(difference * u / (above - below))
+        columns.append((film_transfer(upper, k) - film_transfer(lower, k)) * u / (above - below))
     return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
 
 

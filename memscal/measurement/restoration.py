@@ -25,8 +25,6 @@ from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-__all__ = ["SAME_LOAD", "Comparison", "Expected", "Restoration", "compare_stress", "read_expected"]
-
 #: Loads of a curved indenter may differ by this share: its stress is not proportional to them.
 SAME_LOAD = 0.01
 
@@ -42,23 +40,16 @@ _NEGLIGIBLE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """How a calculated stress agrees with a scan and with the stress restored from it.
-
-    ``sigma_zz`` (n,): the calculated ``stress`` at the restoration's radii, in Pa; ``chi_square``:
-    reduced chi-square of the scan against the calculated stress convolved with A G, of so many
-    ``degrees``, with its ``limit`` (exceeded by chance once in a thousand) and ``p_value``;
-    ``difference``: largest difference of the restored from the calculated stress, over the largest
-    stress; ``within``: share of the radii at which they agree within 1.96 standard uncertainties.
-    """
+    """How a calculated stress agrees with a scan and with the stress restored from it."""
 
     stress: StressProfile | Contact
-    sigma_zz: FloatArray
-    chi_square: float
+    sigma_zz: FloatArray  # (n,): calculated, at the restoration's radii, in Pa
+    chi_square: float  # reduced, of the scan against the calculated stress convolved with A G
     degrees: int
-    limit: float
+    limit: float  # exceeded by chance once in a thousand
     p_value: float
-    difference: float
-    within: float
+    difference: float  # largest, over the largest stress
+    within: float  # share of the radii at which they agree within 1.96 standard uncertainties
 
 
 def compare_stress(
@@ -114,13 +105,11 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     # The film is not part of the direct way: the calculated stress is at its base already.
     added = np.hstack([posterior.shifts["apparatus"], posterior.shifts["position_scale"]])
     if scan.load_uncertainty is not None:
-        share = scan.load_uncertainty / scan.load
-        added = np.column_stack([added, share * signal])
+        added = np.column_stack([added, (scan.load_uncertainty / scan.load) * signal])
     # The stated noise as it is: raised by a misfit, it would hide it.
     stated = points.u_errors is not None
     root = estimate.noise_root * (1 / estimate.noise_scale if stated else posterior.noise_ratio)
-    covariance = root @ root.T + added @ added.T
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+    whiten = np.linalg.inv(np.linalg.cholesky(root @ root.T + added @ added.T))
     flat = np.linalg.qr(whiten @ np.hstack(columns))[0]
     left = whiten @ (points.u - signal)
     left = left - flat @ (flat.T @ left)
@@ -203,8 +192,7 @@ class Restoration(Result):
         InputError
             If a radius is beyond 1.5 times the scan's width, where nothing was computed.
         """
-        nodes = self.posterior.nodes
-        return np.asarray(self._synthesis(r) @ self.posterior.state[:nodes])
+        return np.asarray(self._synthesis(r) @ self.posterior.state[: self.posterior.nodes])
 
     def stress_uncertainty(self, r: ArrayLike) -> FloatArray:
         """Return the standard uncertainty (k = 1) of :meth:`stress`, in Pa."""

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
-from memscal.estimation.assumptions import ExtraColumns, axisymmetry_test, symmetry_test
+from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import CentreError, ProfileEstimate, estimate_profile
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
@@ -42,18 +42,6 @@ from memscal.model.indenter import Rod
 from memscal.model.records import FILM
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
-
-__all__ = [
-    "accept_mismatches",
-    "failed_calibration_messages",
-    "gaussian_pressure",
-    "noise_unstated_message",
-    "require_covariance",
-    "restoration_checks",
-    "restoration_messages",
-    "restore",
-    "restore_known",
-]
 
 #: Properties of one film agree within this share where no uncertainty is stated ...
 _SAME = 0.02
@@ -146,8 +134,7 @@ def _differences(scan: Scan, apparatus: ApparatusFunction) -> Iterator[str]:
             continue
         values = [getattr(film, quantity.name) for film in films]
         spreads = [getattr(film, f"{quantity.name}_uncertainty") or 0.0 for film in films]
-        allowed = max(_SAME * values[1], _COVERAGE * math.hypot(*spreads))
-        if abs(values[0] - values[1]) > allowed:
+        if abs(values[0] - values[1]) > max(_SAME * values[1], _COVERAGE * math.hypot(*spreads)):
             ours, theirs = (f"{v / quantity.scale:.4g} {quantity.unit}".rstrip() for v in values)
             words = quantity.name.replace("_", " ").replace("poisson ratio", "Poisson's ratio")
             yield f"film {words} {ours} in the scan, {theirs} in the artifact"
@@ -199,11 +186,10 @@ def _force(restored: Restoration) -> QualityCheck:
 def _film(restored: Restoration) -> QualityCheck:
     ours, theirs = restored.scan.film, restored.apparatus.film
     spread = np.hypot(ours.thickness_uncertainty or 0.0, theirs.thickness_uncertainty or 0.0)
-    limit = max(_SAME, 2 * float(spread) / theirs.thickness)
     return check(
         "film_agreement",
         abs(ours.thickness / theirs.thickness - 1),
-        limit,
+        max(_SAME, 2 * float(spread) / theirs.thickness),
         f"Relative difference of the film's thickness, {ours.thickness * 1e3:.4g} mm, from that of "
         f"the calibration, {theirs.thickness * 1e3:.4g} mm. A failure means that the sensor was "
         "calibrated under another film; G may not be the same under this one.",
@@ -247,13 +233,9 @@ def _symmetry(restored: Restoration) -> QualityCheck:
             "odd columns. A failure means that the left and right halves differ: a tilted "
             "indenter, an uneven film, or a drifting load."
         )
-    return _added(name, uneven, meaning)
-
-
-def _added(name: str, extra: ExtraColumns, meaning: str) -> QualityCheck:
-    about = f"Fall of chi-square by {extra.count} {meaning}"
-    p_value = float(chdtrc(extra.count, extra.fall))
-    return check(name, extra.fall, chi_square_limit(extra.count), about, p_value)
+    meaning = f"Fall of chi-square by {uneven.count} {meaning}"
+    p_value = float(chdtrc(uneven.count, uneven.fall))
+    return check(name, uneven.fall, chi_square_limit(uneven.count), meaning, p_value)
 
 
 def _outliers(restored: Restoration) -> QualityCheck:

@@ -23,15 +23,6 @@ from memscal.mechanics import film_response as film
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
-__all__ = [
-    "HalfSpaceIntegrals",
-    "InterfaceTraction",
-    "base_normal_spectrum",
-    "base_normal_stress",
-    "base_shear_spectrum",
-    "base_shear_stress",
-]
-
 # Depression by pressure and by shear, outward displacement by pressure and by shear.
 HalfSpaceIntegrals = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 

@@ -40,17 +40,6 @@ from numpy.typing import ArrayLike
 
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "base_normal_from_pressure",
-    "base_normal_from_shear",
-    "base_shear_from_pressure",
-    "base_shear_from_shear",
-    "coupling_correction",
-    "half_space_coupling",
-    "normal_correction",
-    "radial_correction",
-]
-
 # exp(-2 * 340) is still a normal number; beyond, every response has long reached its limit.
 _LARGEST_X = 340.0
 # Below this x a difference is summed as a series, exact to rounding with these terms.

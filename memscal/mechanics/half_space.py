@@ -1,26 +1,17 @@
 r"""Surface of a half-space under tractions that are linear between rings.
 
-With the pressure :math:`p` and the outward traction :math:`q`, the shear modulus :math:`G` and
-:math:`\beta = (1-2\nu)/2(1-\nu)`, the depression and the outward displacement of the surface are
+With :math:`\beta = (1-2\nu)/2(1-\nu)`, depression and outward displacement of the surface are
 
 .. math::
 
     w(x) &= \frac{1-\nu}{G}\Big[\int L_{00}(x, s)\,p\,s\,ds - \beta\int_x^\infty q\,ds\Big], \\
     u(x) &= \frac{1-\nu}{G}\Big[\int L_{11}(x, s)\,q\,s\,ds
-            - \frac{\beta}{x}\int_0^x p\,s\,ds\Big],
+            - \frac{\beta}{x}\int_0^x p\,s\,ds\Big], \\
+    L_{00} &= \frac{2}{\pi\max}\,K(t), \qquad L_{11} = \frac{2}{\pi\min}\,[K(t) - E(t)], \qquad
+    t = \min(x, s)/\max(x, s)
 
-where :math:`L_{nn} = \int_0^\infty J_n(kx)\,J_n(ks)\,dk` are complete elliptic integrals: with
-:math:`t = \min(x, s)/\max(x, s)`,
-
-.. math::
-
-    L_{00} = \frac{2}{\pi\max}\,K(t), \qquad
-    L_{11} = \frac{2}{\pi\min}\,[K(t) - E(t)]
-
-(Johnson, Contact Mechanics, 1985, chapter 3).  The hat :math:`\phi_j` is 1 on ring j and falls
-linearly to zero at its neighbours.  They are singular as :math:`\ln|x - s|`.  Elements
-near to where they are singular are integrated with nodes that crowd there; all others by a plain
-Gauss rule.  Both are exact to about 1e-11.
+(Johnson, Contact Mechanics, 1985, chapter 3).  Elements near the logarithmic singularity are
+integrated with nodes that crowd there, others by a plain Gauss rule; both to about 1e-11.
 """
 
 from __future__ import annotations
@@ -32,8 +23,6 @@ from numpy.typing import NDArray
 from scipy.special import ellipkm1, elliprd
 
 from memscal.model.arrays import FloatArray
-
-__all__ = ["coupling_integrals", "on_hats", "singular_integrals"]
 
 # Nodes of the plain rule: an element that is at least its own length away is exact to 1e-12.
 _ORDER = 8
@@ -52,8 +41,7 @@ def singular_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     measure = s * lengths[:, None] * weights / 2
     kernels = _kernels(x[:, None, None], s[None], np.abs(x[:, None, None] - s))
     rising, falling = measure * share, measure * (1 - share)
-    away = np.maximum(starts - x[:, None], x[:, None] - ends)
-    near = away < lengths
+    near = np.maximum(starts - x[:, None], x[:, None] - ends) < lengths
 
     integrals = []
     corrections = _near_integrals(x, starts, ends, near)
@@ -77,8 +65,7 @@ def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
         lengths * (starts * falling + lengths * (reach**2 / 2 - reach**3 / 3)),
         lengths * (starts * rising + lengths * reach**3 / 3),
     )
-    inverse = np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
-    return beyond, within * inverse
+    return beyond, within * np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
 
 
 def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:

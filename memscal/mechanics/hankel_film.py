@@ -29,8 +29,6 @@ from memscal.mechanics.surface import SurfaceCompliance
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
-__all__ = ["HankelField", "HankelFilm"]
-
 # x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
 _LARGEST_KH = 22.0
 # Phase, in rad, that one panel of the k-quadrature may span.
@@ -104,11 +102,7 @@ class HankelField:
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
         layer = _layer_integrals(
-            self.film,
-            x,
-            (k, weights),
-            traction.pressure_transform(k),
-            traction.shear_transform(k),
+            self.film, x, (k, weights), traction.pressure_transform(k), traction.shear_transform(k)
         )
         return _displacements(self.film, traction.half_space_integrals(x), layer)
 

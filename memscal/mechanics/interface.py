@@ -1,20 +1,9 @@
 r"""Interface between indenter and film: friction, and the compliance of a rough surface.
 
-A smooth interface that obeys Amontons' law is rigid: surfaces that touch do not approach each
-other, and do not slide before the shear reaches :math:`\mu p`.  The contact of a rough surface
-yields in both directions:
-
-- *normally*, the pressure rises gradually as the mean planes approach
-  (:class:`GreenwoodTripp`, :class:`ExponentialCompliance`);
-- *tangentially*, the interface yields elastically up to a *slip length* of the order of the rms
-  roughness, whatever the load, before it slips:
-
-  .. math:: q = -\mu p\,\frac{e}{\ell}, \qquad |e| \le \ell,
-
-  where :math:`e` is the elastic part of the relative displacement (elasto-plastic-like law;
-  Bureau, Caroli and Baumberger, Proc. R. Soc. A 459 (2003) 2787).
-
-With both compliances zero the rigid interface returns.
+A smooth interface that obeys Amontons' law is rigid.  A rough one yields normally as the mean
+planes approach, and tangentially, elastically up to a slip length :math:`\ell` of the order of
+the rms roughness: :math:`q = -\mu p\,e/\ell` for an elastic displacement :math:`|e| \le \ell`
+(Bureau, Caroli and Baumberger, Proc. R. Soc. A 459 (2003) 2787).
 """
 
 from __future__ import annotations
@@ -28,8 +17,6 @@ from scipy.special import gamma, pbdv
 
 from memscal.model.arrays import FloatArray, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
-
-__all__ = ["ExponentialCompliance", "GreenwoodTripp", "Interface", "NormalLaw"]
 
 # Separations, in units of the law's length, between which a law is inverted.
 _CLOSEST = -60.0

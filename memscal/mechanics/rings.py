@@ -13,8 +13,6 @@ from memscal.mechanics.base_stress import HalfSpaceIntegrals
 from memscal.mechanics.half_space import coupling_integrals, on_hats, singular_integrals
 from memscal.model.arrays import FloatArray
 
-__all__ = ["RingTraction", "hat_transforms"]
-
 # Bessel functions evaluated together, which bounds the memory.
 _CHUNK = 4_000_000
 

@@ -1,28 +1,22 @@
 r"""Rigid flat rod on a bonded film: the mixed boundary-value problem, frictionless or sticking.
 
-Under the rod (:math:`r < a`) the surface goes down by the depth :math:`\delta`; outside it is
-free.  Pressure and shear are sought as series whose Hankel transforms are spherical Bessel
-functions,
+Pressure and shear are sought as series whose Hankel transforms are spherical Bessel functions,
 
 .. math::
 
     \hat p(k) = \frac{P}{2\pi} \sum_n a_n\, j_{2n}(ka), \qquad
     \hat q(k) = \frac{P}{2\pi} \sum_n b_n\, j_{2n+1}(ka),
 
-which vanish outside the rod by construction and carry the edge's square-root singularity:
-with :math:`m = \sqrt{1 - r^2/a^2}` they are :math:`P_{2n}(m)/m` and
-:math:`(r/a)P'_{2n+1}(m)/m`.  Requiring the surface displacement to be :math:`\delta` (and the
-radial displacement to vanish, if the film sticks) when weighted with each of these functions
-gives a symmetric, positive definite system: the stationary point of the complementary energy.
-Its frictionless part is the Legendre form of the usual Fredholm equation of the second kind for
-:math:`\hat p(k) \propto \int_0^a \varphi(t) \cos kt\,dt`.  The half-space's share of the matrix
-is known in closed form; the layer's share decays like :math:`e^{-2kh}` and is summed by Gauss
-quadrature.
+which vanish outside the rod and carry the edge's square-root singularity: with
+:math:`m = \sqrt{1 - r^2/a^2}` they are :math:`P_{2n}(m)/m` and :math:`(r/a)P'_{2n+1}(m)/m`.
+Requiring the surface displacement to be :math:`\delta` (and the radial one to vanish, if the film
+sticks) when weighted with each of these functions gives a symmetric, positive definite system.
+The half-space's share of the matrix is known in closed form; the layer's share decays like
+:math:`e^{-2kh}` and is summed by Gauss quadrature.
 
 Convergence is exponential where the edge's singularity is the square root (frictionless, or
 incompressible).  A sticking compressible film has an oscillating edge, exponents
-:math:`-1/2 \pm i\ln(3-4\nu)/2\pi`; there the number of terms is doubled until the stress at the
-base, which does not see the edge, has settled.
+:math:`-1/2 \pm i\ln(3-4\nu)/2\pi`: the number of terms is doubled until the base stress settles.
 """
 
 from __future__ import annotations
@@ -41,8 +35,6 @@ from memscal.mechanics.base_stress import HalfSpaceIntegrals, base_normal_stress
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
-__all__ = ["RodSolution", "RodTraction", "rod_integrals", "solve_rod", "spherical_bessel"]
-
 
 def rod_integrals(
     rho: FloatArray, pressure_terms: FloatArray, shear_terms: FloatArray
@@ -55,8 +47,7 @@ def rod_integrals(
     # t = c sin(theta) below c = min(rho, 1): the root sqrt(rho^2 - t^2) cancels against dt.
     inner = np.minimum(rho, 1.0)
     angle = np.arcsin(np.divide(inner, rho, out=np.ones_like(rho), where=rho > 0))
-    theta = angle[:, None] * share
-    t = rho[:, None] * np.sin(theta)
+    t = rho[:, None] * np.sin(angle[:, None] * share)
     d_theta = angle[:, None] * weights
     pressed, sheared = legendre.legval(t, even), legendre.legval(t, odd)
     w_by_p = np.sum(d_theta * pressed, axis=1)
@@ -141,8 +132,7 @@ class RodTraction:
         # c_n = sqrt(pi) n! / Gamma(n + 1/2) gives each term the transform j_2n.
         series = np.zeros(2 * self.pressure_terms.size)
         series[::2] = self.pressure_terms * _term_scale(self.pressure_terms.size)
-        values = legendre.legval(m, series) / m
-        return np.where(under, values * self._mean_scale(), 0.0)
+        return np.where(under, (legendre.legval(m, series) / m) * self._mean_scale(), 0.0)
 
     def shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction at ``r`` (m) in Pa; zero from the edge outward."""
@@ -251,8 +241,7 @@ def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> _
 def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> FloatArray:
     r"""Return :math:`\int j_m(\xi) j_n(\xi) \{W, X, Y\}(\xi h/a)\,d\xi`, even rows before odd."""
     # The integrand turns at the rate 2 a in k, and the poles lie 0.74/h off the axis.
-    longest = min(1.5 * ratio, 6.0)
-    xi, weights = gauss_panels(_LARGEST_KH * ratio, longest, order)
+    xi, weights = gauss_panels(_LARGEST_KH * ratio, min(1.5 * ratio, 6.0), order)
     x = xi / ratio
     orders = spherical_bessel(2 * terms, xi)
     even, odd = orders[::2], orders[1::2]
@@ -269,8 +258,7 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
 
 def _half_space_diagonal(first: int, terms: int) -> FloatArray:
     r"""Return :math:`\int_0^\infty j_l^2\,d\xi = \pi/2(2l+1)` for ``l = first, first + 2, ...``."""
-    order = first + 2 * np.arange(terms)
-    return np.asarray(np.pi / (2 * (2 * order + 1)), dtype=np.float64)
+    return np.asarray(np.pi / (2 * (2 * (first + 2 * np.arange(terms)) + 1)), dtype=np.float64)
 
 
 def _half_space_coupling_matrix(terms: int) -> FloatArray:

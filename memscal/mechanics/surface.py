@@ -1,16 +1,10 @@
 r"""Surface of a film: its displacements under tractions on rings, as a contact solver needs them.
 
-Pressure and radial shear at the surface are linear between the radii :math:`r_j` of concentric
-rings (the *hat* functions), and the displacements of the surface are taken at the same radii:
-
-.. math::
-
-    w_i &= \sum_j C^{wp}_{ij}\,p_j + C^{wq}_{ij}\,q_j, \\
-    u_i &= \sum_j C^{up}_{ij}\,p_j + C^{uq}_{ij}\,q_j,
-
-with the depression :math:`w` (positive into the film) and the outward displacement :math:`u`.
-Every way to solve the film, by Hankel transforms or by finite elements, comes down to such a
-:class:`SurfaceCompliance`, and to the field inside the film that follows from the tractions.
+Pressure and radial shear are linear between the radii :math:`r_j` of concentric rings (the *hat*
+functions); the displacements of the surface are taken at the same radii,
+:math:`w_i = \sum_j C^{wp}_{ij}\,p_j + C^{wq}_{ij}\,q_j` and
+:math:`u_i = \sum_j C^{up}_{ij}\,p_j + C^{uq}_{ij}\,q_j`, with the depression :math:`w` (positive
+into the film) and the outward displacement :math:`u`.
 """
 
 from __future__ import annotations
@@ -22,8 +16,6 @@ import numpy as np
 
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
-
-__all__ = ["FilmField", "MeshedField", "SurfaceCompliance"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,8 @@
 """Bonded film by finite elements: compliance of its surface, and the field below it.
 
-Static condensation: the equations of the film (:mod:`memscal.mechanics.elements.mixed`) are
-factorised once and solved for a unit traction on every ring.  Of each solution, the displacement
-of the surface and the traction of the base are kept, which is all that a contact asks for.
-
-The traction of the base is found from the forces that hold its nodes: it does the same work as
-they on the displacements of these nodes, and its integral is the load to rounding.  The film
-passes nothing to the base that varies fast; a smooth spline takes what the elements add.
+The equations (:mod:`memscal.mechanics.elements.mixed`) are factorised once and solved for a unit
+traction on every ring.  The traction of the base does the same work as the forces that hold its
+nodes, and its integral is the load to rounding.
 """
 
 from __future__ import annotations
@@ -29,8 +25,6 @@ from memscal.mechanics.surface import SurfaceCompliance
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
-
-__all__ = ["ElementField", "ElementFilm", "field_mesh"]
 
 # A quartic triangle has 15 nodes, at quarters of its sides and of the lines between them: they
 # are the nodes of four quadratic triangles.
@@ -56,8 +50,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     displacement[index, 1] = -solution[inward]
 
     def averaged(values: FloatArray) -> FloatArray:
-        count = np.bincount(index.ravel())
-        return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / count)
+        return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel()))
 
     radial, vertical = averaged(gradient[0][0]), averaged(gradient[1][1])
     hoop = np.where(r > 0, displacement[:, 0] / np.where(r > 0, r, 1.0), radial)
@@ -153,8 +146,7 @@ class ElementFilm:
         for source, unknowns in enumerate((inward, outward)):
             for start in range(0, rings.size, _BATCH):
                 batch = slice(start, start + _BATCH)
-                loads = hats[:, batch].toarray()
-                solution = system.solve(unknowns, loads)
+                solution = system.solve(unknowns, hats[:, batch].toarray())
                 moved[source, 0, :, batch] = scale * (seen @ solution[inward])
                 moved[source, 1, :, batch] = scale * (seen @ solution[outward])
         return SurfaceCompliance(
@@ -204,14 +196,12 @@ class ElementField:
     def base_spectrum(self, k: FloatArray) -> FloatArray:
         """Return the transform of the base stress at ``k`` (rad/m), in N, to 1e-5 of the load."""
         r = self._fine_radii
-        spectrum = hankel_transform(r, self.base_normal(r), np.ravel(k))
-        return spectrum.reshape(np.shape(k))
+        return hankel_transform(r, self.base_normal(r), np.ravel(k)).reshape(np.shape(k))
 
     def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
         r = self._fine_radii
-        spectrum = hankel_transform(r, self.base_shear(r), np.ravel(k), order=1)
-        return spectrum.reshape(np.shape(k))
+        return hankel_transform(r, self.base_shear(r), np.ravel(k), order=1).reshape(np.shape(k))
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""
@@ -249,8 +239,7 @@ class ElementField:
 
     def _at_base(self, component: int, r: FloatArray) -> FloatArray:
         flat = np.ravel(np.asarray(r, dtype=np.float64))
-        inside = np.minimum(flat, self.radius) / self.film.thickness
-        values = self._base[component](inside)
+        values = self._base[component](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
     def _at_surface(self, unknowns: NDArray[np.int64], r: FloatArray) -> FloatArray:

@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.model.arrays import FloatArray
 
-__all__ = ["TriangleMesh", "film_triangles"]
-
 # Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
 _INTERVALS = 2
@@ -82,8 +80,7 @@ def _surface_nodes(rings: FloatArray, radius: float, sizes: _Sizes) -> FloatArra
     beyond = [rings[-1]]
     step = rings[-1] - inside[-2]
     while beyond[-1] < radius:
-        longest = float(sizes.widest(beyond[-1]))
-        step = min(step * (1 + _GROWTH / sizes.refinement), longest)
+        step = min(step * (1 + _GROWTH / sizes.refinement), float(sizes.widest(beyond[-1])))
         left = radius - beyond[-1]
         beyond.append(radius if left < 1.5 * step else beyond[-1] + step)
     return np.concatenate([inside, beyond[1:]])

@@ -8,14 +8,10 @@ With the strain :math:`\varepsilon`, its deviator :math:`e` and the mean pressur
     \qquad
     \int \left(\mathrm{div}\,u + P/K\right) Q\,r\,dr\,dz = 0,
 
-with the bulk modulus :math:`1/K = 3(1-2\nu)/2G(1+\nu)`, which vanishes where the film is
-incompressible: the same equations hold for every Poisson's ratio.  The pair is Taylor and Hood's
-of fourth order, which does not lock (Boffi, Brezzi and Fortin 2013, chapter 8).
-
-Lengths are in film thicknesses and stresses in shear moduli: in SI units, pressures and
-displacements would differ by 12 orders of magnitude, and the direct solver would lose digits.
-The second coordinate is the depth below the surface, so that the second displacement is the
-depression.
+with :math:`1/K = 3(1-2\nu)/2G(1+\nu)`, which vanishes where the film is incompressible.  The pair
+is Taylor and Hood's of fourth order, which does not lock (Boffi, Brezzi and Fortin 2013, chapter
+8).  Lengths are in film thicknesses and stresses in shear moduli, or the direct solver would lose
+digits.  The second coordinate is the depth, and the second displacement the depression.
 """
 
 from __future__ import annotations
@@ -32,8 +28,6 @@ from scipy.sparse import block_array, csc_array, csr_array
 from memscal.axisymmetry.hankel import gauss_between
 from memscal.mechanics.elements.mesh import TriangleMesh
 from memscal.model.arrays import FloatArray
-
-__all__ = ["MixedSystem", "QuarticLine", "smooth"]
 
 _DEGREE = 4
 _SMOOTH_DEGREE = 5
@@ -145,8 +139,7 @@ class MixedSystem:
         mesh = skfem.MeshTri(
             np.ascontiguousarray(self.mesh.points.T), np.ascontiguousarray(self.mesh.triangles.T)
         )
-        element = skfem.ElementVector(skfem.ElementTriP4())
-        return skfem.Basis(mesh, element, intorder=_QUADRATURE)
+        return skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP4()), intorder=_QUADRATURE)
 
     @cached_property
     def pressure(self) -> Any:
@@ -181,14 +174,8 @@ class MixedSystem:
             return -softness * p * q * w.x[0]
 
         coupled = squeeze.assemble(self.displacement, self.pressure)
-        return csr_array(
-            block_array(
-                [
-                    [distortion.assemble(self.displacement), coupled.T],
-                    [coupled, compression.assemble(self.pressure)],
-                ]
-            )
-        )
+        stiff, soft = distortion.assemble(self.displacement), compression.assemble(self.pressure)
+        return csr_array(block_array([[stiff, coupled.T], [coupled, soft]]))
 
     @cached_property
     def free(self) -> NDArray[np.int64]:
@@ -200,8 +187,7 @@ class MixedSystem:
         """Nothing moves at the base, and nothing outward on the axis."""
         deepest = self.mesh.points[:, 1].max()
         base = self.displacement.get_dofs(lambda x: x[1] == deepest).all()
-        axis = self.displacement.get_dofs(lambda x: x[0] == 0).all(["u^1"])
-        return np.union1d(base, axis)
+        return np.union1d(base, self.displacement.get_dofs(lambda x: x[0] == 0).all(["u^1"]))
 
     def side(self, depth: float) -> tuple[QuarticLine, NDArray[np.int64], NDArray[np.int64]]:
         """Return the side of the mesh at a depth, with its outward and inward unknowns."""

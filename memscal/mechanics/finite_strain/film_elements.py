@@ -6,13 +6,8 @@ the neo-Hookean energy per undeformed volume is
 .. math:: W = G\left[\tfrac12(F:F - 3) - (J - 1)\right] + \tfrac{K}{2}(J - 1)^2 .
 
 A share :math:`\kappa` of the bulk modulus acts directly, the rest by a pressure
-:math:`p = (\kappa - K)(J - 1)`, which stays finite where :math:`K` does not.
-
-Displacement is quadratic and pressure linear on triangles of the undeformed cross-section
-(Taylor and Hood), a pair that neither locks nor oscillates at :math:`\nu = 1/2`.  The nodal forces
-are the derivatives of the energy by the nodal displacements, and the tangent is theirs: Newton's
-method converges quadratically.
-
+:math:`p = (\kappa - K)(J - 1)`, which stays finite where :math:`K` does not.  Displacement is
+quadratic and pressure linear on triangles of the undeformed cross-section (Taylor and Hood).
 Lengths are in mm, stresses in MPa, forces in N; in SI units the direct solver loses digits.
 """
 
@@ -28,16 +23,6 @@ from scipy import sparse
 
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
-
-__all__ = [
-    "FilmElements",
-    "IntArray",
-    "NeoHookean",
-    "cofactor",
-    "determinant",
-    "mesh_below_a_rod",
-    "mesh_below_a_sphere",
-]
 
 _PASCAL_TO_MPA = 1e-6
 # Share of the bulk modulus that does not go through the pressure, in shear moduli: enough to keep
@@ -154,8 +139,7 @@ def mesh_below_a_sphere(
     """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
     near = _WIDEST_BELOW_A_SPHERE * thickness / refinement
     side = min(_SHARE_OF_CONTACT * contact / refinement, near)
-    count = int(np.ceil(contact / side))
-    even = np.linspace(0.0, contact, count + 1)
+    even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
     return _tensor(even, (side, near), contact, thickness, radius, refinement)
 
 
@@ -296,13 +280,7 @@ class FilmElements:
         couple = -pressures.transpose(0, 2, 1) @ squeeze[:, :, 0]
         weighted = pressures * (self.material.softness * volumes)[..., None]
         soft = -pressures.transpose(0, 2, 1) @ weighted
-        whole = np.concatenate(
-            [
-                np.concatenate([stiff, couple.transpose(0, 2, 1)], axis=2),
-                np.concatenate([couple, soft], axis=2),
-            ],
-            axis=1,
-        )
+        whole = np.block([[stiff, couple.transpose(0, 2, 1)], [couple, soft]])
         dofs = np.concatenate([moving, pressing], axis=1)
         rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
         columns = np.tile(dofs, (1, dofs.shape[1])).ravel()

@@ -1,17 +1,11 @@
 r"""Contact of the film at finite strain with a rigid face: exact constraints, Newton's method.
 
 A node of the surface that touches lies on the indenter's contour *where it has moved to*,
-
-.. math::
-
-    R + u_r = r(s), \qquad u_z = z(s) - \delta.
-
-Its displacements are no unknowns then, but the arc length s is one, along which it slides without
-friction; where the contact sticks, s stays what it was at first touch.  They are eliminated with
-first and second derivatives, so that the constraint holds exactly (no penalty) and the forces are
-normal to the face where it slides.  The depth :math:`\delta` is one more unknown, whose force is
-the load: load and depth can be prescribed alike.  Which nodes touch is found by an active set: a
-node that is pulled leaves, and one that lies inside the indenter is taken in.
+:math:`R + u_r = r(s),\ u_z = z(s) - \delta`: the arc length s is its only unknown, or stays what
+it was at first touch where the contact sticks.  Its displacements are eliminated with first and
+second derivatives, so that the forces are normal to the face where it slides.  The depth
+:math:`\delta` is one more unknown, whose force is the load.  Which nodes touch is found by an
+active set: a node that is pulled leaves, and one that lies inside the indenter is taken in.
 """
 
 from __future__ import annotations
@@ -26,17 +20,6 @@ from scipy.sparse.linalg import splu
 from memscal.errors import ConvergenceError
 from memscal.mechanics.finite_strain.film_elements import FilmElements, IntArray
 from memscal.model.arrays import FloatArray
-
-__all__ = [
-    "Goal",
-    "NewtonError",
-    "Pressed",
-    "Pressing",
-    "RodFace",
-    "SphereFace",
-    "Step",
-    "follow",
-]
 
 
 @dataclass(frozen=True)
@@ -68,8 +51,7 @@ class RodFace:
         s = np.where(wall, self.flat + np.pi / 2 * self.edge - y, r)
         turning = (x > 0) & (y > 0)
         s = np.where(turning, self.flat + self.edge * np.arctan2(x, y), s)
-        straight = np.where(wall, x, y)
-        return s, np.where(turning, np.hypot(x, y), straight) - self.edge
+        return s, np.where(turning, np.hypot(x, y), np.where(wall, x, y)) - self.edge
 
 
 @dataclass(frozen=True)
@@ -317,9 +299,8 @@ class _Path:
             pieces = max(1.0, np.ceil(abs(left) / self.length - 1e-9))
             ahead = goal.value if pieces == 1 else begin + left / pieces
             try:
-                state = self.pressing.press(
-                    self._guess(Goal(ahead, goal.is_load)), Goal(ahead, goal.is_load)
-                )
+                stage = Goal(ahead, goal.is_load)
+                state = self.pressing.press(self._guess(stage), stage)
             except NewtonError:
                 self.length = abs(ahead - begin) / 2
                 halvings += 1
@@ -358,10 +339,8 @@ class _Path:
         ahead = (goal.value - new) / (new - old)
         place = last.place.copy()
         if not self.pressing.sticking:
-            was, now = (
-                np.isin(before.touching, last.touching),
-                np.isin(last.touching, before.touching),
-            )
+            was = np.isin(before.touching, last.touching)
+            now = np.isin(last.touching, before.touching)
             place[now] += ahead * (place[now] - before.place[was])
         return replace(
             last,

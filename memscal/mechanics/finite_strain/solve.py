@@ -1,9 +1,6 @@
 """Neo-Hookean film at finite strain under a rigid rod or sphere, by finite elements.
 
-The linear model is formal where an indenter sinks by a good part of the film's thickness.  Here
-the film is neo-Hookean, displacement and pressure are quadratic and linear on triangles of the
-undeformed cross-section (:mod:`memscal.mechanics.finite_strain.film_elements`), and the surface
-touches the indenter where it has moved to (:mod:`memscal.mechanics.finite_strain.pressing`).
+The linear model is formal where an indenter sinks by a good part of the film's thickness.
 """
 
 from __future__ import annotations
@@ -32,18 +29,12 @@ from memscal.mechanics.finite_strain.pressing import (
     Step,
     follow,
 )
-from memscal.mechanics.finite_strain.state import (
-    FiniteStrainField,
-    interface_traction,
-    outermost,
-)
+from memscal.mechanics.finite_strain.state import FiniteStrainField, interface_traction, outermost
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.problem import Depth, Load, Target
 from memscal.mechanics.solver.refinement import relative_change
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod, Sphere
-
-__all__ = ["press_at_finite_strain", "solve_finite_strain"]
 
 _MM = 1e3
 # The mesh that tells the convergence has sides longer by this factor.
@@ -116,11 +107,9 @@ def solve_finite_strain(
     refinement: float = 1.0,
     edge: float | None = None,
 ) -> tuple[Contact, ...]:
-    """Press a rod (its edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m).
-
-    Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
-    the wall; under a sphere that sticks nothing in the contact moves radially.
-    """
+    """Press a rod (edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m)."""
+    # Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
+    # the wall; under a sphere that sticks nothing in the contact moves radially.
     by_load = isinstance(targets[0], Load)
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
@@ -216,8 +205,7 @@ class _Request:
             reach = 0.8 * self._hertz_radius(goal)
             depth = reach**2 / (self.indenter.extent * _MM)
         chosen = r <= reach * (1 + 1e-9)
-        place = pressing.place_at(r[chosen])
-        return Pressed(np.zeros(elements.size), depth, nodes[chosen], place)
+        return Pressed(np.zeros(elements.size), depth, nodes[chosen], pressing.place_at(r[chosen]))
 
     def _contact(self, pressing: Pressing, step: Step) -> Contact:
         """Return a state in SI units, of unknown convergence."""

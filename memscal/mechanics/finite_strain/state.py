@@ -15,21 +15,16 @@ from memscal.mechanics.rings import RingTraction
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 
-__all__ = ["FiniteStrainField", "interface_traction", "outermost"]
-
 _MM = 1e-3
 _MPA = 1e6
 
 
 @dataclass(frozen=True, eq=False)
 class FiniteStrainField:
-    """The field in a film at finite strain; see :class:`memscal.mechanics.surface.FilmField`.
+    """The field in a film at finite strain; see :class:`memscal.mechanics.surface.FilmField`."""
 
-    The base is rigid and the film bonded to it: an element of area there neither moves, grows nor
-    turns, so that the Cauchy traction, which a sensor measures, is the nominal one.  ``depression``
-    and ``outward`` are functions of a point's radius *before* the deformation.
-    """
-
+    # An element of the bonded base does not deform: its Cauchy traction is the nominal one.
+    # ``depression`` and ``outward`` are functions of a point's radius *before* the deformation.
     pressing: Pressing
     pressed: Pressed
 
@@ -104,11 +99,9 @@ class FiniteStrainField:
 
 
 def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
-    """Return pressure and shear (Pa) at the deformed radii of the triangles' corners in contact.
-
-    They are means over the hats of the corners, in the deformed surface: nodal forces of
-    quadratic elements are no tractions (that on the axis has no area).  A rod's wall is left out.
-    """
+    """Return pressure and shear (Pa) at the deformed radii of the corners in contact."""
+    # Means over the hats of the corners: nodal forces of quadratic elements are no tractions (that
+    # on the axis has no area).  A rod's wall is left out.
     elements, x = pressing.elements, pressed.x
     nodes = elements.surface
     forces = elements.forces(x)
