@@ -120,8 +120,7 @@ SCAN_DATA = record(
     signal="u_zz",
 )
 SYNTHETIC = record(
-    "NXcollection",
-    Quantity("description", "text", "what is synthetic", origin="synthetic"),
+    "NXcollection", Quantity("description", "text", "what is synthetic", origin="synthetic")
 )
 
 PROFILE = record(
@@ -142,18 +141,14 @@ CONTACT = record(
     Quantity("loading", "text", "incremental or total loading"),
 )
 SOLVER = record(
-    "NXprocess",
-    Quantity("solver", "text", "program", stored="program", origin="program"),
+    "NXprocess", Quantity("solver", "text", "program", stored="program", origin="program")
 )
 NUMERICS = record(
     "NXparameters",
     Quantity("convergence", _ONE, "estimated relative error of the largest stress"),
     Quantity("discretisation", "text", "mesh or quadrature"),
 )
-PROFILE_NOTES = record(
-    "NXprocess",
-    Quantity("notes", "note", "notes", origin="reference_notes"),
-)
+PROFILE_NOTES = record("NXprocess", Quantity("notes", "note", "notes", origin="reference_notes"))
 
 FIELD = record(
     "NXdata",

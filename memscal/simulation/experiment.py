@@ -55,10 +55,7 @@ def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
     thickness = around(film.thickness, film.thickness_uncertainty)
     return Reality(
         film=replace(
-            film,
-            young_modulus=modulus,
-            poisson_ratio=0.5 - abs(0.5 - ratio),
-            thickness=thickness,
+            film, young_modulus=modulus, poisson_ratio=0.5 - abs(0.5 - ratio), thickness=thickness
         ),
         rod=replace(rod, radius=around(rod.radius, rod.radius_uncertainty)),
         sphere=replace(sphere, radius=around(sphere.radius, sphere.radius_uncertainty)),
@@ -90,11 +87,7 @@ class Experiment:
     @property
     def scans(self) -> dict[str, Scan]:
         """The three scans by the names of their files, without a suffix."""
-        return {
-            "rod_scan": self.rod,
-            "sphere_dry": self.dry,
-            "sphere_lubricated": self.lubricated,
-        }
+        return {"rod_scan": self.rod, "sphere_dry": self.dry, "sphere_lubricated": self.lubricated}
 
 
 @single_threaded()
