@@ -92,9 +92,8 @@ def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, Ev
     along_x, along_y = _even_axis(x), _even_axis(y)
     if along_x is None or along_y is None:
         return None
-    return (
-        (along_x, along_y) if _nodes(along_x.index, along_y.index) <= _MOST_NODES * count else None
-    )
+    few = _nodes(along_x.index, along_y.index) <= _MOST_NODES * count
+    return (along_x, along_y) if few else None
 
 
 def _even_axis(positions: FloatArray) -> EvenAxis | None:

@@ -24,13 +24,9 @@ from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
 __all__ = [
-    "LUBRICATIONS",
-    "Scan",
-    "StressSensor",
-    "checked_correlation",
-    "require_contacts",
+    "LUBRICATIONS", "Scan", "StressSensor", "checked_correlation", "require_contacts",
     "require_plane",
-]
+]  # fmt: skip
 
 LUBRICATIONS = ("", "dry", "lubricated")
 """What can be between indenter and film; empty where a scan does not say."""
@@ -153,8 +149,8 @@ class Scan:
         Positions along the scan, in m; need not be sorted, centred or evenly spaced.
     u_zz : ndarray, shape (n,), (repeat, n) or (m, n)
         Normal channel's voltage, in V; NaN marks a missing point.
-    load : float
-        Nominal load of the indenter, in N.
+    load, load_uncertainty : float
+        Nominal load of the indenter and its standard uncertainty, common to all points, in N.
     indenter, film, sensor
         What was pressed, on what, measured by what.
     y : ndarray, shape (m,) of a raster, (n,) of points, optional
@@ -163,38 +159,29 @@ class Scan:
         Which pass each of the points belongs to: any whole numbers.
     u_zz_errors : ndarray, shape of ``u_zz``, optional
         Standard uncertainty of each voltage (electronic noise), in V.
-    normal_load : ndarray, shape of ``u_zz``, optional
-        Load at each point, in N, where it was recorded.
-    normal_load_errors : ndarray, shape of ``u_zz``, optional
-        Standard uncertainty of the load at each point, independent from point to point, in N: of
-        a weight that is set down by hand.
+    normal_load, normal_load_errors : ndarray, shape of ``u_zz``, optional
+        Load at each point where it was recorded, and its standard uncertainty, independent from
+        point to point, in N.
     x_errors : ndarray, shape of ``x``, optional
         Standard uncertainty of each position, independent from point to point, in m.
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
         Correlation of the noise between the points of one repeat (of kind points: between all);
         none where absent.
     direction : str
-        ``"x"`` or ``"y"``: which way a line scan ran across the sensor.  The positions of a scan
-        along y are given as ``x`` all the same.
+        ``"x"`` or ``"y"``: which way a line scan ran across the sensor; its positions are in ``x``.
     position_scale_uncertainty : float, optional
         Relative standard uncertainty of the stage's scale, common to all positions.
     channels : mapping of str to ndarray, shape of ``u_zz``
         Further channels (``u_xz``, ``u_yz``), in V, and where stated their noise
         (``u_xz_errors``, ``u_yz_errors``).
-    load_uncertainty : float, optional
-        Standard uncertainty of the load common to all points, in N.
-    lubrication : str
-        ``"dry"`` or ``"lubricated"``: what was between indenter and film; empty if not stated.
-    lubricant : str
-        Name of the lubricant.
+    lubrication, lubricant : str
+        ``"dry"`` or ``"lubricated"``, empty if not stated, and the name of the lubricant.
     title, start_time, end_time, notes : str
         Free text; times in ISO 8601.
-    reference : StressProfile, optional
-        A base stress that travels with the scan.
+    reference, source : StressProfile, SourceFile, optional
+        A base stress that travels with the scan; the file the scan was read from.
     synthetic : mapping, optional
         The known truth of a simulated scan, SI units; present only in synthetic data.
-    source : SourceFile, optional
-        The file it was read from.
 
     Raises
     ------
@@ -288,9 +275,8 @@ class Scan:
         """Position of every voltage along x and y, in m; each like ``u_zz``, zero across a line."""
         along = np.broadcast_to(self.x, self.u_zz.shape)
         if self.y is not None:
-            return along, np.broadcast_to(
-                self.y.reshape(-1, *[1] * (self.u_zz.ndim - 1)), along.shape
-            )
+            y = self.y.reshape(-1, *[1] * (self.u_zz.ndim - 1))
+            return along, np.broadcast_to(y, along.shape)
         across = np.zeros(self.u_zz.shape)
         return (across, along) if self.direction == "y" else (along, across)
 
@@ -311,10 +297,9 @@ class Scan:
             keep = np.atleast_1d(numbers)
         else:
             keep = np.flatnonzero(np.isin(self.passes, numbers))
-            names = ("x", "y", "repeat", "x_errors")
-            changes = {
-                name: values[keep] for name in names if (values := getattr(self, name)) is not None
-            }
+            for name in ("x", "y", "repeat", "x_errors"):
+                if (values := getattr(self, name)) is not None:
+                    changes[name] = values[keep]
             if self.u_zz_correlation is not None:
                 changes["u_zz_correlation"] = self.u_zz_correlation[np.ix_(keep, keep)]
         for name in ("u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
