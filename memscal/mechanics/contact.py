@@ -23,15 +23,13 @@ from memscal.model.stress import StressProfile
 
 __all__ = ["Contact", "too_deep"]
 
-# Default radii of a profile, in film thicknesses.  The film passes nothing that varies faster
-# than exp(-kh): with these steps, near the contact and far from it, a cubic spline is good to
-# 1e-6 of the maximum.
+# Default radii of a profile, in film thicknesses: near the contact and far from it, a cubic spline
+# with these steps is good to 1e-6 of the maximum.
 _NEAR_STEP = 0.02
 _FAR_STEP = 0.05
 _NEAR_REACH = 6.0
 _FAR_REACH = 26.0
-# The profile ends where the stress stays below this fraction of its maximum, which happens
-# within the far reach for any Poisson's ratio.
+# The profile ends where the stress stays below this fraction of its maximum.
 _PROFILE_FLOOR = 1e-9
 # Radii at which the largest interface pressure is sought.
 _PRESSURE_SAMPLES = 2001

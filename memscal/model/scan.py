@@ -253,7 +253,7 @@ class Scan:
 
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
-        shape = " x ".join(str(n) for n in self.u_zz.shape)
+        shape = " x ".join(map(str, self.u_zz.shape))
         what = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
         return f"<Scan: {what} points, x from {reach}, load {self.load:.4g} N>"
@@ -323,8 +323,7 @@ class Scan:
         if self.repeat is not None and not self.repeat.shape == self.x.shape == shape:
             raise InputError(
                 f"repeat has shape {self.repeat.shape}, but x has {self.x.shape} and u_zz {shape}.",
-                why="It numbers the pass of each point; the rows of a u_zz of two axes say it "
-                "themselves.",
+                why="It numbers the pass of each point; rows of a u_zz of two axes are passes.",
             )
         if self.kind == "points" and self.y is not None:
             require_plane(self.x, self.y)
@@ -348,15 +347,12 @@ class Scan:
             )
         if self.load_uncertainty is not None:
             require_non_negative("standard uncertainty of the load", self.load_uncertainty)
-        if self.u_zz_errors is not None and np.any(
-            (self.u_zz_errors < 0) | np.isinf(self.u_zz_errors)
-        ):
+        errors, loads = self.u_zz_errors, self.normal_load
+        if errors is not None and np.any((errors < 0) | np.isinf(errors)):
             raise InputError(
                 "u_zz_errors holds a standard uncertainty that is negative or infinite."
             )
-        if self.normal_load is not None and np.any(
-            (self.normal_load <= 0) | np.isinf(self.normal_load)
-        ):
+        if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
             raise InputError(
                 "normal_load holds a load that is infinite or not above zero.",
                 cure="Mark points without contact as missing (NaN).",
