@@ -8,8 +8,7 @@ It is the base stress as the sensor blurs it, to be compared with calculated str
 same G.  A profile also holds the measured points, so that a comparison needs no scan.
 
 Files state lengths in mm and voltages in mV.  Every length and voltage here is rounded to a number
-that this conversion gives back (a change of one unit in the last place at most), so that what was
-saved and read again is equal to the last bit.
+that this conversion gives back, so that what was saved and read again is equal to the last bit.
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ __all__ = [
     "simulate_contacts",
 ]  # fmt: skip
 
-# Distance in ln P of the outer states from the middle one, in standard deviations of the load,
-# and its smallest value: closer ones would show the solver's own error.
+# Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
+# its smallest value: closer ones would show the solver's own error.
 _SPREAD = 2.0
 _LEAST_SPREAD = 0.02
 
@@ -131,12 +131,10 @@ def simulate_contacts(
 
     .. math:: U_i = A\,(G \otimes \sigma_{zz}^{P_i})(R_i) + b + d\,\xi_i + n_i
 
-    with an offset b, a linear drift d and Gaussian noise :math:`n_i`.  The stress at each load is
-    a parabola in ln P through solved contacts.  Arguments are those of
-    :func:`memscal.simulate_experiment`, in SI units, for one scan; ``load``: nominal loads, each
-    of which gives ``repeats`` rows of ``points`` contacts; ``load_scale``: all true loads over the
-    stated ones.  Noise, loads and positions are drawn from separate streams of ``seed``.  The
-    scan's truth is in ``synthetic``, ``load_1`` and so on without scatter.
+    with an offset b, a linear drift d and Gaussian noise :math:`n_i`.  The stress at each load is a
+    parabola in ln P through solved contacts.  Arguments are those of
+    :func:`memscal.simulate_experiment` for one scan; each nominal ``load`` gives ``repeats`` rows;
+    ``load_scale``: all true loads over the stated ones.
     """
     loads = _checked_loads(load)
     require_range("spacing", spacing, 1e-9, 0.1, "m")
@@ -147,7 +145,11 @@ def simulate_contacts(
     require_positive("conversion_constant", conversion_constant, "V/Pa")
     require_positive("load_scale", load_scale)
     require_non_negative("position_error", position_error)
-    _require_finite(centre, baseline, drift)
+    if not np.isfinite((*centre, baseline, drift)).all():
+        raise InputError(
+            f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
+            "largest signal; they must be finite."
+        )
     interface, truth = interface or Interface(), apparatus_function(kernel)
     shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
     path = pressed_path(
@@ -228,14 +230,6 @@ def described_film(film: ElasticFilm) -> dict[str, float]:
     """Return what of a film decides over its base stress, by the names of a truth."""
     names = ("young_modulus", "poisson_ratio", "thickness")
     return {name: float(getattr(film, name)) for name in names}
-
-
-def _require_finite(centre: tuple[float, float], baseline: float, drift: float) -> None:
-    if not np.isfinite((*centre, baseline, drift)).all():
-        raise InputError(
-            f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
-            "largest signal; they must be finite."
-        )
 
 
 def _draw(rows: int, points: int, seed: int) -> dict[str, FloatArray]:

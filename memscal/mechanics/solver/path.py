@@ -23,8 +23,7 @@ from memscal.model.arrays import FloatArray
 
 __all__ = ["PathPoint", "follow"]
 
-# At the very edge, a share of the largest pressure may pull, and a share of the depth overlap:
-# that is what the rings next to it resolve.  It is gone with the next ring.
+# Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
 _PULL = 1e-2
 _OVERLAP = 1e-3
 

@@ -28,8 +28,7 @@ __all__ = ["RingRequest", "relative_change", "solve_on_rings"]
 
 # Rings beyond the largest contact, so that it can end where it will.
 _MARGIN = 4
-# At a contact's edge the spacing has shrunk by this factor, and grows away from it by this share
-# of the distance.
+# Shrinkage of the spacing at a contact's edge, and its growth with the distance from there.
 _FINEST = 1 / 16
 _GROWTH = 0.4
 # A rod's rings crowd as the fourth power of their number counted from the edge.
@@ -143,8 +142,7 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
         if reach > _WIDEST * film.thickness:
             raise DomainError(
                 f"The contact would be more than {_WIDEST:g} times as wide as the film is thick.",
-                why="Such a film is no longer a layer under an indenter: its response is that of "
-                "a column at every point.",
+                why="Such a film responds like a column at every point, not like a layer.",
                 cure="Lower the load or the depth, or check the units of film and indenter.",
             )
     edges = [_contact_radius(request, rings, state) for state in states]
