@@ -1,24 +1,14 @@
-"""The family of errors that memscal raises on purpose.
+"""Errors that memscal raises on purpose; each says what is wrong, why, and what to do about it.
 
-Every one of them says what is wrong (file, HDF5 path, value, unit), why that is a
-problem, and what to do about it.  The command line turns each kind into the exit code
-in its ``exit_code`` attribute; a library user catches :class:`MemscalError`.
+The command line exits with the ``exit_code`` of an error; a user catches :class:`MemscalError`.
 """
 
 from __future__ import annotations
 
 __all__ = [
-    "ConvergenceError",
-    "DomainError",
-    "FitError",
-    "FormatError",
-    "InputError",
-    "MemscalError",
-    "OutputError",
-    "SchemaVersionError",
-    "UnitError",
-    "UnsafeFileError",
-]
+    "ConvergenceError", "DomainError", "FitError", "FormatError", "InputError", "MemscalError",
+    "OutputError", "SchemaVersionError", "UnitError", "UnsafeFileError",
+]  # fmt: skip
 
 
 class MemscalError(Exception):
@@ -26,20 +16,15 @@ class MemscalError(Exception):
 
     Parameters
     ----------
-    problem : str
-        What is wrong: the file, the path inside it, the value, the unit.
-    why : str, optional
-        Why this stops the work.
-    cure : str, optional
-        What the user can do.
+    problem, why, cure : str
+        What is wrong (the file, the path inside it, the value, the unit), why this stops the work,
+        and what the user can do.
     """
 
     exit_code = 3
 
     def __init__(self, problem: str, *, why: str = "", cure: str = "") -> None:
-        self.problem = problem
-        self.why = why
-        self.cure = cure
+        self.problem, self.why, self.cure = problem, why, cure
         super().__init__("\n".join(part for part in (problem, why, cure) if part))
 
 

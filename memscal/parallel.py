@@ -18,12 +18,9 @@ if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
 __all__ = [
-    "THREAD_VARIABLES",
-    "one_thread_per_process",
-    "require_workers",
-    "single_threaded",
+    "THREAD_VARIABLES", "one_thread_per_process", "require_workers", "single_threaded",
     "worker_pool",
-]
+]  # fmt: skip
 
 #: What OpenBLAS, OpenMP, MKL and Accelerate read when they are loaded.
 THREAD_VARIABLES = (
@@ -57,8 +54,7 @@ def _controller() -> ThreadpoolController:
 def single_threaded() -> Iterator[None]:
     """Run BLAS on one thread, also as a decorator; a number that the user set stays.
 
-    Threads spin while they wait for each other.  On the matrices here, of a few hundred rows, that
-    costs ten times the processor time of the work itself.
+    On matrices of a few hundred rows, waiting threads cost ten times the work's processor time.
     """
     if _set_by_user():
         yield
@@ -82,11 +78,9 @@ def require_workers(workers: Any) -> None:
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes.
+    """Yield a pool of processes, started afresh: one forked from a process with threads may hang.
 
-    A process forked from one with threads may hang, so each is started afresh.  Matrices here are
-    small: threads of BLAS in every process would only wait for each other.  Their number is read
-    when a process starts, from the environment, which is put back afterwards.
+    BLAS reads its number of threads, one, from the environment, which is put back afterwards.
     """
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context

@@ -23,15 +23,13 @@ from memscal.model.stress import StressProfile
 
 __all__ = ["Contact", "too_deep"]
 
-# Default radii of a profile, in film thicknesses.  The film passes nothing that varies faster
-# than exp(-kh): with these steps, near the contact and far from it, a cubic spline is good to
-# 1e-6 of the maximum.
+# Default radii of a profile, in film thicknesses: near the contact and far from it, a cubic spline
+# with these steps is good to 1e-6 of the maximum.
 _NEAR_STEP = 0.02
 _FAR_STEP = 0.05
 _NEAR_REACH = 6.0
 _FAR_REACH = 26.0
-# The profile ends where the stress stays below this fraction of its maximum, which happens
-# within the far reach for any Poisson's ratio.
+# The profile ends where the stress stays below this fraction of its maximum.
 _PROFILE_FLOOR = 1e-9
 # Radii at which the largest interface pressure is sought.
 _PRESSURE_SAMPLES = 2001
@@ -47,34 +45,22 @@ class Contact(Result):
     ----------
     film, indenter, interface
         What was pressed on what, and what was between them.
-    load : float
-        Normal load :math:`P`, in N.
-    depth : float
-        Indentation depth :math:`\delta`, in m.
-    contact_radius : float
-        Radius of the contact in m.  Where the interface is normally compliant the contact has no
-        edge: it is the radius at which the pressure has fallen to a thousandth of its largest.
-    stick_radius : float
-        Radius of the part of the contact that sticks, in m.
+    load, depth : float
+        Normal load :math:`P`, in N, and indentation depth :math:`\delta`, in m.
+    contact_radius, stick_radius : float
+        Radius of the contact, and of its part that sticks, in m.  Where the interface is normally
+        compliant the contact ends where the pressure has fallen to a thousandth of its largest.
     friction : float
         Amontons' coefficient; ``inf`` for a contact that sticks wherever it touches.
-    loading : str
-        ``"incremental"`` or ``"total"``; ``""`` where it makes no difference (a rod).
-    strain : str
-        ``"linear"``: small strain; ``"finite"``: the neo-Hookean film at finite strain.
-    backend : str
-        ``"hankel"``: Hankel transforms; ``"fem"``: finite elements.
+    loading, strain, backend : str
+        As of :func:`memscal.indent`; ``loading`` is ``""`` where it makes no difference (a rod).
     convergence : float
         Largest change of base stress, load and depth under refinement, relative to the largest
         stress, the load and the depth.
-    steps : int
-        Steps of the loading from the untouched film.
-    discretisation : str
-        What was refined, in words.
-    traction : InterfaceTraction
-        Pressure and shear at the interface.
-    inside : FilmField
-        The field in the film.
+    steps, discretisation : int, str
+        Steps of the loading from the untouched film; what was refined, in words.
+    traction, inside : InterfaceTraction, FilmField
+        Pressure and shear at the interface; the field in the film.
     elastic_energy : float
         Energy stored in the film, in J.
     work, dissipated_energy : float or None
@@ -84,8 +70,7 @@ class Contact(Result):
     Notes
     -----
     Stresses are in Pa at radii in m.  Normal stress is positive in compression.  Shear is the
-    traction on the film, positive outward, at both of its faces: under the indenter it is the
-    indenter's, at the base it is the base's, which holds the film back and is negative.
+    traction on the film, positive outward, at both faces: that of the base is negative.
 
     Examples
     --------
@@ -128,22 +113,10 @@ class Contact(Result):
         )
 
     def base_stress(self, r: ArrayLike) -> FloatArray:
-        r"""Return the normal stress :math:`\sigma_{zz}` at the base, compression positive.
+        r"""Return the normal stress :math:`\sigma_{zz}` at the base in Pa, compression positive.
 
-        Parameters
-        ----------
-        r : array_like
-            Radii from 0 upward, in m, of any shape.
-
-        Returns
-        -------
-        ndarray, shape of ``r``
-            The stress in Pa.  Set to zero where it has decayed below 1e-13 of its maximum.
-
-        Raises
-        ------
-        InputError
-            If a radius is negative or not finite.
+        At radii ``r`` from 0 upward, in m, of any shape; zero where it has decayed below 1e-13 of
+        its maximum.
         """
         return self.inside.base_normal(_radii(r))
 
@@ -206,13 +179,7 @@ class Contact(Result):
         return self.inside.outward(_radii(r))
 
     def mesh(self) -> FieldMesh:
-        """Return displacement and stress in the whole film, on the mesh of its finite elements.
-
-        Raises
-        ------
-        InputError
-            If the contact was solved without a mesh.
-        """
+        """Return displacement and stress in the whole film, on the mesh of its finite elements."""
         if isinstance(self.inside, MeshedField):
             return self.inside.mesh()
         raise InputError(
@@ -223,12 +190,9 @@ class Contact(Result):
     def profile(self, r: ArrayLike | None = None) -> StressProfile:
         """Return the stress at the base as a table, such as a calibration divides by.
 
-        Parameters
-        ----------
-        r : array_like, shape (n,), optional
-            Increasing radii in m.  By default 50 per film thickness near the contact and 20
-            far from it, out to where the stress stays below 1e-9 of its maximum: a cubic
-            spline through them is accurate to 1e-6 of the maximum.
+        ``r`` (n,): increasing radii in m; by default 50 per film thickness near the contact and 20
+        far from it, out to where the stress stays below 1e-9 of its maximum: a cubic spline
+        through them is accurate to 1e-6 of the maximum.
         """
         return self._default_profile if r is None else self._tabulated(_radii(r))
 

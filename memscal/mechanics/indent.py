@@ -78,10 +78,8 @@ def indent(
 
     Parameters
     ----------
-    film : ElasticFilm
-        The film; elastic, bonded to a rigid base.
-    indenter : Rod, Sphere, Cone or Profile
-        The indenter.
+    film, indenter : ElasticFilm, Indenter
+        The film, bonded to a rigid base, and a Rod, Sphere, Cone or Profile.
     load, depth : float or sequence of float
         Normal load in N, or indentation depth in m: one of them.  A sequence is a path: its
         states are visited in the order given, also downward (unloading) and up again.
@@ -117,8 +115,8 @@ def indent(
     InputError
         If an argument makes no sense, or if load and depth are both or neither given.
     DomainError
-        If the request lies outside what the model holds for: the contact outgrows the film or
-        the indenter's known face, or the indenter would pass through the film.
+        If the contact outgrows the film or the indenter's known face, or the indenter would pass
+        through the film.
     ConvergenceError
         If the contact does not settle, or has not converged; ``last`` is the last one solved.
 

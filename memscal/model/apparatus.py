@@ -9,7 +9,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, freeze_arrays
-from memscal.model.checks import QualityCheck
+from memscal.model.checks import QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
@@ -18,13 +18,9 @@ from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
 __all__ = [
-    "ApparatusData",
-    "ApparatusField",
-    "ApparatusRadial",
-    "ParameterSet",
-    "Reconvolution",
+    "ApparatusData", "ApparatusField", "ApparatusRadial", "ParameterSet", "Reconvolution",
     "TransferFunction",
-]
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +84,9 @@ class TransferFunction:
 class Reconvolution:
     """The scan beside what the calibration predicts for it; all in V against ``x`` in m.
 
-    In a line scan ``x`` is the position; in a raster, the distance from the sensor's centre.
-
-    ``u_zz_predicted`` uses the deconvolved G, ``u_zz_gaussian`` the Gaussian fitted in data
-    space; ``residual`` is measured minus predicted.
+    In a raster ``x`` is the distance from the sensor's centre.  ``u_zz_predicted`` uses the
+    deconvolved G, ``u_zz_gaussian`` the Gaussian fitted in data space; ``residual`` is measured
+    minus predicted.
     """
 
     x: FloatArray
@@ -113,14 +108,11 @@ class ParameterSet:
 
     Parameters
     ----------
-    names : tuple of str
-        Such as ``conversion_constant`` (V/Pa) or ``gaussian_sigma`` (m).
-    values : ndarray, shape (n,)
-        Their estimates.
-    covariance : ndarray, shape (n, n)
-        Their joint covariance, systematic contributions included.
-    units : tuple of str, optional
-        Their SI units; needed only for names that the file format does not know.
+    names, units : tuple of str
+        Such as ``conversion_constant`` and ``gaussian_sigma``; their SI units, needed only for
+        names that the file format does not know.
+    values, covariance : ndarray, shape (n,), (n, n)
+        Estimates and their joint covariance, systematic contributions included.
 
     Examples
     --------
@@ -166,26 +158,10 @@ class ParameterSet:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ApparatusData:
-    """Everything that an apparatus-function artifact stores.
+    """Everything that an apparatus-function artifact stores, in SI units.
 
-    Parameters
-    ----------
-    field, radial_profile, transfer, reconvolution
-        The apparatus function in its three views, and the scan it came from.
-    parameters : ParameterSet
-        ``conversion_constant`` (V/Pa), ``gaussian_sigma``, ``gaussian_sigma_deconvolved``,
-        ``centre`` (m), ``baseline`` (V), and any further ones.
-    checks : tuple of QualityCheck
-        Quality checks.
-    film, indenter, sensor, load
-        Carried over from the scan; the load in N.
-    reference : StressProfile
-        The base stress that was divided by.
-    process : Process
-        What was done, with what.
-    budget : mapping
-        Standard uncertainty of the conversion constant and of both Gaussian widths by
-        source: ``{"conversion_constant": {"noise": ..., "load": ...}, ...}``, SI units.
+    ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
+    of the conversion constant and of both Gaussian widths by source.
     """
 
     field: ApparatusField
@@ -204,17 +180,14 @@ class ApparatusData:
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        a = format_measured(
-            self.conversion_constant * 1e3,
-            self.parameters.uncertainty("conversion_constant") * 1e3,
-            "mV/Pa",
+        a, sigma = (
+            format_measured(
+                self.parameters[name] * 1e3, self.parameters.uncertainty(name) * 1e3, unit
+            )
+            for name, unit in (("conversion_constant", "mV/Pa"), ("gaussian_sigma", "mm"))
         )
-        sigma = format_measured(
-            self.gaussian_sigma * 1e3, self.parameters.uncertainty("gaussian_sigma") * 1e3, "mm"
-        )
-        failed = [check.name for check in self.checks if not check.passed]
-        checks = f"failed: {', '.join(failed)}" if failed else "all checks passed"
-        return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {checks}>"
+        state = state_of_checks(self.checks)
+        return f"<{type(self).__name__}: A = {a}, sigma = {sigma}, {state}>"
 
     @property
     def conversion_constant(self) -> float:

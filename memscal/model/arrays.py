@@ -13,17 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from memscal.errors import InputError
 
 __all__ = [
-    "FloatArray",
-    "finite_vector",
-    "freeze_arrays",
-    "frozen_array",
-    "require_increasing",
-    "require_non_negative",
-    "require_positive",
-    "require_range",
-    "same_content",
+    "FloatArray", "finite_vector", "freeze_arrays", "frozen_array", "require_increasing",
+    "require_non_negative", "require_positive", "require_range", "same_content",
     "whole_numbers",
-]
+]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 
@@ -107,7 +100,6 @@ def same_content(first: Any, second: Any) -> bool:
     if isinstance(first, tuple | list) and isinstance(second, tuple | list):
         return len(first) == len(second) and all(map(same_content, first, second))
     if is_dataclass(first) and type(first) is type(second):
-        return all(
-            same_content(getattr(first, f.name), getattr(second, f.name)) for f in fields(first)
-        )
+        names = [f.name for f in fields(first)]
+        return all(same_content(getattr(first, n), getattr(second, n)) for n in names)
     return bool(first == second)

@@ -7,23 +7,11 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 __all__ = [
-    "FAILED_CALIBRATION",
-    "FAILED_CHECK",
-    "FALSE_ALARM",
-    "NOISE_LIMIT",
-    "NOISE_UNSTATED",
-    "OUTLIER_LIMIT",
-    "OUTLIER_WEIGHT",
-    "Message",
-    "QualityCheck",
-    "check",
-    "chi_square_limit",
-    "failed_check_messages",
-    "import_notes",
-    "marked_texts",
-    "messages_from_json",
-    "messages_to_json",
-]
+    "FAILED_CALIBRATION", "FAILED_CHECK", "FALSE_ALARM", "NOISE_LIMIT", "NOISE_UNSTATED",
+    "OUTLIER_LIMIT", "OUTLIER_WEIGHT", "Message", "QualityCheck", "check", "chi_square_limit",
+    "failed_check_messages", "import_notes", "marked_texts", "messages_from_json",
+    "messages_to_json", "state_of_checks",
+]  # fmt: skip
 
 #: Chance that a check fails although its assumption holds.
 FALSE_ALARM = 1e-3
@@ -49,10 +37,8 @@ class Message:
     kind : str
         What it is about, for code to select by: ``"failed_check"``, ``"outlier"``,
         ``"uncertainty_unstated"``, ...; ``"note"`` where a file does not state it.
-    text : str
-        One or more sentences; ``str(message)`` returns them.
-    severity : {"note", "warning"}
-        A warning puts the result in doubt, a note helps to judge it.
+    text, severity : str, {"note", "warning"}
+        One or more sentences; a warning puts the result in doubt, a note helps to judge it.
 
     Examples
     --------
@@ -103,8 +89,13 @@ def check(
     name: str, value: float, limit: float, meaning: str, p_value: float | None = None
 ) -> QualityCheck:
     """Return a check, which passes while its value is at most the limit."""
-    passed = bool(value <= limit)
-    return QualityCheck(name, float(value), float(limit), passed, meaning, p_value)
+    return QualityCheck(name, float(value), float(limit), bool(value <= limit), meaning, p_value)
+
+
+def state_of_checks(checks: Iterable[QualityCheck]) -> str:
+    """Return the names of the checks that failed, or that all passed."""
+    failed = ", ".join(check.name for check in checks if not check.passed)
+    return f"failed: {failed}" if failed else "all checks passed"
 
 
 def chi_square_limit(degrees: float) -> float:
@@ -116,13 +107,9 @@ def chi_square_limit(degrees: float) -> float:
 
 def failed_check_messages(checks: Iterable[QualityCheck]) -> list[Message]:
     """Return a warning for each check that failed, in their order."""
+    failed = "Quality check {0.name} failed: {0.value:.3g} exceeds {0.limit:.3g}. {0.meaning}"
     return [
-        Message(
-            FAILED_CHECK,
-            f"Quality check {check.name} failed: {check.value:.3g} exceeds {check.limit:.3g}. "
-            f"{check.meaning}",
-            "warning",
-        )
+        Message(FAILED_CHECK, failed.format(check), "warning")
         for check in checks
         if not check.passed
     ]
@@ -135,10 +122,7 @@ def import_notes(texts: Iterable[str]) -> list[Message]:
 
 def marked_texts(messages: Iterable[Message]) -> list[str]:
     """Return texts for a list without severities: a warning begins with "Warning: "."""
-    return [
-        f"Warning: {message.text}" if message.severity == "warning" else message.text
-        for message in messages
-    ]
+    return [("Warning: " if m.severity == "warning" else "") + m.text for m in messages]
 
 
 def messages_to_json(messages: Iterable[Message]) -> list[dict[str, str]]:
@@ -148,7 +132,7 @@ def messages_to_json(messages: Iterable[Message]) -> list[dict[str, str]]:
 
 def messages_from_json(stored: Sequence[Any]) -> tuple[Message, ...]:
     """Return messages from a file; a plain text, as older files hold them, is a note."""
-    return tuple(_message_from_json(entry) for entry in stored)
+    return tuple(map(_message_from_json, stored))
 
 
 def _message_from_json(entry: object) -> Message:

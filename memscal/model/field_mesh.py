@@ -19,9 +19,8 @@ _CORNERS_ONLY, _WITH_MIDSIDES = 3, 6
 class FieldMesh:
     r"""Displacement and stress in the half-plane :math:`r \ge 0` of an axisymmetric film.
 
-    Unlike everywhere else in memscal, the stress is that of continuum mechanics, **tension
-    positive**, because this is what other programs expect of a mesh: the normal stress at the base
-    of a film under an indenter is negative here.
+    Unlike everywhere else in memscal, stress is **tension positive**, as other programs expect of
+    a mesh: the normal stress at the base of a film under an indenter is negative here.
 
     Parameters
     ----------
@@ -38,11 +37,6 @@ class FieldMesh:
         \sigma_{rz}`, in Pa, tension positive.
     notes : str
         What it is a field of: film, load, elements.
-
-    Raises
-    ------
-    InputError
-        If the shapes disagree, a value is not finite, or a triangle has a node that is not there.
 
     Examples
     --------

@@ -24,15 +24,10 @@ class ElasticFilm:
     roughness_rms : float, optional
         Root-mean-square roughness of the free surface, in m.
     young_modulus_uncertainty, poisson_ratio_uncertainty, thickness_uncertainty : float, optional
-        Standard uncertainties (k = 1), in the unit of the quantity.  ``None`` means "not
-        stated"; a calibration then counts nothing for that source and says so.
+        Standard uncertainties (k = 1), in the unit of the quantity.  ``None`` means "not stated":
+        a calibration counts nothing for that source and says so.
     name : str
         Which film it is, where there are several; scans that name the same film must agree on it.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite or lies outside its physical range.
 
     Examples
     --------

@@ -34,10 +34,7 @@ class Indenter:
         raise NotImplementedError
 
     def height(self, r: ArrayLike) -> FloatArray:
-        """Return the face's height above its lowest point at radii ``r`` in m, in m.
-
-        It is ``inf`` beyond the indenter's extent.
-        """
+        """Return the face's height above its lowest point in m at radii ``r`` (m), or ``inf``."""
         raise NotImplementedError
 
 
@@ -47,15 +44,9 @@ class RoundIndenter(Indenter):
 
     Parameters
     ----------
-    radius : float
-        Radius of the rod, or radius of curvature of the sphere, in m.
-    radius_uncertainty : float, optional
-        Its standard uncertainty (k = 1), in m; ``None`` means "not stated".
-
-    Raises
-    ------
-    InputError
-        If the radius is not finite and positive.
+    radius, radius_uncertainty : float
+        Radius of the rod or of the sphere's curvature, and its standard uncertainty (k = 1), in m;
+        ``None`` means "not stated".
     """
 
     radius: float
@@ -117,12 +108,8 @@ class Cone(Indenter):
     Parameters
     ----------
     inclination : float
-        Angle between the cone's face and the film's surface, in rad: 0 would be flat.
-
-    Raises
-    ------
-    InputError
-        If the inclination is not between 0 and a right angle.
+        Angle between the cone's face and the film's surface, in rad, above 0 (flat) and below a
+        right angle.
 
     Examples
     --------
@@ -160,13 +147,7 @@ class Profile(Indenter):
     r : ndarray, shape (n,)
         Radii from 0 upward, in m, four or more.
     z : ndarray, shape (n,)
-        Height of the face above its lowest point, in m; a cubic spline goes through the table.
-
-    Raises
-    ------
-    InputError
-        If the table has fewer than four radii, does not begin at the axis, is not finite, or its
-        lowest height is not 0.
+        Height of the face in m, its lowest 0; a cubic spline goes through the table.
 
     Examples
     --------
@@ -205,17 +186,7 @@ class Profile(Indenter):
     def from_function(
         cls, height: Callable[[FloatArray], ArrayLike], *, extent: float, points: int = 2001
     ) -> Profile:
-        """Return the profile that a function gives, as a table of ``points`` even radii.
-
-        Parameters
-        ----------
-        height : callable
-            Height in m for an array of radii in m.
-        extent : float
-            Largest radius, in m.
-        points : int
-            Radii in the table.
-        """
+        """Return the profile of a function: ``points`` even radii up to ``extent``, all in m."""
         require_positive("extent of the indenter's profile", extent, "m")
         r = np.linspace(0.0, extent, points)
         return cls(r=r, z=np.broadcast_to(np.asarray(height(r), dtype=np.float64), r.shape))

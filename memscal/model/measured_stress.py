@@ -8,8 +8,7 @@ It is the base stress as the sensor blurs it, to be compared with calculated str
 same G.  A profile also holds the measured points, so that a comparison needs no scan.
 
 Files state lengths in mm and voltages in mV.  Every length and voltage here is rounded to a number
-that this conversion gives back (a change of one unit in the last place at most), so that what was
-saved and read again is equal to the last bit.
+that this conversion gives back, so that what was saved and read again is equal to the last bit.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from memscal.model.arrays import FloatArray, frozen_array, same_content
-from memscal.model.checks import Message, QualityCheck
+from memscal.model.checks import Message, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
@@ -100,16 +99,12 @@ class MeasuredPoints:
 class MeasuredProfile:
     """The measured stress of one load, from the centre outward.
 
-    Profiles are equal if all that they hold is, to the last bit.
-
     Parameters
     ----------
     scan : MeasuredScan
         What was scanned: film, indenter, sensor, lubrication, file.
-    load : float
-        Nominal load, in N.
-    load_uncertainty : float or None
-        Its standard uncertainty, common to all loads of a scan, in N.
+    load, load_uncertainty : float
+        Nominal load and its standard uncertainty, common to all loads of a scan, in N.
     x, y, r : ndarray, shape (n,)
         Positions and their distance from the centre, by which they are sorted, in m.  Repeats at
         one position are averaged by their weights.
@@ -119,14 +114,11 @@ class MeasuredProfile:
         Its covariance by source, in Pa^2: ``noise`` (electronic, of loads and of positions),
         ``conversion_constant``, ``centre``, ``baseline`` (with drift; what centre and baseline
         share is the centre's).
-    force : float
-        Integral of the stress over the plane, in N.
-    force_budget : mapping of str to float
-        Its standard uncertainty by source, in N.
-    maximum : float
-        Stress on the axis, in Pa: the restored stress blurred by G.
-    maximum_budget : mapping of str to float
-        Its standard uncertainty by source, in Pa.
+    force, force_budget : float, mapping of str to float
+        Integral of the stress over the plane and its standard uncertainty by source, in N.
+    maximum, maximum_budget : float, mapping of str to float
+        Stress on the axis, restored and blurred by G, and its standard uncertainty by source, in
+        Pa.
     centre, centre_uncertainty : ndarray, shape (2,)
         Centre (x0, y0) of the profile, in m; zero across a line.
     baseline, baseline_uncertainty : float
@@ -228,7 +220,7 @@ class MeasuredStress(Result):
     profiles : tuple of MeasuredProfile
         In the order of the scans, each from its smallest load up.
     scans : tuple of MeasuredScan
-        What was scanned; each names its file.
+        What was scanned.
     conversion_constant, conversion_constant_uncertainty : float
         A, by which the voltages were divided, and its standard uncertainty, in V/Pa.
     checks : tuple of QualityCheck
@@ -237,10 +229,9 @@ class MeasuredStress(Result):
         Mismatches of artifact and scan that were accepted.
     process : Process
         What was done, with what; its messages are what a user should know.
-    artifact : SourceFile, optional
-        The file of the apparatus function, where it was read from one.
-    artifact_digest : str
-        Content digest of the apparatus function; empty if it was read from a file of version 1.0.
+    artifact, artifact_digest : SourceFile, str, optional
+        File of the apparatus function, where it was read from one, and its content digest, empty
+        in files of version 1.0.
     """
 
     profiles: tuple[MeasuredProfile, ...]
@@ -267,10 +258,8 @@ class MeasuredStress(Result):
 
     def __repr__(self) -> str:
         """Return the loads and the state of the checks."""
-        failed = [check.name for check in self.checks if not check.passed]
-        state = f"failed: {', '.join(failed)}" if failed else "all checks passed"
         loads = "; ".join(profile.label for profile in self.profiles)
-        return f"<MeasuredStress: {loads}; {state}>"
+        return f"<MeasuredStress: {loads}; {state_of_checks(self.checks)}>"
 
     @property
     def loads(self) -> FloatArray:
@@ -290,13 +279,7 @@ class MeasuredStress(Result):
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the measured stress to a file (memscal-stress).
 
-        Two measurements of the same files with the same options give the same bytes while
-        ``SOURCE_DATE_EPOCH`` is set.
-
-        Raises
-        ------
-        OutputError
-            If the file exists and ``overwrite`` is false, or cannot be written.
+        The same files and options give the same bytes while ``SOURCE_DATE_EPOCH`` is set.
         """
         from memscal.formats.stress import write_stress
 
@@ -311,8 +294,7 @@ def _kept(value: float) -> float:
 def _kept_record(record: Record, *lengths: str) -> Record:
     """Round the lengths of a film or an indenter, and their uncertainties."""
     names = [name + end for name in lengths for end in ("", "_uncertainty")]
-    stated = {name: getattr(record, name) for name in names}
-    kept: dict[str, Any] = {name: _kept(v) for name, v in stated.items() if v is not None}
+    kept: Any = {n: _kept(v) for n in names if (v := getattr(record, n)) is not None}
     return replace(record, **kept)
 
 

@@ -20,9 +20,8 @@ def format_measured(
 ) -> str:
     """Write a value with its standard uncertainty and unit, for people to read.
 
-    The uncertainty keeps two significant digits and the value is rounded to the same place,
-    as the GUM (JCGM 100:2008, 7.2) advises.  Very large and very small numbers share one
-    power of ten.
+    The uncertainty keeps two significant digits and the value is rounded to the same place
+    (GUM, JCGM 100:2008, 7.2).
     """
     tail = "" if unit in ("", "1") else f" {unit}"
     if not math.isfinite(value):
@@ -84,9 +83,6 @@ def format_bound(bound: float, *, upper: bool) -> str:
 
 
 def printable(value: object, limit: int) -> str:
-    r"""Return text without the characters that could steer a terminal.
-
-    Bytes are decoded as UTF-8 with replacement; line feeds and tabs stay.
-    """
+    """Return text, or bytes as UTF-8, without the characters that could steer a terminal."""
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
     return "".join(c for c in text[:limit] if c.isprintable() or c in "\n\t")

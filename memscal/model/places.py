@@ -86,15 +86,13 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
 def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, EvenAxis] | None:
     """Fit an even lattice to the positions of ``count`` places in a plane, or return ``None``.
 
-    Whole rows may be missing, but not most of its nodes: on a lattice as fine as the stage's
-    resolution lie all positions.
+    Rows may be missing, but not most nodes: all positions lie on a lattice that is fine enough.
     """
     along_x, along_y = _even_axis(x), _even_axis(y)
     if along_x is None or along_y is None:
         return None
-    return (
-        (along_x, along_y) if _nodes(along_x.index, along_y.index) <= _MOST_NODES * count else None
-    )
+    few = _nodes(along_x.index, along_y.index) <= _MOST_NODES * count
+    return (along_x, along_y) if few else None
 
 
 def _even_axis(positions: FloatArray) -> EvenAxis | None:

@@ -16,10 +16,7 @@ __all__ = ["Process", "SourceFile", "timestamp"]
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A file that was read: its base name and the SHA-256 of its bytes.
-
-    The folder is left out on purpose: it says nothing elsewhere and may be private.
-    """
+    """A file that was read: its base name (a folder may be private) and SHA-256 of its bytes."""
 
     file_name: str
     sha256: str
@@ -33,10 +30,9 @@ class Process:
     ----------
     program, version, date : str
         Name and version of the program; date in ISO 8601 with its offset.
-    configuration : mapping
-        Every option with its value, the seed included; JSON-serialisable.
-    environment : mapping
-        Versions of Python and of the numerical libraries; JSON-serialisable.
+    configuration, environment : mapping
+        Every option with its value, the seed included; versions of Python and of the numerical
+        libraries; both JSON-serialisable.
     messages : tuple of Message
         What the user was told while it ran.
     input_scan, input_reference : SourceFile, optional
@@ -54,10 +50,9 @@ class Process:
 
 
 def timestamp() -> str:
-    """Return the current time in UTC, in ISO 8601, to the second.
+    """Return the current time in UTC, in ISO 8601, to the second; ``SOURCE_DATE_EPOCH`` counts.
 
-    ``SOURCE_DATE_EPOCH`` (seconds since 1970, https://reproducible-builds.org/specs/)
-    takes the clock's place where it is set, so that the same input gives the same bytes.
+    This variable (https://reproducible-builds.org/specs/) makes the same input give the same bytes.
     """
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:

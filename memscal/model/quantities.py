@@ -1,7 +1,6 @@
 """Quantities of memscal's records: each declared once by name, dimension, axes, words and symbol.
 
-Files, ``memscal inspect``, tables, figures and reports take what they write from here and from
-:mod:`memscal.model.records`; a further quantity is one more line there.
+Files, tables, figures and reports take what they write from here and :mod:`memscal.model.records`.
 """
 
 from __future__ import annotations
@@ -14,36 +13,13 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.notation import format_measured
 
 __all__ = [
-    "DIMENSIONS",
-    "ESTIMATED",
-    "KPA",
-    "MM",
-    "MV",
-    "PER_MM",
-    "PER_MM2",
-    "TRUTH",
-    "Dimension",
-    "Quantity",
-    "Record",
-    "by_name",
-    "declared_quantity",
-    "estimated_quantity",
-    "measured",
-    "measured_text",
-    "parameter_quantity",
-    "record",
-]
+    "DIMENSIONS", "ESTIMATED", "KPA", "MM", "MV", "PER_MM", "PER_MM2", "TRUTH", "Dimension",
+    "Quantity", "Record", "by_name", "declared_quantity", "estimated_quantity", "measured",
+    "measured_text", "parameter_quantity", "record",
+]  # fmt: skip
 
-MM = 1e-3
-"""Metres in a millimetre; dividing by it shows a length in mm."""
-MV = 1e-3
-"""Volts in a millivolt."""
-KPA = 1e3
-"""Pascals in a kilopascal."""
-PER_MM = 1e3
-"""rad/m in a rad/mm."""
-PER_MM2 = 1e6
-"""1/m^2 in a 1/mm^2."""
+# SI units in the unit that is shown: m in a mm, V in a mV, ...; dividing by MM shows mm.
+MM, MV, KPA, PER_MM, PER_MM2 = 1e-3, 1e-3, 1e3, 1e3, 1e6
 
 
 class Dimension(NamedTuple):
@@ -77,24 +53,17 @@ _OTHER_UNITS = {"um": 1e-6, "MPa": 1e6, "1/mm^2": PER_MM2, "percent": 1e-2}
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a record.
+    """A quantity of a record."""
 
-    ``name`` is its attribute; ``dimension`` a key of :data:`DIMENSIONS`, or what else it is, such
-    as ``"text"`` (:data:`memscal.formats.codec.KINDS`); ``axes`` name the quantities along which
-    an array runs.  ``stored`` is its name in files where that differs from ``name``, ``shown`` the
-    unit where that differs from its dimension's, and ``origin`` its name among the origins of a
-    file where it says where the data come from.
-    """
-
-    name: str
-    dimension: str
+    name: str  # of its attribute
+    dimension: str  # a key of DIMENSIONS, or of memscal.formats.codec.KINDS, such as "text"
     words: str = ""
     symbol: str = ""
-    axes: tuple[str, ...] = ()
+    axes: tuple[str, ...] = ()  # the quantities along which an array runs
     required: bool = False
-    stored: str = ""
-    shown: str = ""
-    origin: str = ""
+    stored: str = ""  # the name in files where it is another
+    shown: str = ""  # the unit where it is not its dimension's
+    origin: str = ""  # the name among the origins of a file where it says where data come from
 
     @property
     def key(self) -> str:
@@ -225,9 +194,8 @@ def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
     """
     start, _, number = name.rpartition("_")
     if start in ESTIMATED and number.isdigit():
-        declared = replace(
-            ESTIMATED[start], name=name, words=f"{ESTIMATED[start].words}, scan {number}"
-        )
+        words = f"{ESTIMATED[start].words}, scan {number}"
+        declared = replace(ESTIMATED[start], name=name, words=words)
     else:
         declared = ESTIMATED.get(name) or Quantity(name, "SI units", name.replace("_", " "))
     if not si_unit:

@@ -5,37 +5,12 @@ from __future__ import annotations
 from memscal.model.quantities import Quantity, Record, measured, record
 
 __all__ = [
-    "CHECK",
-    "CONE",
-    "CONTACT",
-    "CONVERSION",
-    "EXPERIMENT",
-    "FIELD",
-    "FILM",
-    "INDENTER",
-    "INDENTER_FACE",
-    "LOAD",
-    "MEASURED_SCAN",
-    "NUMERICS",
-    "PROCESS",
-    "PROFILE",
-    "PROFILE_NOTES",
-    "RADIAL",
-    "RADIAL_COVARIANCE",
-    "RADIAL_VERSION_1_0",
-    "RECONVOLUTION",
-    "ROUND_INDENTER",
-    "SAMPLE",
-    "SCAN_DATA",
-    "SENSOR",
-    "SOLVER",
-    "STRESS_CURVE",
-    "STRESS_NUMBERS",
-    "STRESS_PROFILE",
-    "SYNTHETIC",
-    "TRANSFER",
-    "points_record",
-]
+    "CHECK", "CONE", "CONTACT", "CONVERSION", "EXPERIMENT", "FIELD", "FILM", "INDENTER",
+    "INDENTER_FACE", "LOAD", "MEASURED_SCAN", "NUMERICS", "PROCESS", "PROFILE", "PROFILE_NOTES",
+    "RADIAL", "RADIAL_COVARIANCE", "RADIAL_VERSION_1_0", "RECONVOLUTION", "ROUND_INDENTER",
+    "SAMPLE", "SCAN_DATA", "SENSOR", "SOLVER", "STRESS_CURVE", "STRESS_NUMBERS",
+    "STRESS_PROFILE", "SYNTHETIC", "TRANSFER", "points_record",
+]  # fmt: skip
 
 _L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
 _PER_AREA = "per area"
@@ -120,8 +95,7 @@ SCAN_DATA = record(
     signal="u_zz",
 )
 SYNTHETIC = record(
-    "NXcollection",
-    Quantity("description", "text", "what is synthetic", origin="synthetic"),
+    "NXcollection", Quantity("description", "text", "what is synthetic", origin="synthetic")
 )
 
 PROFILE = record(
@@ -142,18 +116,14 @@ CONTACT = record(
     Quantity("loading", "text", "incremental or total loading"),
 )
 SOLVER = record(
-    "NXprocess",
-    Quantity("solver", "text", "program", stored="program", origin="program"),
+    "NXprocess", Quantity("solver", "text", "program", stored="program", origin="program")
 )
 NUMERICS = record(
     "NXparameters",
     Quantity("convergence", _ONE, "estimated relative error of the largest stress"),
     Quantity("discretisation", "text", "mesh or quadrature"),
 )
-PROFILE_NOTES = record(
-    "NXprocess",
-    Quantity("notes", "note", "notes", origin="reference_notes"),
-)
+PROFILE_NOTES = record("NXprocess", Quantity("notes", "note", "notes", origin="reference_notes"))
 
 FIELD = record(
     "NXdata",

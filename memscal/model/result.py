@@ -55,52 +55,26 @@ class Result:
         return mapping
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the arrays on their axes, each with its unit, in SI units (needs xarray).
-
-        Raises
-        ------
-        InputError
-            If xarray is not installed, or the result holds no arrays.
-        """
+        """Return the arrays on their axes, each with its unit, in SI units (needs xarray)."""
         dataset: xarray.Dataset = self._told("dataset")
         return dataset
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the result as a table of numbers, units in the names of columns (needs pandas).
-
-        Raises
-        ------
-        InputError
-            If pandas is not installed, or the result is no table.
-        """
-        frame: pd.DataFrame = self._told("frame")
-        return frame
+        """Return the result as a table of numbers, units in the names of columns (needs pandas)."""
+        return self._told("frame")
 
     def ufloats(self) -> dict[str, Any]:
-        """Return the parameters as correlated numbers of the package uncertainties, in SI units.
-
-        Raises
-        ------
-        InputError
-            If uncertainties is not installed, or the result states no covariance.
-        """
+        """Return the parameters as correlated numbers of the package uncertainties, in SI units."""
         numbers: dict[str, Any] = self._told("correlated")
         return numbers
 
     def plot(self, **options: Any) -> Figure:
-        """Draw the result; the figure is returned, and nothing is shown or written.
-
-        Raises
-        ------
-        InputError
-            If there is no figure of such a result.
-        """
+        """Draw the result; the figure is returned, and nothing is shown or written."""
         if not self._figure:
             raise InputError(f"There is no figure of a {type(self).__name__}.")
         module, _, function = self._figure.rpartition(".")
-        figure: Figure = getattr(import_module(f"memscal.figures.{module}"), function)(
-            self, **options
-        )
+        draw = getattr(import_module(f"memscal.figures.{module}"), function)
+        figure: Figure = draw(self, **options)
         return figure
 
     def _told(self, form: str) -> Any:

@@ -24,13 +24,9 @@ from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
 __all__ = [
-    "LUBRICATIONS",
-    "Scan",
-    "StressSensor",
-    "checked_correlation",
-    "require_contacts",
+    "LUBRICATIONS", "Scan", "StressSensor", "checked_correlation", "require_contacts",
     "require_plane",
-]
+]  # fmt: skip
 
 LUBRICATIONS = ("", "dry", "lubricated")
 """What can be between indenter and film; empty where a scan does not say."""
@@ -153,8 +149,8 @@ class Scan:
         Positions along the scan, in m; need not be sorted, centred or evenly spaced.
     u_zz : ndarray, shape (n,), (repeat, n) or (m, n)
         Normal channel's voltage, in V; NaN marks a missing point.
-    load : float
-        Nominal load of the indenter, in N.
+    load, load_uncertainty : float
+        Nominal load of the indenter and its standard uncertainty, common to all points, in N.
     indenter, film, sensor
         What was pressed, on what, measured by what.
     y : ndarray, shape (m,) of a raster, (n,) of points, optional
@@ -163,38 +159,29 @@ class Scan:
         Which pass each of the points belongs to: any whole numbers.
     u_zz_errors : ndarray, shape of ``u_zz``, optional
         Standard uncertainty of each voltage (electronic noise), in V.
-    normal_load : ndarray, shape of ``u_zz``, optional
-        Load at each point, in N, where it was recorded.
-    normal_load_errors : ndarray, shape of ``u_zz``, optional
-        Standard uncertainty of the load at each point, independent from point to point, in N: of
-        a weight that is set down by hand.
+    normal_load, normal_load_errors : ndarray, shape of ``u_zz``, optional
+        Load at each point where it was recorded, and its standard uncertainty, independent from
+        point to point, in N.
     x_errors : ndarray, shape of ``x``, optional
         Standard uncertainty of each position, independent from point to point, in m.
     u_zz_correlation : ndarray, shape (n, n), or (m n, m n) of a raster, optional
         Correlation of the noise between the points of one repeat (of kind points: between all);
         none where absent.
     direction : str
-        ``"x"`` or ``"y"``: which way a line scan ran across the sensor.  The positions of a scan
-        along y are given as ``x`` all the same.
+        ``"x"`` or ``"y"``: which way a line scan ran across the sensor; its positions are in ``x``.
     position_scale_uncertainty : float, optional
         Relative standard uncertainty of the stage's scale, common to all positions.
     channels : mapping of str to ndarray, shape of ``u_zz``
         Further channels (``u_xz``, ``u_yz``), in V, and where stated their noise
         (``u_xz_errors``, ``u_yz_errors``).
-    load_uncertainty : float, optional
-        Standard uncertainty of the load common to all points, in N.
-    lubrication : str
-        ``"dry"`` or ``"lubricated"``: what was between indenter and film; empty if not stated.
-    lubricant : str
-        Name of the lubricant.
+    lubrication, lubricant : str
+        ``"dry"`` or ``"lubricated"``, empty if not stated, and the name of the lubricant.
     title, start_time, end_time, notes : str
         Free text; times in ISO 8601.
-    reference : StressProfile, optional
-        A base stress that travels with the scan.
+    reference, source : StressProfile, SourceFile, optional
+        A base stress that travels with the scan; the file the scan was read from.
     synthetic : mapping, optional
         The known truth of a simulated scan, SI units; present only in synthetic data.
-    source : SourceFile, optional
-        The file it was read from.
 
     Raises
     ------
@@ -266,7 +253,7 @@ class Scan:
 
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
-        shape = " x ".join(str(n) for n in self.u_zz.shape)
+        shape = " x ".join(map(str, self.u_zz.shape))
         what = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
         return f"<Scan: {what} points, x from {reach}, load {self.load:.4g} N>"
@@ -288,9 +275,8 @@ class Scan:
         """Position of every voltage along x and y, in m; each like ``u_zz``, zero across a line."""
         along = np.broadcast_to(self.x, self.u_zz.shape)
         if self.y is not None:
-            return along, np.broadcast_to(
-                self.y.reshape(-1, *[1] * (self.u_zz.ndim - 1)), along.shape
-            )
+            y = self.y.reshape(-1, *[1] * (self.u_zz.ndim - 1))
+            return along, np.broadcast_to(y, along.shape)
         across = np.zeros(self.u_zz.shape)
         return (across, along) if self.direction == "y" else (along, across)
 
@@ -311,10 +297,9 @@ class Scan:
             keep = np.atleast_1d(numbers)
         else:
             keep = np.flatnonzero(np.isin(self.passes, numbers))
-            names = ("x", "y", "repeat", "x_errors")
-            changes = {
-                name: values[keep] for name in names if (values := getattr(self, name)) is not None
-            }
+            for name in ("x", "y", "repeat", "x_errors"):
+                if (values := getattr(self, name)) is not None:
+                    changes[name] = values[keep]
             if self.u_zz_correlation is not None:
                 changes["u_zz_correlation"] = self.u_zz_correlation[np.ix_(keep, keep)]
         for name in ("u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
@@ -338,8 +323,7 @@ class Scan:
         if self.repeat is not None and not self.repeat.shape == self.x.shape == shape:
             raise InputError(
                 f"repeat has shape {self.repeat.shape}, but x has {self.x.shape} and u_zz {shape}.",
-                why="It numbers the pass of each point; the rows of a u_zz of two axes say it "
-                "themselves.",
+                why="It numbers the pass of each point; rows of a u_zz of two axes are passes.",
             )
         if self.kind == "points" and self.y is not None:
             require_plane(self.x, self.y)
@@ -363,15 +347,12 @@ class Scan:
             )
         if self.load_uncertainty is not None:
             require_non_negative("standard uncertainty of the load", self.load_uncertainty)
-        if self.u_zz_errors is not None and np.any(
-            (self.u_zz_errors < 0) | np.isinf(self.u_zz_errors)
-        ):
+        errors, loads = self.u_zz_errors, self.normal_load
+        if errors is not None and np.any((errors < 0) | np.isinf(errors)):
             raise InputError(
                 "u_zz_errors holds a standard uncertainty that is negative or infinite."
             )
-        if self.normal_load is not None and np.any(
-            (self.normal_load <= 0) | np.isinf(self.normal_load)
-        ):
+        if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
             raise InputError(
                 "normal_load holds a load that is infinite or not above zero.",
                 cure="Mark points without contact as missing (NaN).",

@@ -31,22 +31,17 @@ class StressProfile:
         Radial traction of the base on the film, in Pa, positive outward.
     sigma_zz_errors : ndarray, shape (n,), optional
         Standard uncertainty of ``sigma_zz``, in Pa; a calibration takes it as common to all radii.
-    depth, contact_radius, stick_radius : float, optional
-        Indentation depth and radii, in m.
-    friction_coefficient : float, optional
-        Amontons' coefficient; ``inf`` for full stick.
-    loading : str
-        ``"incremental"``, ``"total"``, or ``""`` where it makes no difference or is unknown.
-    film, indenter : optional
-        What was pressed on what.
+    film, indenter, depth, contact_radius, stick_radius : optional
+        What was pressed on what; indentation depth and radii, in m.
+    friction_coefficient, loading : float, str, optional
+        Amontons' coefficient, ``inf`` for full stick; ``"incremental"``, ``"total"``, or ``""``
+        where it makes no difference or is unknown.
     solver, discretisation : str
         The program or method, and its mesh or quadrature.
     convergence : float, optional
         Estimated relative error of ``sigma_zz``, of its maximum.
-    notes : str
-        What was done to it on its way, and what its author wrote at its head.
-    source : SourceFile, optional
-        The file it was read from.
+    notes, source : str, SourceFile, optional
+        What was done to it and what its author wrote at its head; the file it was read from.
 
     Raises
     ------
@@ -83,9 +78,8 @@ class StressProfile:
         for name in ("r", "sigma_zz", "sigma_rz", "sigma_zz_errors"):
             values = getattr(self, name)
             if values is not None:
-                object.__setattr__(
-                    self, name, finite_vector(f"{name} of the stress profile", values)
-                )
+                values = finite_vector(f"{name} of the stress profile", values)
+                object.__setattr__(self, name, values)
         require_increasing("r of the stress profile", self.r)
         if self.r[0] < 0:
             raise InputError(
@@ -102,10 +96,9 @@ class StressProfile:
     def __repr__(self) -> str:
         """Return what it is of in place of thousands of array elements."""
         peak = float(np.abs(self.sigma_zz).max()) * 1e-3
-        reach = self.r[-1] * 1e3
         return (
-            f"<StressProfile: load {self.load:.4g} N, {self.r.size} radii to {reach:.4g} mm, "
-            f"largest stress {peak:.4g} kPa>"
+            f"<StressProfile: load {self.load:.4g} N, {self.r.size} radii to "
+            f"{self.r[-1] * 1e3:.4g} mm, largest stress {peak:.4g} kPa>"
         )
 
     @property

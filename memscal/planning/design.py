@@ -204,14 +204,10 @@ def _out_of_reach(search: _Search, wishes: Mapping[str, float], tried: list[Desi
 
 
 def _band_ends(best: Design, problem: str) -> FitError:
-    sampled = np.pi / best.plan.step
+    step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
     if best.resolved_wavenumber >= 0.99 * sampled:
-        return FitError(
-            problem,
-            why=f"A step of {best.plan.step * 1e3:.4g} mm samples no more than "
-            f"{sampled * 1e-3:.4g} rad/mm.",
-            cure="Plan a finer step.",
-        )
+        why = f"A step of {step:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
+        return FitError(problem, why=why, cure="Plan a finer step.")
     return FitError(
         problem,
         why=f"A film of {best.plan.film.thickness * 1e3:.4g} mm passes little of larger "
@@ -242,41 +238,29 @@ def design(
 ) -> Design:
     r"""Predict the uncertainties of a calibration from a line scan that is not made yet.
 
-    The covariance is that of the linear model about the expected apparatus function,
-
-    .. math::
-
-        \mathrm{cov} = (J^T J/\sigma^2)^{-1}
-
-    for the Gaussian's parameters (the bound of Cramer and Rao); beside it, departures from a
-    Gaussian are weighed as a calibration does, with the expected squares of its data.  No scan is
-    simulated, and nothing is drawn.
+    The covariance of the Gaussian's parameters is that of the linear model about the expected
+    apparatus function, :math:`(J^T J/\sigma^2)^{-1}` (the bound of Cramer and Rao); departures from
+    a
+    Gaussian are weighed as a calibration does.  No scan is simulated, and nothing is drawn.
 
     Parameters
     ----------
     film, rod : ElasticFilm, Rod
         What is pressed on what, with the uncertainties that are known of it; the paper's.
-    kernel : RadialKernel, optional
-        The apparatus function to expect; the paper's Gaussian of 561 um where absent.
-    conversion_constant : float
-        A to expect, in V/Pa.
+    kernel, conversion_constant : RadialKernel, float
+        G to expect, the paper's Gaussian of 561 um where absent, and A in V/Pa.
     load, load_uncertainty : float
         Load in N and its relative standard uncertainty.
-    step, half_range : float
-        Distance of neighbouring positions, and how far they reach to either side, in m.
-    repeats : int
-        How often the line is scanned.
-    noise : float
+    step, half_range, repeats : float, float, int
+        Distance of neighbouring positions, and how far they reach to either side, in m; how often
+        the line is scanned.
+    noise, noise_voltage : float
         Standard deviation of one voltage, as a share of the signal with the rod right above the
-        sensor.
-    noise_voltage : float, optional
-        The same in V, in place of the share.
+        sensor, or in V in place of the share.
     centre : float
         Expected position of the sensor along the scan, in m.
-    method : str or Regulariser
-        How the scan would be evaluated.
-    seed : int
-        Seed of methods that draw random numbers.
+    method, seed : str or Regulariser, int
+        How the scan would be evaluated; seed of methods that draw random numbers.
     want : mapping of str to float, optional
         Relative standard uncertainties wanted of ``A``, ``sigma`` and ``fwhm``, at most, and
         ``resolved`` wavenumber, in rad/m, at least.
@@ -292,8 +276,7 @@ def design(
     Raises
     ------
     InputError
-        If a number is out of range, the scan would not pass over the sensor, or a wish is
-        unknown.
+        If a number is out of range, the scan misses the sensor, or a wish is unknown.
     FitError
         If the scan would not determine the parameters, or a wish is out of reach: with the best
         that can be reached, and its limiting source.

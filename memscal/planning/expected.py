@@ -1,9 +1,8 @@
-r"""Expected calibration of a planned scan: its estimate and covariance.
+"""Expected calibration of a planned scan: its estimate and covariance.
 
 The Gaussian's parameters have the covariance of the inverse Fisher information at the true ones
 (the bound of Cramer and Rao).  Departures are weighed as in :mod:`memscal.estimation.bayesian`,
-with the expected squares of the data, those of the signal plus those of the noise, in place of
-the data's own.  Everything after that is the calibration's own code.
+with the expected squares of signal plus noise in place of the data's own.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 
 from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
-from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
+from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.deconvolution.division import Regulariser, create_regulariser
 from memscal.errors import FitError
 from memscal.estimation.band import find_band
@@ -69,8 +68,7 @@ def expected_calibration(plan: Plan, regulariser: Regulariser) -> Expected:
         deconvolution=deconvolution,
         gaussian_misfit=deconvolution.misfit,
     )
-    effects = input_effects(solution.scans, solution.stresses, estimate)
-    return Expected(solution, _propagated(solution, effects))
+    return Expected(solution, _propagated(solution))
 
 
 def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
@@ -95,15 +93,11 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
     return estimate
 
 
-def _propagated(solution: Solution, effects: Mapping[str, InputEffect]) -> Results:
-    return propagate(
-        solution.estimate,
-        solution.deconvolution,
-        solution.window_at_nodes,
-        solution.fields.along_axis(solution.deconvolution.quotient.window)[0],
-        effects,
-        {},
-    )
+def _propagated(solution: Solution) -> Results:
+    estimate, deconvolution = solution.estimate, solution.deconvolution
+    effects = input_effects(solution.scans, solution.stresses, estimate)
+    window = solution.fields.along_axis(deconvolution.quotient.window)[0]
+    return propagate(estimate, deconvolution, solution.window_at_nodes, window, effects, {})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,10 +106,8 @@ class Design(Result):
 
     Parameters
     ----------
-    plan : Plan
-        The scan.
-    method : str
-        How it would be evaluated.
+    plan, method : Plan, str
+        The scan, and how it would be evaluated.
     parameters : ParameterSet
         What a calibration states, in expectation: ``conversion_constant`` (V/Pa),
         ``gaussian_sigma``, ``fwhm`` (m) and more, with their joint covariance.
@@ -126,11 +118,10 @@ class Design(Result):
     r, g, g_errors : ndarray, shape (n,)
         G to expect, in 1/m^2, at radii in m.
     k, transfer, transfer_errors : ndarray, shape (m,)
-        Its transfer function at wavenumbers in rad/m.
-    resolved_wavenumber : float
-        Up to which the scan would determine G, in rad/m.
+        Its transfer function at wavenumbers in rad/m; the scan would determine G up to
+        ``resolved_wavenumber``.
     want : mapping of str to float
-        What the plan was varied to reach, as it was asked for.
+        What the plan was varied to reach.
     """
 
     plan: Plan
@@ -164,19 +155,12 @@ class Design(Result):
         )
 
     def relative_uncertainty(self, name: str) -> float:
-        """Return the standard uncertainty of a parameter over its value.
-
-        Raises
-        ------
-        InputError
-            If there is no such parameter.
-        """
+        """Return the standard uncertainty of a parameter over its value."""
         return abs(self.parameters.uncertainty(name) / self.parameters[name])
 
     def largest_source(self, name: str) -> str:
         """Return the source that contributes most to a budgeted parameter."""
-        parts = self.budget[name]
-        return max(parts, key=lambda source: parts[source])
+        return max(self.budget[name], key=self.budget[name].__getitem__)
 
 
 def evaluate(plan: Plan, method: str | Regulariser = "bayesian", seed: int = 0) -> Design:
@@ -185,8 +169,7 @@ def evaluate(plan: Plan, method: str | Regulariser = "bayesian", seed: int = 0) 
     expected = expected_calibration(plan, regulariser)
     solution, results = expected.solution, expected.results
     deconvolution, fields = solution.deconvolution, solution.fields
-    transfer = fields.grid.transfer(deconvolution.quotient.values)
-    k, modulus = fields.along_axis(np.abs(transfer))
+    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)))
     return Design(
         plan=plan,
         method=regulariser.name,

@@ -61,7 +61,14 @@ class Plan:
                 f"The scan would be repeated {self.repeats} times.",
                 cure="Give a whole number of repeats, one or more.",
             )
-        _require_noise(self.noise if self.noise_voltage is None else self.noise_voltage)
+        noise = self.noise if self.noise_voltage is None else self.noise_voltage
+        if not 0 < noise < math.inf:
+            raise InputError(
+                f"The noise of the planned scan is {noise:g}.",
+                why="Without noise there is no uncertainty to expect, and no scan is without.",
+                cure="Give its standard deviation: a share of the largest signal (0.005: half a "
+                "percent), or a voltage; a few readings with the rod at rest tell it.",
+            )
         if not abs(self.centre) <= self.half_range:
             raise InputError(
                 f"The scan would reach {self.half_range * 1e3:.4g} mm to either side, but the "
@@ -114,13 +121,3 @@ class Plan:
         )
         noise = self.point_noise / math.sqrt(self.repeats)
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
-
-
-def _require_noise(noise: float) -> None:
-    if not 0 < noise < math.inf:
-        raise InputError(
-            f"The noise of the planned scan is {noise:g}.",
-            why="Without noise there is no uncertainty to expect from it, and no scan is without.",
-            cure="Give its standard deviation: a share of the largest signal (0.005: half a "
-            "percent), or a voltage; a few readings with the rod at rest tell it.",
-        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -26,16 +26,12 @@ from memscal.simulation.sensor import (
 )
 
 __all__ = [
-    "PAPER_LOADS",
-    "PAPER_SPHERE",
-    "LoadPath",
-    "described_film",
-    "pressed_path",
+    "PAPER_LOADS", "PAPER_SPHERE", "LoadPath", "described_film", "pressed_path",
     "simulate_contacts",
-]
+]  # fmt: skip
 
-# Distance in ln P of the outer states from the middle one, in standard deviations of the load,
-# and its smallest value: closer ones would show the solver's own error.
+# Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
+# its smallest value: closer ones would show the solver's own error.
 _SPREAD = 2.0
 _LEAST_SPREAD = 0.02
 
@@ -63,10 +59,9 @@ class LoadPath:
         *,
         order: int = 0,
     ) -> FloatArray:
-        """Return the blurred stress near the nominal load ``index``, in Pa, shape of ``radius``.
+        """Return the blurred stress in Pa at ``radius`` (m) and ``ratio``, load over nominal load.
 
-        ``radius`` (m) and ``ratio``, load over the nominal one, of each contact; ``order`` one for
-        the shear's radial component.
+        ``order`` one gives the shear's radial component.
         """
         values = blurred_stress(self.states[index], kernel, radius, order=order)
         if len(values) == 1:
@@ -79,22 +74,13 @@ class LoadPath:
 
 
 def pressed_path(
-    film: ElasticFilm,
-    sphere: Sphere,
-    loads: FloatArray,
-    *,
-    friction: float,
-    loading: str,
-    interface: Interface,
-    scatter: float,
+    solve: Callable[[FloatArray], list[Contact]], loads: FloatArray, scatter: float
 ) -> LoadPath:
     """Solve the contacts at the loads (N) that scatter by a relative standard deviation."""
     spread = max(_SPREAD * scatter, _LEAST_SPREAD) if scatter > 0 else 0.0
     around = np.exp(spread * np.arange(-1, 2)) if scatter > 0 else np.ones(1)
     path, place = np.unique(np.multiply.outer(loads, around), return_inverse=True)
-    solved = indent(
-        film, sphere, load=path, friction=friction, loading=loading, interface=interface
-    )
+    solved = solve(path)
     rows = np.reshape(place, (loads.size, around.size))
     return LoadPath([[solved[i] for i in row] for row in rows], spread)
 
@@ -145,29 +131,33 @@ def simulate_contacts(
 
     .. math:: U_i = A\,(G \otimes \sigma_{zz}^{P_i})(R_i) + b + d\,\xi_i + n_i
 
-    with an offset b, a linear drift d and Gaussian noise :math:`n_i`.  The stress at each load is
-    a parabola in ln P through solved contacts.  Arguments are those of
-    :func:`memscal.simulate_experiment`, in SI units, for one scan; ``load``: nominal loads, each
-    of which gives ``repeats`` rows of ``points`` contacts; ``load_scale``: all true loads over the
-    stated ones.  Noise, loads and positions are drawn from separate streams of ``seed``.  The
-    scan's truth is in ``synthetic``, ``load_1`` and so on without scatter.
+    with an offset b, a linear drift d and Gaussian noise :math:`n_i`.  The stress at each load is a
+    parabola in ln P through solved contacts.  Arguments are those of
+    :func:`memscal.simulate_experiment` for one scan; each nominal ``load`` gives ``repeats`` rows;
+    ``load_scale``: all true loads over the stated ones.
     """
     loads = _checked_loads(load)
-    _require_plausible(points, spacing, repeats, noise, load_scatter, load_reading, seed)
+    require_range("spacing", spacing, 1e-9, 0.1, "m")
+    require_non_negative("noise", noise)
+    require_range("load_scatter", load_scatter, 0.0, _MOST_SCATTER)
+    require_range("load_reading", load_reading, 0.0, _MOST_SCATTER)
+    _require_plausible(points, repeats, seed)
     require_positive("conversion_constant", conversion_constant, "V/Pa")
     require_positive("load_scale", load_scale)
     require_non_negative("position_error", position_error)
-    _require_finite(centre, baseline, drift)
+    if not np.isfinite((*centre, baseline, drift)).all():
+        raise InputError(
+            f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
+            "largest signal; they must be finite."
+        )
     interface, truth = interface or Interface(), apparatus_function(kernel)
     shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
     path = pressed_path(
-        film,
-        sphere,
+        lambda at: indent(
+            film, sphere, load=at, friction=friction, loading=loading, interface=interface
+        ),
         load_scale * loads,
-        friction=friction,
-        loading=loading,
-        interface=interface,
-        scatter=load_scatter,
+        load_scatter,
     )
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
     row = np.repeat(np.arange(loads.size), repeats)
@@ -242,14 +232,6 @@ def described_film(film: ElasticFilm) -> dict[str, float]:
     return {name: float(getattr(film, name)) for name in names}
 
 
-def _require_finite(centre: tuple[float, float], baseline: float, drift: float) -> None:
-    if not np.isfinite((*centre, baseline, drift)).all():
-        raise InputError(
-            f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
-            "largest signal; they must be finite."
-        )
-
-
 def _draw(rows: int, points: int, seed: int) -> dict[str, FloatArray]:
     """Return standard normal numbers for each source of error, from streams of their own."""
     sources = ("noise", "load", "position", "reading")
@@ -284,19 +266,7 @@ def _checked_loads(load: float | Sequence[float]) -> FloatArray:
     return loads
 
 
-def _require_plausible(
-    points: int,
-    spacing: float,
-    repeats: int,
-    noise: float,
-    load_scatter: float,
-    load_reading: float,
-    seed: int,
-) -> None:
-    require_range("spacing", spacing, 1e-9, 0.1, "m")
-    require_non_negative("noise", noise)
-    require_range("load_scatter", load_scatter, 0.0, _MOST_SCATTER)
-    require_range("load_reading", load_reading, 0.0, _MOST_SCATTER)
+def _require_plausible(points: int, repeats: int, seed: int) -> None:
     if points < 2 or repeats < 1 or seed < 0:
         raise InputError(
             f"There are {points} contacts in a row and {repeats} rows at each load, from the seed "

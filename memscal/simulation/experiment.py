@@ -51,15 +51,10 @@ def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
 
     film, rod, sphere = stated.film, stated.rod, stated.sphere
     modulus = around(film.young_modulus, film.young_modulus_uncertainty)
-    ratio = around(film.poisson_ratio, film.poisson_ratio_uncertainty)
+    ratio = 0.5 - abs(0.5 - around(film.poisson_ratio, film.poisson_ratio_uncertainty))
     thickness = around(film.thickness, film.thickness_uncertainty)
     return Reality(
-        film=replace(
-            film,
-            young_modulus=modulus,
-            poisson_ratio=0.5 - abs(0.5 - ratio),
-            thickness=thickness,
-        ),
+        film=replace(film, young_modulus=modulus, poisson_ratio=ratio, thickness=thickness),
         rod=replace(rod, radius=around(rod.radius, rod.radius_uncertainty)),
         sphere=replace(sphere, radius=around(sphere.radius, sphere.radius_uncertainty)),
         rod_load_scale=around(1.0, load_uncertainty),
@@ -75,12 +70,8 @@ _STREAMS = ("inputs", "rod", "dry", "lubricated")
 class Experiment:
     """The scans of one synthetic experiment, with one sensor on one film.
 
-    Parameters
-    ----------
-    rod : Scan
-        The rod scan that calibrates the sensor.
-    dry, lubricated : Scan
-        Scans of a sphere's contacts at several loads.
+    ``rod`` calibrates the sensor; ``dry`` and ``lubricated`` are scans of a sphere's contacts at
+    several loads.
     """
 
     rod: Scan
@@ -90,11 +81,7 @@ class Experiment:
     @property
     def scans(self) -> dict[str, Scan]:
         """The three scans by the names of their files, without a suffix."""
-        return {
-            "rod_scan": self.rod,
-            "sphere_dry": self.dry,
-            "sphere_lubricated": self.lubricated,
-        }
+        return {"rod_scan": self.rod, "sphere_dry": self.dry, "sphere_lubricated": self.lubricated}
 
 
 @single_threaded()
@@ -154,18 +141,15 @@ def simulate_experiment(
         Whether ``u_xz`` is recorded, too, and its G and A, as of :func:`memscal.simulate`.
     rod_load, rod_points, rod_repeats : float, int, int
         Load of the rod in N, positions of its scan over 8 mm to both sides, and repeats.
-    loads, lubricated_loads : sequence of float
-        Nominal loads of the sphere in N, dry and lubricated.
+    loads, lubricated_loads, lubricant
+        Nominal loads of the sphere in N, dry and lubricated, and the lubricant's name.
     friction, loading, interface
         Law of the dry contacts, as of :func:`memscal.indent`.
-    lubricant : str
-        What the lubricated scan names.
     points, spacing, repeats : int, float, int
         Contacts in a row, their distance in m, and rows at each load.
-    noise : float
-        Standard deviation of each scan's noise, as a share of its largest signal.
-    rod_noise : float, optional
-        That of the rod scan, where it differs.
+    noise, rod_noise : float
+        Standard deviation of each scan's noise, and of the rod scan's where it differs, as a
+        share of the scan's largest signal.
     load_scatter, record_loads, load_reading, position_error
         Of each contact of the sphere: relative standard deviation of its load; whether that load
         is recorded in place of the nominal one, and the relative standard deviation of its
@@ -182,14 +166,12 @@ def simulate_experiment(
         Draw the true values from the stated uncertainties: modulus, Poisson's ratio
         (reflected at 0.5) and thickness of the film, the radii, and the common errors of the
         rod's and of the sphere's loads, which are independent.  The files state the nominal
-        values, as those of a real experiment do.  Without it the nominal values are the true ones.
-    gain : float
-        A mistake: factor on the voltages of the sphere's scans, which the rod scan does not have.
-    thickness_factor : float
-        A mistake: the film's true thickness relative to the one that is stated.
+        values.
+    gain, thickness_factor : float
+        Mistakes: factor on the voltages of the sphere's scans only, and the film's true thickness
+        relative to the stated one.
     seed : int
-        Seed.  What is drawn and each scan have streams of their own: another load of one scan
-        changes no number of another scan.
+        What is drawn and each scan have streams of random numbers of their own.
 
     Returns
     -------
@@ -201,7 +183,7 @@ def simulate_experiment(
     InputError
         If a number is out of range, or the kernel is no apparatus function.
     DomainError
-        If a load is beyond what the contact's model holds for.
+        If a load is out of the contact model's range.
 
     Examples
     --------
@@ -218,8 +200,8 @@ def simulate_experiment(
     reality = Reality(film=film, rod=rod, sphere=sphere)
     if draw_inputs:
         reality = drawn(reality, load_uncertainty or 0.0, seeds["inputs"])
-    thick = replace(reality.film, thickness=thickness_factor * reality.film.thickness)
-    reality = replace(reality, film=thick)
+    thickness = thickness_factor * reality.film.thickness
+    reality = replace(reality, film=replace(reality.film, thickness=thickness))
     shared: dict[str, Any] = {
         "film": reality.film,
         "kernel": kernel,
@@ -246,7 +228,6 @@ def simulate_experiment(
         "load_scale": reality.load_scale,
         "position_error": position_error,
     }
-    free = Interface(normal=None if interface is None else interface.normal)
     calibration = simulate(
         rod=reality.rod,
         conversion_constant=conversion_constant,
@@ -259,17 +240,11 @@ def simulate_experiment(
         **shared,
     )
     dry = simulate_contacts(
-        load=loads,
-        friction=friction,
-        interface=interface,
-        lubrication="dry",
-        seed=seeds["dry"],
-        **contacts,
+        load=loads, friction=friction, interface=interface, seed=seeds["dry"], **contacts
     )
     lubricated = simulate_contacts(
         load=lubricated_loads,
-        friction=0.0,
-        interface=free,
+        interface=Interface(normal=None if interface is None else interface.normal),
         lubrication="lubricated",
         lubricant=lubricant,
         seed=seeds["lubricated"],
@@ -282,10 +257,9 @@ def simulate_experiment(
     }
     if len(channels) > 1:
         common["conversion_constant_xz"] = shear_conversion_constant
+    calibration = _with_load(calibration, rod_load, reality)
     return Experiment(
-        rod=_as_stated(
-            _with_load(calibration, rod_load, reality), film, rod, common | {"gain": 1.0}
-        ),
+        rod=_as_stated(calibration, film, rod, common | {"gain": 1.0}),
         dry=_as_stated(dry, film, sphere, common),
         lubricated=_as_stated(lubricated, film, sphere, common),
     )
@@ -294,15 +268,13 @@ def simulate_experiment(
 def _seeds(seed: int) -> dict[str, int]:
     """Return a seed for each part of the experiment, all of them from one."""
     streams = np.random.SeedSequence(seed).spawn(len(_STREAMS))
-    return {
-        name: int(stream.generate_state(1)[0])
-        for name, stream in zip(_STREAMS, streams, strict=True)
-    }
+    states = (int(stream.generate_state(1)[0]) for stream in streams)
+    return dict(zip(_STREAMS, states, strict=True))
 
 
 def _with_load(scan: Scan, load: float, reality: Reality) -> Scan:
     """Return the rod scan with its nominal load, and in its truth the true one."""
-    spread = scan.load_uncertainty
+    spread = None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
     truth: dict[str, float | str] = {
         **(scan.synthetic or {}),
         **described_film(reality.film),
@@ -310,18 +282,12 @@ def _with_load(scan: Scan, load: float, reality: Reality) -> Scan:
         "load_scale": reality.rod_load_scale,
         "load_1": scan.load,
     }
-    return replace(
-        scan,
-        load=load,
-        load_uncertainty=None if spread is None else spread * load / scan.load,
-        synthetic=truth,
-    )
+    return replace(scan, load=load, load_uncertainty=spread, synthetic=truth)
 
 
 def _as_stated(
     scan: Scan, film: ElasticFilm, indenter: Rod | Sphere, truth: Mapping[str, float | str]
 ) -> Scan:
     """Return the scan with film and indenter as the files state them."""
-    return replace(
-        scan, film=film, indenter=indenter, synthetic={**(scan.synthetic or {}), **truth}
-    )
+    synthetic = {**(scan.synthetic or {}), **truth}
+    return replace(scan, film=film, indenter=indenter, synthetic=synthetic)

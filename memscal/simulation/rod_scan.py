@@ -83,23 +83,18 @@ def simulate(
         G (the paper's Gaussian where absent) and A (V/Pa) of that channel.
     load : float or sequence of float
         Load in N; several loads give one repeat of the scan for each.
-    half_range : float
-        Positions run from minus to plus this, in m.
-    points : int
-        Number of positions along each axis.
-    repeats : int
-        Repeats at each load.
-    raster : bool
-        Scan a square instead of a line.
+    half_range, points : float, int
+        Positions run from minus to plus ``half_range`` in m, ``points`` along each axis.
+    repeats, raster : int, bool
+        Repeats at each load; whether to scan a square instead of a line.
     noise, baseline, drift : float
         Standard deviation of the noise, offset, and change of the offset across the scan, each
         as a share of the largest signal that the scan meets, at the (mean) load.
     centre : tuple of float
         Position of the sensor, in m.
-    load_uncertainty : float, optional
-        Relative standard uncertainty to be stated for the load.
-    state_noise : bool
-        Whether the scan states its noise (``u_zz_errors``).
+    load_uncertainty, state_noise : float or None, bool
+        Relative standard uncertainty that the scan states for the load, and whether it states its
+        noise (``u_zz_errors``).
     seed : int
         Seed of the noise.
 
@@ -143,8 +138,7 @@ def simulate(
     signal = per_newton * row_loads[:, None] if not raster else per_newton * loads[0]
     largest = float(per_newton.max() * loads.mean())
     clean = signal + largest * disturbance(x, baseline, drift)
-    rng = np.random.default_rng(seed)
-    u = clean + rng.normal(0.0, noise * largest, clean.shape)
+    u = clean + np.random.default_rng(seed).normal(0.0, noise * largest, clean.shape)
     if not raster and row_loads.size == 1:
         u = u[0]
     channel_data: dict[str, FloatArray] = {}
@@ -155,13 +149,12 @@ def simulate(
         rows = sheared * (loads[0] if raster else row_loads[:, None])
         disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
         channel_data, shear_truth = shear.recorded(rows.reshape(u.shape), x, disturbed)
-    varying = loads.size > 1
     return Scan(
         x=x,
         y=x if raster else None,
         u_zz=u,
         u_zz_errors=np.full(u.shape, noise * largest) if state_noise and noise > 0 else None,
-        normal_load=np.broadcast_to(row_loads[:, None], u.shape) if varying else None,
+        normal_load=np.broadcast_to(row_loads[:, None], u.shape) if loads.size > 1 else None,
         channels=channel_data,
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),

@@ -14,13 +14,9 @@ from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray, require_positive
 
 __all__ = [
-    "Disturbances",
-    "ShearChannel",
-    "apparatus_function",
-    "blurred_stress",
-    "disturbance",
+    "Disturbances", "ShearChannel", "apparatus_function", "blurred_stress", "disturbance",
     "shear_channel",
-]
+]  # fmt: skip
 
 # The film passes exp(-kh): beyond this in kh nothing is left in double precision.
 _REACH = 40.0
@@ -56,12 +52,8 @@ def blurred_stress(
     radial component of the blurred base shear.
     """
     nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, float(radius.max()))
-    transform = kernel.transform(nodes.k)
-    transforms = [
-        contact.base_shear_spectrum(nodes.k) if order else contact.base_spectrum(nodes.k)
-        for contact in contacts
-    ]
-    spectra = np.stack([stress * transform for stress in transforms], axis=1)
+    transforms = [(c.base_shear_spectrum if order else c.base_spectrum)(nodes.k) for c in contacts]
+    spectra = np.stack(transforms, axis=1) * kernel.transform(nodes.k)[:, None]
     return np.moveaxis(nodes.synthesise(spectra, radius, order=order), -1, 0)
 
 
@@ -93,10 +85,7 @@ class ShearChannel:
     conversion_constant: float
 
     def side(self, x: FloatArray, away: FloatArray) -> FloatArray:
-        """Cosine of the angle between x and the direction to the indenter; zero on the sensor.
-
-        ``x``, ``away``: coordinate along x and distance of the indenter from the sensor, in m.
-        """
+        """Cosine of the angle from x to the indenter, ``away`` from the sensor (m); 0 on it."""
         return np.asarray(np.divide(x, away, out=np.zeros_like(away + x), where=away > 0))
 
     def recorded(
@@ -104,8 +93,7 @@ class ShearChannel:
     ) -> tuple[dict[str, FloatArray], dict[str, float | str]]:
         """Return the channel's voltages, and its truth by names that end in ``_xz``.
 
-        ``stress`` (..., n): component of the blurred shear along x, in Pa; ``x`` (n,): positions,
-        in m; ``disturbed``: as shares of this channel's own largest signal.
+        ``stress`` (..., n): the blurred shear along x, in Pa; ``x`` (n,): positions, in m.
         """
         clean = self.conversion_constant * stress
         largest = float(np.abs(clean).max())

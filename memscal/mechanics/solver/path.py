@@ -1,13 +1,10 @@
 r"""Path of a contact to its loads: friction depends on history, and is followed step by step.
 
-*Incremental* loading is the slow one of an experiment.  Between indenter and film that do not
-yield, every step ends when the surfaces meet at the next ring (or part, on the way back): the
-ring then sticks exactly where it first touched, and the contact grows by one ring in a step.
-Between surfaces that yield, contact has no edge; steps are even in the cube root of the load (the
-square root of the depth), which is even in the contact radius for a sphere.
-
-*Total* loading is one step from the untouched film: with :math:`\mu = \infty` no point of the
-contact has moved sideways at all.
+*Incremental* loading is the slow one of an experiment.  On a rigid interface every step ends when
+the surfaces meet at the next ring (or part, on the way back): the ring then sticks exactly where it
+first touched.  On a compliant one, contact has no edge; steps are even in the cube root of the load
+(the square root of the depth), which is even in the contact radius for a sphere.  *Total* loading
+is one step from the untouched film.
 """
 
 from __future__ import annotations
@@ -26,16 +23,14 @@ from memscal.model.arrays import FloatArray
 
 __all__ = ["PathPoint", "follow"]
 
-# At the very edge, a share of the largest pressure may pull, and a share of the depth overlap:
-# that is what the rings next to it resolve.  It is gone with the next ring.
+# Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
 _PULL = 1e-2
 _OVERLAP = 1e-3
 
 
 def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
     """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``."""
-    # The rings in contact stay in contact, though one may pull a little at the edge; only where
-    # that is more than a little are they free to go.
+    # The rings in contact stay in contact, unless one pulls by more than a little at the edge.
     state = take_step(problem, start, Touch(ring), same_contact=True)
     return state if _is_contact(problem, state) else take_step(problem, start, Touch(ring))
 
@@ -54,8 +49,7 @@ def _mixture(lower: ContactState, upper: ContactState, target: Target) -> Contac
     if not 0 <= share <= 1:
         raise ConvergenceError(
             f"No contact was found at {target}.",
-            why=f"It should lie between {begin:.6g} and {end:.6g}, where the surfaces meet at one "
-            "ring and at the next.",
+            why=f"It should lie from {begin:.6g} to {end:.6g}, where two neighbouring rings touch.",
             cure="Try another number of rings, or a friction coefficient nearby.",
         )
     mixed = {
@@ -206,8 +200,7 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
     while (following := _next_meeting(problem, walk.state, target, rising=rising)) is not None:
         begin, end = _reached(walk.state, target), _reached(following, target)
         if not (begin < end <= target.value or begin > end >= target.value):
-            # A path that goes on in the same direction goes on from the ring before: looking at a
-            # state between two rings must not change those that follow.
+            # The path goes on from the ring before: a state between two rings changes no other.
             before = replace(walk)
             walk.step_to(_mixture(walk.state, following, target))
             return before
@@ -231,8 +224,8 @@ def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
 def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) -> None:
     """Go to a target in steps that are even in the contact radius of a sphere."""
     power = 3 if isinstance(target, Load) else 2
-    start = _reached(walk.state, target)
-    begin, end = ((value / farthest) ** (1 / power) for value in (start, target.value))
+    values = _reached(walk.state, target), target.value
+    begin, end = ((value / farthest) ** (1 / power) for value in values)
     count = max(1, math.ceil(increments * abs(end - begin) - 1e-9))
     for share in np.linspace(begin, end, count + 1)[1:-1]:
         goal = replace(target, value=farthest * float(share) ** power)

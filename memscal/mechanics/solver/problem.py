@@ -64,16 +64,8 @@ class ContactProblem:
     def virgin(self) -> ContactState:
         """Return the state of the first touch, at the ring (or rings) of the lowest height."""
         nothing, lowest = np.zeros(self.size), float(self.heights.min())
-        return ContactState(
-            pressure=nothing,
-            shear=nothing,
-            depth=lowest,
-            load=0.0,
-            touching=self.heights <= lowest,
-            slip=np.zeros(self.size, dtype=np.int8),
-            anchor=nothing,
-            outward=nothing,
-        )
+        touching, slip = self.heights <= lowest, np.zeros(self.size, dtype=np.int8)
+        return ContactState(nothing, nothing, lowest, 0.0, touching, slip, nothing, nothing)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,7 @@ __all__ = ["RingRequest", "relative_change", "solve_on_rings"]
 
 # Rings beyond the largest contact, so that it can end where it will.
 _MARGIN = 4
-# At a contact's edge the spacing has shrunk by this factor, and grows away from it by this share
-# of the distance.
+# Shrinkage of the spacing at a contact's edge, and its growth with the distance from there.
 _FINEST = 1 / 16
 _GROWTH = 0.4
 # A rod's rings crowd as the fourth power of their number counted from the edge.
@@ -44,8 +43,7 @@ def _rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArra
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
     local = np.full(r.size, spacing)
     for edge in edges:
-        graded = np.hypot(_FINEST * spacing, _GROWTH * (r - edge))
-        local = np.minimum(local, graded)
+        local = np.minimum(local, np.hypot(_FINEST * spacing, _GROWTH * (r - edge)))
     # Where the number of rings passed so far is whole, there is one.
     passed = np.concatenate([[0.0], np.cumsum(np.diff(r) / 2 * (1 / local[1:] + 1 / local[:-1]))])
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
@@ -144,8 +142,7 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
         if reach > _WIDEST * film.thickness:
             raise DomainError(
                 f"The contact would be more than {_WIDEST:g} times as wide as the film is thick.",
-                why="Such a film is no longer a layer under an indenter: its response is that of "
-                "a column at every point.",
+                why="Such a film responds like a column at every point, not like a layer.",
                 cure="Lower the load or the depth, or check the units of film and indenter.",
             )
     edges = [_contact_radius(request, rings, state) for state in states]
@@ -162,12 +159,9 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
 
 def _follow(request: RingRequest, model: HankelFilm | ElementFilm) -> list[PathPoint]:
     rings = model.compliance.r
+    heights = request.indenter.height(rings)
     problem = ContactProblem(
-        film=request.film,
-        compliance=model.compliance,
-        heights=request.indenter.height(rings),
-        friction=request.friction,
-        interface=request.interface,
+        request.film, model.compliance, heights, request.friction, request.interface
     )
     # Between rigid surfaces a step is a ring; where nothing touches all at once, as many steps.
     return follow(problem, request.targets, request.loading, increments=rings.size)
@@ -189,13 +183,11 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
         if isinstance(error.last, PathPoint):
             error.last = _contact(request, model, error.last)
         raise
-    contacts = [_contact(request, model, point) for point in points]
+    contacts = (_contact(request, model, point) for point in points)
     # The targets are met to rounding; a contact has the target's own value.
     return [
-        replace(contact, load=target.value)
-        if isinstance(target, Load)
-        else replace(contact, depth=target.value)
-        for contact, target in zip(contacts, request.targets, strict=True)
+        replace(c, load=t.value) if isinstance(t, Load) else replace(c, depth=t.value)
+        for c, t in zip(contacts, request.targets, strict=True)
     ]
 
 
@@ -204,7 +196,7 @@ def _contact(request: RingRequest, model: HankelFilm | ElementFilm, point: PathP
     if state.depth >= request.film.thickness:
         raise too_deep(request.film, request.indenter, state.load, state.depth)
     radius = _contact_radius(request, rings, state)
-    count = int(np.count_nonzero(state.pressure > 0))
+    count = np.count_nonzero(state.pressure > 0)
     return Contact(
         film=request.film,
         indenter=request.indenter,

@@ -1,9 +1,8 @@
 r"""Step of a contact from one equilibrium to the next, by an active-set Newton method.
 
-Which rings touch, stick and slip decides which equations hold.  With that known they are linear
-(rigid interface) or smooth (compliant interface); they are solved, the rings that contradict
-their status change it, and so on until none does: a semismooth Newton method on the conditions
-of Signorini and Amontons.  Friction acts at the end of the step (implicit Euler).
+Which rings touch, stick and slip decides which equations hold.  These are solved, the rings that
+contradict their status change it, and so on until none does: a semismooth Newton method on the
+conditions of Signorini and Amontons.  Friction acts at the end of the step (implicit Euler).
 """
 
 from __future__ import annotations
@@ -59,20 +58,11 @@ def _solve_system(problem: ContactProblem, statuses: _Statuses, goal: Goal) -> _
 
     # In units of the film's own compliance, the matrix mixes pressures with pressures.
     unit = c.normal[0, 0]
-    normal = np.hstack(
-        [
-            c.normal[:, rows] + c.normal_by_shear[:, rows] * ratio,
-            c.normal_by_shear[:, stuck],
-            np.full((problem.size, 1), -unit),
-        ]
-    )
-    radial = np.hstack(
-        [
-            c.radial_by_pressure[np.ix_(stuck, rows)] + c.radial[np.ix_(stuck, rows)] * ratio,
-            c.radial[np.ix_(stuck, stuck)],
-            np.zeros((stuck.size, 1)),
-        ]
-    )
+    depth = np.full((problem.size, 1), -unit)
+    by_rows = c.normal[:, rows] + c.normal_by_shear[:, rows] * ratio
+    normal = np.hstack([by_rows, c.normal_by_shear[:, stuck], depth])
+    by_rows = c.radial_by_pressure[np.ix_(stuck, rows)] + c.radial[np.ix_(stuck, rows)] * ratio
+    radial = np.hstack([by_rows, c.radial[np.ix_(stuck, stuck)], np.zeros((stuck.size, 1))])
     last, value = _goal_row(problem, goal, normal, rows, unit)
     matrix = np.vstack([normal[rows], radial, last])
     right = np.concatenate([-problem.heights[rows], statuses.anchor[stuck], [value]])
@@ -190,11 +180,8 @@ def take_step(
 
 def _first_statuses(problem: ContactProblem, start: ContactState, goal: Goal) -> _Statuses:
     """Begin with the statuses of the state before."""
-    law = problem.normal_law
-    pressing = start.touching.copy()
-    separation = problem.separations(start)
-    if law is not None:
-        pressing = _bearing(problem, law, separation)
+    law, separation = problem.normal_law, problem.separations(start)
+    pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
     if isinstance(goal, Touch):
         pressing[goal.ring] = False
     return _Statuses(
@@ -228,13 +215,11 @@ def _revise(
     slip, tangential = _revised_slip(problem, statuses, tractions, u, careful=careful)
     law = problem.normal_law
     if law is None:
-        pressing = _revised_contact(statuses, p, gap, tractions.depth, held, careful=careful)
-        separation = gap
-        normal = bool(np.any(pressing != statuses.pressing))
+        pressing = _revised_contact(statuses, tractions, gap, held, careful=careful)
+        separation, normal = gap, bool(np.any(pressing != statuses.pressing))
     else:
         separation = _revised_separation(problem, law, statuses, tractions, gap)
-        pressing = _bearing(problem, law, separation)
-        normal = False
+        pressing, normal = _bearing(problem, law, separation), False
     moved = np.max(np.abs(p - statuses.pressure)) > _SETTLED * p.max()
     settled = not (normal or tangential or (moved and not problem.interface.rigid))
     length = problem.interface.slip_length
@@ -250,15 +235,10 @@ def _revise(
 
 
 def _revised_contact(
-    statuses: _Statuses,
-    p: FloatArray,
-    gap: FloatArray,
-    depth: float,
-    held: int | None,
-    *,
-    careful: bool,
+    statuses: _Statuses, tractions: _Tractions, gap: FloatArray, held: int | None, *, careful: bool
 ) -> NDArray[np.bool_]:
     """Let go of rings that pull, and catch rings that would pass through the indenter."""
+    p, depth = tractions.pressure, tractions.depth
     pulled = np.where(statuses.pressing, -p / np.abs(p).max(initial=1e-300), 0.0)
     passed = np.where(statuses.pressing, 0.0, -gap / max(abs(depth), 1e-300))
     if held is not None:
@@ -316,7 +296,7 @@ def _revised_separation(
 ) -> FloatArray:
     """Return the next trial of the separations."""
     # Where the surfaces part, the linear equations' own; where they close, the one at which the
-    # law bears the linear equations' pressure, because a convex law soon bears far more.
+    # (convex) law bears the linear equations' pressure.
     before, p = statuses.separation, tractions.pressure
     after = np.maximum(gap, np.minimum(before, 0.0) - _PLUNGE * law.length)
     closing = statuses.pressing & (gap < before) & (p > 0)
@@ -340,14 +320,5 @@ def _accepted(
     touching = statuses.pressing.copy()
     if held is not None:
         touching[held] = True
-    return ContactState(
-        pressure=p,
-        shear=q,
-        depth=tractions.depth,
-        load=float(problem.compliance.areas @ p),
-        touching=touching,
-        slip=slip,
-        anchor=anchor,
-        outward=u,
-        iterations=iterations,
-    )
+    load = float(problem.compliance.areas @ p)
+    return ContactState(p, q, tractions.depth, load, touching, slip, anchor, u, iterations)
