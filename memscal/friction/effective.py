@@ -21,12 +21,7 @@ from memscal.friction.likelihood import (
     points_at,
     predict,
 )
-from memscal.friction.results import (
-    BoundedEstimate,
-    DryAgainstLubricated,
-    Interval,
-    LoadComparison,
-)
+from memscal.friction.results import BoundedEstimate, DryAgainstLubricated, Interval, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_bound
 

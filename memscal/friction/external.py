@@ -12,12 +12,7 @@ from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
 from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import (
-    FRICTION_SCALE,
-    ProfileFamily,
-    base_wavenumbers,
-    require_loads,
-)
+from memscal.friction.family import FRICTION_SCALE, ProfileFamily, base_wavenumbers, require_loads
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere

@@ -26,12 +26,7 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import ConvergenceError, DomainError, InputError, MemscalError
-from memscal.formats.cache import (
-    CacheFolder,
-    find_contact_table,
-    keep_contact_table,
-    table_key,
-)
+from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_table, table_key
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface

@@ -122,11 +122,7 @@ def tables(restored: Restoration) -> list[Table]:
         f"Stress at the base of a {film.thickness / MM:.4g} mm film under a {indenter.shape} of "
         f"radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
     )
-    return [
-        Table(title, ("", ""), rows),
-        _stress_table(restored),
-        checks_table(restored.checks),
-    ]
+    return [Table(title, ("", ""), rows), _stress_table(restored), checks_table(restored.checks)]
 
 
 def _stress_table(restored: Restoration) -> Table:
