@@ -64,10 +64,7 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     floor = max(0.3 * float(smallest), 10**-_LOG_DECADES * peak)
     _draw_band(axes, radial, floor=floor)
     _draw_profiles(
-        axes,
-        radial.r,
-        np.where(radial.g > 0, radial.g, np.nan),
-        np.where(radial.g_gaussian > 0, radial.g_gaussian, np.nan),
+        axes, radial.r, *(np.where(g > 0, g, np.nan) for g in (radial.g, radial.g_gaussian))
     )
     axes.set_ylim(floor / PER_MM2, 3 * peak / PER_MM2)
     axes.set_xlim(0.0, _shown_radius(radial) / MM)
@@ -79,19 +76,14 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     """Draw the transfer function's modulus, the window, and the resolved band."""
     transfer = data.transfer
     k, limit = transfer.k / PER_MM, transfer.resolved_wavenumber / PER_MM
-    end = _shown_wavenumber(k, limit)
+    end = float(k[-1])
+    if np.isfinite(limit) and limit > 0:
+        end = min(end, 2.0 * limit)
     shown = k <= end
     band = _EXPANDED * transfer.modulus_errors
     blue = COLOURS["deconvolved"]
-    axes.fill_between(
-        k,
-        np.maximum(transfer.modulus - band, 0.0),
-        transfer.modulus + band,
-        color=blue,
-        alpha=0.25,
-        lw=0,
-        label="±2u (k = 2)",
-    )
+    low, high = np.maximum(transfer.modulus - band, 0.0), transfer.modulus + band
+    axes.fill_between(k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2)")
     axes.plot(k, transfer.modulus, "-", color=blue, label="modulus for G")
     sigma = data.gaussian_sigma
     gaussian = np.exp(-0.5 * (sigma * transfer.k) ** 2)
@@ -107,15 +99,9 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
 
 def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
     spread = _EXPANDED * radial.g_errors
-    axes.fill_between(
-        radial.r / MM,
-        np.maximum(radial.g - spread, floor) / PER_MM2,
-        np.maximum(radial.g + spread, floor) / PER_MM2,
-        color=COLOURS["deconvolved"],
-        alpha=0.25,
-        lw=0,
-        label="±2u (k = 2)",
-    )
+    low, high = (np.maximum(radial.g + side * spread, floor) / PER_MM2 for side in (-1, 1))
+    blue, r = COLOURS["deconvolved"], radial.r / MM
+    axes.fill_between(r, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2)")
 
 
 def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
@@ -127,16 +113,8 @@ def _shade_unresolved(axes: Axes, limit: float, end: float) -> None:
     if not (np.isfinite(limit) and limit < end):
         return
     axes.axvspan(0.0, limit, color=COLOURS["reference"], alpha=0.10, lw=0, label="_resolved")
-    axes.axvspan(
-        limit,
-        end,
-        facecolor="0.95",
-        edgecolor="0.75",
-        hatch="////",
-        lw=0,
-        zorder=0,
-        label="extrapolated",
-    )
+    hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
+    hatched.set(zorder=0, label="extrapolated")
     axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
 
 
@@ -152,13 +130,6 @@ def _shown_radius(radial: ApparatusRadial) -> float:
     return float(min(1.1 * far, radial.r[-1])) or float(radial.r[-1])
 
 
-def _shown_wavenumber(k: FloatArray, limit: float) -> float:
-    end = float(k[-1])
-    if np.isfinite(limit) and limit > 0:
-        end = min(end, 2.0 * limit)
-    return end
-
-
 def _largest(values: FloatArray, floor: float = 1e-300) -> float:
     finite = values[np.isfinite(values)]
     return max(float(np.max(finite)), floor) if finite.size else floor
@@ -172,17 +143,10 @@ _MARGIN = 0.012  # left and right of the lines of text, of the width
 
 
 def calibration_figure(result: Calibrated) -> Figure:
-    r"""Draw an apparatus function and the scan that it came from.
+    """Draw an apparatus function and the scan that it came from, after Fig. 2 of the paper.
 
-    Left: the scan with its standard uncertainty, the reconvolutions
-    :math:`A\,(G \otimes \sigma_{zz})` with the deconvolved G and with the Gaussian, the
-    reference :math:`\sigma_{zz}` on the right-hand axis, and the rod's diameter (a, linear;
-    c, logarithmic), and residuals in units of standard uncertainty (b).  Right: G(r) with
-    its band (k = 2) and the Gaussian (d, linear; e, logarithmic), and the transfer function
-    with the regularisation's window, hatched where the scan does not resolve it (f).
-
-    After Fig. 2 of Scheibert, Prevost, Frelat, Rey and Debrégeas: panel a is its a), panel d
-    its b).  In c a point less than 2u above the baseline is drawn as an upper limit.
+    Panels a and c, the scan with reconvolutions and reference; b, residuals over u; d and e, G(r)
+    with its band (k = 2) and the Gaussian; f, the transfer function.
     """
     data = apparatus_of(result)
     with house_style():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -60,11 +61,10 @@ _COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
 
 
 def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
-    """Draw what laws of the interface explain, of a comparison with friction or of the laws alone.
+    """Draw laws of the interface, of a comparison with friction or of the laws alone.
 
-    Panel a, profile likelihood of the length over which the interface yields; b, evidence of each
-    law over that of the best; c, where dry scans were measured, the coefficient that the slip
-    length means at each load, beside that which was measured there.
+    Panel a, profile likelihood of the length; b, evidence of each law over that of the best; c, of
+    dry scans, the coefficient that the slip length means at each load, beside the measured one.
     """
     laws = comparison if isinstance(comparison, InterfaceComparison) else comparison.interface
     loads: Sequence[LoadComparison] = ()
@@ -118,18 +118,12 @@ def _draw_evidence(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
             below = law.log_evidence - best
             axes.plot([below, 0.0], [height, height], color="0.8", lw=0.8, zorder=1)
             axes.plot([below], [height], "o", color=COLOURS[_COLOURS[direction]], ms=5)
-            names.append(_folded(law.name))
+            names.append(textwrap.fill(law.name, 22))
             height += 1
     axes.yaxis.set_ticks(list(range(height)), names)
     axes.set_ylim(height - 0.5, -0.5)
     axes.axvline(0.0, color="0.6", lw=0.6)
     axes.set_xlabel("ln of evidence over the best")
-
-
-def _folded(name: str, width: int = 22) -> str:
-    import textwrap
-
-    return "\n".join(textwrap.wrap(name, width))
 
 
 def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadComparison]) -> None:
@@ -159,11 +153,7 @@ _ROOM = 0.22
 
 
 def maxima_figure(comparison: FrictionComparison) -> Figure:
-    """Draw S_max/p0_max against the load, a panel for each definition of the loading.
-
-    Measured ratios with standard uncertainties, dry and lubricated, and curves of p_max/p0_max for
-    several friction coefficients, as Figure 5 of the paper.
-    """
+    """Draw measured and calculated S_max/p0_max against the load, a panel for each loading."""
     with house_style():
         figure = new_figure(3.4)
         count = len(comparison.loadings)
@@ -182,15 +172,19 @@ def draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str | None 
     loading = main_loading(comparison, loading)
     loads, curves = _curves(comparison, loading)
     ends = []
-    for mu in _shown(comparison.friction):
+    ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
+    usual = {float(mu) for mu in comparison.friction if mu in _SHOWN}
+    for mu in sorted(usual.union(ends_of_all)):
         curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
         (line,) = axes.plot(loads, curve, color=friction_colours(mu)[0], lw=0.9)
         line.set_gid(f"mu={mu:g}")
         ends.append((float(curve[-1]), mu))
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
-        _draw_ratios(axes, comparison, loading, lubrication)
-    _make_room(axes, float(loads[0]), float(loads[-1]))
-    _name_ends(axes, float(loads[-1]), ends)
+        _draw_ratios(axes, comparison.loads[loading], lubrication)
+    first, last = float(loads[0]), float(loads[-1])
+    # Room at the right for the curves' names.
+    axes.set_xlim(min(0.0, first), last + _ROOM * max(last - first, 0.2 * last))
+    _name_ends(axes, last, ends)
     axes.set_xlabel("load (N)")
     axes.set_ylabel(r"$S_{max}/p^0_{max}$")
     words = f"{loading} loading" if loading else "as given"
@@ -198,42 +192,24 @@ def draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str | None 
     legend_above(axes, columns=3)
 
 
-def _shown(friction: FloatArray) -> list[float]:
-    """Return coefficients to draw: the usual ones that were calculated, and the ends."""
-    shown = {float(mu) for mu in friction if mu in _SHOWN} | {float(friction[0])}
-    return sorted(shown | {float(friction[-1])})
-
-
 def _curves(comparison: FrictionComparison, loading: str) -> tuple[FloatArray, FloatArray]:
     """Return loads, increasing, and the calculated maxima over the frictionless ones there."""
-    by_load = {
-        at_load.load: at_load.p_max / at_load.p0_max for at_load in comparison.loads[loading]
-    }
+    by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
     loads = sorted(by_load)
     return np.array(loads), np.array([by_load[load] for load in loads])
 
 
-def _draw_ratios(
-    axes: Axes, comparison: FrictionComparison, loading: str, lubrication: str
-) -> None:
-    measured = [
-        at_load for at_load in comparison.loads[loading] if at_load.lubrication == lubrication
-    ]
+def _draw_ratios(axes: Axes, loads: Sequence[LoadComparison], lubrication: str) -> None:
+    measured = [load for load in loads if load.lubrication == lubrication]
     marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
     black = COLOURS["measured"]
     axes.errorbar(
-        [at_load.load for at_load in measured],
-        [at_load.ratio for at_load in measured],
-        [at_load.ratio_uncertainty for at_load in measured],
+        [load.load for load in measured],
+        [load.ratio for load in measured],
+        [load.ratio_uncertainty for load in measured],
         fmt=marker, color=black, mfc=black if filled else "white", ms=4, mew=0.8,
         elinewidth=0.8, capsize=2, label=lubricated_words(lubrication), zorder=3,
     )  # fmt: skip
-
-
-def _make_room(axes: Axes, first: float, last: float) -> None:
-    """Leave room at the right for the curves' names."""
-    span = max(last - first, 0.2 * last)
-    axes.set_xlim(min(0.0, first), last + _ROOM * span)
 
 
 def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
@@ -268,9 +244,8 @@ def comparison_figure(
 ) -> Figure:
     """Draw a comparison on one page; by default of the first lubrication and loading.
 
-    Panel a, measured profiles between no friction and full stick; b, measured maxima over
-    frictionless ones against the load; c, residuals against the frictionless profiles; d, the
-    effective friction coefficient against the load.
+    Panel a, profiles between no friction and full stick; b, maxima over frictionless ones; c,
+    residuals against the frictionless profiles; d, the effective friction coefficient.
     """
     loading = main_loading(comparison, loading)
     loads = chosen(comparison, loading, lubrication)
@@ -289,11 +264,7 @@ def comparison_figure(
 
 
 def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[[], Figure]]:
-    """Return what draws each figure of a comparison when called, by the stem of its file's name.
-
-    ``profiles-dry`` and ``friction-set-dry`` (one for each lubrication), ``maxima``,
-    ``effective-friction`` and ``likelihood``, and ``interface`` where one was compared.
-    """
+    """Return what draws each figure of a comparison when called, by the stem of its file's name."""
     figures: dict[str, Callable[[], Figure]] = {}
     measured = (profile.lubrication for profile in comparison.measured.profiles)
     for lubrication in dict.fromkeys(measured):

@@ -40,9 +40,8 @@ def profile_figure(
 ) -> Figure:
     """Draw measured profiles between no friction and full stick, as Figure 3 of the paper.
 
-    By default of the first lubrication and loading.  Panels a and b, stress against the distance
-    from the centre, on a linear and on a logarithmic scale, with standard uncertainties; c and d,
-    residuals against the frictionless profile and that of the largest coefficient, over them.
+    Panels a and b, stress on a linear and a logarithmic scale; c and d, residuals over standard
+    uncertainties against the frictionless profile and that of the largest coefficient.
     """
     loading = main_loading(comparison, loading)
     loads = chosen(comparison, loading, lubrication)
@@ -123,12 +122,13 @@ def friction_set_figure(
 ) -> Figure:
     """Draw profiles beside those of a set of friction coefficients, as Figure 4 of the paper.
 
-    A column for each load (four at most, from the smallest to the largest).  Top, stress near the
-    centre for several coefficients; middle, the same less the frictionless profile, in percent of
-    its maximum; bottom, residuals against the calculated coefficient of least chi-square.
+    A column for each of at most four loads: stress near the centre, the same less the frictionless
+    profile (percent of its maximum), residuals against the coefficient of least chi-square.
     """
     loading = main_loading(comparison, loading)
-    loads = _spread(chosen(comparison, loading, lubrication))
+    loads = chosen(comparison, loading, lubrication)
+    shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
+    loads = [loads[i] for i in np.unique(shown)]
     with house_style():
         figure = new_figure(5.0)
         rows = (1.5, 1.5, 1.0)
@@ -138,7 +138,9 @@ def friction_set_figure(
             _draw_differences(column[1], comparison, at_load)
             _draw_best(column[2], comparison, at_load)
         share_limits(panels[2])
-        _share_differences(panels[1])
+        low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
+        for axes in panels[1]:
+            axes.set_ylim(min(low), max(high))
         words = ("stress (kPa)", "beyond frictionless\n(% of its maximum)", "residual / $u$")
         for axes, label in zip(panels[:, 0], words, strict=True):
             axes.set_ylabel(label)
@@ -146,12 +148,6 @@ def friction_set_figure(
         figure.supxlabel("distance from the centre (mm)", fontsize=8)
         _legend_of_friction(figure, comparison, loads[0].lubrication, loading)
     return figure
-
-
-def _spread(loads: Sequence[LoadComparison]) -> list[LoadComparison]:
-    """Return at most as many loads as fit in a row, the ends always."""
-    count = min(len(loads), _MOST_LOADS)
-    return [loads[i] for i in np.unique(np.linspace(0, len(loads) - 1, count).round().astype(int))]
 
 
 def _shown_indices(comparison: FrictionComparison) -> list[int]:
@@ -185,14 +181,9 @@ def _draw_differences(axes: Axes, comparison: FrictionComparison, at_load: LoadC
         change = (at_load.calculated[i] - at_load.calculated[0])[None, :]
         colour = friction_colours(comparison.friction[i])[0]
         axes.plot(r / MM, on_axis(at_load.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
-    draw_errorbar(
-        axes,
-        at_load.profile.r / MM,
-        (at_load.profile.s_zz - at_load.calculated[0]) / unit,
-        at_load.profile.s_zz_errors / unit,
-        at_load,
-        colour=COLOURS["measured"],
-    )
+    profile = at_load.profile
+    beyond, u = (profile.s_zz - at_load.calculated[0]) / unit, profile.s_zz_errors / unit
+    draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=COLOURS["measured"])
 
 
 def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
@@ -202,26 +193,10 @@ def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparis
     axes.axhline(0.0, color="0.4", lw=0.6)
     marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
     black = COLOURS["measured"]
-    axes.plot(
-        at_load.profile.r / MM,
-        z,
-        marker,
-        color=black,
-        ms=2.5,
-        mew=0.6,
-        mfc=black if filled else "white",
-    )
+    face = black if filled else "white"
+    axes.plot(at_load.profile.r / MM, z, marker, color=black, ms=2.5, mew=0.6, mfc=face)
     label = rf"least $\chi^2$: $\mu$ = {friction_name(comparison.friction[best])}"
-    axes.annotate(
-        label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7
-    )  # fmt: skip
-
-
-def _share_differences(panels: Sequence[Axes]) -> None:
-    low = min(axes.get_ylim()[0] for axes in panels)
-    high = max(axes.get_ylim()[1] for axes in panels)
-    for axes in panels:
-        axes.set_ylim(low, high)
+    axes.annotate(label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 def _legend_of_friction(

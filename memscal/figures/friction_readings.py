@@ -44,11 +44,10 @@ _ENTRIES = 7
 
 
 def effective_friction_figure(comparison: FrictionComparison) -> Figure:
-    """Draw the effective friction coefficient against the load.
+    """Draw the effective friction coefficient against the load, with intervals.
 
-    A row for each lubrication, a panel for each definition of the loading: the coefficient by the
-    maximum and by the whole profile with intervals (arrows where one side is open), the interval of
-    all loads together as a band, and the macroscopic coefficient.
+    A row for each lubrication, a panel for each loading.  Open intervals end in arrows; a band is
+    the interval of all loads together.
     """
     return _panels(comparison, draw_effective, 2.7)
 
@@ -65,14 +64,9 @@ def draw_effective(
     span = loads[-1].load - loads[0].load or loads[0].load
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
-            _draw_reading(
-                axes,
-                getattr(at_load, name),
-                at_load.load + side * _ASIDE * span,
-                COLOURS[colour],
-                words if i == 0 else "",
-                LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""]),
-            )
+            reading, x = getattr(at_load, name), at_load.load + side * _ASIDE * span
+            marker = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
+            _draw_reading(axes, reading, x, COLOURS[colour], words if i == 0 else "", marker)
     _draw_joint(axes, comparison.joint[loads[0].lubrication][loading])
     _draw_macroscopic(axes, comparison.macroscopic)
     friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
@@ -141,17 +135,13 @@ def _panels(
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
                 draw(axes, comparison, lubrication, loading)
-                _name_panel(axes, lubrication, loading)
+                words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
+                axes.set_title(words, fontsize=8, loc="left")
         for axes, letter in zip(panels.flat, "abcdef", strict=False):
             panel_letter(axes, letter)
             axes.label_outer()
         _one_legend(figure, panels.flat)
     return figure
-
-
-def _name_panel(axes: Axes, lubrication: str, loading: str) -> None:
-    words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
-    axes.set_title(words, fontsize=8, loc="left")
 
 
 def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
@@ -160,22 +150,15 @@ def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             shown.setdefault(label, handle)
-    loads = sorted((label for label in shown if label.endswith(" N")), key=_newtons)
+    of_loads = (label for label in shown if label.endswith(" N"))
+    loads = sorted(of_loads, key=lambda label: float(label.removesuffix(" N")))
     order = [*loads, *(label for label in shown if label not in loads)]
     handles = [shown[label] for label in order]
     figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), _ENTRIES))
 
 
-def _newtons(label: str) -> float:
-    return float(label.removesuffix(" N"))
-
-
 def likelihood_figure(comparison: FrictionComparison) -> Figure:
-    """Draw the profile likelihoods of the effective friction coefficient.
-
-    Chi-square above its least value against the coefficient, of each load's profile and of all
-    together, with the levels that bound 68.3 % and 95 %.
-    """
+    """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
     return _panels(comparison, draw_likelihood, 2.4)
 
 

@@ -74,10 +74,7 @@ def friction_colours(friction: ArrayLike) -> list[str]:
 
 
 def load_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
-    """Return colour and name of each load: darker as it grows, also in grey, alike in all panels.
-
-    Loads within 5 % of each other, such as those of recorded repeats, look alike.
-    """
+    """Return colour and name of each load: darker as it grows; within 5 % loads look alike."""
     import matplotlib as mpl
 
     groups: list[list[float]] = []
@@ -133,8 +130,7 @@ def chosen(
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
     """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones.
 
-    Radii closer than a micrometre count as one; the fine ones lie within the others, or between the
-    axis and the first.
+    Radii closer than a micrometre count as one.
     """
     from scipy.interpolate import CubicSpline
 
@@ -165,11 +161,7 @@ _LEAST_LIMIT = 3.5
 def draw_points(
     axes: Axes, at_load: LoadComparison, colour: str, label: str, logarithmic: bool
 ) -> None:
-    """Draw the measured points.
-
-    On a logarithmic scale those that are not above 0 are left out, and those that are less than
-    twice their uncertainty are pale: they say no more than that the stress has decayed.
-    """
+    """Draw the measured points; on a logarithmic scale those below 2u are pale or left out."""
     profile = at_load.profile
     r, s, u = (np.asarray(v) for v in (profile.r, profile.s_zz, profile.s_zz_errors))
     clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)

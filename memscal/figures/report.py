@@ -75,10 +75,7 @@ $body
 
 
 def html_report(data: ApparatusData) -> str:
-    """Return a calibration as a self-contained HTML page, for reading and for printing.
-
-    The same data give the same text; everything that came from a file is escaped.
-    """
+    """Return a calibration as a self-contained HTML page; what came from files is escaped."""
     title = sensor_title(data)
     values, _ = tables(data)
     sections = {
@@ -93,13 +90,10 @@ def html_report(data: ApparatusData) -> str:
         f"<section>\n<h2>{escape(heading)}</h2>\n{content}\n</section>"
         for heading, content in sections.items()
     )
-    heading = f"<h1>{escape(title)}</h1>\n{_verdict(data)}\n"
-    return _PAGE.substitute(title=escape(title), style=_STYLE, body=heading + body)
-
-
-def _verdict(data: ApparatusData) -> str:
     kind = "verdict" if data.passed else "verdict failed"
-    return f'<p class="{kind}" role="note">{escape(_verdict_text(data))}</p>'
+    verdict = f'<p class="{kind}" role="note">{escape(_verdict_text(data))}</p>'
+    heading = f"<h1>{escape(title)}</h1>\n{verdict}\n"
+    return _PAGE.substitute(title=escape(title), style=_STYLE, body=heading + body)
 
 
 def _verdict_text(data: ApparatusData) -> str:
@@ -123,14 +117,9 @@ def _budget(data: ApparatusData) -> str:
         total = float(np.sqrt(sum(u**2 for u in budget.values())))
         cells = [_share(budget.get(source), total, quantity.scale) for source in sources]
         ratio = _relative(data.parameters, name)
-        columns.append(
-            (
-                f"{quantity.words} ({quantity.unit})",
-                *cells,
-                f"{total / quantity.scale:.2g}",
-                f"{100 * ratio:.2g} %" if np.isfinite(ratio) else "–",
-            )
-        )
+        share = f"{100 * ratio:.2g} %" if np.isfinite(ratio) else "–"
+        column = f"{quantity.words} ({quantity.unit})"
+        columns.append((column, *cells, f"{total / quantity.scale:.2g}", share))
     names = [source.replace("_", " ") for source in sources]
     first = ("source", *names, "root sum of squares", "relative standard uncertainty")
     head, *rows = zip(first, *columns, strict=True)
@@ -190,13 +179,9 @@ def _provenance(data: ApparatusData) -> str:
         if mapping:
             rows = [(str(key), _plain(value)) for key, value in mapping.items()]
             blocks.append(Table(caption, ("name", "value"), rows).html())
-    blocks.append("<h3>Messages</h3>")
-    if process.messages:
-        items = "\n".join(f"<li>{escape(message.text)}</li>" for message in process.messages)
-        blocks.append(f"<ul>\n{items}\n</ul>")
-    else:
-        blocks.append("<p>None.</p>")
-    return "\n".join(blocks)
+    items = "\n".join(f"<li>{escape(message.text)}</li>" for message in process.messages)
+    messages = f"<ul>\n{items}\n</ul>" if items else "<p>None.</p>"
+    return "\n".join([*blocks, "<h3>Messages</h3>", messages])
 
 
 def _source_rows(what: str, source: SourceFile | None) -> list[tuple[str, str]]:

@@ -24,11 +24,7 @@ _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a li
 
 
 def draw_scan(axes: Axes, data: ApparatusData) -> None:
-    """Draw the scan on a linear axis, in mV; the right-hand axis reads U/A in kPa.
-
-    The two axes are one scale: the reference is drawn as baseline + A sigma_zz, so that its
-    distance from the points is what the sensor's apparatus function blurs away.
-    """
+    """Draw the scan on a linear axis, in mV; the right-hand axis reads U/A in kPa."""
     scan = data.reconvolution
     _draw_measured(axes, scan.x, scan.u_zz, _finite_errors(scan.u_zz_errors))
     _draw_predictions(axes, data)
@@ -43,8 +39,7 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
 def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     """Draw the scan less its baseline on a logarithmic axis.
 
-    A point below twice its standard uncertainty is not a measurement of a magnitude: its
-    upper limit, max(U, 0) + 2u, is drawn instead, as an open triangle pointing down.  Of a
+    Of a point below 2u the upper limit, max(U, 0) + 2u, is drawn as an open triangle.  Of a
     tangential channel, the side where the voltage is negative is turned over.
     """
     scan = data.reconvolution
@@ -88,19 +83,9 @@ def _draw_measured(
         points.set_label("scan" if not label.startswith("_") else label)
         return
     axes.errorbar(
-        x / MM,
-        u / MV,
-        errors / MV,
-        fmt="o",
-        ms=size,
-        mfc="white",
-        mew=0.7,
-        color=colour,
-        elinewidth=0.7,
-        capsize=1.5 if x.size <= 100 else 0,
-        zorder=2,
-        label=label,
-    )
+        x / MM, u / MV, errors / MV, fmt="o", ms=size, mfc="white", mew=0.7, color=colour,
+        elinewidth=0.7, capsize=1.5 if x.size <= 100 else 0, zorder=2, label=label,
+    )  # fmt: skip
 
 
 def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> None:
@@ -115,7 +100,8 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
         if net:
             curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
-        line_like = (x.size < scan.x.size or _single_valued(scan.x)) and not _joint(data)
+        single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
+        line_like = single_valued and not _joint(data)
         (line,) = axes.plot(x / MM, curve / MV, style, color=COLOURS[name], label=label, zorder=3)
         if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
             line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
@@ -129,10 +115,8 @@ def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         order = np.argsort(x, kind="stable")
         return x[order], u[order]
     mean = np.bincount(inverse, weights=u) / np.bincount(inverse)
-    spread = np.max(np.abs(u - mean[inverse]))
-    if spread <= 1e-3 * np.ptp(u):
-        return places, mean
-    return x, u
+    alike = np.max(np.abs(u - mean[inverse])) <= 1e-3 * np.ptp(u)
+    return (places, mean) if alike else (x, u)
 
 
 def _joint(data: ApparatusData) -> bool:
@@ -140,15 +124,8 @@ def _joint(data: ApparatusData) -> bool:
     return "further_scans" in data.process.configuration
 
 
-def _single_valued(x: FloatArray) -> bool:
-    return bool(np.unique(x).size == x.size)
-
-
 def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> None:
-    """Draw baseline + A sigma_zz for the scan's load, mirrored about the centre.
-
-    ``net``: less baseline and drift, and only where positive.
-    """
+    """Draw baseline + A sigma_zz for the scan's load about the centre; ``net``: only A sigma_zz."""
     reference, constant = data.reference, data.conversion_constant
     stress = _seen_stress(data)
     if not (np.isfinite(constant) and constant > 0) or stress is None:
@@ -160,15 +137,8 @@ def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> No
     curve = np.concatenate([voltage[::-1], voltage])
     if not net:
         curve = _turned(data, x) * curve + _background(data, x)
-    axes.plot(
-        x / MM,
-        curve / MV,
-        "-.",
-        color=COLOURS["reference"],
-        lw=1.0,
-        zorder=1.5,
-        label=rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)",
-    )
+    (line,) = axes.plot(x / MM, curve / MV, "-.", color=COLOURS["reference"], lw=1.0, zorder=1.5)
+    line.set_label(rf"reference $\sigma_{{{channel_indices(data)}}}$ (right axis)")
 
 
 def _reference_peak(data: ApparatusData) -> float:
@@ -213,8 +183,7 @@ def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
 
 def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
     """Add the right-hand axis (U - baseline)/A in kPa; without a positive A there is none."""
-    constant = data.conversion_constant
-    if not (np.isfinite(constant) and constant > 0):
+    if not (np.isfinite(constant := data.conversion_constant) and constant > 0):
         return
     per_mv, offset = MV / constant / KPA, baseline / MV
 
@@ -236,12 +205,9 @@ def _centre(data: ApparatusData) -> float:
 
 
 def _by_distance(data: ApparatusData) -> bool:
-    """Whether a raster's points are given by their distance from the centre.
-
-    A raster has a second centre; its points along x alone would be negative somewhere.  Several
-    scans of a tangential channel keep the sign of the distance.
-    """
+    """Whether a raster's points are given by their distance from the centre."""
     raster = any(name.startswith("centre_") for name in data.parameters.names)
+    # Several scans of a tangential channel keep the sign of the distance.
     signed = _tangential(data) and _joint(data)
     return raster and (signed or bool(np.all(data.reconvolution.x >= 0)))
 
@@ -252,11 +218,7 @@ def _baseline(data: ApparatusData) -> float:
 
 
 def _background(data: ApparatusData, x: FloatArray) -> FloatArray:
-    """Return baseline and drift at positions x, in V.
-
-    ``drift`` is the change of the baseline from one end of the scan to the other.  Points
-    given by their distance from a raster's centre no longer tell where on it they were.
-    """
+    """Return baseline and drift, its change from end to end, at positions x, in V."""
     level = np.full(x.shape, _baseline(data))
     along = data.reconvolution.x
     if "drift" in data.parameters and np.ptp(along) > 0 and not _by_distance(data):
@@ -277,10 +239,7 @@ def limit_to_scan(axes: Axes, x: FloatArray) -> None:
 
 
 def draw_residuals(axes: Axes, data: ApparatusData) -> None:
-    """Draw measured minus predicted in units of each point's standard uncertainty.
-
-    Points beyond the axis are drawn at its edge as triangles, never dropped.
-    """
+    """Draw residuals over each point's standard uncertainty; those beyond the axis at its edge."""
     scan = data.reconvolution
     errors, scale = _residual_scale(data)
     with_g, with_gaussian = scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors
@@ -294,11 +253,9 @@ def draw_residuals(axes: Axes, data: ApparatusData) -> None:
         (with_g, "deconvolved", "o", COLOURS["deconvolved"]),
     ):
         label = f"{'Gaussian' if name == 'gaussian' else 'G'}: rms {_rms(z):.2f}"
-        (points,) = axes.plot(
-            scan.x / MM, z, ls="none", marker=marker, ms=size, mew=0.3 if many else 0.7
-        )
+        (points,) = axes.plot(scan.x / MM, z, ls="none", marker=marker, ms=size)
         points.set(color=COLOURS[name], markerfacecolor=face, label=label)
-        points.set_rasterized(many)
+        points.set(rasterized=many, markeredgewidth=0.3 if many else 0.7)
         _mark_beyond(axes, scan.x, z, limit, COLOURS[name])
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")

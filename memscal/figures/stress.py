@@ -23,7 +23,6 @@ from memscal.figures.style import (
 )
 from memscal.measurement.restoration import Comparison, Restoration
 from memscal.mechanics.contact import Contact
-from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
 
@@ -76,36 +75,19 @@ def _coloured(measured: MeasuredStress) -> Iterator[tuple[MeasuredProfile, str]]
 
 
 def _draw(axes: Axes, profile: MeasuredProfile, colour: str, *, logarithmic: bool) -> None:
-    """Draw a profile; if ``logarithmic``, points not distinct from zero are pale, without bars.
-
-    On a logarithmic axis their bars have no lower end.
-    """
+    """Draw a profile; if ``logarithmic``, points not distinct from zero are pale, without bars."""
     lubricated = profile.lubrication == "lubricated"
-    line: dict[str, Any] = {
-        "color": colour,
-        "lw": 0.8,
-        "ls": "--" if lubricated else "-",
-        "alpha": 0.7,
-    }
-    axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, **line)
+    (line,) = axes.plot(profile.curve_r / MM, profile.curve_s_zz / KPA, color=colour, lw=0.8)
+    line.set(ls="--" if lubricated else "-", alpha=0.7)
     bars = _MEASURED_STRESS_EXPANDED * profile.s_zz_errors
     shown = profile.s_zz > bars if logarithmic else np.ones(profile.r.size, dtype=np.bool_)
-    look: dict[str, Any] = {
-        "marker": "s" if lubricated else "o",
-        "ls": "none",
-        "color": colour,
-        "mew": 0.7,
-    }
-    look |= {"ms": 2.6, "mfc": "white" if lubricated else colour}
-    axes.errorbar(
-        profile.r[shown] / MM,
-        profile.s_zz[shown] / KPA,
-        yerr=bars[shown] / KPA,
-        elinewidth=0.6,
-        **look,
-    )
+    marker, face = ("s", "white") if lubricated else ("o", colour)
+    look: dict[str, Any] = {"marker": marker, "ls": "none", "color": colour, "mew": 0.7}
+    look |= {"ms": 2.6, "mfc": face}
+    r, stress = profile.r / MM, profile.s_zz / KPA
+    axes.errorbar(r[shown], stress[shown], yerr=bars[shown] / KPA, elinewidth=0.6, **look)
     if not shown.all():
-        axes.plot(profile.r[~shown] / MM, profile.s_zz[~shown] / KPA, alpha=0.3, **look)
+        axes.plot(r[~shown], stress[~shown], alpha=0.3, **look)
     radius = profile.contact_radius / MM
     axes.axvline(radius, ymin=0.94, color=colour, lw=1.2, ls=":" if lubricated else "-")
 
@@ -118,20 +100,10 @@ def _legend(figure: Figure, measured: MeasuredStress) -> None:
             seen.add(colour)
             handles.append(Line2D([], [], color=colour, lw=2.0, label=f"{profile.load:.3g} N"))
     for state in dict.fromkeys(profile.lubrication for profile in measured.profiles):
-        lubricated = state == "lubricated"
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color="0.2",
-                lw=0.8,
-                marker="s" if lubricated else "o",
-                ms=3.2,
-                mfc="white" if lubricated else "0.2",
-                ls="--" if lubricated else "-",
-                label=f"{state or 'measured'}, ±1.96u",
-            )
-        )
+        marker, face, ls = ("s", "white", "--") if state == "lubricated" else ("o", "0.2", "-")
+        handle = Line2D([], [], color="0.2", lw=0.8, marker=marker, ms=3.2, mfc=face, ls=ls)
+        handle.set_label(f"{state or 'measured'}, ±1.96u")
+        handles.append(handle)
     radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
     figure.legend(
         handles=[*handles, radius], loc="outside upper center", ncols=min(len(handles) + 1, 7)
@@ -175,9 +147,7 @@ def _draw_stress(axes: Axes, restored: Restoration, compared: Comparison | None)
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
     many = restored.points.u.size > SCATTER_THRESHOLD
     size = 1.2 if many else 0.8 * marker_size(restored.points.u.size)
-    (points,) = axes.plot(
-        restored.distance / MM, restored.measured_stress / KPA, ls="none", marker="o"
-    )
+    (points,) = axes.plot(restored.distance / MM, restored.measured_stress / KPA, "o")
     points.set(color=COLOURS["measured"], ms=size, mfc="none", mew=0.6)
     points.set(label="scan, $S_{zz} = U/A$", rasterized=many)
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
@@ -258,8 +228,13 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
         axes.plot(r / MM, pressure / KPA, color=colour, label=label)
         if contact.friction > 0:
             axes.plot(r / MM, contact.interface_shear(r) / KPA, color=colour, ls="--")
-        highest = max(highest, _shown_pressure(contact, pressure))
-        _mark_radii(axes, contact, colour)
+        top = float(pressure.max())
+        if not math.isfinite(contact.max_interface_stress):
+            top = _SHOWN_MEANS * contact.load / (math.pi * contact.contact_radius**2)
+        highest = max(highest, top)
+        axes.plot(contact.contact_radius / MM, 0.0, marker="|", ms=8, mew=1.2, color=colour)
+        if 0 < contact.stick_radius < contact.contact_radius:
+            axes.plot(contact.stick_radius / MM, 0.0, "o", ms=3, mfc="none", color=colour)
     axes.set_ylim(top=1.08 * highest / KPA)
     axes.plot([], [], color="0.4", marker="|", ms=8, ls="none", label="contact radius")
     if any(0 < contact.stick_radius < contact.contact_radius for contact in contacts):
@@ -269,19 +244,6 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
     axes.set(xlabel="radius (mm)", ylabel="at the interface (kPa)")
     legend_above(axes, columns=2)
-
-
-def _shown_pressure(contact: Contact, pressure: FloatArray) -> float:
-    if math.isfinite(contact.max_interface_stress):
-        return float(pressure.max())
-    return _SHOWN_MEANS * contact.load / (math.pi * contact.contact_radius**2)
-
-
-def _mark_radii(axes: Axes, contact: Contact, colour: str) -> None:
-    """Mark the contact radius, and the radius within which the film sticks."""
-    axes.plot(contact.contact_radius / MM, 0.0, marker="|", ms=8, mew=1.2, color=colour)
-    if 0 < contact.stick_radius < contact.contact_radius:
-        axes.plot(contact.stick_radius / MM, 0.0, marker="o", ms=3, mfc="none", color=colour)
 
 
 def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:

@@ -70,10 +70,8 @@ _STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
     "axes.formatter.use_mathtext": True,
     "axes.formatter.limits": (-5, 6),  # a factor above the axis would lie under the legend
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), 7.0),
+    **dict.fromkeys(("xtick.direction", "ytick.direction"), "in"),
     "xtick.top": True,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
@@ -95,10 +93,9 @@ _STYLE: dict[str, Any] = {
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Set matplotlib's settings to those of this module, and restore the user's afterwards.
+    """Set matplotlib's settings to those of this module, not the user's, and restore them after.
 
-    The user's matplotlibrc has no effect, so that a figure looks the same everywhere.
-    Settings are read both when a figure is built and when it is rendered: both need this.
+    They are read both when a figure is built and when it is rendered: both need this.
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -126,9 +123,7 @@ def panel_letter(axes: Axes, letter: str) -> None:
     label = axes.annotate(
         letter, (0.0, 1.0), (-30, 4), xycoords="axes fraction", textcoords="offset points"
     )
-    label.set_fontweight("bold")
-    label.set_fontsize(10)
-    label.set_in_layout(False)
+    label.set(fontweight="bold", fontsize=10, in_layout=False)
 
 
 def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:
@@ -177,10 +172,7 @@ def figure_format(suffix: str) -> str:
 
 
 def render_figure(figure: Figure, file_format: str, *, dpi: float = 200.0) -> bytes:
-    """Return the figure as the bytes of a PNG, SVG or PDF file, without dates.
-
-    ``dpi`` is that of a PNG, and of the point clouds inside the others.
-    """
+    """Return the figure as the bytes of a PNG, SVG or PDF file, without dates."""
     metadata = _METADATA[figure_format("." + file_format)]
     buffer = io.BytesIO()
     with house_style():

@@ -21,24 +21,15 @@ _SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge
 def sweep_figure(sweep: Sweep) -> Figure:
     """Draw how A, sigma and the reconvolution change with the noise that regularises them.
 
-    A line joins the results of the exact expectation.  Dots are seeded draws, with their
-    median and the range that holds the middle 68 % of them.  Single draws are heavy-tailed:
-    those beyond the axis are drawn at its edge as triangles, and counted.
+    A line joins exact expectations; dots are draws, those beyond the axis triangles at its edge.
     """
+    constants = sweep.conversion_constant, sweep.seed_conversion_constant
+    widths = sweep.gaussian_sigma_deconvolved, sweep.seed_gaussian_sigma
     power = _power_of_ten(sweep.conversion_constant / MV)
+    unit = f"$10^{{{power}}}$ mV/Pa" if power else "mV/Pa"
     rows = (
-        (
-            f"$A$ ($10^{{{power}}}$ mV/Pa)" if power else "$A$ (mV/Pa)",
-            sweep.conversion_constant,
-            sweep.seed_conversion_constant,
-            MV * 10.0**power,
-        ),
-        (
-            r"$\sigma$ of deconvolved $G$ (mm)",
-            sweep.gaussian_sigma_deconvolved,
-            sweep.seed_gaussian_sigma,
-            MM,
-        ),
+        (f"$A$ ({unit})", *constants, MV * 10.0**power),
+        (r"$\sigma$ of deconvolved $G$ (mm)", *widths, MM),
         ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
     )
     with house_style():
@@ -75,15 +66,8 @@ def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: Float
     low, high = _limits(exact, draws)
     if np.any(np.isfinite(draws)):
         _draw_seeds(axes, amplitude, draws, (low, high))
-    axes.plot(
-        amplitude,
-        exact,
-        "-o",
-        color=COLOURS["deconvolved"],
-        ms=4,
-        label="exact expectation",
-        zorder=4,
-    )
+    (line,) = axes.plot(amplitude, exact, "-o", color=COLOURS["deconvolved"], ms=4, zorder=4)
+    line.set_label("exact expectation")
     axes.set_ylim(low, high)
 
 
@@ -106,16 +90,9 @@ def _draw_seeds(
         beyond = sign * draws > sign * edge
         outside += int(np.sum(beyond))
         places = amplitude[np.any(beyond, axis=1)]
-        level = np.full(places.size, 0.96 if sign > 0 else 0.04)
-        axes.plot(
-            places,
-            level,
-            marker,
-            color=colour,
-            ms=4,
-            transform=axes.get_xaxis_transform(),
-            label="_beyond the axis",
-        )
+        level, across_x = np.full(places.size, 0.5 + 0.46 * sign), axes.get_xaxis_transform()
+        label = "_beyond the axis"
+        axes.plot(places, level, marker, color=colour, ms=4, transform=across_x, label=label)
     if outside:
         note = f"{outside} of {int(np.sum(np.isfinite(draws)))} draws beyond the axis"
         axes.set_title(note, loc="right", fontsize=7, color=COLOURS["muted"], pad=2)

@@ -54,20 +54,8 @@ def amontons_family(
 ) -> ProfileFamily:
     """Return the base stresses of a sphere on a film for a range of friction coefficients.
 
-    ``loads`` (L,) are in N; the coefficients increase from 0 or above, the last may be ``inf``;
-    ``loading`` is ``"incremental"`` or ``"total"`` (see :func:`memscal.indent`); ``reach`` (m) is
-    the largest distance from the axis at which stresses will be asked for.  ``order`` is zero for
-    the normal stress at the base, one for its shear.  Stated uncertainties become ``changes``.
-
-    >>> import numpy as np
-    >>> from memscal.model.indenter import Sphere
-    >>> film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    >>> family = amontons_family(
-    ...     film, Sphere(radius=128.8e-3), [0.34], friction=[0, math.inf], reach=8e-3
-    ... )
-    >>> maxima = family.wavenumbers.synthesise(family.spectra[:, 0].T, np.array(0.0))
-    >>> (maxima / 1e3).round(1)
-    array([27.7, 30.9])
+    ``loads`` (L,) are in N; ``reach`` (m) is the largest distance from the axis at which stresses
+    will be asked for; ``order`` is zero for the normal stress at the base, one for its shear.
     """
     setup = FamilySetup.of(
         film, indenter, loads, reach=reach, cache=cache, workers=workers, order=order
@@ -108,11 +96,9 @@ def elasto_plastic_family(
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ProfileFamily:
-    r"""Return the base stresses for a range of slip lengths (m) at a given friction coefficient.
+    """Return the base stresses for a range of slip lengths (m) at a given friction coefficient.
 
-    The interface yields elastically before it slips: :math:`q = -\mu p\,e/\ell` for
-    :math:`|e| \le \ell` (see :class:`memscal.Interface`).  Loading is incremental.  A slip length
-    of 0 is the rigid interface at that friction; ``inf`` bears no shear.
+    Loading is incremental.  A slip length of 0 is the rigid interface; ``inf`` bears no shear.
     """
     setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
     values = parameter_values("slip lengths", slip_lengths)
@@ -134,7 +120,7 @@ def elasto_plastic_family(
         name="elasto-plastic",
         loading="incremental",
         values=values,
-        scale=_natural_length(setup),
+        scale=film.thickness**2 / setup.indenter.radius,
         a_length=True,
         notes=(f"Macroscopic friction coefficient {friction:g}.",),
     )
@@ -155,8 +141,7 @@ def normal_compliance_family(
 
     ``"exponential"``: :math:`p = p_1 e^{-d/\lambda}` with the length :math:`\lambda`; the pressure
     :math:`p_1` only shifts the depth.  ``"greenwood-tripp"``: asperities of the roughness
-    :math:`\sigma`, with :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.  Lengths go
-    up to eight times the film's roughness (2 um where it states none) by default.
+    :math:`\sigma`, with :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.
     """
     setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
     if law not in ("exponential", "greenwood-tripp"):
@@ -178,7 +163,7 @@ def normal_compliance_family(
         name="normal-compliance",
         loading="",
         values=values,
-        scale=_natural_length(setup),
+        scale=film.thickness**2 / setup.indenter.radius,
         a_length=True,
         stronger=stronger if law == "greenwood-tripp" else None,
         notes=(_NORMAL_NOTES[law],),
@@ -208,11 +193,6 @@ def _normal(law: str, film: ElasticFilm, length: float, strength: float) -> Inte
     )
 
 
-def _natural_length(setup: FamilySetup) -> float:
-    """Return h^2/R, in m."""
-    return setup.film.thickness**2 / setup.indenter.radius
-
-
 #: Stresses are calculated out to this multiple of the largest distance from the centre.
 _REACH = 1.1
 #: Loads are near whose logarithms differ by less: stresses are linear between to 2e-5.
@@ -235,9 +215,7 @@ class LawFamilies:
         self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
     ) -> ProfileFamily:
         """Return incremental contacts of Amontons' law, from no friction to full stick."""
-        if calculated is not None and not (
-            calculated.values[0] == 0 and math.isinf(calculated.values[-1])
-        ):
+        if calculated is not None and tuple(calculated.values[[0, -1]]) != (0.0, math.inf):
             calculated = None
 
         def family() -> ProfileFamily:
@@ -254,8 +232,7 @@ class LawFamilies:
     ) -> ProfileFamily:
         """Return contacts of the elasto-plastic law at a macroscopic coefficient.
 
-        The difference to those at one standard uncertainty more is the change named
-        ``"macroscopic_friction"``.
+        The change by its standard uncertainty is named ``"macroscopic_friction"``.
         """
 
         def at(film: ElasticFilm, mu: float) -> ProfileFamily:

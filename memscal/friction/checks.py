@@ -187,8 +187,7 @@ def _against_macroscopic(
                 verdict = "agrees with the macroscopic one"
             words = f" ({loading} loading)" if loading else ""
             yield Message(
-                "macroscopic",
-                f"The effective friction coefficient{words} {verdict}, {value:.3g}.",
+                "macroscopic", f"The effective friction coefficient{words} {verdict}, {value:.3g}."
             )
 
 

@@ -58,11 +58,8 @@ __all__ = [
 
 def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredScan]:
     """Return the scans, and those of which a stress was measured."""
-    return [
-        scan
-        for item in contacts
-        for scan in (item.scans if isinstance(item, MeasuredStress) else (item,))
-    ]
+    of_items = (item.scans if isinstance(item, MeasuredStress) else (item,) for item in contacts)
+    return [scan for scans in of_items for scan in scans]
 
 
 def require_contacts(scans: Sequence[Scan | MeasuredScan]) -> None:
@@ -264,10 +261,7 @@ def compare_measured(
     *,
     macroscopic: tuple[float, float | None] | None = None,
 ) -> FrictionComparison:
-    """Compare measured stress with families, by definition of the loading.
-
-    The families' loads hold every measured one.
-    """
+    """Compare measured stress with families by loading, which hold every measured load."""
     confronted = _confronted(measured, apparatus, families)
     loads = {
         name: tuple(load_comparison(p, of_family, i) for i, p in enumerate(measured.profiles))

@@ -21,12 +21,7 @@ from memscal.friction.likelihood import (
     points_at,
     predict,
 )
-from memscal.friction.results import (
-    BoundedEstimate,
-    DryAgainstLubricated,
-    Interval,
-    LoadComparison,
-)
+from memscal.friction.results import BoundedEstimate, DryAgainstLubricated, Interval, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_bound
 
@@ -53,11 +48,7 @@ _EXPANDED = 1.96
 def bracketed_share(
     measured: FloatArray, errors: FloatArray, calculated: FloatArray, calculated_errors: FloatArray
 ) -> float:
-    """Return the share of points between the extremes of a family, within 1.96 u.
-
-    Stresses (n,) against calculated ones (m, n), in Pa.  Where the profiles of different friction
-    cross, away from the axis, the larger of the two extremes is above.
-    """
+    """Return the share of stresses (n,) within 1.96 u of the extremes of calculated ones (m, n)."""
     ends, end_errors = calculated[[0, -1]], calculated_errors[[0, -1]]
     allowed = _EXPANDED * np.hypot(errors, end_errors)
     above = (ends + allowed).max(axis=0)
@@ -84,9 +75,8 @@ def profile_estimate(
 ) -> BoundedEstimate:
     """Return best value and interval of chi-square (m,) along an increasing bounded coordinate.
 
-    The coordinates are fine enough for a cubic spline; ``value_at`` takes one to the parameter's
-    value.  There is a value where the interval has an upper end (with ``two_sided`` both ends);
-    elsewhere ``reason`` says why not.
+    There is a value where the interval has an upper end (with ``two_sided`` both ends); elsewhere
+    ``reason`` says why not.
     """
     from scipy.interpolate import CubicSpline
 
@@ -140,10 +130,7 @@ def _crossing(
 
 
 def friction_reason(interval: Interval, last: float) -> str:
-    """Say why there is no friction coefficient; empty where there is one.
-
-    ``last`` is the last coefficient that was calculated; ``inf`` is full stick.
-    """
+    """Say why there is no friction coefficient, ``last`` being the last one that was calculated."""
     if interval.high is not None:
         return ""
     end = "full stick" if np.isinf(last) else f"{last:.3g}, the last one calculated,"
@@ -263,11 +250,7 @@ def random_uncertainty(budget: Mapping[str, float]) -> float:
 
 
 def with_loading(estimate: BoundedEstimate, other: BoundedEstimate | None) -> BoundedEstimate:
-    r"""Add to a budget what the other definition of the loading would have given.
-
-    The truth lies anywhere between the two: a rectangle of their difference, whose standard
-    uncertainty is :math:`|\Delta| / \sqrt{12}`.
-    """
+    """Add to a budget what the other loading would have given: a rectangle's u, of their width."""
     if estimate.value is None or other is None or other.value is None:
         return estimate
     apart = abs(estimate.value - other.value) / math.sqrt(12)
@@ -309,10 +292,7 @@ def load_comparison(
 def _blurred(
     sensor: Sensor, members: ProfileFamily, load: int, r: FloatArray, like: LoadPoints
 ) -> tuple[FloatArray, FloatArray]:
-    """Return G convolved with the base stress of each member at radii, and its uncertainty.
-
-    That of A is not counted: it is the measured stress's.
-    """
+    """Return G convolved with each member's base stress, and its uncertainty (not that of A)."""
     predicted = predict(points_at(r, like), sensor.of_shape, members, load)
     variance = np.zeros_like(predicted.signal)
     for column in predicted.columns.values():
@@ -359,13 +339,10 @@ def dry_against_lubricated(
 ) -> DryAgainstLubricated | None:
     """Compare the dry and the lubricated profile of one load, without A.
 
-    The difference of the voltages at the same places is held against none.  An error of A scales
-    a difference that is small, an error of G or of the film changes both alike: what is left is
-    noise, the scatter of the loads, and each scan's own baseline, drift and centre.  ``None`` is
-    returned where the scans have too few places in common.  ``frictionless``, the calculated
-    contact without friction, says how voltages change with load and place where those of the two
-    scans differ; ``loads`` are its loads of the two, and ``conversion_share`` is the relative
-    standard uncertainty of A.
+    Errors of A, G and film nearly cancel in the difference: what is left is noise, the scatter of
+    the loads, and each scan's own baseline, drift and centre.  ``frictionless`` says how voltages
+    change with load and place, ``loads`` are its loads of the two, ``conversion_share`` is the
+    relative standard uncertainty of A.  ``None``: the scans have too few places in common.
     """
     sides = [of_load.averaged() for of_load in points]
     kept = _common(sides[0].offset, sides[1].offset)
@@ -388,12 +365,8 @@ def dry_against_lubricated(
     degrees = kept[0].size - flat.shape[1]
     difference, errors = _difference(profiles, sides, predicted, kept, sensor, conversion_share)
     top = profiles[0].maximum - profiles[1].maximum
-    u_top = float(
-        np.hypot(
-            conversion_share * top,
-            math.hypot(*(random_uncertainty(profile.maximum_budget) for profile in profiles)),
-        )
-    )
+    random = (random_uncertainty(profile.maximum_budget) for profile in profiles)
+    u_top = math.hypot(conversion_share * top, *random)
     return DryAgainstLubricated(
         load=profiles[0].load,
         r=sides[0].radius[kept[0]],

@@ -12,12 +12,7 @@ from memscal.axisymmetry.hankel import hankel_transform
 from memscal.errors import InputError
 from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import amontons_family
-from memscal.friction.family import (
-    FRICTION_SCALE,
-    ProfileFamily,
-    base_wavenumbers,
-    require_loads,
-)
+from memscal.friction.family import FRICTION_SCALE, ProfileFamily, base_wavenumbers, require_loads
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
@@ -47,10 +42,8 @@ def external_family(
 ) -> ProfileFamily:
     """Return the base stresses of tables that were calculated elsewhere, by friction coefficient.
 
-    One table for each load and coefficient: a load within 1 % of one that is asked for serves it,
-    its stress scaled in proportion.  Film and sphere, by default as the first table states them,
-    are solved at the tables' coefficients and their sensitivities taken over; where they are not
-    known there are none, and the stress counts as proportional to the load.
+    A table serves loads within 1 % of its own.  Sensitivities are those of contacts solved here,
+    where film and sphere are given or stated by a table.
     """
     nominal = require_loads(loads)
     tables = [_checked(profile, reach) for profile in profiles]
@@ -61,9 +54,12 @@ def external_family(
     grid = _grid(tables, frictions, nominal)
     film = film or next((p.film for p in tables if p.film is not None), None)
     indenter = indenter or next((p.indenter for p in tables if p.indenter is not None), None)
-    # Where no film is known, the tables' own spacing says how fine their stress can be.
-    nodes = base_wavenumbers(film.thickness if film is not None else _finest(tables), reach)
-    spectra = np.array([[_transform(cell, nodes.k) for cell in row] for row in grid])
+    # Where no film is known: a stress halves over about the film's thickness.
+    thickness = film.thickness if film else min(_half_width(profile) for profile in tables)
+    nodes = base_wavenumbers(thickness, reach)
+    spectra = np.array(
+        [[hankel_transform(cell.r, cell.sigma_zz, nodes.k) for cell in row] for row in grid]
+    )
     spectra *= (nominal / np.array([[cell.load for cell in row] for row in grid]))[:, :, None]
     by_load, changes = spectra, {}
     notes = "No film and sphere are known: the stress counts as proportional to the load."
@@ -190,15 +186,6 @@ def _name(profile: StressProfile) -> str:
     if profile.source is not None:
         return profile.source.file_name
     return f"A table for {profile.load:g} N"
-
-
-def _transform(profile: StressProfile, k: FloatArray) -> FloatArray:
-    return hankel_transform(profile.r, profile.sigma_zz, k)
-
-
-def _finest(tables: Sequence[StressProfile]) -> float:
-    """Return the film's thickness that fits the tables: a stress halves over about as much."""
-    return min(_half_width(profile) for profile in tables)
 
 
 def _half_width(profile: StressProfile) -> float:

@@ -26,12 +26,7 @@ from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import ConvergenceError, DomainError, InputError, MemscalError
-from memscal.formats.cache import (
-    CacheFolder,
-    find_contact_table,
-    keep_contact_table,
-    table_key,
-)
+from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_table, table_key
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
@@ -239,8 +234,7 @@ def _scaled_changes(
 ) -> dict[str, FloatArray]:
     """Return the changes by one stated standard uncertainty that the contact's scales give.
 
-    The keywords are derivatives by logarithms: of the load, the wavenumber, and of length and
-    strength of the interface's law, which are zero for a rigid one.
+    The keywords are derivatives by the logarithms of load and wavenumber, and of the interface's.
     """
     stiffer = spectra - load
     derivatives = {
@@ -261,10 +255,7 @@ def _scaled_changes(
 
 
 def _poisson_ratios(film: ElasticFilm) -> tuple[float, float] | None:
-    """Return two Poisson's ratios whose difference shows its influence; ``None`` if it is exact.
-
-    An incompressible film is at the end of the range: the difference is then one-sided.
-    """
+    """Return two Poisson's ratios whose difference shows its influence; ``None`` if it is exact."""
     if not (u := film.poisson_ratio_uncertainty):
         return None
     step = max(u, _SMALLEST_STEP)
@@ -289,8 +280,7 @@ _STRETCH = 1e-4
 class LoadingPath:
     """A loading of one film with one interface, looked at at ``loads`` (N, in any order).
 
-    ``derivatives``: whether those by load and wavenumber are needed; ``order``: zero for the
-    normal stress at the base, one for the shear.
+    ``order`` is zero for the normal stress at the base, one for the shear.
     """
 
     film: ElasticFilm
@@ -309,8 +299,7 @@ def solve_paths(
     """Return the arrays of several paths at ``k`` (rad/m), solved in one or more processes.
 
     ``spectra`` (L, K) in N with ``by_load`` and ``by_wavenumber``, derivatives by the logarithms
-    (zero where not needed), and ``depths``, ``contact_radii``, ``convergence`` (L,).  Each path is
-    solved by itself: the result does not depend on the number of processes.
+    (zero where not needed), and ``depths``, ``contact_radii``, ``convergence`` (L,).
     """
     several = min(workers, len(paths))
     if several < 2:
@@ -484,8 +473,7 @@ class FamilySetup:
     ) -> ProfileFamily:
         """Return the family of some paths, as it was kept or calculated now.
 
-        ``a_length`` says whether its values are lengths; ``stronger`` are the paths with an
-        interface that is stronger by ``STRONGER``, where that makes a difference.
+        ``stronger`` are paths with an interface stronger by ``STRONGER``, where that matters.
         """
         k = self.wavenumbers.k
         key = _family_key(paths, values, scale, k)

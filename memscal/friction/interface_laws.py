@@ -95,20 +95,24 @@ class LawCurve:
 def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] = ()) -> LawCurve:
     """Return the likelihood along a family's parameter, of all loads or of one by its index.
 
-    Nodes are even in the bounded coordinate, with more of them where the likelihood is not
-    negligible; ``also`` are values that are nodes too.
+    Nodes are even in the bounded coordinate, closer where it matters; ``also`` are nodes too.
     """
     family = measured.family
     first, last = family.coordinates[0], family.coordinates[-1]
     extra = [family.coordinate(value) for value in also]
     coarse = np.unique(np.concatenate([np.linspace(first, last, _COARSE), extra]))
-    rough = _group(_tables(measured, coarse), load)
+
+    def tables_at(coordinates: FloatArray) -> Tables:
+        tables = measured.tables(family.values_at(coordinates))
+        return tables.together() if load is None else tables.group(load)
+
+    rough = tables_at(coarse)
     rough_log = log_likelihood(rough)[0][:, 0]
     near = np.flatnonzero(2 * (rough_log.max() - rough_log) < _EXCLUDED)
     low, high = coarse[max(near[0] - 1, 0)], coarse[min(near[-1] + 1, coarse.size - 1)]
     count = _FINE if load is None else _FINER
     fine = np.setdiff1d(np.linspace(low, high, count), coarse)
-    close = _group(_tables(measured, fine), load)
+    close = tables_at(fine)
     both = np.concatenate([coarse, fine])
     order = np.argsort(both)
     tables = Tables(
@@ -127,26 +131,11 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     )
 
 
-def _tables(measured: Measured, coordinates: FloatArray) -> Tables:
-    return measured.tables(measured.family.values_at(coordinates))
-
-
-def _group(tables: Tables, load: int | None) -> Tables:
-    return tables.together() if load is None else tables.group(load)
-
-
 def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter for all loads; degrees are points less nuisances."""
-    best = along.best
-    return _law(
-        name,
-        (float(along.values[best]),),
-        along.log_evidence(prior),
-        0.0,
-        float(along.log_likelihood[best]),
-        float(along.chi_square[best]),
-        degrees - 1,
-    )
+    best, log_evidence = float(along.values[along.best]), along.log_evidence(prior)
+    top, least = float(along.log_likelihood[along.best]), float(along.chi_square[along.best])
+    return _law(name, (best,), log_evidence, 0.0, top, least, degrees - 1)
 
 
 def of_one_value(name: str, along: LawCurve, index: int, degrees: int) -> InterfaceLaw:
@@ -219,10 +208,7 @@ _STICK = 2e-4
 def implied_friction(
     rigid: Measured, slipping: Measured, length: BoundedEstimate, friction: float
 ) -> ImpliedFriction:
-    """Return what a slip length, and the ends of its interval, mean at each load.
-
-    Effective coefficients are read as from the maximum: from the largest stress behind G.
-    """
+    """Return what a slip length and its interval mean at each load, read from the maximum."""
     order = np.argsort(rigid.family.loads, kind="stable")
     high = math.inf if length.interval.high is None else length.interval.high
     lengths = np.array([length.interval.low, length.best, high])

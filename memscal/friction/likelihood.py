@@ -119,10 +119,7 @@ class LoadPoints:
 
 
 def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
-    """Return the points of a measured profile, with the noise that is stated, or was estimated.
-
-    A stated noise is taken at its word: raised by a misfit, it would hide it.
-    """
+    """Return the points of a measured profile, with the noise that is stated, or was estimated."""
     points = profile.points.get(channel)
     if points is None:
         raise _missing(profile, channel)
@@ -234,10 +231,7 @@ class Predicted:
 
 
 def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float) -> Sensor:
-    """Return a sensor at a family's nodes, with the changes of A G that its stresses feel.
-
-    Any rotation of independent changes is another set of them: one is taken in which few matter.
-    """
+    """Return a sensor at a family's nodes, with the changes of A G that its stresses feel."""
     nodes = family.wavenumbers
     middle = family.spectra[family.values.size // 2]
     changes = apparatus_changes(apparatus, nodes.k)
@@ -246,6 +240,7 @@ def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float)
     largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
     shapes = middle / largest[:, None]
     felt = np.concatenate([(kernel * row) @ changes for row in shapes])
+    # Any rotation of independent changes is another set of them: in this one few matter.
     if changes.shape[1]:
         _, sizes, axes = np.linalg.svd(felt, full_matrices=False)
         changes = changes @ axes[sizes > _UNFELT * sizes[0]].T
@@ -368,12 +363,13 @@ def standardise(points: LoadPoints, predicted: Predicted) -> Standardised:
         return left if values.ndim == 3 else left[..., 0]
 
     diagonal = np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))
+    pivots = whitener if whitener.ndim == 2 else np.diagonal(whitener, axis1=-2, axis2=-1)
     return Standardised(
         residual=projected(points.u - predicted.signal),
         slope=projected(predicted.by_coordinate),
         columns={source: projected(column) for source, column in predicted.columns.items()},
         noises={name: _scaled(whitener, points, name, kind) for name, kind in kinds.items()},
-        volume=2 * np.log(diagonal).sum(axis=-1) - 2 * _log_determinant(whitener),
+        volume=2 * np.log(diagonal).sum(axis=-1) - 2 * np.log(pivots).sum(axis=-1),
         degrees=points.degrees,
     )
 
@@ -401,11 +397,6 @@ def _scaled(whitener: FloatArray, points: LoadPoints, name: str, kind: FloatArra
     return whitener @ (points.noise[:, None] * np.linalg.cholesky(points.correlation))
 
 
-def _log_determinant(whitener: FloatArray) -> FloatArray:
-    diagonal = whitener if whitener.ndim == 2 else np.diagonal(whitener, axis1=-2, axis2=-1)
-    return np.asarray(np.log(diagonal).sum(axis=-1))
-
-
 @dataclass(frozen=True, eq=False)
 class Likelihood:
     """Chi-square of one load or several along V values of one parameter."""
@@ -426,25 +417,22 @@ class Likelihood:
     @cached_property
     def chi_square(self) -> FloatArray:
         """Least chi-square over all nuisances, shape (V,)."""
-        residual = self._joined([load.residual for load in self.loads])
+        residual = np.concatenate([load.residual for load in self.loads], axis=1)
         return np.asarray(np.einsum("vn,vn->v", residual, self._inverse_times(residual)))
 
     @cached_property
     def information(self) -> FloatArray:
         """Inverse variance of the bounded coordinate that the likelihood's slope tells, (V,)."""
-        slope = self._joined([load.slope for load in self.loads])
+        slope = np.concatenate([load.slope for load in self.loads], axis=1)
         return np.asarray(np.einsum("vn,vn->v", slope, self._inverse_times(slope)))
 
     def budget(self, index: int) -> dict[str, float]:
-        """Contribution of each source to the coordinate's uncertainty, at one of the values.
-
-        The gain by which the best coordinate follows the voltages, times what each source does to
-        them: the squares add up to the variance.
-        """
-        slope = self._joined([load.slope for load in self.loads])
+        """Contribution of each source to the coordinate's uncertainty, at one of the values."""
+        slope = np.concatenate([load.slope for load in self.loads], axis=1)
         information = float(self.information[index])
         if not information > 0:
             return {}
+        # The gain by which the best coordinate follows the voltages.
         gain = self._inverse_times(slope)[index] / information
         shares: dict[str, float] = {}
         pieces = np.split(gain, np.cumsum([load.residual.shape[1] for load in self.loads])[:-1])
@@ -492,18 +480,14 @@ class Likelihood:
     def _columns(self) -> dict[str, FloatArray]:
         """Systematic columns over all points by source."""
         return {
-            source: self._joined([self._columns_of(load, source) for load in self.loads])
+            source: np.concatenate([self._columns_of(load, source) for load in self.loads], axis=1)
             for source in self._widths
         }
-
-    @staticmethod
-    def _joined(arrays: Sequence[FloatArray]) -> FloatArray:
-        return np.concatenate(arrays, axis=1)
 
     @cached_property
     def _systematic(self) -> tuple[FloatArray, FloatArray]:
         """Columns of all sources, shape (V, n, q), and the inverse of 1 + D^T D."""
-        columns = self._joined([self._all_columns(load) for load in self.loads])
+        columns = np.concatenate([self._all_columns(load) for load in self.loads], axis=1)
         grip = np.swapaxes(columns, -1, -2) @ columns
         return columns, np.asarray(np.linalg.inv(grip + np.eye(columns.shape[-1])), np.float64)
 

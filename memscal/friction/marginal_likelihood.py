@@ -111,10 +111,7 @@ def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
 
 
 def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> Evidence:
-    """Return the evidence of a law with one parameter, from the nodes of its prior.
-
-    ``weights`` (M,): the prior's share of each node, of which the sum is at most 1.
-    """
+    """Return the evidence of a law with one parameter; ``weights`` (M,): the prior of each node."""
     with np.errstate(divide="ignore"):
         return Evidence(float(_log_sum(log_likelihoods + np.log(weights))))
 
@@ -122,10 +119,9 @@ def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> Evidenc
 def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) -> Evidence:
     """Return the evidence of a law with one parameter of each load, on its nodes and their weights.
 
-    The loads are taken one after the other.  Given the parameters of those before, the next one
-    is known at all nodes of its prior; it is drawn from that, and the mean over the draws of the
-    product of what each load had been expected to be is the evidence.  The draws are the points
-    of a Sobol sequence, so that the result is the same each time.
+    The loads are taken one after the other, and the parameter of each drawn given those before;
+    the evidence is the mean over the draws (of a Sobol sequence) of the product of what each load
+    was expected to be.
     """
     from scipy.stats.qmc import Sobol
 

@@ -73,11 +73,7 @@ _UM = 1e-6
 def weigh_slip_length(
     rigid: Measured, slipping: Measured, *, macroscopic: float, lubrication: str = "dry"
 ) -> LawComparison:
-    """Weigh a slip length against effective coefficients of a rigid interface.
-
-    The same points and sensor with contacts of Amontons' law along its coefficient, and with those
-    of the elasto-plastic law along the slip length.
-    """
+    """Weigh a slip length (``slipping``) against effective coefficients of a rigid interface."""
     of_friction = bounded_prior(rigid.family.scale, f"uniform in mu/(mu + {rigid.family.scale:g})")
     of_length = _log_prior("slip length", *_SLIP_LENGTHS)
     of_all = curve(rigid)
@@ -183,12 +179,9 @@ def compare_interface(
 ) -> InterfaceComparison:
     """Weigh laws of the interface by all loads together.
 
-    The macroscopic coefficient is that at which the indenter slides, measured otherwise; the
-    difference of contacts at it and at one standard uncertainty more becomes a systematic change.
-    Families that are given must hold a load within 1 % of each measured one, or are calculated:
-    ``amontons`` (incremental, from 0 to ``inf``), ``slipping`` (elasto-plastic at the macroscopic
-    coefficient, with its uncertainty among the changes), ``yielding`` (normally compliant).
-    Scans that do not state their lubrication count as dry.
+    The macroscopic coefficient is that at which the indenter slides.  Families without a load
+    within 1 % of each measured one are calculated: ``amontons`` (incremental, from 0 to ``inf``),
+    ``slipping`` (elasto-plastic at the macroscopic coefficient), ``yielding`` (normally compliant).
     """
     if not profiles:
         raise InputError("No measured profile is there to compare laws of the interface with.")

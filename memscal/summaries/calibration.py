@@ -44,13 +44,8 @@ __all__ = [
 
 Calibrated: TypeAlias = Calibration | ApparatusData
 
-_IN_JSON = (
-    "conversion_constant",
-    "gaussian_sigma",
-    "gaussian_sigma_deconvolved",
-    "centre",
-    "baseline",
-)
+_IN_JSON = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "centre",
+            "baseline")  # fmt: skip
 
 
 def tables(result: Calibrated) -> list[Table]:
@@ -60,11 +55,9 @@ def tables(result: Calibrated) -> list[Table]:
     if method := apparatus.process.configuration.get("method"):
         rows.insert(-1, ("method of division", "", str(method)))
     if isinstance(result, Calibration):
-        deconvolved = result.solution.deconvolution.misfit
-        rows += [
-            ("reconvolution with the deconvolved G", "", _misfit(deconvolved)),
-            ("reconvolution with the Gaussian", "", _misfit(result.solution.gaussian_misfit)),
-        ]
+        misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
+        rows.append(("reconvolution with the deconvolved G", "", _misfit(misfit)))
+        rows.append(("reconvolution with the Gaussian", "", _misfit(gaussian)))
     title = f"{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
     return [Table(title, ("", "", ""), rows), checks_table(apparatus.checks)]
 

@@ -35,11 +35,7 @@ __all__ = ["failures", "file_json", "frame", "mapping", "notes", "tables"]
 
 
 def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
-    """Return what ``compare --json`` prints but for the files that it was given and wrote.
-
-    A friction coefficient of infinity is ``null``, with ``"sticking": true``; an interval's open
-    end is ``null``.
-    """
+    """Return what ``compare --json`` prints but for the files that it was given and wrote."""
     scans = [
         file_json(scan.source) | {"lubrication": scan.lubrication}
         for scan in comparison.measured.scans
@@ -140,25 +136,18 @@ def _joint(
 
 def file_json(source: SourceFile | None) -> dict[str, Any]:
     """Return a file's name and digest as the JSON output holds them."""
-    if source is None:
-        return {"file_name": None, "sha256": None}
-    return {"file_name": source.file_name, "sha256": source.sha256}
+    return {name: getattr(source, name, None) for name in ("file_name", "sha256")}
 
 
 def _quantity(value: float, uncertainty: float | None, unit: str) -> dict[str, Any]:
     return {"value": finite(value), "standard_uncertainty": finite(uncertainty), "unit": unit}
 
 
-def _coefficient(friction: float) -> dict[str, Any]:
-    return {"friction_coefficient": finite(friction), "sticking": math.isinf(friction)}
-
-
 def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
     """Return what was measured at one load, and what each loading makes of it."""
     profile = load.profile
-    source = profile.scan.source
     return {
-        "scan": None if source is None else source.file_name,
+        "scan": getattr(profile.scan.source, "file_name", None),
         "lubrication": load.lubrication,
         "load": {"value": finite(load.load), "unit": "N"},
         "force": _quantity(profile.force, profile.force_uncertainty, "N"),
@@ -182,7 +171,8 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
         "degrees": load.degrees,
         "profiles": [
             {
-                **_coefficient(float(mu)),
+                "friction_coefficient": finite(mu),
+                "sticking": math.isinf(mu),
                 "p_max": {"value": finite(load.p_max[i] / KPA), "unit": "kPa"},
                 "chi2": finite(float(load.chi_square[i])),
                 "p_value": finite(float(load.p_values[i])),
@@ -215,7 +205,6 @@ def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
 
 
 def _shortened(values: FloatArray) -> list[float | None]:
-    """Return numbers of a curve with six digits, infinity as null."""
     return [finite(float(f"{value:.6g}")) for value in values]
 
 
@@ -239,14 +228,14 @@ def notes(comparison: FrictionComparison) -> Iterator[Message]:
     others = (message for message in comparison.messages if message.kind != FAILED_CHECK)
     laws = comparison.interface
     of_laws = () if laws is None else laws.messages
-    missing = (
-        Message("no_value", f"{_capital(_which(lubrication, loading))}, all loads: {joint.reason}")
+    texts = (
+        f"{_which(lubrication, loading)}, all loads: {joint.reason}"
         for lubrication, loading, joint in _joint(comparison)
         if joint.reason
     )
-    yield from dict.fromkeys(
-        [*_failed(comparison), *others, *missing, *_about_profiles(comparison), *of_laws]
-    )
+    missing = (Message("no_value", text[:1].upper() + text[1:]) for text in texts)
+    about = (*_failed(comparison), *others, *missing, *_about_profiles(comparison), *of_laws)
+    yield from dict.fromkeys(about)
 
 
 def _about_profiles(comparison: FrictionComparison) -> Iterator[Message]:
@@ -296,10 +285,6 @@ def _which(lubrication: str, loading: str) -> str:
     return ", ".join(word for word in words if word)
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 _LABELS = ("", "state", "load (N)")
 #: No table is wider than this many columns of text.
 _WIDTH = 98
@@ -312,14 +297,11 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
     friction = [_friction_table(comparison, loading) for loading in comparison.loadings]
     if isinstance(comparison, ShearComparison):
         return [*friction, _budget_table(comparison)]
+    fits = [table for way in comparison.loadings for table in _chi_square_tables(comparison, way)]
     return [
         _maxima_table(comparison),
         *friction,
-        *(
-            table
-            for loading in comparison.loadings
-            for table in _chi_square_tables(comparison, loading)
-        ),
+        *fits,
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
@@ -468,10 +450,9 @@ def _macroscopic_table(comparison: FrictionComparison) -> Table:
 
 
 def _against(joint: BoundedEstimate, value: float) -> str:
-    level = percent(joint.interval.level)
-    if joint.interval.holds(value):
-        return f"within the {level} interval"
-    return ("below" if value < joint.interval.low else "above") + f" the {level} interval"
+    side = "below" if value < joint.interval.low else "above"
+    place = "within" if joint.interval.holds(value) else side
+    return f"{place} the {percent(joint.interval.level)} interval"
 
 
 def _checks_table(checks: Sequence[QualityCheck]) -> Table:

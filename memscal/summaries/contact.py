@@ -37,15 +37,9 @@ _PROFILE = (
 
 def mapping(contact: Contact) -> dict[str, Any]:
     """Return one solution of ``reference --json``; the contract fixes its form."""
-    lengths = {
-        name: quantity_json(
-            getattr(contact, name) / _QUANTITIES[name].scale, _QUANTITIES[name].unit
-        )
-        for name in ("depth", "contact_radius", "stick_radius")
-    }
+    shown = [_QUANTITIES[name] for name in ("load", "depth", "contact_radius", "stick_radius")]
     return {
-        "load": quantity_json(contact.load, "N"),
-        **lengths,
+        **{q.name: quantity_json(getattr(contact, q.name) / q.scale, q.unit) for q in shown},
         "max_interface_stress": quantity_json(contact.max_interface_stress, "Pa"),
         "max_base_stress": quantity_json(contact.max_base_stress, "Pa"),
         "friction_coefficient": quantity_json(contact.friction, "1"),
@@ -97,8 +91,7 @@ def contacts_table(contacts: Sequence[Contact]) -> Table:
     if contacts[0].friction > 0:
         columns |= _lengths("stick_radius", contacts)
     if not rod:
-        peaks = [f"{c.max_interface_stress / KPA:.5g}" for c in contacts]
-        columns["interface peak (kPa)"] = peaks
+        columns["interface peak (kPa)"] = [f"{c.max_interface_stress / KPA:.5g}" for c in contacts]
     columns["base peak (kPa)"] = [f"{c.max_base_stress / KPA:.5g}" for c in contacts]
     columns["steps"] = [f"{c.steps}" for c in contacts]
     columns["change"] = [f"{c.convergence:.1g}" for c in contacts]
@@ -115,15 +108,10 @@ def _lengths(name: str, contacts: Sequence[Contact]) -> dict[str, list[str]]:
 def _title(contact: Contact) -> str:
     """Say in one line what was pressed on what, and how it was solved."""
     film = contact.film
-    if contact.friction == 0:
-        friction = "frictionless"
-    elif math.isinf(contact.friction):
-        friction = "sticking"
-    else:
-        friction = f"friction {contact.friction:.4g}"
+    friction = "sticking" if math.isinf(contact.friction) else f"friction {contact.friction:.4g}"
+    friction = friction if contact.friction else "frictionless"
     loading = f", {contact.loading} loading" if contact.loading and contact.friction else ""
-    described = contact.interface.description
-    interface = f"; interface: {described}" if described else ""
+    interface = f"; interface: {text}" if (text := contact.interface.description) else ""
     strain = ", finite strain" if contact.strain == "finite" else ""
     return (
         f"{_name(contact)} on a film of {film.thickness / MM:.4g} mm, "

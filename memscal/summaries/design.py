@@ -95,15 +95,12 @@ def _contributions_table(planned: Design) -> Table:
     largest = {name: max(contributions.values()) for name, contributions in shares.items()}
     rows = []
     for source in shares["conversion_constant"]:
-        cells = [_cell(shares[name].get(source, 0.0), largest[name]) for name in shares]
+        parts = [(shares[name].get(source, 0.0), largest[name]) for name in shares]
+        cells = [f"{part * 100:.2g}" if part > _NEGLIGIBLE * top else "0" for part, top in parts]
         if any(cell != "0" for cell in cells):
             rows.append([_WORDS.get(source, source.replace("_", " ")), *cells])
     head = ("source", *(symbol for _, symbol in _SHOWN.values()))
     return Table("Contributions, in percent", head, rows)
-
-
-def _cell(share: float, largest: float) -> str:
-    return f"{share * 100:.2g}" if share > _NEGLIGIBLE * largest else "0"
 
 
 def mapping(planned: Design) -> dict[str, Any]:
@@ -149,9 +146,8 @@ def dataset(planned: Design) -> xarray.Dataset:
 
 def frame(planned: Design) -> pd.DataFrame:
     """Return one row for each radius at which G is expected."""
-    return data_frame(
-        _QUANTITIES[:3], {name: getattr(planned, name) for name in ("r", "g", "g_errors")}
-    )
+    names = ("r", "g", "g_errors")
+    return data_frame(_QUANTITIES[:3], {name: getattr(planned, name) for name in names})
 
 
 def correlated(planned: Design) -> dict[str, Any]:

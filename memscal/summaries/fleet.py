@@ -31,15 +31,10 @@ def mapping(result: FleetCalibration) -> dict[str, Any]:
     if result.parameters is None or result.resolved_wavenumber is None:
         return values | {"error": str(result.error)}
     resolved = {"value": finite(result.resolved_wavenumber / PER_MM), "unit": "rad/mm"}
-    return (
-        values
-        | {name: parameter_json(result.parameters, name) for name in result.parameters.names}
-        | {
-            "resolved_wavenumber": resolved,
-            "checks": checks_json(result.checks),
-            "warnings": texts_of(result.messages),
-        }
-    )
+    estimates = {name: parameter_json(result.parameters, name) for name in result.parameters.names}
+    checks, warnings = checks_json(result.checks), texts_of(result.messages)
+    of_all = {"resolved_wavenumber": resolved, "checks": checks, "warnings": warnings}
+    return values | estimates | of_all
 
 
 def frame(result: FleetCalibration) -> pd.DataFrame:

@@ -31,11 +31,10 @@ def tables(comparison: InterfaceComparison) -> list[Table]:
     """Return evidence and lengths, and what a slip length means at each load."""
     shown = []
     for direction, compared in comparison.by_direction.items():
-        shown += [
-            _law_table(direction, compared),
-            _length_table(direction, compared),
-            _priors_table(compared),
-        ]
+        rows = [[prior.prior, f"{prior.log_factor:.1f}"] for prior in compared.priors]
+        title = f"The same against {compared.laws[0].name}, under other priors"
+        shown += [_law_table(direction, compared), _length_table(direction, compared)]
+        shown.append(Table(title, ["prior", "ln of the Bayes factor"], rows))
         if compared.implied is not None:
             shown.append(_implied_table(compared.implied))
     return shown
@@ -74,26 +73,12 @@ def _length_table(direction: str, compared: LawComparison) -> Table:
     rows = []
     for factor in compared.factors:
         yielding = factor.favoured == compared.laws[-1].name
-        rows.append(
-            [
-                factor.against if yielding else factor.favoured,
-                _factor(factor.value),
-                f"{'for' if yielding else 'against'} it, {factor.words}",
-            ]
-        )
+        law, side = (factor.against, "for") if yielding else (factor.favoured, "against")
+        value = f"{factor.value:.3g}" if factor.value < 1e6 else f"{factor.value:.1e}"
+        rows.append([law, value, f"{side} it, {factor.words}"])
     level = f" [{percent(compared.length.interval.level)} interval]" if "[" in length else ""
     title = f"The law that yields, {words} {length}{level}, against the others"
     return Table(title, ["law", "Bayes factor", "evidence"], rows)
-
-
-def _priors_table(compared: LawComparison) -> Table:
-    rows = [[prior.prior, f"{prior.log_factor:.1f}"] for prior in compared.priors]
-    title = f"The same against {compared.laws[0].name}, under other priors"
-    return Table(title, ["prior", "ln of the Bayes factor"], rows)
-
-
-def _factor(value: float) -> str:
-    return f"{value:.3g}" if value < 1e6 else f"{value:.1e}"
 
 
 def _implied_table(implied: ImpliedFriction) -> Table:

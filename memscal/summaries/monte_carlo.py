@@ -21,15 +21,10 @@ def tables(result: MonteCarlo) -> list[Table]:
         quantity = estimated_quantity(comparison.name)
         scale = quantity.scale
         low, high = (end / scale for end in comparison.symmetric)
-        rows.append(
-            (
-                f"{quantity.words} ({quantity.unit})",
-                f"{comparison.first_order / scale:.2g}",
-                f"{comparison.uncertainty / scale:.2g}",
-                f"{low:.4g} to {high:.4g}",
-                "yes" if comparison.agrees else "no",
-            )
-        )
+        first, draws = comparison.first_order / scale, comparison.uncertainty / scale
+        cells = (f"{first:.2g}", f"{draws:.2g}", f"{low:.4g} to {high:.4g}")
+        agrees = "yes" if comparison.agrees else "no"
+        rows.append((f"{quantity.words} ({quantity.unit})", *cells, agrees))
     disagreeing = frozenset(i for i, row in enumerate(rows) if row[-1] == "no")
     *others, last = (source.replace("_", " ") for source in result.sources)
     sources = f"{', '.join(others)} and {last}" if others else last
@@ -73,6 +68,5 @@ def frame(result: MonteCarlo) -> pd.DataFrame:
     import pandas as pd
 
     names = [comparison.name for comparison in result.comparisons]
-    units = [estimated_quantity(name).si_unit for name in names]
-    columns = [f"{name} ({unit})" for name, unit in zip(names, units, strict=True)]
+    columns = [f"{name} ({estimated_quantity(name).si_unit})" for name in names]
     return pd.DataFrame(result.samples, columns=columns)

@@ -107,26 +107,16 @@ def tables(restored: Restoration) -> list[Table]:
         ("restored stress blurred again", f"χ²/ν = {restored.chi_square / restored.degrees:.3g}"),
     ]
     if (comparison := restored.comparison) is not None:
-        rows += [
-            (
-                f"{_origin(comparison)}, blurred",
-                f"χ²/ν = {comparison.chi_square:.3g}, p = {comparison.p_value:.2g}",
-            ),
-            (
-                f"{_origin(comparison)}, beside the restored",
-                f"within 95 % bounds at {comparison.within:.0%} of radii",
-            ),
-        ]
+        origin, within = _origin(comparison), comparison.within
+        fit = f"χ²/ν = {comparison.chi_square:.3g}, p = {comparison.p_value:.2g}"
+        beside = f"within 95 % bounds at {within:.0%} of radii"
+        rows += [(f"{origin}, blurred", fit), (f"{origin}, beside the restored", beside)]
     indenter, film = restored.scan.indenter, restored.scan.film
     title = (
         f"Stress at the base of a {film.thickness / MM:.4g} mm film under a {indenter.shape} of "
         f"radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
     )
-    return [
-        Table(title, ("", ""), rows),
-        _stress_table(restored),
-        checks_table(restored.checks),
-    ]
+    return [Table(title, ("", ""), rows), _stress_table(restored), checks_table(restored.checks)]
 
 
 def _stress_table(restored: Restoration) -> Table:

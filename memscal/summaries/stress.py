@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
-from memscal.model.checks import QualityCheck
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, MV, Quantity, by_name
@@ -49,11 +48,10 @@ def mapping(stress: MeasuredStress) -> dict[str, Any]:
 
 
 def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
-    source = profile.scan.source
     baseline, baseline_error = profile.baseline / MV, profile.baseline_uncertainty / MV
     centre, centre_error = _centre(profile)
     return {
-        "scan": None if source is None else source.file_name,
+        "scan": getattr(profile.scan.source, "file_name", None),
         "load": quantity_json(profile.load, "N"),
         "lubrication": profile.lubrication,
         "force": quantity_json(profile.force, "N", profile.force_uncertainty),
@@ -61,9 +59,7 @@ def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
         "centre": quantity_json(centre, "mm", centre_error),
         "baseline": quantity_json(baseline, "mV", baseline_error),
         "force_budget": {source: finite(u) for source, u in profile.force_budget.items()},
-        "maximum_budget_kpa": {
-            source: finite(u / KPA) for source, u in profile.maximum_budget.items()
-        },
+        "maximum_budget_kpa": {name: finite(u / KPA) for name, u in profile.maximum_budget.items()},
         "stress": {
             "r_mm": [finite(r / MM) for r in profile.r],
             "x_mm": [finite(x / MM) for x in profile.x],
@@ -99,11 +95,11 @@ def tables(stress: MeasuredStress) -> list[Table]:
         f"Stress measured at the base of a {film.thickness / MM:.4g} mm film under a "
         f"{indenter.shape} of radius {indenter.radius / MM:.4g} mm (± standard uncertainty, k = 1)"
     )
-    return [
-        Table(title, head, rows, frozenset(marked)),
-        Table("All profiles", ("", ""), _common_rows(stress)),
-        checks_table(_shown_checks(stress)),
-    ]
+    # What checks all profiles, the force of each, and what failed.
+    kinds = ("applied_force", "applied_force_all")
+    checks = [check for check in stress.checks if check.kind in kinds or not check.passed]
+    common = Table("All profiles", ("", ""), _common_rows(stress))
+    return [Table(title, head, rows, frozenset(marked)), common, checks_table(checks)]
 
 
 def _common_rows(stress: MeasuredStress) -> list[tuple[str, str]]:
@@ -114,15 +110,6 @@ def _common_rows(stress: MeasuredStress) -> list[tuple[str, str]]:
         ("conversion constant A", format_measured(a / _PER_PASCAL, u / _PER_PASCAL, "mV/Pa")),
         ("total force over applied load", format_measured(*pooled_force(stress.profiles))),
         ("points", f"{points}, from the axis to {farthest / MM:.3g} mm"),
-    ]
-
-
-def _shown_checks(stress: MeasuredStress) -> list[QualityCheck]:
-    """Return what checks all profiles, the force of each, and what failed."""
-    return [
-        check
-        for check in stress.checks
-        if check.kind in ("applied_force", "applied_force_all") or not check.passed
     ]
 
 

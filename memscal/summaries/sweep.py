@@ -26,7 +26,10 @@ _RESULTS = (
 
 def tables(result: Sweep) -> list[Table]:
     """Return every second amplitude: the exact expectation, and the median of the draws."""
-    power = _power(result.conversion_constant / MV)
+    # The power of ten stands in the head in place of a row of zeros.
+    values = result.conversion_constant / MV
+    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+    power = int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
     scales, forms = (MV * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
     for (name, *_), scale, form in zip(_RESULTS, scales, forms, strict=True):
@@ -68,12 +71,6 @@ def dataset(result: Sweep) -> xarray.Dataset:
 
 def _scaled(values: FloatArray, scale: float) -> list[float | None]:
     return [finite(float(value) / scale) for value in values]
-
-
-def _power(values: FloatArray) -> int:
-    """Return the power of ten to name in the head in place of a row of zeros."""
-    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
-    return int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
 
 
 def _median(values: FloatArray, form: str) -> str:

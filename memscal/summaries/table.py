@@ -32,32 +32,19 @@ _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 # How a character is written where the terminal's encoding lacks it.
-_PLAIN = {
-    "±": "+/-",
-    "×": "x",
-    "σ": "sigma",
-    "χ": "chi",
-    "²": "2",
-    "ν": "nu",
-    "Δ": "d",
-    "₀": "0",
-    "µ": "u",
-    "–": "-",
-    "…": "...",
-}
+_PLAIN = dict(zip("×²Δ₀µ–", "x2d0u-", strict=True)) | {
+    "±": "+/-", "σ": "sigma", "χ": "chi", "ν": "nu", "…": "..."
+}  # fmt: skip
 
 
 def readable(text: str, stream: TextIO | None = None) -> str:
-    """Return text without control characters, in characters that the stream can encode.
-
-    A power of ten is spelt out: a terminal that shows ``×10⁻⁷`` as ``x10??`` shows a wrong
-    number.
-    """
+    """Return text without control characters, in characters that the stream can encode."""
     text = printable(text, _LONGEST)
     encoding = getattr(sys.stdout if stream is None else stream, "encoding", None) or "utf-8"
     try:
         text.encode(encoding)
     except UnicodeEncodeError:
+        # A terminal that shows ×10⁻⁷ as x10?? shows a wrong number.
         power = re.compile("×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
         text = power.sub(lambda match: "e" + match[1].translate(_SUPERSCRIPTS), text)
         text = "".join(_PLAIN.get(c, c) for c in text)
@@ -66,13 +53,7 @@ def readable(text: str, stream: TextIO | None = None) -> str:
 
 
 def finite(value: float | None) -> float | None:
-    """Return a number that JSON can say, ``None`` (null) in place of any other.
-
-    Examples
-    --------
-    >>> finite(2.5), finite(float("inf")), finite(None)
-    (2.5, None, None)
-    """
+    """Return a number that JSON can say, ``None`` (null) in place of any other."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 
@@ -107,7 +88,7 @@ def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:
             "value": finite(check.value),
             "limit": finite(check.limit),
             "passed": check.passed,
-            "p_value": None if check.p_value is None else finite(check.p_value),
+            "p_value": finite(check.p_value),
         }
         for check in checks
     ]
