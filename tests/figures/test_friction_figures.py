@@ -129,9 +129,7 @@ def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest() -> Non
     assert (titles[0], titles[-1]) == ("0.34 N", "2.75 N")
 
 
-def test_ratios_stand_at_their_loads_among_the_calculated_curves(
-    found: FrictionComparison,
-) -> None:
+def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: FrictionComparison) -> None:
     figure = maxima_figure(found)
     assert len(figure.axes) == len(found.loadings)
     for axes, loads in zip(figure.axes, found.loads.values(), strict=True):

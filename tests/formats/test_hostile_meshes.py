@@ -406,12 +406,7 @@ def test_a_reader_that_does_not_end_is_ended(
 
 @pytest.mark.parametrize(
     ("name", "options"),
-    [
-        ("film.vtu", {}),
-        ("film.vtk", {}),
-        ("film.xdmf", {}),
-        ("vtk_film.vtu", None),
-    ],
+    [("film.vtu", {}), ("film.vtk", {}), ("film.xdmf", {}), ("vtk_film.vtu", None)],
 )
 def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path: Path, name: str, options: Any):
     path = tmp_path / name

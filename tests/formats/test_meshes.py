@@ -394,9 +394,7 @@ def test_a_mesh_without_a_base_that_can_be_used_is_refused(
     assert caught.value.cure
 
 
-def test_a_mesh_with_one_node_at_its_lowest_level_is_refused_with_the_options_named(
-    tmp_path: Path,
-):
+def test_a_mesh_with_one_node_at_its_lowest_level_is_refused_with_the_options_named(tmp_path: Path):
     mesh = section()
     mesh.points[:, 1] += 0.01 * mesh.points[:, 0]
     with pytest.raises(InputError, match=r"Only 1 nodes(.|\n)*--vertical(.|\n)*--base"):

@@ -78,10 +78,7 @@ def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfi
         "x": x,
         "y": 0 * x,
         "s_zz": 1e5 * load * np.exp(-(r**2) / 1e-6),
-        "covariances": {
-            "noise": 1e4 * root @ root.T,
-            "centre": 10.0 * np.ones((n, n)),
-        },
+        "covariances": {"noise": 1e4 * root @ root.T, "centre": 10.0 * np.ones((n, n))},
         "force": 1.01 * load,
         "force_budget": {"scan": 0.003, "apparatus": 0.004},
         "maximum": 1e5 * load,
