@@ -33,19 +33,16 @@ TABLE = Table(
 )
 
 
-@pytest.mark.parametrize(
-    ("encoding", "text"),
-    [
-        ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"),
-        ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
-        ("latin-1", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
-    ],
-)
-def test_a_number_stays_the_same_in_every_encoding(encoding: str, text: str) -> None:
+@pytest.mark.parametrize(("encoding", "text"), [
+    ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"),
+    ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
+    ("latin-1", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
+])  # fmt: skip
+def test_a_number_stays_the_same_in_every_encoding(encoding: str, text: str):
     assert readable("σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa", stream(encoding)) == text
 
 
-def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]):
     emit_tables(TABLE, Table("empty", ("a",), []))
     assert capsys.readouterr().out == (
         "Quality checks\n"
@@ -58,7 +55,7 @@ def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_terminal_gets_a_drawn_table_in_which_cells_are_text(
     monkeypatch: pytest.MonkeyPatch,
-) -> None:
+):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stdout", terminal)
     monkeypatch.setenv("TERM", "xterm-256color")
@@ -73,7 +70,7 @@ def test_a_terminal_gets_a_drawn_table_in_which_cells_are_text(
 
 def test_progress_appears_when_work_is_long_and_leaves_no_trace(
     monkeypatch: pytest.MonkeyPatch,
-) -> None:
+):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setattr("memscal.cli.output._FIRST_AFTER", 0.0)
@@ -83,7 +80,7 @@ def test_progress_appears_when_work_is_long_and_leaves_no_trace(
     assert terminal.getvalue().endswith("\r\x1b[K")
 
 
-def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]):
     with working("Sweeping"):
         pass
     assert capsys.readouterr().err == ""

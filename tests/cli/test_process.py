@@ -43,14 +43,14 @@ def files_up_to(size: int) -> Callable[[], None]:
     return limit
 
 
-def test_a_failed_check_is_the_exit_code_of_the_process(drifting_scan: Path, folder: Path) -> None:
+def test_a_failed_check_is_the_exit_code_of_the_process(drifting_scan: Path, folder: Path):
     done = run("calibrate", str(drifting_scan), "-o", "out.h5", cwd=folder)
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     assert (folder / "out.h5").is_file()
 
 
-def test_a_file_size_limit_leaves_the_old_artifact(scan: Path, folder: Path) -> None:
+def test_a_file_size_limit_leaves_the_old_artifact(scan: Path, folder: Path):
     (folder / "out.h5").write_bytes(b"old")
 
     arguments = ["calibrate", "scan.h5", "-o", "out.h5", "--force"]
@@ -60,7 +60,7 @@ def test_a_file_size_limit_leaves_the_old_artifact(scan: Path, folder: Path) -> 
     assert sorted(os.listdir(folder)) == ["out.h5", "scan.h5"]
 
 
-def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path) -> None:
+def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path):
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -71,9 +71,7 @@ def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path) -> None
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_results_that_cannot_be_printed_are_exit_code_4(
-    scan: Path, folder: Path, unbuffered: str
-) -> None:
+def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path, unbuffered: str):
     with (folder / "shown.txt").open("w") as shown:
         done = run(
             "inspect",
@@ -88,9 +86,7 @@ def test_results_that_cannot_be_printed_are_exit_code_4(
     assert "Exception ignored" not in done.stderr
 
 
-def test_a_terminal_without_the_characters_still_shows_the_right_number(
-    scan: Path, folder: Path
-) -> None:
+def test_a_terminal_without_the_characters_still_shows_the_right_number(scan: Path, folder: Path):
     done = run("calibrate", "scan.h5", cwd=folder, PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
     assert done.stdout.isascii()
@@ -99,7 +95,7 @@ def test_a_terminal_without_the_characters_still_shows_the_right_number(
     assert "e-5 mV/Pa" in line
 
 
-def test_a_wrong_clock_is_refused_in_our_words(scan: Path, folder: Path) -> None:
+def test_a_wrong_clock_is_refused_in_our_words(scan: Path, folder: Path):
     done = run("calibrate", "scan.h5", cwd=folder, SOURCE_DATE_EPOCH="yesterday")
     assert done.returncode == 3
     assert "SOURCE_DATE_EPOCH is 'yesterday'" in done.stderr

@@ -54,17 +54,10 @@ def test_an_existing_file_is_replaced_only_when_that_is_allowed(target: Path):
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "open", "replace"])
-@pytest.mark.parametrize(
-    ("code", "cure"),
-    [
-        (errno.ENOSPC, "Free some space"),
-        (errno.EROFS, "read-only"),
-        (errno.EACCES, "may write"),
-        (errno.EDQUOT, "quota"),
-        (errno.EIO, "another folder"),
-    ],
-    ids=["full disk", "read-only disk", "forbidden", "quota", "broken disk"],
-)
+@pytest.mark.parametrize(("code", "cure"), [
+    (errno.ENOSPC, "Free some space"), (errno.EROFS, "read-only"), (errno.EACCES, "may write"),
+    (errno.EDQUOT, "quota"), (errno.EIO, "another folder"),
+], ids=["full disk", "read-only disk", "forbidden", "quota", "broken disk"])  # fmt: skip
 def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
     target: Path, monkeypatch: pytest.MonkeyPatch, call: str, code: int, cure: str
 ):
@@ -204,15 +197,10 @@ def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path: Path):
             atomic_write_bytes(path, b"", overwrite=True)
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("missing/out.h5", "Create the folder"),
-        ("file/out.h5", "a file, not a folder"),
-        ("a" * 300, "shorter name"),
-        ("", "not the name"),
-    ],
-)
+@pytest.mark.parametrize(("name", "words"), [
+    ("missing/out.h5", "Create the folder"), ("file/out.h5", "a file, not a folder"),
+    ("a" * 300, "shorter name"), ("", "not the name"),
+])  # fmt: skip
 def test_a_path_that_cannot_exist_is_refused_with_its_cure(tmp_path: Path, name: str, words: str):
     (tmp_path / "file").write_bytes(b"")
     path = str(tmp_path / name) if name else ""

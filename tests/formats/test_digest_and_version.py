@@ -65,20 +65,10 @@ def take_the_digest_away(file: h5py.File) -> None:
     del file.attrs["memscal_content_sha256"]
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        change_a_value,
-        change_one_of_many,
-        change_a_unit,
-        change_a_text,
-        change_a_verdict,
-        change_the_axes,
-        take_something_away,
-        take_the_list_away,
-        take_the_digest_away,
-    ],
-)
+@pytest.mark.parametrize("change", [
+    change_a_value, change_one_of_many, change_a_unit, change_a_text, change_a_verdict,
+    change_the_axes, take_something_away, take_the_list_away, take_the_digest_away,
+])  # fmt: skip
 def test_an_artifact_that_was_altered_is_refused(
     artifact: Path, change: Callable[[h5py.File], None]
 ):
@@ -161,13 +151,10 @@ def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, vers
     assert versioned(version).load == 1.0
 
 
-@pytest.mark.parametrize(
-    ("path", "change", "message"),
-    [
-        ("/entry/radial_covariance/r", lambda r: 1.5 * r, "differs from /entry/radial_profile/r"),
-        ("/entry/radial_profile/g", lambda g: g[:-1], r"shape \(40,\), but its axes give \(41,\)"),
-    ],
-)
+@pytest.mark.parametrize(("path", "change", "message"), [
+    ("/entry/radial_covariance/r", lambda r: 1.5 * r, "differs from /entry/radial_profile/r"),
+    ("/entry/radial_profile/g", lambda g: g[:-1], r"shape \(40,\), but its axes give \(41,\)"),
+])  # fmt: skip
 def test_arrays_that_do_not_fit_each_other_are_refused(
     artifact: Path, path: str, change: Callable[[Any], Any], message: str
 ):

@@ -188,19 +188,15 @@ def test_values_that_were_never_written_do_not_read_as_zeros(edited: Edit, chunk
     assert_refused_cheaply(path, "never written")
 
 
-@pytest.mark.parametrize(
-    ("dtype", "value"),
-    [
-        (h5py.vlen_dtype(np.float64), np.zeros(3)),
-        (h5py.string_dtype(), "text"),
-        (np.dtype([("a", "f8"), ("b", "i4")]), (1.0, 2)),
-        (np.dtype("c16"), 1j),
-        (np.dtype("S8"), b"text"),
-        (np.dtype("V8"), b"12345678"),
-        (h5py.enum_dtype({"a": 1}), 1),
-    ],
-    ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"],
-)
+@pytest.mark.parametrize(("dtype", "value"), [
+    (h5py.vlen_dtype(np.float64), np.zeros(3)),
+    (h5py.string_dtype(), "text"),
+    (np.dtype([("a", "f8"), ("b", "i4")]), (1.0, 2)),
+    (np.dtype("c16"), 1j),
+    (np.dtype("S8"), b"text"),
+    (np.dtype("V8"), b"12345678"),
+    (h5py.enum_dtype({"a": 1}), 1),
+], ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"])  # fmt: skip
 def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype: Any, value: Any):
     def make(group: h5py.Group) -> Any:
         dataset = group.create_dataset("u_zz", (33,), dtype)
@@ -248,17 +244,13 @@ def test_one_large_dataset_linked_under_many_names_meets_the_limit_of_the_file(
         read_scan(edited(make))
 
 
-@pytest.mark.parametrize(
-    "value",
-    [
-        h5py.Empty("f8"),
-        np.array([b"mm"] * 100),
-        np.array([[b"m", b"V"], [b"m", b"V"]]),
-        np.array([h5py.Reference()], dtype=h5py.ref_dtype),
-        b"m" * 60_000,
-    ],
-    ids=["null", "many", "table", "reference", "long"],
-)
+@pytest.mark.parametrize("value", [
+    h5py.Empty("f8"),
+    np.array([b"mm"] * 100),
+    np.array([[b"m", b"V"], [b"m", b"V"]]),
+    np.array([h5py.Reference()], dtype=h5py.ref_dtype),
+    b"m" * 60_000,
+], ids=["null", "many", "table", "reference", "long"])  # fmt: skip
 def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value: Any):
     path = edited(lambda g: g.create_dataset("u_zz", data=np.zeros(33)))
     with h5py.File(path, "r+") as file:

@@ -68,17 +68,13 @@ def refused(
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("name", "document_type"),
-    [
-        ("film.vtu", f"<!DOCTYPE a [{BOMB}]>"),
-        ("film.xdmf", f"<!DOCTYPE a [{BOMB}]>"),
-        ("film.vtu", '<!DOCTYPE a [<!ENTITY e11 SYSTEM "{}">]>'),
-        ("film.xdmf", '<!DOCTYPE a [<!ENTITY % e SYSTEM "{}"> %e;]>'),
-        ("film.vtu", '<!DOCTYPE a SYSTEM "{}">'),
-    ],
-    ids=["laughs", "laughs", "file", "parameter", "document type"],
-)
+@pytest.mark.parametrize(("name", "document_type"), [
+    ("film.vtu", f"<!DOCTYPE a [{BOMB}]>"),
+    ("film.xdmf", f"<!DOCTYPE a [{BOMB}]>"),
+    ("film.vtu", '<!DOCTYPE a [<!ENTITY e11 SYSTEM "{}">]>'),
+    ("film.xdmf", '<!DOCTYPE a [<!ENTITY % e SYSTEM "{}"> %e;]>'),
+    ("film.vtu", '<!DOCTYPE a SYSTEM "{}">'),
+], ids=["laughs", "laughs", "file", "parameter", "document type"])  # fmt: skip
 def test_entities_neither_grow_nor_open_a_file(tmp_path: Path, name: str, document_type: str):
     (tmp_path / "other").write_text('<!ENTITY e11 "a secret">')
     path = tmp_path / name
@@ -105,16 +101,13 @@ def test_compressed_blocks_of_gigabytes_meet_the_limit_of_memory(tmp_path: Path)
     refused(path, "more than 1,", UnsafeFileError)
 
 
-@pytest.mark.parametrize(
-    ("section_name", "options"),
-    [
-        ("POINTS", {"binary": True, "fmt_version": "5.1"}),
-        ("POINTS", {"binary": False, "fmt_version": "4.2"}),
-        ("CELLS", {"binary": True, "fmt_version": "5.1"}),
-        ("CELLS", {"binary": False, "fmt_version": "5.1"}),
-        ("CELL_TYPES", {"binary": True, "fmt_version": "4.2"}),
-    ],
-)
+@pytest.mark.parametrize(("section_name", "options"), [
+    ("POINTS", {"binary": True, "fmt_version": "5.1"}),
+    ("POINTS", {"binary": False, "fmt_version": "4.2"}),
+    ("CELLS", {"binary": True, "fmt_version": "5.1"}),
+    ("CELLS", {"binary": False, "fmt_version": "5.1"}),
+    ("CELL_TYPES", {"binary": True, "fmt_version": "4.2"}),
+])  # fmt: skip
 def test_a_count_beyond_the_files_size_is_refused(
     tmp_path: Path, section_name: str, options: dict[str, Any]
 ):
@@ -155,17 +148,10 @@ def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets: str):
     refused(path)
 
 
-@pytest.mark.parametrize(
-    "address",
-    [
-        "/etc/passwd:/data1",
-        "../film.h5:/data1",
-        "other.h5:/data1",
-        "film.xdmf:/data1",
-        "<!-- -->other.h5:/data1",
-        "<![CDATA[/other/film.h5:/data9]]>",
-    ],
-)
+@pytest.mark.parametrize("address", [
+    "/etc/passwd:/data1", "../film.h5:/data1", "other.h5:/data1", "film.xdmf:/data1",
+    "<!-- -->other.h5:/data1", "<![CDATA[/other/film.h5:/data9]]>",
+])  # fmt: skip
 def test_an_xdmf_file_reaches_no_file_but_the_one_of_its_name(tmp_path: Path, address: str):
     path = edited(small(tmp_path / "film.xdmf"), "film.h5:/data1", address)
     with h5py.File(tmp_path / "film.h5", "r") as file, h5py.File(tmp_path / "other.h5", "w") as to:
@@ -199,15 +185,12 @@ def test_the_hdf5_file_beside_an_xdmf_file_is_a_source_of_it_and_goes_through_th
         read_mesh(path)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('Dimensions="10 9"', 'Dimensions="100000000 900000000"', "reshape"),
-        ('Dimensions="10 9"', 'Dimensions="10 9" Reference="/Xdmf/Domain/Grid"', "points to them"),
-        ('Dimensions="10 9"', 'Dimensions="10 9" ItemType="Function"', "calculated from others"),
-        ("<Domain>", "<Domain><Grid><Topology/></Grid>", "holds 2 grids"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('Dimensions="10 9"', 'Dimensions="100000000 900000000"', "reshape"),
+    ('Dimensions="10 9"', 'Dimensions="10 9" Reference="/Xdmf/Domain/Grid"', "points to them"),
+    ('Dimensions="10 9"', 'Dimensions="10 9" ItemType="Function"', "calculated from others"),
+    ("<Domain>", "<Domain><Grid><Topology/></Grid>", "holds 2 grids"),
+])  # fmt: skip
 def test_xdmf_that_is_more_than_a_mesh_with_numbers_is_refused(
     tmp_path: Path, old: str, new: str, words: str
 ):
@@ -227,17 +210,14 @@ def test_xdmf_is_read_as_fenics_writes_it_and_the_rest_of_it_is_left_alone(tmp_p
     assert read_mesh(path).point_data["S9"].shape == (10, 9)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('type="UnstructuredGrid"', 'type="PolyData"', "it holds PolyData"),
-        ("<Piece", '<Piece NumberOfPoints="0" NumberOfCells="0"/><Piece', "2 pieces"),
-        ('Name="Points" NumberOfComponents="3"', 'Name="Points" NumberOfComponents="5"', "mesh"),
-        ('byte_order="LittleEndian"', 'byte_order="Middle"', "Middle"),
-        ('NumberOfPoints="10"', 'NumberOfPoints="11"', "cannot be read as a mesh"),
-        ('Name="connectivity"', 'Name="joints"', "connectivity"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('type="UnstructuredGrid"', 'type="PolyData"', "it holds PolyData"),
+    ("<Piece", '<Piece NumberOfPoints="0" NumberOfCells="0"/><Piece', "2 pieces"),
+    ('Name="Points" NumberOfComponents="3"', 'Name="Points" NumberOfComponents="5"', "mesh"),
+    ('byte_order="LittleEndian"', 'byte_order="Middle"', "Middle"),
+    ('NumberOfPoints="10"', 'NumberOfPoints="11"', "cannot be read as a mesh"),
+    ('Name="connectivity"', 'Name="joints"', "connectivity"),
+])  # fmt: skip
 def test_a_vtu_file_of_another_shape_is_refused(tmp_path: Path, old: str, new: str, words: str):
     refused(edited(small(tmp_path / "film.vtu"), old, new), words)
 
@@ -375,22 +355,18 @@ def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
     assert secret.read_text() == "a secret"
 
 
-@pytest.mark.parametrize(
-    ("code", "words"),
-    [
-        ("bytearray(2**34)", "more than 1,0"),
-        ("raise SystemExit('the end')", "cannot be read as a mesh"),
-        ("os._exit(0)", "cannot be read"),
-        ("os.abort()", "ended by an error"),
-        (
-            "return types.SimpleNamespace(cells=[], points=np.zeros((2**27, 1)), **NONE)",
-            "cannot be read",
-        ),
-        ("import meshio.other", "No module named"),
-        ("return types.SimpleNamespace(cells=[], points=[[print]], **NONE)", "ended by an error"),
-    ],
-    ids=["memory", "exit", "silence", "crash", "no mesh", "no module", "objects"],
-)
+@pytest.mark.parametrize(("code", "words"), [
+    ("bytearray(2**34)", "more than 1,0"),
+    ("raise SystemExit('the end')", "cannot be read as a mesh"),
+    ("os._exit(0)", "cannot be read"),
+    ("os.abort()", "ended by an error"),
+    (
+        "return types.SimpleNamespace(cells=[], points=np.zeros((2**27, 1)), **NONE)",
+        "cannot be read",
+    ),
+    ("import meshio.other", "No module named"),
+    ("return types.SimpleNamespace(cells=[], points=[[print]], **NONE)", "ended by an error"),
+], ids=["memory", "exit", "silence", "crash", "no mesh", "no module", "objects"])  # fmt: skip
 def test_whatever_ends_the_reader_of_a_mesh_is_an_error_of_ours(
     hostile: Callable[[str], Path], code: str, words: str
 ):

@@ -92,19 +92,11 @@ def test_a_mesh_as_paraview_writes_it_is_read_at_its_nodes_and_in_its_cells():
     assert found.profile.sigma_rz is None
 
 
-@pytest.mark.parametrize(
-    ("name", "options"),
-    [
-        ("film.vtu", {}),
-        ("film.vtu", {"compression": "lzma"}),
-        ("film.vtu", {"compression": None}),
-        ("film.vtu", {"header_type": "UInt64"}),
-        ("film.vtk", {}),
-        ("film.vtk", {"fmt_version": "4.2"}),
-        ("film.xdmf", {}),
-        ("film.xdmf", {"data_format": "XML"}),
-    ],
-)
+@pytest.mark.parametrize(("name", "options"), [
+    ("film.vtu", {}), ("film.vtu", {"compression": "lzma"}), ("film.vtu", {"compression": None}),
+    ("film.vtu", {"header_type": "UInt64"}), ("film.vtk", {}), ("film.vtk", {"fmt_version": "4.2"}),
+    ("film.xdmf", {}), ("film.xdmf", {"data_format": "XML"}),
+])  # fmt: skip
 def test_every_kind_of_file_gives_the_same_stress(
     tmp_path: Path, name: str, options: dict[str, Any]
 ):
@@ -233,15 +225,11 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path: Pa
     assert any("39 nodes repeat a radius" in note.text for note in found.notes)
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "centre"),
-    [
-        (np.linspace(0, 8, 41), np.linspace(0, 8, 41), (0.0, 0.0)),
-        (np.linspace(-8, 8, 81), np.linspace(-8, 8, 81), (0.0, 0.0)),
-        (np.linspace(-8, 8, 81), np.linspace(0, 8, 41), (0.5, 0.0)),
-    ],
-    ids=["quarter", "whole", "half, off the centre"],
-)
+@pytest.mark.parametrize(("x", "y", "centre"), [
+    (np.linspace(0, 8, 41), np.linspace(0, 8, 41), (0.0, 0.0)),
+    (np.linspace(-8, 8, 81), np.linspace(-8, 8, 81), (0.0, 0.0)),
+    (np.linspace(-8, 8, 81), np.linspace(0, 8, 41), (0.5, 0.0)),
+], ids=["quarter", "whole", "half, off the centre"])  # fmt: skip
 def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x: Any, y: Any, centre: Any):
     """Linear interpolation on squares of 0.2 mm costs at most 0.2² / 4 of the curvature."""
     path = saved(block(x, y, centre=centre), tmp_path / "film.vtu")
@@ -371,20 +359,17 @@ def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path: Path):
         imported(path, "S33", shear="C33")
 
 
-@pytest.mark.parametrize(
-    ("mesh", "options", "words"),
-    [
-        (section(), {"base": 0.1e-3}, "nearest node is at 0 mm"),
-        (section(heights=[0.0, 1.0]), {"vertical": "x"}, "Only 2 nodes"),
-        (section(), {"centre": (0.0, 0.0)}, "--centre"),
-        (section(radii=np.linspace(-8, 8, 41)), {}, "negative radius"),
-        (block(RADII, RADII), {"shear": "S33"}, "sections only"),
-        (meshio.Mesh(section().points, [("vertex", [[0], [1]])]), {}, "a line or a point"),
-        (section(radii=RADII[:3]), {}, "Only 3 nodes"),
-        (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
-        (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
-    ],
-)
+@pytest.mark.parametrize(("mesh", "options", "words"), [
+    (section(), {"base": 0.1e-3}, "nearest node is at 0 mm"),
+    (section(heights=[0.0, 1.0]), {"vertical": "x"}, "Only 2 nodes"),
+    (section(), {"centre": (0.0, 0.0)}, "--centre"),
+    (section(radii=np.linspace(-8, 8, 41)), {}, "negative radius"),
+    (block(RADII, RADII), {"shear": "S33"}, "sections only"),
+    (meshio.Mesh(section().points, [("vertex", [[0], [1]])]), {}, "a line or a point"),
+    (section(radii=RADII[:3]), {}, "Only 3 nodes"),
+    (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
+    (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
+])  # fmt: skip
 def test_a_mesh_without_a_base_that_can_be_used_is_refused(
     tmp_path: Path, mesh: meshio.Mesh, options: dict[str, Any], words: str
 ):

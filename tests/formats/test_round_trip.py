@@ -184,7 +184,7 @@ def test_check_names_are_kept_as_they_are_and_two_alike_are_refused(tmp_path: Pa
         write_artifact(make_artifact(checks=(check, check)), tmp_path / "b.h5")
 
 
-def test_the_texts_of_older_files_are_read_as_notes() -> None:
+def test_the_texts_of_older_files_are_read_as_notes():
     assert messages_from_json(["old"]) == (Message("note", "old"),)
     odd = [7, {"severity": "fatal", "text": ["z"]}, {}]
     texts = [(each.kind, each.text, each.severity) for each in messages_from_json(odd)]
@@ -267,19 +267,11 @@ def test_a_scan_of_another_program_is_read_in_its_own_units(tmp_path: Path):
     assert scan.film.poisson_ratio == 0.5
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        "/entry/data/x",
-        "/entry/data/u_zz",
-        "/entry/indenter/load",
-        "/entry/indenter/radius",
-        "/entry/indenter/shape",
-        "/entry/sample/film/young_modulus",
-        "/entry/sample/film/poisson_ratio",
-        "/entry/sample/film/thickness",
-    ],
-)
+@pytest.mark.parametrize("path", [
+    "/entry/data/x", "/entry/data/u_zz", "/entry/indenter/load", "/entry/indenter/radius",
+    "/entry/indenter/shape", "/entry/sample/film/young_modulus", "/entry/sample/film/poisson_ratio",
+    "/entry/sample/film/thickness",
+])  # fmt: skip
 def test_a_missing_part_is_named_by_its_path(tmp_path: Path, path: str):
     other_program(tmp_path / "scan.h5")
     with h5py.File(tmp_path / "scan.h5", "r+") as file:
@@ -288,19 +280,16 @@ def test_a_missing_part_is_named_by_its_path(tmp_path: Path, path: str):
         read_scan(tmp_path / "scan.h5")
 
 
-@pytest.mark.parametrize(
-    ("path", "units", "wanted"),
-    [
-        ("/entry/data/x", "mV", "length"),
-        ("/entry/data/x", "parsnip", "unknown"),
-        ("/entry/data/u_zz", "T", "voltage"),
-        ("/entry/indenter/load", "kg", "force"),
-        ("/entry/sample/film/young_modulus", "N", "stress"),
-        ("/entry/sample/film/poisson_ratio", "mm", "dimensionless"),
-        ("/entry/data/x", None, "has no unit"),
-        ("/entry/indenter/load", None, "has no unit"),
-    ],
-)
+@pytest.mark.parametrize(("path", "units", "wanted"), [
+    ("/entry/data/x", "mV", "length"),
+    ("/entry/data/x", "parsnip", "unknown"),
+    ("/entry/data/u_zz", "T", "voltage"),
+    ("/entry/indenter/load", "kg", "force"),
+    ("/entry/sample/film/young_modulus", "N", "stress"),
+    ("/entry/sample/film/poisson_ratio", "mm", "dimensionless"),
+    ("/entry/data/x", None, "has no unit"),
+    ("/entry/indenter/load", None, "has no unit"),
+])  # fmt: skip
 def test_a_wrong_or_missing_unit_is_named_with_its_path_and_the_right_one(
     tmp_path: Path, path: str, units: str | None, wanted: str
 ):

@@ -54,14 +54,10 @@ def test_what_was_done_travels_with_the_scan(tmp_path: Path):
     assert found.scan.source.sha256 in again.notes
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "x,u,n\n0,1,4\n1,2,4\n3,4,4\n3,4.4,7\n1,2.2,7\n0,1.1,7\n",
-        "x,u,n\n3,4.4,7\n0,1,4\n1,2.2,7\n1,2,4\n0,1.1,7\n3,4,4\n",
-    ],
-    ids=["forth and back", "mixed"],
-)
+@pytest.mark.parametrize("text", [
+    "x,u,n\n0,1,4\n1,2,4\n3,4,4\n3,4.4,7\n1,2.2,7\n0,1.1,7\n",
+    "x,u,n\n3,4.4,7\n0,1,4\n1,2.2,7\n1,2,4\n0,1.1,7\n3,4,4\n",
+], ids=["forth and back", "mixed"])  # fmt: skip
 def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text: str):
     found = scan_table(tmp_path, text, repeat="n")
     assert found.scan.kind == "repeats"
@@ -72,15 +68,11 @@ def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text: str):
     assert any("6 readings in 2 repeats at 3 places" in note.text for note in found.notes)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1.02,2.2,2\n-0.01,1.1,2\n2.99,4.4,2\n",
-        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n",
-        "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n0,4.4,2\n",
-    ],
-    ids=["scattered positions", "a row that is missing", "a position read twice"],
-)
+@pytest.mark.parametrize("text", [
+    "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1.02,2.2,2\n-0.01,1.1,2\n2.99,4.4,2\n",
+    "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n",
+    "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n0,4.4,2\n",
+], ids=["scattered positions", "a row that is missing", "a position read twice"])  # fmt: skip
 def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, text: str):
     found = scan_table(tmp_path, text, repeat="n")
     stated = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
@@ -108,7 +100,7 @@ def test_equal_positions_without_a_column_of_repeats_are_one_line(tmp_path: Path
 @given(seed=st.integers(0, 2**16), spread=st.floats(0.0, 0.4))
 def test_a_single_line_is_not_told_of_repeats(
     tmp_path_factory: pytest.TempPathFactory, seed: int, spread: float
-) -> None:
+):
     rng = np.random.default_rng(seed)
     x = rng.permutation(np.arange(33.0) + spread * rng.uniform(-1, 1, 33))
     text = rows(x.tolist(), [1.0] * 33, header="x,u")
@@ -184,19 +176,15 @@ def test_rows_without_a_position_are_left_out_and_counted(tmp_path: Path):
     assert any("1 rows without a position" in note.text for note in found.notes)
 
 
-@pytest.mark.parametrize(
-    ("text", "decimal"),
-    [
-        ("x;u\n0,5;1,25\n1,5;2,5\n", ","),
-        ("x\tu\n0.5\t1.25\n1.5\t2.5\n", "."),
-        ("x u\n0.5   1.25\n 1.5 2.5\n", "."),
-        ("# made by a stage\n% in mm\nx,u\n0.5,1.25\n1.5,2.5\n", "."),
-        ('"x","u"\n"0.5","1.25"\n"1.5","2.5"\n', "."),
-        ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", "."),
-        ("x|u\n5D-1|1.25\n1.5|2.5d0\n", "."),
-    ],
-    ids=["German", "tabs", "spaces", "comments", "quotes", "Excel", "Fortran"],
-)
+@pytest.mark.parametrize(("text", "decimal"), [
+    ("x;u\n0,5;1,25\n1,5;2,5\n", ","),
+    ("x\tu\n0.5\t1.25\n1.5\t2.5\n", "."),
+    ("x u\n0.5   1.25\n 1.5 2.5\n", "."),
+    ("# made by a stage\n% in mm\nx,u\n0.5,1.25\n1.5,2.5\n", "."),
+    ('"x","u"\n"0.5","1.25"\n"1.5","2.5"\n', "."),
+    ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", "."),
+    ("x|u\n5D-1|1.25\n1.5|2.5d0\n", "."),
+], ids=["German", "tabs", "spaces", "comments", "quotes", "Excel", "Fortran"])  # fmt: skip
 def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text: str, decimal: str):
     found = scan_table(tmp_path, text)
     assert found.scan.x.tolist() == [0.5e-3, 1.5e-3]
@@ -265,14 +253,11 @@ def test_nodes_given_twice_are_averaged_and_reported(tmp_path: Path):
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("r,s\n0,2\n1,\n2,1\n", "sigma_zz is not a number in data row 2"),
-        ("r,s\n0,2\nnan,3\n,1\n", "r is not a number in data row 2 and 1 more"),
-        ("r,s\n-1,2\n0,3\n1,2\n", "negative radius"),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    ("r,s\n0,2\n1,\n2,1\n", "sigma_zz is not a number in data row 2"),
+    ("r,s\n0,2\nnan,3\n,1\n", "r is not a number in data row 2 and 1 more"),
+    ("r,s\n-1,2\n0,3\n1,2\n", "negative radius"),
+])  # fmt: skip
 def test_a_fem_table_with_holes_or_negative_radii_is_refused(tmp_path: Path, text: str, words: str):
     with pytest.raises(InputError, match=words):
         reference_table(tmp_path, text)
@@ -361,7 +346,7 @@ def test_a_voltage_that_falls_under_compression_can_be_turned(tmp_path: Path):
         scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_sign=2)
 
 
-def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path) -> None:
+def test_what_the_table_says_at_its_head_travels_with_the_scan(tmp_path: Path):
     head = "# SYNTHETIC: made up\x1b[2J\n%  rod 3\n#\n" + "# " + "z" * 5000 + "\n" + "# more\n" * 40
     found = scan_table(tmp_path, head + "x,u\n0,1\n# within the table\n1,2\n")
     lines = found.scan.notes.splitlines()
