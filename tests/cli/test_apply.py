@@ -55,9 +55,7 @@ def test_the_file_names_its_inputs_and_holds_the_profiles(
     assert "memscal-stress" in run("inspect", "out.h5").out
 
 
-def test_a_wrong_gain_fails_the_check_and_the_exit_code_says_so(
-    run: Run, artifact: Path, folder: Path
-):
+def test_a_wrong_gain_fails_the_check_and_is_exit_code_1(run: Run, artifact: Path, folder: Path):
     scan = contact_scan(1, load=LOADS, noise=0.001, load_scatter=0.0)
     memscal.write_scan(replace(scan, u_zz=1.2 * scan.u_zz), folder / "gain.h5")
     done = run("apply", artifact, "gain.h5").exits(CHECK_FAILED)
@@ -66,9 +64,7 @@ def test_a_wrong_gain_fails_the_check_and_the_exit_code_says_so(
     assert "gain.stress.h5" in names(folder)
 
 
-def test_another_film_is_refused_and_an_override_is_recorded(
-    run: Run, artifact: Path, folder: Path
-):
+def test_another_film_is_refused_or_its_override_recorded(run: Run, artifact: Path, folder: Path):
     scan = contact_scan(1, load=LOADS)
     film = replace(scan.film, thickness=2.1e-3)
     memscal.write_scan(replace(scan, film=film), folder / "other.h5")
@@ -83,9 +79,7 @@ def test_another_film_is_refused_and_an_override_is_recorded(
     assert found.process.configuration == {"override": True}
 
 
-def test_an_existing_output_is_kept_without_force(
-    run: Run, artifact: Path, dry: Path, folder: Path
-):
+def test_an_old_output_is_kept_without_force(run: Run, artifact: Path, dry: Path, folder: Path):
     (folder / "dry.stress.h5").write_text("mine")
     assert run("apply", artifact, dry).code == EXISTS
     assert (folder / "dry.stress.h5").read_text() == "mine"
@@ -107,6 +101,6 @@ def test_files_of_another_kind_are_refused(run: Run, artifact: Path, dry: Path):
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
-def test_a_figure_is_drawn(run: Run, artifact: Path, dry: Path, folder: Path, suffix: str):
+def test_a_figure_is_drawn(run: Run, artifact: Path, dry: Path, folder: Path, suffix):
     assert run("apply", artifact, dry, "--figure", f"f.{suffix}").code == 0
     assert (folder / f"f.{suffix}").stat().st_size > 1000

@@ -84,7 +84,7 @@ def test_a_voltage_of_the_wrong_sign_is_refused(refused: Callable[..., str], fol
     assert "--u-sign -1" in message
 
 
-def test_a_reference_that_does_not_cover_the_scan_is_refused(
+def test_a_reference_shorter_than_the_scan_is_refused(
     refused: Callable[..., str], scan: Path, folder: Path
 ):
     film = memscal.simulate(seed=1).film

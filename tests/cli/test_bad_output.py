@@ -73,18 +73,14 @@ def test_a_read_only_disk_is_known_before_computing(
 
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("name", ["--output", "--report", "--figure", "--sweep-figure"])
-def test_every_output_is_proven_writable_before_computing(
-    run: Run, scan: Path, folder: Path, name: str
-):
+def test_every_output_is_proven_writable_before_computing(run: Run, scan: Path, folder: Path, name):
     run("calibrate", scan, name, "missing/out.png").exits(4, "missing", "Create the folder")
     assert names(folder) == ["scan.h5"]
 
 
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("spelling", ["scan.h5", "./scan.h5", "link.h5", "twin.h5"])
-def test_an_output_is_never_an_input_even_if_forced(
-    run: Run, scan: Path, folder: Path, spelling: str
-):
+def test_an_output_is_never_an_input_even_if_forced(run: Run, scan: Path, folder: Path, spelling):
     before = scan.read_bytes()
     (folder / "link.h5").symlink_to("scan.h5")
     (folder / "twin.h5").hardlink_to(folder / "scan.h5")
@@ -102,7 +98,7 @@ def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
 
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("name", [".", "/dev/null", "scan.h5/out.h5", "a" * 300])
-def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name: str):
+def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name):
     refused = run("calibrate", scan, "-o", name, "--force").exits(4)
     assert refused.err.startswith("Error: The output ")
 
@@ -148,9 +144,7 @@ def test_an_internal_error_is_owned_up_to_without_a_traceback(
         run(*arguments).exits(70, "Traceback", "flux capacitor")
 
 
-def test_running_out_of_memory_is_said_plainly(
-    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_running_out_of_memory_is_said_so(run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch):
     def greedy(*_: object, **__: object) -> None:
         raise MemoryError
 
@@ -158,9 +152,7 @@ def test_running_out_of_memory_is_said_plainly(
     run("calibrate", scan).exits(70, "out of memory")
 
 
-def test_a_python_warning_becomes_one_line_of_words(
-    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_python_warning_becomes_one_line(run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch):
     import warnings
 
     from memscal.calibration.calibrate import calibrate

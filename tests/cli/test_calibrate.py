@@ -39,7 +39,7 @@ def test_the_table_of_checks_fits_a_terminal_and_shows_p_values(run: Run, scan: 
     assert 0.0 <= float(row.split()[4]) <= 1.0
 
 
-def test_a_failed_check_is_exit_code_1_with_the_artifact_written_and_marked(
+def test_a_failed_check_is_exit_code_1_and_marks_the_artifact(
     run: Run, drifting_scan: Path, folder: Path
 ):
     done = run("calibrate", drifting_scan, "-o", "out.h5", "--json").exits(1)
@@ -142,7 +142,7 @@ def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path):
     (["--colour"], "--colour"),
 ])  # fmt: skip
 def test_wrong_usage_is_exit_code_2_with_a_hint(
-    run: Run, scan: Path, folder: Path, arguments: list[str], hint: str
+    run: Run, scan: Path, folder: Path, arguments, hint
 ):
     refused = run("calibrate", scan, *arguments).exits(2, hint, "--help")
     assert refused.out == ""
@@ -173,9 +173,7 @@ def test_the_name_of_the_artifact_keeps_what_is_no_suffix(run: Run, good_scan: P
     assert (folder / "film_0.5mm.apparatus.h5").is_file()
 
 
-def test_an_output_may_be_reached_through_a_link_and_the_link_stays(
-    run: Run, scan: Path, folder: Path
-):
+def test_a_link_to_an_output_is_followed_and_stays(run: Run, scan: Path, folder: Path):
     (folder / "store").mkdir()
     (folder / "out.h5").symlink_to("store/real.h5")
     assert run("calibrate", scan, "-o", "out.h5").code == 0
@@ -184,6 +182,6 @@ def test_an_output_may_be_reached_through_a_link_and_the_link_stays(
 
 
 @pytest.mark.parametrize(("typed", "power"), [(0.14, -3), (2.2, 6), (561.0, -6), (1e-4, -3)])
-def test_a_number_typed_in_a_unit_is_the_number_that_python_reads_in_si(typed: float, power: int):
+def test_a_number_typed_in_a_unit_is_the_number_that_python_reads_in_si(typed, power):
     mantissa, _, exponent = repr(typed).partition("e")
     assert si(typed, power) == float(f"{mantissa}e{int(exponent or 0) + power}")

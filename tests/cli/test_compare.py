@@ -69,9 +69,7 @@ def made_by_hand(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return give
 
 
-def test_it_finds_the_friction_of_an_experiment_from_its_files(
-    compare: Callable[..., Any], folder: Path
-):
+def test_it_finds_the_friction_of_an_experiment(compare: Callable[..., Any], folder: Path):
     done = compare(*QUICK, "--json", scans=("dry.h5", "lubricated.h5"))
     assert done.code in (0, CHECKED), done.err
     told = done.json
@@ -93,7 +91,7 @@ def test_it_finds_the_friction_of_an_experiment_from_its_files(
 
 
 @pytest.mark.usefixtures("folder")
-def test_measured_stress_gives_the_same_numbers_as_its_scans(
+def test_measured_stress_gives_the_numbers_of_its_scans(
     run: Run, compare: Callable[..., Any], bench: Path
 ):
     scans = ("dry.h5", "lubricated.h5")
@@ -115,7 +113,7 @@ def flat(told: Any) -> Iterator[Any]:
         yield told
 
 
-def test_stress_of_another_calibration_is_refused_or_overridden(
+def test_stress_of_another_calibration_is_refused(
     run: Run, compare: Callable[..., Any], bench: Path, folder: Path
 ):
     known = memscal.load_apparatus(bench / "sensor.apparatus.h5")
@@ -130,9 +128,7 @@ def test_stress_of_another_calibration_is_refused_or_overridden(
     refused(compare(*QUICK, scans=both), "other.apparatus.h5")
 
 
-def test_profiles_calculated_elsewhere_take_the_place_of_ours(
-    compare: Callable[..., Any], folder: Path
-):
+def test_profiles_calculated_elsewhere_replace_ours(compare: Callable[..., Any], folder: Path):
     tables = []
     for friction in (0.0, 0.3, float("inf")):
         contact = memscal.indent(PAPER_FILM, PAPER_SPHERE, load=2.75, friction=friction)
@@ -150,9 +146,7 @@ def test_profiles_calculated_elsewhere_take_the_place_of_ours(
     assert chi_square[0] < chi_square[1]  # it is lubricated
 
 
-def test_tables_name_every_load_and_stand_within_a_hundred_columns(
-    compare: Callable[..., Any],
-):
+def test_tables_name_every_load_within_a_hundred_columns(compare: Callable[..., Any]):
     done = compare(*QUICK)
     assert max(map(len, done.out.splitlines())) < 100
     for words in ("1.37", "2.75", "S_max/p0_max", "by the profile", "Quality checks", "χ²"):
@@ -184,8 +178,8 @@ def test_a_damaged_cache_is_made_anew(compare: Callable[..., Any], bench: Path):
          "film"),
     ],
 )  # fmt: skip
-def test_another_sensor_channel_or_film_is_refused_and_both_are_named(
-    run: Run, bench: Path, folder: Path, change: dict[str, Any], words: str
+def test_another_sensor_channel_or_film_is_refused(
+    run: Run, bench: Path, folder: Path, change, words
 ):
     scan = replace(memscal.read_scan(bench / "dry.h5"), **change)
     memscal.write_scan(scan, folder / "other.h5")
@@ -220,9 +214,7 @@ def without(scan: Scan, kept: np.ndarray) -> Scan:
     return replace(scan, **{n: v[..., kept] for n, v in given.items() if v is not None})
 
 
-def test_a_scan_that_does_not_come_down_to_its_baseline_is_refused(
-    run: Run, bench: Path, folder: Path
-):
+def test_a_scan_that_does_not_reach_its_baseline_is_refused(run: Run, bench: Path, folder: Path):
     scan = memscal.read_scan(bench / "dry.h5")
     memscal.write_scan(without(scan, np.abs(scan.x) < 3e-3), folder / "narrow.h5")
     done = run("compare", bench / "sensor.apparatus.h5", "narrow.h5", "--no-cache", *QUICK)
@@ -239,7 +231,7 @@ def test_a_run_of_missing_points_is_refused_with_its_place(run: Run, bench: Path
 
 
 @pytest.mark.parametrize("missing", ["sensor.apparatus.h5", "dry.h5"])
-def test_a_missing_file_is_refused_by_its_name(run: Run, bench: Path, folder: Path, missing: str):
+def test_a_missing_file_is_refused_by_its_name(run: Run, bench: Path, folder: Path, missing):
     files = {name: bench / name for name in ("sensor.apparatus.h5", "dry.h5")}
     files[missing] = folder / "missing.h5"
     done = run("compare", *files.values(), "--no-cache")
@@ -256,15 +248,13 @@ def test_a_missing_file_is_refused_by_its_name(run: Run, bench: Path, folder: Pa
     (["--cache", "here", "--no-cache"], "not both"),
     (["--figure", "table.txt"], ".png"),
 ])  # fmt: skip
-def test_options_that_do_not_go_together_are_exit_code_2(
-    run: Run, bench: Path, arguments: list[str], words: str
-):
+def test_options_that_do_not_go_together_are_exit_code_2(run: Run, bench: Path, arguments, words):
     done = run("compare", bench / "sensor.apparatus.h5", bench / "dry.h5", *arguments).exits(USAGE)
     assert done.out == ""
     assert words in done.err
 
 
-def test_a_failed_check_is_exit_code_1_and_the_results_are_printed(
+def test_a_failed_check_is_exit_code_1_after_the_results(
     compare: Callable[..., Any], made_by_hand: Callable[..., None]
 ):
     made_by_hand(comparison(lubrications=("dry",), failed=True))
@@ -314,7 +304,7 @@ def test_nothing_is_overwritten_without_force(
     assert (folder / "drawn" / "maxima.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_folder_that_cannot_be_made_is_known_before_computing(
+def test_a_folder_is_proven_writable_before_computing(
     compare: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ):
     def reached(*_: object, **__: object) -> None:

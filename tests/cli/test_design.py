@@ -53,9 +53,7 @@ def test_a_wish_out_of_reach_is_an_error_with_the_best(run: Run):
     (["--weight", 0.5, "--weight", 0.5], "--weight"),
     (["--figure", "design.gif"], ".png"),
 ])  # fmt: skip
-def test_wrong_use_is_told_before_anything_is_computed(
-    run: Run, arguments: list[object], told: str
-):
+def test_wrong_use_is_told_before_anything_is_computed(run: Run, arguments, told):
     failed = run("design", *arguments)
     assert (failed.code, failed.out) == (2, "")
     assert told in failed.err
@@ -69,7 +67,7 @@ def test_wrong_use_is_told_before_anything_is_computed(
     (["--radius", 1.5], "The rod is 3 mm wide"),
     (["--method", "magic"], "magic"),
 ])  # fmt: skip
-def test_a_plan_that_cannot_be_is_refused(run: Run, arguments: list[object], told: str):
+def test_a_plan_that_cannot_be_is_refused(run: Run, arguments, told):
     failed = run("design", *arguments)
     assert (failed.code, failed.out) == (3, "")
     assert told in failed.err

@@ -32,21 +32,21 @@ def test_the_list_of_commands_names_and_describes_each(run: Run):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_shows_examples_that_name_it(run: Run, name: str):
+def test_every_command_shows_examples_that_name_it(run: Run, name):
     shown = run(name, "--help").exits(0)
     examples = shown.out[shown.out.index("Examples:") :]
     assert f"memscal {name} " in examples
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_options_in_the_examples_exist(name: str):
+def test_the_options_in_the_examples_exist(name):
     command = commands()[name]
     known = {text for option in options(command) for text in (*option.opts, *option.secondary_opts)}
     assert set(re.findall(r" (--?[a-z][a-z-]*)", command.epilog or "")) <= known | {"--help"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_option_with_a_unit_says_it_in_words(name: str):
+def test_every_option_with_a_unit_says_it_in_words(name):
     for option in options(commands()[name]):
         unit = getattr(option.type, "unit", None)
         if unit not in (None, "ratio"):
@@ -71,13 +71,13 @@ def test_version_is_that_of_the_package(run: Run):
     (["completion", "tcsh"], "fish"),
     (["--verbose"], "--version"),
 ])  # fmt: skip
-def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments: list[str], hint: str):
+def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments, hint):
     refused = run(*arguments).exits(2, hint)
     assert refused.out == ""
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_shell_gets_its_completion_script(run: Run, shell: str):
+def test_a_shell_gets_its_completion_script(run: Run, shell):
     done = run("completion", shell).exits(0)
     assert f"_MEMSCAL_COMPLETE={shell}_complete" in done.out
 
@@ -89,8 +89,8 @@ def test_a_shell_gets_its_completion_script(run: Run, shell: str):
     (["memscal", "reference", ""], {"rod", "sphere", "cone", "profile"}),
 ])  # fmt: skip
 def test_words_are_completed(
-    words: list[str],
-    expected: set[str],
+    words,
+    expected,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ):

@@ -112,7 +112,7 @@ def test_a_fem_table_becomes_a_reference(run: Run, folder: Path):
     columns = ["--r", "r", "--r-unit", "mm", "--sigma", "S33", "--sigma-unit", "MPa", "--load", 1]
     wrong = run("import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns)
     wrong.exits(3, "--sign -1")
-    done = run(
+    run(
         "import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns, "--sign", "-1",
         "--solver", "a FEM program",
     ).exits(0)  # fmt: skip
@@ -148,7 +148,7 @@ def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path):
     r = np.linspace(0, 8, 81)
     sigma = np.exp(-(r**2) / 2) / (2 * np.pi)
     write_table(folder / "fem.csv", "r,S33,S13", np.stack([r, -sigma, -0.1 * r * sigma], axis=1))
-    done = run(
+    run(
         "import", "fem.csv", "--format", "reference", "-o", "rod.h5", "--r", "r", "--r-unit", "mm",
         "--sigma", "S33", "--sigma-unit", "MPa", "--sign", "-1", "--load", 1,
         "--shear", "S13", "--shear-sign", "-1",
@@ -171,7 +171,7 @@ def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path):
     (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
 ])  # fmt: skip
 def test_what_is_missing_is_named_all_at_once(
-    run: Run, table: Path, folder: Path, arguments: list[object], hints: list[str]
+    run: Run, table: Path, folder: Path, arguments, hints
 ):
     refused = run("import", table, "-o", "scan.h5", *arguments).exits(2)
     assert all(hint in refused.err for hint in hints), refused.err
@@ -184,7 +184,7 @@ def test_what_is_missing_is_named_all_at_once(
     (["--u-unit", "bananas"], "bananas"),
 ])  # fmt: skip
 def test_a_wrong_column_or_unit_is_refused_by_name(
-    run: Run, table: Path, folder: Path, change: list[str], word: str
+    run: Run, table: Path, folder: Path, change, word
 ):
     run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *change).exits(3, word)
     assert names(folder) == ["scan.csv"]

@@ -65,9 +65,7 @@ def test_lengths_on_the_command_line_are_in_mm(run: Run, folder: Path):
     (["--format", "reference"], 2, ["--r-unit", "--sigma", "--sigma-unit", "--load"]),
     ([], 2, ["film.vtu is a mesh", "--format reference"]),
 ])  # fmt: skip
-def test_what_is_wrong_with_a_mesh_or_its_options_is_said(
-    run: Run, mesh: Path, options: list[object], code: int, words: list[str]
-):
+def test_what_is_wrong_with_a_mesh_is_said(run: Run, mesh: Path, options, code, words):
     refused = run("import", mesh, "-o", "film.h5", *options).exits(code)
     assert all(word in refused.err for word in words), refused.err
     assert names(mesh.parent) == ["film.vtu"]
@@ -85,7 +83,7 @@ def test_a_mesh_of_another_kind_is_not_taken_for_a_table(run: Run, folder: Path)
     run("import", "film.frd", "-o", "film.h5", *MESH, "--sigma", "STRESS").exits(3, ".vtu")
 
 
-def test_without_meshio_the_command_to_install_it_is_shown(
+def test_without_meshio_its_installation_is_shown(
     run: Run, mesh: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setitem(sys.modules, "meshio", None)

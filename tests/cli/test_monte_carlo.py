@@ -27,6 +27,6 @@ def test_draws_are_given_as_json_in_the_units_of_the_rest(run: Run, scan: Path):
 
 
 @pytest.mark.parametrize("draws", ["1", "0", "many", "-5"])
-def test_a_number_of_draws_that_makes_no_sense_is_refused(run: Run, scan: Path, draws: str):
+def test_a_number_of_draws_that_makes_no_sense_is_refused(run: Run, scan: Path, draws):
     run("calibrate", scan, f"--monte-carlo={draws}").exits(2, "--monte-carlo")
     assert not scan.with_suffix(".apparatus.h5").exists()

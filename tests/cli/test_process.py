@@ -22,16 +22,9 @@ def run(
     **environment: str,
 ) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [*MEMSCAL, *arguments],
-        cwd=cwd,
-        env={**os.environ, **environment},
-        stdout=stdout,
-        stderr=subprocess.PIPE,
-        text=True,
-        encoding="utf-8",
-        preexec_fn=preexec,
-        check=False,
-    )
+        [*MEMSCAL, *arguments], cwd=cwd, env={**os.environ, **environment}, stdout=stdout,
+        stderr=subprocess.PIPE, text=True, encoding="utf-8", preexec_fn=preexec, check=False,
+    )  # fmt: skip
 
 
 def files_up_to(size: int) -> Callable[[], None]:
@@ -71,16 +64,12 @@ def test_a_reader_that_goes_away_is_no_failure(scan: Path, folder: Path):
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path, unbuffered: str):
+def test_results_that_cannot_be_printed_are_exit_code_4(scan: Path, folder: Path, unbuffered):
     with (folder / "shown.txt").open("w") as shown:
         done = run(
-            "inspect",
-            "scan.h5",
-            cwd=folder,
-            stdout=shown.fileno(),
-            preexec=files_up_to(16),
+            "inspect", "scan.h5", cwd=folder, stdout=shown.fileno(), preexec=files_up_to(16),
             PYTHONUNBUFFERED=unbuffered,
-        )
+        )  # fmt: skip
     assert done.returncode == 4
     assert "cannot be printed: File too large" in done.stderr
     assert "Exception ignored" not in done.stderr

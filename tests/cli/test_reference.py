@@ -56,9 +56,7 @@ def test_load_and_depth_exclude_each_other(run: Run):
     (["sphere", "--backend", "fem", "--film-radius", "1"], "the film's edge at 1 mm"),
     (["profile", "--profile-table", "absent.csv"], "absent.csv"),
 ])  # fmt: skip
-def test_what_cannot_be_solved_is_refused_plainly(
-    run: Run, folder: Path, arguments: list[str], word: str
-):
+def test_what_cannot_be_solved_is_refused_plainly(run: Run, folder: Path, arguments, word):
     run("reference", *arguments, "-o", "out.h5").exits(3, word)
     assert names(folder) == []
 
@@ -131,9 +129,7 @@ def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
         "one normal law",
     ),
 ])  # fmt: skip
-def test_options_that_make_no_sense_are_a_matter_of_usage(
-    run: Run, folder: Path, arguments: list[str], word: str
-):
+def test_options_that_make_no_sense_are_a_matter_of_usage(run: Run, folder: Path, arguments, word):
     run("reference", *arguments).exits(2, word)
     assert names(folder) == []
 
@@ -154,12 +150,10 @@ def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path):
 
 
 @pytest.mark.parametrize("way", [["--backend", "fem"], ["--strain", "finite"]])
-def test_the_field_in_the_film_goes_to_a_mesh_that_can_be_imported_again(
-    run: Run, folder: Path, way: list[str]
-):
+def test_the_field_goes_to_a_mesh_that_can_be_imported(run: Run, folder: Path, way):
     run("reference", "sphere", "--load", 0.34, *way, "--mesh", "film.vtu", "-o", "film.h5").exits(0)
     units = ["--r-unit", "mm", "--sigma", "stress_Pa", "--sigma-unit", "Pa", "--load", 0.34]
-    back = run("import", "film.vtu", "-o", "back.h5", "--format", "reference", *units).exits(0)
+    run("import", "film.vtu", "-o", "back.h5", "--format", "reference", *units).exits(0)
     written, imported = memscal.read_reference("film.h5"), memscal.read_reference("back.h5")
     # A mesh holds stresses at its nodes, which are less accurate than the base's reaction.
     direct = np.interp(imported.r, written.r, written.sigma_zz)

@@ -30,9 +30,7 @@ def sphere(folder: Path) -> Path:
     return path
 
 
-def test_the_file_is_a_reference_with_uncertainties(
-    run: Run, artifact: Path, sphere: Path, folder: Path
-):
+def test_the_file_is_a_reference_with_errors(run: Run, artifact: Path, sphere: Path, folder: Path):
     done = run("restore", artifact, sphere, "-o", "stress.h5")
     assert "Written: stress.h5" in done.err
     profile = memscal.read_reference(folder / "stress.h5")
@@ -42,7 +40,7 @@ def test_the_file_is_a_reference_with_uncertainties(
     assert run("check", "stress.h5").code == 0
 
 
-def test_an_expected_stress_that_was_not_there_is_exit_code_1(
+def test_a_wrong_expected_stress_is_exit_code_1(
     run: Run, artifact: Path, sphere: Path, folder: Path
 ):
     memscal.write_reference(pressed(1.0, np.inf).profile(), folder / "sticking.h5")

@@ -43,7 +43,7 @@ def planned() -> memscal.Design:
 
 
 @pytest.mark.parametrize("name", ["stress", "restored", "contact", "planned"])
-def test_text_mapping_notebook_figure_and_arrays(name: str, request: pytest.FixtureRequest):
+def test_text_mapping_notebook_figure_and_arrays(name, request: pytest.FixtureRequest):
     result = request.getfixturevalue(name)
     assert str(result) == result.summary()
     assert "\n" not in repr(result)
@@ -72,7 +72,7 @@ def test_the_commands_print_the_results(
     )
 
 
-def test_a_contact_with_friction_is_not_called_frictionless(
+def test_the_friction_of_a_contact_is_named(
     restored: memscal.Restoration, contact: memscal.Contact
 ):
     assert restored.to_dict()["calculated"]["origin"] == "calculated without friction"
@@ -104,9 +104,7 @@ def test_forces_of_one_sensor_are_correlated(stress: memscal.MeasuredStress):
     assert total.std_dev < first.force_uncertainty + second.force_uncertainty
 
 
-def test_the_numbers_of_a_restoration_have_their_joint_covariance(
-    restored: memscal.Restoration,
-):
+def test_numbers_of_a_restoration_have_their_joint_covariance(restored: memscal.Restoration):
     numbers = restored.ufloats()
     assert list(numbers) == ["force", "stress_on_axis", "centre", "baseline"]
     assert numbers["force"].nominal_value == pytest.approx(restored.force)

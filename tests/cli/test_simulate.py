@@ -96,6 +96,6 @@ def test_noise_may_be_left_unstated(run: Run, folder: Path):
     (["--noise", -1], 2),
     (["--sigma", 700, "--weight", 0.5], 3),
 ])  # fmt: skip
-def test_what_makes_no_scan_is_refused(run: Run, folder: Path, arguments: list[object], code: int):
+def test_what_makes_no_scan_is_refused(run: Run, folder: Path, arguments, code):
     run("simulate", "-o", "scan.h5", *arguments).exits(code)
     assert names(folder) == []

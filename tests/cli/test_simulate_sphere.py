@@ -140,9 +140,7 @@ def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path):
     (["-o", "no/such/folder"], 4, "Create the folder first"),
     (["-o", "file"], 4, "not a folder"),
 ])  # fmt: skip
-def test_what_makes_no_experiment_is_refused(
-    run: Run, folder: Path, arguments: list[object], code: int, hint: str
-):
+def test_what_makes_no_experiment_is_refused(run: Run, folder: Path, arguments, code, hint):
     (folder / "file").write_text("mine")
     refused = run(*SPHERE, *arguments)
     assert (refused.code, hint in refused.err) == (code, True), refused.err
@@ -153,9 +151,7 @@ def test_what_makes_no_experiment_is_refused(
     (["--friction", 0.2], "--friction belongs to --experiment sphere"),
     (["--gain", 1, "--slip-length", 2], "--slip-length, --gain belong"),
 ])  # fmt: skip
-def test_a_rod_scan_refuses_what_only_a_sphere_has(
-    run: Run, folder: Path, arguments: list[object], hint: str
-):
+def test_a_rod_scan_refuses_what_only_a_sphere_has(run: Run, folder: Path, arguments, hint):
     refused = run("simulate", *arguments)
     assert (refused.code, hint in refused.err) == (2, True), refused.err
     assert names(folder) == []

@@ -32,16 +32,14 @@ def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(run: Run,
 
 
 def test_a_report_and_a_figure_are_drawn(run: Run, sheared: Path):
-    done = run(
+    run(
         "calibrate", sheared, "--channel", "xz", "--report", "r.html", "--figure", "f.png"
     ).exits(0)  # fmt: skip
     assert {"r.html", "f.png"} < set(names(sheared.parent))
 
 
 @pytest.mark.parametrize("further", [[], ["--dry-run"]])
-def test_a_method_that_divides_fields_is_an_input_refused(
-    run: Run, sheared: Path, further: list[str]
-):
+def test_a_method_that_divides_fields_is_an_input_refused(run: Run, sheared: Path, further):
     done = run("calibrate", sheared, "--channel", "xz", "--method", "wiener", *further)
     done.exits(3, "bayesian")
     assert names(sheared.parent) == ["scan.h5"]

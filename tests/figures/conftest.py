@@ -59,13 +59,9 @@ def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolut
     spread = noise * float(np.max(clean))
     u = clean + rng.normal(0.0, spread, r.size)
     return Reconvolution(
-        x=x,
-        u_zz=u,
-        u_zz_errors=np.full(r.size, spread),
-        u_zz_predicted=clean,
-        u_zz_gaussian=single,
-        residual=u - clean,
-    )
+        x=x, u_zz=u, u_zz_errors=np.full(r.size, spread), u_zz_predicted=clean,
+        u_zz_gaussian=single, residual=u - clean,
+    )  # fmt: skip
 
 
 def radial_profile(error: float, ripple: float) -> ApparatusRadial:
@@ -103,12 +99,10 @@ def build(
     g = sum(w * gaussian(np.hypot(grid, grid[:, None]), s) for w, s in _PARTS)
     names = ("reconvolution", "symmetry", "tail_share", "resolved_band", "gaussian_misfit")
     values = {
-        "conversion_constant": (_CONSTANT, 1.3e-10),
-        "gaussian_sigma": (_SIGMA, 3.4e-6),
-        "gaussian_sigma_deconvolved": (0.544e-3, 5.1e-6),
-        "centre": (_CENTRE, 4.2e-6),
+        "conversion_constant": (_CONSTANT, 1.3e-10), "gaussian_sigma": (_SIGMA, 3.4e-6),
+        "gaussian_sigma_deconvolved": (0.544e-3, 5.1e-6), "centre": (_CENTRE, 4.2e-6),
         "baseline": (_BASELINE, 1.1e-6),
-    }
+    }  # fmt: skip
     if kind != "line":
         values["centre_y"] = (0.0, 4.4e-6)
     numbers, spreads = np.array(list(values.values())).T

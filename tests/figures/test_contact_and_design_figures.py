@@ -92,7 +92,7 @@ def test_curves_are_the_designs_own(planned: Design):
 
 
 @pytest.mark.parametrize("vary", ["step", "half_range", "repeats"])
-def test_less_noise_is_less_uncertainty_along_every_axis(planned: Design, vary: str):
+def test_less_noise_is_less_uncertainty_along_every_axis(planned: Design, vary):
     axes = design_figure(planned, vary=vary).axes[2]
     (sigma,) = (line for line in axes.lines if line.get_label() == "σ")
     first, last = sigma.get_ydata()[0], sigma.get_ydata()[-1]

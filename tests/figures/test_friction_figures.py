@@ -49,9 +49,7 @@ def test_profiles_are_drawn_with_their_standard_uncertainties(found: FrictionCom
         np.testing.assert_allclose(u, profile.s_zz_errors * 1e-3)
 
 
-def test_the_limits_of_friction_pass_through_the_calculated_profiles(
-    found: FrictionComparison,
-):
+def test_limits_of_friction_pass_through_the_calculated_profiles(found: FrictionComparison):
     axes = profile_figure(found).axes[0]
     solid = [
         line for line in axes.lines if line.get_ls() == "-" and np.size(line.get_xdata()) > 100
@@ -79,9 +77,7 @@ def test_every_residual_is_within_its_panel(found: FrictionComparison):
             assert np.all((z > low) & (z < high))
 
 
-def test_a_logarithmic_scale_shows_every_positive_stress_of_three_decades(
-    found: FrictionComparison,
-):
+def test_a_logarithmic_scale_shows_every_stress_of_three_decades(found: FrictionComparison):
     axes = profile_figure(found).axes[1]
     low, high = axes.get_ylim()
     assert high / low > 1e3
@@ -106,9 +102,7 @@ def test_a_load_has_one_colour_in_all_panels():
     assert len(set(colours[0].values())) == len(LOADS)
 
 
-def test_a_set_of_coefficients_is_drawn_less_the_frictionless_profile(
-    found: FrictionComparison,
-):
+def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionComparison):
     figure = friction_set_figure(found, loading="total")
     differences = figure.axes[len(LOADS) : 2 * len(LOADS)]
     dry = [one for one in found.loads["total"] if one.lubrication == "dry"]
@@ -193,7 +187,7 @@ def test_an_axis_of_friction_is_monotone_and_ends_at_infinity():
 
 
 @pytest.mark.parametrize("first", [0.0, 1e-9, 0.2e-3])
-def test_a_profile_between_the_measured_radii_is_even_and_smooth(first: float):
+def test_a_profile_between_the_measured_radii_is_even_and_smooth(first):
     width = 1e-3
     r = np.concatenate([[first], np.sort(np.r_[0.25e-3:6e-3:0.3e-3, 0.4e-3:6e-3:0.3e-3])])
     fine = np.linspace(0.0, r[-1], 500)
@@ -210,7 +204,7 @@ def test_all_figures_have_the_names_that_the_command_line_proves():
 
 
 @pytest.mark.parametrize("stem", figure_stems(["dry", "lubricated"]))
-def test_every_figure_renders(found: FrictionComparison, stem: str):
+def test_every_figure_renders(found: FrictionComparison, stem):
     figure = comparison_figures(found)[stem]()
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 

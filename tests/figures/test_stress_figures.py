@@ -57,9 +57,7 @@ def test_the_logarithmic_panel_shows_three_decades(stress: MeasuredStress):
     assert high > top
 
 
-def test_dry_and_lubricated_differ_in_mark_and_line_and_share_the_colour_of_their_load(
-    stress: MeasuredStress,
-):
+def test_dry_and_lubricated_differ_in_line_and_share_a_colour(stress: MeasuredStress):
     axes = measured_stress_figure(stress).axes[0]
     curves = [line for line in axes.lines if len(line.get_xdata()) > 100]
     styles = [line.get_linestyle() for line in curves]

@@ -28,17 +28,12 @@ def table(values: int = 3) -> dict[str, FloatArray]:
     rng = np.random.default_rng(1)
     whole, part = (values, 2, 64), (values, 2)
     return {
-        "value": np.append(np.arange(values - 1) / 3, np.inf),
-        "load": np.array([0.34, 2.75]),
-        "k": np.linspace(1.0, 1e4, 64),
-        "spectra": rng.normal(size=whole),
-        "by_load": rng.normal(size=whole),
-        "change_thickness": rng.normal(size=whole),
-        "change_poisson_ratio": rng.normal(size=whole),
-        "depths": np.full(part, np.nan),
-        "contact_radii": rng.normal(size=part),
-        "convergence": rng.normal(size=part),
-    }
+        "value": np.append(np.arange(values - 1) / 3, np.inf), "load": np.array([0.34, 2.75]),
+        "k": np.linspace(1.0, 1e4, 64), "spectra": rng.normal(size=whole),
+        "by_load": rng.normal(size=whole), "change_thickness": rng.normal(size=whole),
+        "change_poisson_ratio": rng.normal(size=whole), "depths": np.full(part, np.nan),
+        "contact_radii": rng.normal(size=part), "convergence": rng.normal(size=part),
+    }  # fmt: skip
 
 
 def entry(folder: Path, key: str = KEY) -> Path:
@@ -61,7 +56,7 @@ def test_what_was_never_kept_is_not_found(tmp_path: Path):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
-def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share: float):
+def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share):
     keep_contact_table(tmp_path, KEY, table())
     data = entry(tmp_path).read_bytes()
     entry(tmp_path).write_bytes(data[: int(share * len(data))])
@@ -129,9 +124,7 @@ def test_the_tables_used_longest_ago_make_room(tmp_path: Path, monkeypatch: pyte
     assert kept == {keys[0], keys[2], keys[3]}
 
 
-def test_a_folder_keeps_to_its_bytes_but_always_holds_the_last(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_folder_keeps_to_its_limit_of_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(contact_table, "_MOST_BYTES", 1)
     for number in range(3):
         keep_contact_table(tmp_path, table_key({"number": number}), table())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -69,9 +68,7 @@ def take_the_digest_away(file: h5py.File) -> None:
     change_a_value, change_one_of_many, change_a_unit, change_a_text, change_a_verdict,
     change_the_axes, take_something_away, take_the_list_away, take_the_digest_away,
 ])  # fmt: skip
-def test_an_artifact_that_was_altered_is_refused(
-    artifact: Path, change: Callable[[h5py.File], None]
-):
+def test_an_artifact_that_was_altered_is_refused(artifact: Path, change):
     with h5py.File(artifact, "r+") as file:
         change(file)
     with pytest.raises(FormatError, match=r"a\.h5 was changed after it was written") as caught:
@@ -141,13 +138,13 @@ def rewrite_digest(file: h5py.File) -> None:
 
 
 @pytest.mark.parametrize("version", ["2.0.0", "10.1.0"])
-def test_a_newer_major_version_is_refused_in_plain_words(versioned: Any, version: str):
+def test_a_newer_major_version_is_refused_in_plain_words(versioned: Any, version):
     with pytest.raises(SchemaVersionError, match=rf"newer memscal(.|\n)*{version}(.|\n)*Upgrade"):
         versioned(version)
 
 
 @pytest.mark.parametrize("version", ["1.0.0", SCHEMA_VERSION, "1.7.3"])
-def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, version: str):
+def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, version):
     assert versioned(version).load == 1.0
 
 
@@ -155,9 +152,7 @@ def test_a_newer_minor_version_with_unknown_content_is_read(versioned: Any, vers
     ("/entry/radial_covariance/r", lambda r: 1.5 * r, "differs from /entry/radial_profile/r"),
     ("/entry/radial_profile/g", lambda g: g[:-1], r"shape \(40,\), but its axes give \(41,\)"),
 ])  # fmt: skip
-def test_arrays_that_do_not_fit_each_other_are_refused(
-    artifact: Path, path: str, change: Callable[[Any], Any], message: str
-):
+def test_arrays_that_do_not_fit_each_other_are_refused(artifact: Path, path, change, message):
     with h5py.File(artifact, "r+") as file:
         values = change(file[path][()])
         del file[path]
@@ -169,7 +164,7 @@ def test_arrays_that_do_not_fit_each_other_are_refused(
 
 
 @pytest.mark.parametrize("version", ["", "one", "-1", "²"])
-def test_a_version_that_is_none_is_refused(versioned: Any, version: str):
+def test_a_version_that_is_none_is_refused(versioned: Any, version):
     with pytest.raises(FormatError, match="not a version"):
         versioned(version)
 

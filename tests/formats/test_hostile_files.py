@@ -67,12 +67,9 @@ def edited(tmp_path: Path) -> Edit:
 def run_sweep(path: Path, sweep: str) -> tuple[int, int]:
     """Run a sweep over damaged copies; return how many were read and how many refused."""
     done = subprocess.run(
-        [sys.executable, "-c", sweep, str(path)],
-        capture_output=True,
-        text=True,
-        timeout=300,
+        [sys.executable, "-c", sweep, str(path)], capture_output=True, text=True, timeout=300,
         check=False,
-    )
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     read, refused = map(int, done.stdout.split())
     return read, refused
@@ -124,9 +121,7 @@ def test_a_soft_link_half_way_along_the_path_is_refused(tmp_path: Path):
         read_scan(path)
 
 
-def test_external_raw_storage_is_refused_and_the_other_file_stays_unread(
-    edited: Edit, tmp_path: Path
-):
+def test_external_storage_is_refused_and_the_other_file_stays_unread(edited: Edit, tmp_path: Path):
     secret = tmp_path / "secret.bin"
     secret.write_bytes(np.full(33, 42.0).tobytes())
     before = secret.stat().st_atime_ns
@@ -163,7 +158,7 @@ def test_a_filter_listed_twice_is_refused(edited: Edit):
 
 
 @pytest.mark.parametrize("code", [h5py.h5z.FILTER_LZF, 32015])
-def test_a_filter_that_may_load_foreign_code_is_refused(edited: Edit, code: int):
+def test_a_filter_that_may_load_foreign_code_is_refused(edited: Edit, code):
     def prepare(plist: Any) -> None:
         plist.set_chunk((33,))
         plist.set_filter(code, h5py.h5z.FLAG_OPTIONAL)
@@ -183,7 +178,7 @@ def test_a_dataset_cut_into_millions_of_chunks_is_refused(edited: Edit):
 
 
 @pytest.mark.parametrize("chunks", [None, (11,)])
-def test_values_that_were_never_written_do_not_read_as_zeros(edited: Edit, chunks: Any):
+def test_values_that_were_never_written_do_not_read_as_zeros(edited: Edit, chunks):
     path = edited(lambda g: g.create_dataset("u_zz", (33,), "f8", chunks=chunks))
     assert_refused_cheaply(path, "never written")
 
@@ -197,7 +192,7 @@ def test_values_that_were_never_written_do_not_read_as_zeros(edited: Edit, chunk
     (np.dtype("V8"), b"12345678"),
     (h5py.enum_dtype({"a": 1}), 1),
 ], ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"])  # fmt: skip
-def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype: Any, value: Any):
+def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype, value):
     def make(group: h5py.Group) -> Any:
         dataset = group.create_dataset("u_zz", (33,), dtype)
         dataset[0] = value
@@ -231,7 +226,7 @@ def test_a_group_in_the_place_of_a_dataset_is_refused(edited: Edit):
         read_scan(edited(lambda g: g.create_group("u_zz")))
 
 
-def test_one_large_dataset_linked_under_many_names_meets_the_limit_of_the_file(
+def test_one_dataset_of_many_names_meets_the_limit_of_the_file(
     edited: Edit, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(hdf5_reader, "_MAX_TOTAL_BYTES", 1500)
@@ -251,7 +246,7 @@ def test_one_large_dataset_linked_under_many_names_meets_the_limit_of_the_file(
     np.array([h5py.Reference()], dtype=h5py.ref_dtype),
     b"m" * 60_000,
 ], ids=["null", "many", "table", "reference", "long"])  # fmt: skip
-def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value: Any):
+def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value):
     path = edited(lambda g: g.create_dataset("u_zz", data=np.zeros(33)))
     with h5py.File(path, "r+") as file:
         if isinstance(value, np.ndarray) and value.dtype == h5py.ref_dtype:
@@ -286,9 +281,7 @@ def test_text_of_variable_length_as_other_programs_write_it_is_read(tmp_path: Pa
 
 @pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
 @pytest.mark.parametrize("further", [0, 5, 30])
-def test_variable_text_is_read_in_every_version_of_the_format(
-    tmp_path: Path, libver: str, further: int
-):
+def test_variable_text_is_read_in_every_version_of_the_format(tmp_path: Path, libver, further):
     """Where attributes are many, HDF5 moves them out of the object's header."""
     write_scan(make_scan(), tmp_path / "ours.h5")
     with (
@@ -311,9 +304,7 @@ def test_variable_text_is_read_in_every_version_of_the_format(
 
 @pytest.mark.parametrize("further", [0, 30])
 @pytest.mark.parametrize("place", ["dataset", "attribute"])
-def test_a_variable_text_that_claims_four_gibibytes_is_refused_before_memory_is_taken(
-    tmp_path: Path, further: int, place: str
-):
+def test_a_variable_text_that_claims_four_gibibytes_is_refused(tmp_path: Path, further, place):
     path = tmp_path / "scan.h5"
     marker = "a text of 33 bytes to be found..."
     write_scan(make_scan(), path)
@@ -347,7 +338,7 @@ def test_every_flipped_byte_of_a_heap_of_texts_is_met_without_hanging(tmp_path: 
 @pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
 @pytest.mark.parametrize("further", [0, 5, 30])
 def test_the_claims_of_an_attribute_are_found_wherever_hdf5_stores_it(
-    tmp_path: Path, libver: str, further: int
+    tmp_path: Path, libver, further
 ):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w", libver=libver, track_order=further == 5) as file:
@@ -426,8 +417,8 @@ def artifact_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1), dense=st.booleans(), bit=st.integers(0, 7))
-def test_an_artifact_with_a_flipped_bit_is_read_unchanged_or_refused(
-    artifact_bytes: bytes, tmp_path: Path, where: float, dense: bool, bit: int
+def test_a_flipped_bit_of_an_artifact_is_refused_or_harmless(
+    artifact_bytes: bytes, tmp_path: Path, where, dense, bit
 ):
     damaged = bytearray(artifact_bytes)
     # Half of the flips go to the first pages, where the structure is densest.

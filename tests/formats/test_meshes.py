@@ -97,17 +97,13 @@ def test_a_mesh_as_paraview_writes_it_is_read_at_its_nodes_and_in_its_cells():
     ("film.vtu", {"header_type": "UInt64"}), ("film.vtk", {}), ("film.vtk", {"fmt_version": "4.2"}),
     ("film.xdmf", {}), ("film.xdmf", {"data_format": "XML"}),
 ])  # fmt: skip
-def test_every_kind_of_file_gives_the_same_stress(
-    tmp_path: Path, name: str, options: dict[str, Any]
-):
+def test_every_kind_of_file_gives_the_same_stress(tmp_path: Path, name, options):
     path = saved(section(), tmp_path / name, **options)
     assert_is_the_section(imported(path, "S9"))
 
 
 @pytest.mark.parametrize("compression", [None, "zlib"])
-def test_appended_raw_bytes_are_read_as_paraview_writes_them(
-    tmp_path: Path, compression: str | None
-):
+def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path: Path, compression):
     path = tmp_path / "film.vtu"
     saved(section(), path, compression=compression, header_type="UInt64")
     raw = b""
@@ -129,9 +125,7 @@ def test_appended_raw_bytes_are_read_as_paraview_writes_them(
 @pytest.mark.parametrize(
     ("sigma", "plane"), [("S4", "xy"), ("S4", "yz"), ("S6", "xz"), ("S6", "yz"), ("S9", "xz")]
 )
-def test_the_components_of_a_tensor_are_found_in_every_plane(
-    tmp_path: Path, sigma: str, plane: str
-):
+def test_the_components_of_a_tensor_are_found_in_every_plane(tmp_path: Path, sigma, plane):
     assert_is_the_section(imported(saved(section(plane), tmp_path / "film.vtu"), sigma))
 
 
@@ -230,7 +224,7 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path: Pa
     (np.linspace(-8, 8, 81), np.linspace(-8, 8, 81), (0.0, 0.0)),
     (np.linspace(-8, 8, 81), np.linspace(0, 8, 41), (0.5, 0.0)),
 ], ids=["quarter", "whole", "half, off the centre"])  # fmt: skip
-def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x: Any, y: Any, centre: Any):
+def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x, y, centre):
     """Linear interpolation on squares of 0.2 mm costs at most 0.2² / 4 of the curvature."""
     path = saved(block(x, y, centre=centre), tmp_path / "film.vtu")
     place = (1e-3 * centre[0], 1e-3 * centre[1]) if any(centre) else None
@@ -268,12 +262,10 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
         return_inverse=True,
     )
     mesh = FieldMesh(
-        points=1e-3 * points,
-        triangles=index.reshape(6, -1).T,
-        displacement=1e-6 * points,
+        points=1e-3 * points, triangles=index.reshape(6, -1).T, displacement=1e-6 * points,
         stress=1e6 * tensor(*points.T),
         notes="A film -- with a -->comment<!-- in its notes, E = 2.2 MPa ---",
-    )
+    )  # fmt: skip
     write_mesh(mesh, tmp_path / "film.vtu")
     found = imported(tmp_path / "film.vtu", "stress_Pa", sigma_unit="Pa")
     assert_is_the_section(found)
@@ -287,11 +279,9 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
 
 def test_a_mesh_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     mesh = FieldMesh(
-        points=[[0, 0], [1, 0], [0, 1]],
-        triangles=[[0, 1, 2]],
-        displacement=np.zeros((3, 2)),
+        points=[[0, 0], [1, 0], [0, 1]], triangles=[[0, 1, 2]], displacement=np.zeros((3, 2)),
         stress=np.zeros((3, 4)),
-    )
+    )  # fmt: skip
     path = tmp_path / "film.vtu"
     path.write_text("mine")
     with pytest.raises(MemscalError, match="exists already"):
@@ -370,9 +360,7 @@ def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path: Path):
     (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
     (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
 ])  # fmt: skip
-def test_a_mesh_without_a_base_that_can_be_used_is_refused(
-    tmp_path: Path, mesh: meshio.Mesh, options: dict[str, Any], words: str
-):
+def test_a_mesh_without_a_base_that_can_be_used_is_refused(tmp_path: Path, mesh, options, words):
     path = saved(mesh, tmp_path / "film.vtk")
     with pytest.raises(InputError, match=words) as caught:
         imported(path, **options)

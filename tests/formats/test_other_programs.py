@@ -114,9 +114,7 @@ def test_xarray_opens_every_group_without_a_warning(path: Path):
     ("points", "data", "y", ("point",), "mm"),
     ("reference", "reference", "sigma_zz", ("r",), "Pa"),
 ], indirect=["kind"])  # fmt: skip
-def test_xarray_gives_dimensions_in_order_with_units(
-    path: Path, group: str, name: str, dims: tuple[str, ...], units: str
-):
+def test_xarray_gives_dimensions_in_order_with_units(path: Path, group, name, dims, units):
     with xarray.open_dataset(path, engine="h5netcdf", group=f"/entry/{group}") as dataset:
         assert dataset[name].dims == dims
         assert dataset[name].attrs["units"] == units

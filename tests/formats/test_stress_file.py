@@ -53,16 +53,11 @@ SCANS = tuple(
 def make_points(n: int, rng: np.random.Generator, channel: str) -> MeasuredPoints:
     normal = channel == "zz"
     return MeasuredPoints(
-        x=rng.normal(0, 1e-3, n),
-        y=np.zeros(n),
-        u=rng.normal(0, 1e-3, n),
-        noise=rng.uniform(1e-6, 1e-5, n) if normal else None,
-        weight=rng.uniform(0, 1, n),
-        load=rng.uniform(0.5, 1.5, n),
-        load_errors=rng.uniform(0, 0.01, n),
-        x_errors=rng.uniform(0, 1e-5, n),
-        correlation=np.eye(n) if normal else None,
-    )
+        x=rng.normal(0, 1e-3, n), y=np.zeros(n), u=rng.normal(0, 1e-3, n),
+        noise=rng.uniform(1e-6, 1e-5, n) if normal else None, weight=rng.uniform(0, 1, n),
+        load=rng.uniform(0.5, 1.5, n), load_errors=rng.uniform(0, 0.01, n),
+        x_errors=rng.uniform(0, 1e-5, n), correlation=np.eye(n) if normal else None,
+    )  # fmt: skip
 
 
 def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfile:
@@ -71,27 +66,16 @@ def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfi
     r = np.sort(np.abs(x))
     root = rng.normal(size=(n, n))
     made: dict[str, Any] = {
-        "scan": SCANS[1],
-        "load": load,
-        "load_uncertainty": 0.01 * load,
-        "r": r,
-        "x": x,
-        "y": 0 * x,
+        "scan": SCANS[1], "load": load, "load_uncertainty": 0.01 * load, "r": r, "x": x, "y": 0 * x,
         "s_zz": 1e5 * load * np.exp(-(r**2) / 1e-6),
         "covariances": {"noise": 1e4 * root @ root.T, "centre": 10.0 * np.ones((n, n))},
-        "force": 1.01 * load,
-        "force_budget": {"scan": 0.003, "apparatus": 0.004},
-        "maximum": 1e5 * load,
-        "maximum_budget": {"noise": 120.0},
-        "centre": np.array([1.23456789e-4, 0.0]),
-        "centre_uncertainty": np.array([1e-5 / 3, 0.0]),
-        "baseline": 1e-5 / 7,
-        "baseline_uncertainty": 1e-7 / 3,
-        "contact_radius": 2e-3 / 3,
-        "curve_r": np.linspace(0, r[-1], 11),
-        "curve_s_zz": np.linspace(1e5, 0, 11) / 3,
+        "force": 1.01 * load, "force_budget": {"scan": 0.003, "apparatus": 0.004},
+        "maximum": 1e5 * load, "maximum_budget": {"noise": 120.0},
+        "centre": np.array([1.23456789e-4, 0.0]), "centre_uncertainty": np.array([1e-5 / 3, 0.0]),
+        "baseline": 1e-5 / 7, "baseline_uncertainty": 1e-7 / 3, "contact_radius": 2e-3 / 3,
+        "curve_r": np.linspace(0, r[-1], 11), "curve_s_zz": np.linspace(1e5, 0, 11) / 3,
         "points": {name: make_points(2 * n, rng, name) for name in ("zz", "xz")},
-    }
+    }  # fmt: skip
     return MeasuredProfile(**(made | fields))
 
 
@@ -142,7 +126,7 @@ def test_any_length_and_voltage_survives_the_units_of_the_file(numbers: list[flo
     {"force": 1.0}, {"scan": replace(SCANS[1], synthetic=True)}, {"points": {}},
     {"covariances": {"noise": np.eye(9)}}, {"s_zz": np.full(9, np.nan)},
 ])  # fmt: skip
-def test_stress_that_differs_anywhere_is_not_equal(change: dict[str, Any]):
+def test_stress_that_differs_anywhere_is_not_equal(change):
     first, second = make_stress().profiles
     other = replace(second, **change)
     assert other != second
@@ -225,7 +209,7 @@ def test_an_array_of_another_shape_is_refused_by_its_path(tmp_path: Path):
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
-def test_a_flipped_bit_is_refused_or_changes_nothing(path: Path, where: float, bit: int):
+def test_a_flipped_bit_is_refused_or_changes_nothing(path: Path, where, bit):
     whole = path.read_bytes()
     damaged = bytearray(whole)
     damaged[int(where * len(whole))] ^= 1 << bit

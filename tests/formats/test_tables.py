@@ -58,7 +58,7 @@ def test_what_was_done_travels_with_the_scan(tmp_path: Path):
     "x,u,n\n0,1,4\n1,2,4\n3,4,4\n3,4.4,7\n1,2.2,7\n0,1.1,7\n",
     "x,u,n\n3,4.4,7\n0,1,4\n1,2.2,7\n1,2,4\n0,1.1,7\n3,4,4\n",
 ], ids=["forth and back", "mixed"])  # fmt: skip
-def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text: str):
+def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text):
     found = scan_table(tmp_path, text, repeat="n")
     assert found.scan.kind == "repeats"
     assert found.scan.x.tolist() == [0.0, 1e-3, 3e-3]
@@ -73,7 +73,7 @@ def test_repeats_over_the_same_positions_become_rows(tmp_path: Path, text: str):
     "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n",
     "x,u,n\n0,1,1\n1,2,1\n3,4,1\n1,2.2,2\n0,1.1,2\n0,4.4,2\n",
 ], ids=["scattered positions", "a row that is missing", "a position read twice"])  # fmt: skip
-def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, text: str):
+def test_other_repeats_are_points_as_they_stand_in_the_table(tmp_path: Path, text):
     found = scan_table(tmp_path, text, repeat="n")
     stated = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
     assert found.scan.kind == "points"
@@ -98,8 +98,8 @@ def test_equal_positions_without_a_column_of_repeats_are_one_line(tmp_path: Path
 
 
 @given(seed=st.integers(0, 2**16), spread=st.floats(0.0, 0.4))
-def test_a_single_line_is_not_told_of_repeats(
-    tmp_path_factory: pytest.TempPathFactory, seed: int, spread: float
+def test_a_single_line_has_no_note_of_repeats(
+    tmp_path_factory: pytest.TempPathFactory, seed, spread
 ):
     rng = np.random.default_rng(seed)
     x = rng.permutation(np.arange(33.0) + spread * rng.uniform(-1, 1, 33))
@@ -110,9 +110,7 @@ def test_a_single_line_is_not_told_of_repeats(
 
 @pytest.mark.parametrize("numbered", [True, False])
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 0.02])
-def test_a_raster_is_points_and_its_places_and_steps_are_named(
-    tmp_path: Path, noise: float, numbered: bool
-):
+def test_a_raster_is_points_and_its_places_and_steps_are_named(tmp_path: Path, noise, numbered):
     """In random order, with three places missing and scattered positions."""
     rng = np.random.default_rng(3)
     place = rng.permutation(np.repeat(np.setdiff1d(np.arange(35), [4, 17, 30]), 3))
@@ -149,7 +147,7 @@ def test_a_foreign_sensor_needs_a_scale_and_the_scale_is_recorded(tmp_path: Path
 
 
 @pytest.mark.parametrize("scale", [0.0, np.nan, np.inf])
-def test_a_scale_that_destroys_the_data_is_refused(tmp_path: Path, scale: float):
+def test_a_scale_that_destroys_the_data_is_refused(tmp_path: Path, scale):
     with pytest.raises(InputError, match="scale"):
         scan_table(tmp_path, "x,u\n0,1\n1,2\n", u_unit="uT", u_scale=scale)
 
@@ -185,7 +183,7 @@ def test_rows_without_a_position_are_left_out_and_counted(tmp_path: Path):
     ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", "."),
     ("x|u\n5D-1|1.25\n1.5|2.5d0\n", "."),
 ], ids=["German", "tabs", "spaces", "comments", "quotes", "Excel", "Fortran"])  # fmt: skip
-def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text: str, decimal: str):
+def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text, decimal):
     found = scan_table(tmp_path, text)
     assert found.scan.x.tolist() == [0.5e-3, 1.5e-3]
     assert found.scan.u_zz.tolist() == [1.25e-3, 2.5e-3]
@@ -198,7 +196,7 @@ def test_columns_without_a_header_go_by_number(tmp_path: Path):
 
 
 @pytest.mark.parametrize("column", ["volts", "0", "3", -1])
-def test_a_column_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path, column: Any):
+def test_a_column_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path, column):
     with pytest.raises(InputError, match=r"columns are: x, u\."):
         scan_table(tmp_path, "x,u\n0,1\n1,2\n", u=column)
 
@@ -209,7 +207,7 @@ def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "x,u\n", "\0\0\0"])
-def test_a_file_without_a_table_is_refused(tmp_path: Path, text: str):
+def test_a_file_without_a_table_is_refused(tmp_path: Path, text):
     with pytest.raises(InputError, match=r"table\.csv"):
         scan_table(tmp_path, text)
 
@@ -258,13 +256,13 @@ def test_nodes_given_twice_are_averaged_and_reported(tmp_path: Path):
     ("r,s\n0,2\nnan,3\n,1\n", "r is not a number in data row 2 and 1 more"),
     ("r,s\n-1,2\n0,3\n1,2\n", "negative radius"),
 ])  # fmt: skip
-def test_a_fem_table_with_holes_or_negative_radii_is_refused(tmp_path: Path, text: str, words: str):
+def test_a_fem_table_with_holes_or_negative_radii_is_refused(tmp_path: Path, text, words):
     with pytest.raises(InputError, match=words):
         reference_table(tmp_path, text)
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_shear_keeps_its_own_sign(tmp_path: Path, turned: int):
+def test_shear_keeps_its_own_sign(tmp_path: Path, turned):
     text = "r,s,t\n0,-2,0\n1,-1,0.3\n"
     found = reference_table(tmp_path, text, sign=-1, shear="t", shear_sign=turned, load=3.0)
     assert found.profile.sigma_zz.tolist() == [2e6, 1e6]
@@ -286,7 +284,7 @@ def test_the_shear_sign_turns_the_stress_component_into_the_traction_on_the_film
 
 
 @pytest.mark.parametrize("name", ["sign", "shear_sign"])
-def test_a_sign_is_one_or_minus_one(tmp_path: Path, name: str):
+def test_a_sign_is_one_or_minus_one(tmp_path: Path, name):
     with pytest.raises(InputError, match="Give 1 or -1"):
         reference_table(tmp_path, "r,s\n0,2\n1,1\n", load=3.0, **{name: 0})
 
@@ -306,13 +304,13 @@ def test_the_force_of_a_table_is_as_good_as_its_radii(tmp_path: Path):
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 0.4, 2.5, 1e3])
-def test_a_force_far_from_the_load_is_refused_as_a_wrong_unit(tmp_path: Path, factor: float):
+def test_a_force_far_from_the_load_is_refused_as_a_wrong_unit(tmp_path: Path, factor):
     with pytest.raises(InputError, match=r"times the load(.|\n)*\"MPa\"(.|\n)*\"mm\"(.|\n)*sign"):
         reference_table(tmp_path, gaussian_table(8.0, factor))
 
 
 @pytest.mark.parametrize("factor", [0.6, 0.95, 1.05, 1.9])
-def test_a_force_that_differs_from_the_load_is_warned_of(tmp_path: Path, factor: float):
+def test_a_force_that_differs_from_the_load_is_warned_of(tmp_path: Path, factor):
     found = reference_table(tmp_path, gaussian_table(8.0, factor))
     (note,) = [note for note in found.notes if note.kind == "force_differs"]
     assert f"{abs(factor - 1):.1%}" in note.text

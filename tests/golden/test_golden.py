@@ -48,7 +48,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_prints_the_golden_results(name: str, runs: Runs):
+def test_a_command_prints_the_golden_results(name, runs: Runs):
     tolerance = TOLERANCE_OF_DRAWS if name in {"calibrate-draw", "calibrate-sweep"} else TOLERANCE
     changes = list(differences(load(name), runs[name], tolerance))
     assert not changes, "\n".join(changes[:20])
