@@ -11,6 +11,8 @@ import pytest
 from helpers.console import Run, names
 
 OLD = b"an artifact from last week"
+CALIBRATE = "memscal.calibration.calibrate.calibrate"
+Patch = pytest.MonkeyPatch
 
 
 @pytest.fixture
@@ -21,35 +23,26 @@ def old(folder: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def no_computing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fail the test if the calibration is reached."""
+def raising(error: BaseException) -> Callable[..., None]:
+    """A function that fails whatever it is given."""
 
-    def reached(*_: object, **__: object) -> None:
-        raise AssertionError("The calibration was reached.")
-
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", reached)
-
-
-def failing_after(count: int, code: int, original: Callable[..., object]) -> Callable[..., object]:
-    """A system call that fails with an error after it has worked some times."""
-    calls = 0
-
-    def call(*arguments: object) -> object:
-        nonlocal calls
-        calls += 1
-        if calls > count:
-            raise OSError(code, os.strerror(code))
-        return original(*arguments)
+    def call(*_: object, **__: object) -> None:
+        raise error
 
     return call
 
 
+@pytest.fixture
+def no_computing(monkeypatch: Patch) -> None:
+    """Fail the test if the calibration is reached."""
+    monkeypatch.setattr(CALIBRATE, raising(AssertionError("The calibration was reached.")))
+
+
 @pytest.mark.usefixtures("no_computing")
 def test_a_full_disk_is_known_before_computing(
-    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
 ):
-    monkeypatch.setattr("os.fsync", failing_after(0, errno.ENOSPC, os.fsync))
+    monkeypatch.setattr("os.fsync", raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))))
     run("calibrate", scan, "-o", old, "--force").exits(4, "No space left", "Free some space")
     assert old.read_bytes() == OLD
     assert names(folder) == ["out.h5", "scan.h5"]
@@ -57,7 +50,7 @@ def test_a_full_disk_is_known_before_computing(
 
 @pytest.mark.usefixtures("no_computing")
 def test_a_read_only_disk_is_known_before_computing(
-    run: Run, scan: Path, old: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, scan: Path, old: Path, monkeypatch: Patch
 ):
     real_open = os.open
 
@@ -104,12 +97,9 @@ def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name):
 
 
 def test_an_interruption_leaves_the_old_artifact(
-    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
 ):
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("memscal.formats.artifact.write_tree", interrupted)
+    monkeypatch.setattr("memscal.formats.artifact.write_tree", raising(KeyboardInterrupt()))
     stopped = run("calibrate", scan, "-o", old, "--force").exits(130)
     assert "Interrupted" in stopped.err
     assert "Traceback" not in stopped.err
@@ -118,23 +108,20 @@ def test_an_interruption_leaves_the_old_artifact(
 
 
 def test_a_figure_that_fails_leaves_nothing_half_done(
-    run: Run, scan: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, scan: Path, folder: Path, monkeypatch: Patch
 ):
-    def broken(*_: object, **__: object) -> None:
-        raise ZeroDivisionError("division by zero")
-
-    monkeypatch.setattr("memscal.figures.calibration.calibration_figure", broken)
+    monkeypatch.setattr(
+        "memscal.figures.calibration.calibration_figure",
+        raising(ZeroDivisionError("division by zero")),
+    )
     run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
 
 
 def test_an_internal_error_is_owned_up_to_without_a_traceback(
-    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, scan: Path, monkeypatch: Patch
 ):
-    def broken(*_: object, **__: object) -> None:
-        raise RuntimeError("the flux capacitor\nis empty")
-
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", broken)
+    monkeypatch.setattr(CALIBRATE, raising(RuntimeError("the flux capacitor\nis empty")))
     failed = run("calibrate", scan).exits(70)
     assert "memscal itself failed" in failed.err
     assert "the flux capacitor is empty" in failed.err
@@ -144,15 +131,12 @@ def test_an_internal_error_is_owned_up_to_without_a_traceback(
         run(*arguments).exits(70, "Traceback", "flux capacitor")
 
 
-def test_running_out_of_memory_is_said_so(run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch):
-    def greedy(*_: object, **__: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", greedy)
+def test_running_out_of_memory_is_said_so(run: Run, scan: Path, monkeypatch: Patch):
+    monkeypatch.setattr(CALIBRATE, raising(MemoryError()))
     run("calibrate", scan).exits(70, "out of memory")
 
 
-def test_a_python_warning_becomes_one_line(run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_python_warning_becomes_one_line(run: Run, scan: Path, monkeypatch: Patch):
     import warnings
 
     from memscal.calibration.calibrate import calibrate
@@ -163,6 +147,6 @@ def test_a_python_warning_becomes_one_line(run: Run, scan: Path, monkeypatch: py
             warnings.warn("the film is old", UserWarning, stacklevel=1)
         return calibrate(*given, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", warning)
+    monkeypatch.setattr(CALIBRATE, warning)
     done = run("calibrate", scan).exits(0)
     assert "Warning: UserWarning: the film is old" in done.err.splitlines()
