@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,47 +28,30 @@ def artifact(tmp_path: Path) -> Path:
     return tmp_path / "a.h5"
 
 
-def change_a_value(file: h5py.File) -> None:
-    file["/entry/parameters/conversion_constant"][()] *= 1 + 1e-15
+def altered(path: str, index: Any, change: Callable[[Any], Any]) -> Callable[[h5py.File], None]:
+    """A change of the values of a dataset."""
+    return lambda file: file[path].__setitem__(index, change(file[path][index]))
 
 
-def change_one_of_many(file: h5py.File) -> None:
-    file["/entry/apparatus_function/g"][3, 4] += 1e-9
-
-
-def change_a_unit(file: h5py.File) -> None:
-    file["/entry/radial_profile/r"].attrs["units"] = np.bytes_("um")
-
-
-def change_a_text(file: h5py.File) -> None:
+def new_text(file: h5py.File) -> None:
     del file["/entry/process/date"]
     file["/entry/process"]["date"] = np.bytes_("2034-01-02T03:04:05+00:00")
 
 
-def change_a_verdict(file: h5py.File) -> None:
-    file["/entry/quality/symmetry/passed"][()] = 1
+CHANGES = {
+    "value": altered("/entry/parameters/conversion_constant", (), lambda a: a * (1 + 1e-15)),
+    "one of many": altered("/entry/apparatus_function/g", (3, 4), lambda g: g + 1e-9),
+    "verdict": altered("/entry/quality/symmetry/passed", (), lambda _: 1),
+    "unit": lambda file: file["/entry/radial_profile/r"].attrs.update(units=np.bytes_("um")),
+    "axes": lambda file: file["/entry/apparatus_function"].attrs.update(axes=[b"x", b"y"]),
+    "text": new_text,
+    "something gone": lambda file: file.__delitem__("/entry/parameters/baseline_errors"),
+    "list gone": lambda file: file.__delitem__("/entry/contents"),
+    "digest gone": lambda file: file.attrs.__delitem__("memscal_content_sha256"),
+}
 
 
-def change_the_axes(file: h5py.File) -> None:
-    file["/entry/apparatus_function"].attrs["axes"] = np.array([b"x", b"y"])
-
-
-def take_something_away(file: h5py.File) -> None:
-    del file["/entry/parameters/baseline_errors"]
-
-
-def take_the_list_away(file: h5py.File) -> None:
-    del file["/entry/contents"]
-
-
-def take_the_digest_away(file: h5py.File) -> None:
-    del file.attrs["memscal_content_sha256"]
-
-
-@pytest.mark.parametrize("change", [
-    change_a_value, change_one_of_many, change_a_unit, change_a_text, change_a_verdict,
-    change_the_axes, take_something_away, take_the_list_away, take_the_digest_away,
-])  # fmt: skip
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
 def test_an_artifact_that_was_altered_is_refused(artifact: Path, change):
     with h5py.File(artifact, "r+") as file:
         change(file)
