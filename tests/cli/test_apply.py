@@ -46,7 +46,6 @@ def test_the_file_names_its_inputs_and_holds_the_profiles(
     measured = memscal.measure_stress([memscal.read_scan(p) for p in (dry, lubricated)], artifact)
     for mine, its in zip(found.profiles, measured.profiles, strict=True):
         assert mine == its
-    assert found.artifact is not None
     assert found.artifact.file_name == "sensor.apparatus.h5"
     sources = [scan.source.file_name for scan in found.scans if scan.source]
     assert sources == ["dry.h5", "lubricated.h5"]

@@ -88,7 +88,6 @@ def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
     passes = [(0.5, 6e-3), (0.5, 7e-3), (2.0, 21e-3), (2.0, 22e-3)]
     for i, (load, voltage) in enumerate(passes):
         line = scan.only_passes(i)
-        assert line.normal_load is not None
         assert line.x.size == (8 if i == 2 else 9)
         np.testing.assert_allclose(line.normal_load, load)
         np.testing.assert_allclose(line.u_zz, voltage)
@@ -139,7 +138,6 @@ def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folde
     found = memscal.read_reference("rod.h5")
     ours = memscal.indent(memscal.simulate().film, memscal.Rod(radius=0.25e-3), load=1.0)
     shear = ours.base_shear(found.r)
-    assert found.sigma_rz is not None
     np.testing.assert_allclose(found.sigma_rz, shear, atol=2e-3 * np.abs(shear).max())
     assert found.force == pytest.approx(1.0, abs=1e-4)
 
@@ -154,7 +152,6 @@ def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path):
         "--shear", "S13", "--shear-sign", "-1",
     ).exits(0)  # fmt: skip
     shear = memscal.read_reference("rod.h5").sigma_rz
-    assert shear is not None
     np.testing.assert_allclose(shear, 0.1e6 * r * sigma, rtol=1e-12)
     write_table(folder / "scan.csv", "position,voltage", np.stack([r, -sigma], axis=1))
     run("import", "scan.csv", "-o", "scan.h5", *COLUMNS, *SET_UP, "--u-sign", "-1").exits(0)

@@ -43,7 +43,6 @@ def test_options_mean_their_units(run: Run, folder: Path):
     assert done.json["synthetic"] is True
     scan = memscal.read_scan("scan.h5")
     truth = scan.synthetic
-    assert truth is not None
     assert truth["gaussian_sigma"] == pytest.approx(400e-6)
     assert truth["conversion_constant"] == pytest.approx(2e-7)
     assert truth["centre"] == pytest.approx(-0.3e-3)
@@ -69,7 +68,6 @@ def test_a_sum_of_gaussians_is_stored_as_truth(run: Run, folder: Path):
     ring = ["--sigma", 700, "--weight", 1.5, "--sigma", 400, "--weight", -0.5]
     assert run("simulate", "-o", "ring.h5", *ring).code == 0
     truth = memscal.read_scan("ring.h5").synthetic
-    assert truth is not None
     assert (truth["kernel_weights"], truth["kernel_sigmas_um"]) == ("1.5, -0.5", "700, 400")
 
 

@@ -25,7 +25,6 @@ def scans(folder: Path) -> dict[str, memscal.Scan]:
 
 
 def truth(scan: memscal.Scan) -> dict[str, Any]:
-    assert scan.synthetic is not None
     return dict(scan.synthetic)
 
 

@@ -44,7 +44,6 @@ def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_pat
     one = table()
     assert keep_contact_table(tmp_path / "made" / "anew", KEY, one)
     found = find_contact_table(tmp_path / "made" / "anew", KEY)
-    assert found is not None
     assert list(found) == list(one)
     for name, array in one.items():
         np.testing.assert_array_equal(found[name], array)

@@ -336,21 +336,13 @@ def test_a_text_dataset_longer_than_any_text_is_refused(tmp_path: Path):
         read_scan(path)
 
 
-def test_a_folder_is_refused(tmp_path: Path):
+def test_a_folder_a_device_and_a_pipe_are_refused_without_waiting(tmp_path: Path):
+    os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is not a regular file"):
         read_scan(tmp_path)
-
-
-def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path: Path):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    with pytest.raises(UnsafeFileError, match="not a regular file"):
-        read_scan(pipe)
-
-
-def test_a_device_is_refused():
-    with pytest.raises(UnsafeFileError, match="not a regular file"):
-        read_scan(os.devnull)
+    for path in (tmp_path / "pipe", os.devnull):
+        with pytest.raises(UnsafeFileError, match="not a regular file"):
+            read_scan(path)
 
 
 def test_a_missing_file_and_a_name_that_is_none_are_input_errors(tmp_path: Path):

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import memscal
-from memscal.errors import FormatError, InputError, MemscalError, OutputError, UnitError
+from memscal.errors import FormatError, InputError, MemscalError, UnitError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
 from memscal.formats.stress import read_stress, write_stress
@@ -186,13 +186,6 @@ def test_another_schema_is_refused_by_its_name(tmp_path: Path):
     write_artifact(make_artifact(), tmp_path / "a.h5")
     with pytest.raises(FormatError, match='schema "memscal-artifact", but "memscal-stress"'):
         read_stress(tmp_path / "a.h5")
-
-
-def test_an_existing_file_is_left_alone(path: Path):
-    before = path.read_bytes()
-    with pytest.raises(OutputError):
-        write_stress(make_stress(), path)
-    assert path.read_bytes() == before
 
 
 def test_an_array_of_another_shape_is_refused_by_its_path(tmp_path: Path):
