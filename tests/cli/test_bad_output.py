@@ -39,7 +39,7 @@ def no_computing(monkeypatch: Patch) -> None:
 
 
 @pytest.mark.usefixtures("no_computing")
-def test_a_full_disk_is_known_before_computing(
+def test_a_full_disk_is_known_first(
     run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
 ):
     monkeypatch.setattr("os.fsync", raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))))
@@ -49,9 +49,7 @@ def test_a_full_disk_is_known_before_computing(
 
 
 @pytest.mark.usefixtures("no_computing")
-def test_a_read_only_disk_is_known_before_computing(
-    run: Run, scan: Path, old: Path, monkeypatch: Patch
-):
+def test_a_read_only_disk_is_known_first(run: Run, scan: Path, old: Path, monkeypatch: Patch):
     real_open = os.open
 
     def read_only(path: str, flags: int, *rest: int, **more: int) -> int:
@@ -96,7 +94,7 @@ def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name):
     assert refused.err.startswith("Error: The output ")
 
 
-def test_an_interruption_leaves_the_old_artifact(
+def test_an_interruption_keeps_the_old(
     run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
 ):
     monkeypatch.setattr("memscal.formats.artifact.write_tree", raising(KeyboardInterrupt()))
@@ -107,20 +105,14 @@ def test_an_interruption_leaves_the_old_artifact(
     assert names(folder) == ["out.h5", "scan.h5"]
 
 
-def test_a_figure_that_fails_leaves_nothing_half_done(
-    run: Run, scan: Path, folder: Path, monkeypatch: Patch
-):
-    monkeypatch.setattr(
-        "memscal.figures.calibration.calibration_figure",
-        raising(ZeroDivisionError("division by zero")),
-    )
+def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, monkeypatch: Patch):
+    figure = "memscal.figures.calibration.calibration_figure"
+    monkeypatch.setattr(figure, raising(ZeroDivisionError("division by zero")))
     run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
 
 
-def test_an_internal_error_is_owned_up_to_without_a_traceback(
-    run: Run, scan: Path, monkeypatch: Patch
-):
+def test_an_internal_error_has_no_traceback(run: Run, scan: Path, monkeypatch: Patch):
     monkeypatch.setattr(CALIBRATE, raising(RuntimeError("the flux capacitor\nis empty")))
     failed = run("calibrate", scan).exits(70)
     assert "memscal itself failed" in failed.err

@@ -38,9 +38,7 @@ def test_the_table_of_checks_fits_a_terminal_and_shows_p_values(run: Run, scan: 
     assert 0.0 <= float(row.split()[4]) <= 1.0
 
 
-def test_a_failed_check_is_exit_code_1_and_marks_the_artifact(
-    run: Run, drifting_scan: Path, folder: Path
-):
+def test_a_failed_check_is_exit_code_1_and_marked(run: Run, drifting_scan: Path, folder: Path):
     done = run("calibrate", drifting_scan, "-o", "out.h5", "--json").exits(1)
     assert {c["name"]: c["passed"] for c in done.json["checks"]}["baseline_drift"] is False
     apparatus = memscal.load_apparatus("out.h5")
@@ -139,9 +137,7 @@ def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path):
     (["--seed", "x"], "--seed"),
     (["--colour"], "--colour"),
 ])  # fmt: skip
-def test_wrong_usage_is_exit_code_2_with_a_hint(
-    run: Run, scan: Path, folder: Path, arguments, hint
-):
+def test_wrong_use_is_exit_code_2_with_a_hint(run: Run, scan: Path, folder: Path, arguments, hint):
     refused = run("calibrate", scan, *arguments).exits(2, hint, "--help")
     assert refused.out == ""
     assert names(folder) == ["scan.h5"]

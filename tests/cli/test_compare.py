@@ -23,6 +23,8 @@ from memscal.simulation.rod_scan import PAPER_FILM
 
 CHECKED, USAGE, REFUSED, NOT_WRITTEN = CHECK_FAILED, 2, 3, 4
 MU = 0.15
+Give = Callable[..., None]
+Patch = pytest.MonkeyPatch
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +42,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def compare(run: Run, bench: Path, folder: Path) -> Callable[..., Any]:
+def compare(run: Run, bench: Path, folder: Path) -> Run:
     """Compare the bench's scans in an empty folder, with a cache that the tests share."""
 
     def compare_(*arguments: object, scans: tuple[str, ...] = ("dry.h5",)) -> Any:
@@ -55,7 +57,7 @@ QUICK = ("--friction", 0.2, "--friction", 0.1, "--loading", "incremental")
 
 
 @pytest.fixture
-def made_by_hand(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+def made_by_hand(monkeypatch: Patch) -> Callable[..., None]:
     """Let the comparison give a result made by hand, and remember what it was asked."""
 
     def give(found: Any = None, asked: dict[str, Any] | None = None) -> None:
@@ -69,7 +71,7 @@ def made_by_hand(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return give
 
 
-def test_it_finds_the_friction_of_an_experiment(compare: Callable[..., Any], folder: Path):
+def test_it_finds_the_friction_of_an_experiment(compare: Run, folder: Path):
     done = compare(*QUICK, "--json", scans=("dry.h5", "lubricated.h5"))
     assert done.code in (0, CHECKED), done.err
     told = done.json
@@ -91,9 +93,7 @@ def test_it_finds_the_friction_of_an_experiment(compare: Callable[..., Any], fol
 
 
 @pytest.mark.usefixtures("folder")
-def test_measured_stress_gives_the_numbers_of_its_scans(
-    run: Run, compare: Callable[..., Any], bench: Path
-):
+def test_measured_stress_gives_the_numbers_of_its_scans(run: Run, compare: Run, bench: Path):
     scans = ("dry.h5", "lubricated.h5")
     written = bench / "contacts.stress.h5"
     run("apply", bench / "sensor.apparatus.h5", *(bench / n for n in scans), "-o", written)
@@ -113,9 +113,7 @@ def flat(told: Any) -> Iterator[Any]:
         yield told
 
 
-def test_stress_of_another_calibration_is_refused(
-    run: Run, compare: Callable[..., Any], bench: Path, folder: Path
-):
+def test_stress_of_another_sensor_is_refused(run: Run, compare: Run, bench: Path, folder: Path):
     known = memscal.load_apparatus(bench / "sensor.apparatus.h5")
     replace(known, load=2 * known.load).save(folder / "other.apparatus.h5")
     written = folder / "dry.stress.h5"
@@ -128,7 +126,7 @@ def test_stress_of_another_calibration_is_refused(
     refused(compare(*QUICK, scans=both), "other.apparatus.h5")
 
 
-def test_profiles_calculated_elsewhere_replace_ours(compare: Callable[..., Any], folder: Path):
+def test_profiles_calculated_elsewhere_replace_ours(compare: Run, folder: Path):
     tables = []
     for friction in (0.0, 0.3, float("inf")):
         contact = memscal.indent(PAPER_FILM, PAPER_SPHERE, load=2.75, friction=friction)
@@ -146,14 +144,14 @@ def test_profiles_calculated_elsewhere_replace_ours(compare: Callable[..., Any],
     assert chi_square[0] < chi_square[1]  # it is lubricated
 
 
-def test_tables_name_every_load_within_a_hundred_columns(compare: Callable[..., Any]):
+def test_tables_name_every_load_within_a_hundred_columns(compare: Run):
     done = compare(*QUICK)
     assert max(map(len, done.out.splitlines())) < 100
     for words in ("1.37", "2.75", "S_max/p0_max", "by the profile", "Quality checks", "χ²"):
         assert words in done.out
 
 
-def test_a_second_run_takes_the_contacts_from_the_cache(compare: Callable[..., Any], bench: Path):
+def test_a_second_run_takes_the_contacts_from_the_cache(compare: Run, bench: Path):
     first = compare(*QUICK, "--json")
     kept = {path.name: path.stat().st_ino for path in (bench / "cache").iterdir()}
     assert kept
@@ -162,7 +160,7 @@ def test_a_second_run_takes_the_contacts_from_the_cache(compare: Callable[..., A
     assert first.out == second.out
 
 
-def test_a_damaged_cache_is_made_anew(compare: Callable[..., Any], bench: Path):
+def test_a_damaged_cache_is_made_anew(compare: Run, bench: Path):
     first = compare(*QUICK, "--json")
     for path in (bench / "cache").iterdir():
         path.write_bytes(b"not a table")
@@ -254,18 +252,14 @@ def test_options_that_do_not_go_together_are_exit_code_2(run: Run, bench: Path, 
     assert words in done.err
 
 
-def test_a_failed_check_is_exit_code_1_after_the_results(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None]
-):
+def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, made_by_hand: Give):
     made_by_hand(comparison(lubrications=("dry",), failed=True))
     done = compare()
     done.exits(CHECKED, "bracketing")
     assert "Effective friction coefficient" in done.out
 
 
-def test_the_options_reach_the_comparison(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None], bench: Path
-):
+def test_the_options_reach_the_comparison(compare: Run, made_by_hand: Give, bench: Path):
     asked: dict[str, Any] = {}
     made_by_hand(asked=asked)
     compare("--macroscopic", 1.6, "--macroscopic-uncertainty", 0.2, "--interface", "--override")
@@ -277,9 +271,7 @@ def test_the_options_reach_the_comparison(
     assert asked["cache"] == bench / "cache"
 
 
-def test_one_page_and_all_figures_are_written(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None], folder: Path
-):
+def test_a_page_and_all_figures_are_written(compare: Run, made_by_hand: Give, folder: Path):
     made_by_hand(comparison(lubrications=("dry",), loads=(1.37,), interface=interface_comparison()))
     options = ("--macroscopic", 1.6, "--interface", "--figures", "drawn", "--figure-format", "svg")
     done = compare("--figure", "page.png", *options).exits(0)
@@ -291,9 +283,7 @@ def test_one_page_and_all_figures_are_written(
     assert "Written: drawn/maxima.svg" in done.err.replace("\\", "/")
 
 
-def test_nothing_is_overwritten_without_force(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None], folder: Path
-):
+def test_nothing_is_overwritten_without_force(compare: Run, made_by_hand: Give, folder: Path):
     made_by_hand()
     (folder / "drawn").mkdir()
     (folder / "drawn" / "maxima.png").write_bytes(b"mine")
@@ -304,9 +294,7 @@ def test_nothing_is_overwritten_without_force(
     assert (folder / "drawn" / "maxima.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_folder_is_proven_writable_before_computing(
-    compare: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-):
+def test_a_folder_is_proven_writable_before_computing(compare: Run, monkeypatch: Patch):
     def reached(*_: object, **__: object) -> None:
         raise AssertionError("The comparison was reached.")
 
@@ -314,7 +302,7 @@ def test_a_folder_is_proven_writable_before_computing(
     assert compare("--figures", "no/such/folder").code == NOT_WRITTEN
 
 
-def test_the_cache_is_the_users_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+def test_the_cache_is_the_users_own(monkeypatch: Patch, tmp_path: Path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert user_cache_folder() == tmp_path / "memscal" / "contacts"
     assert cache_from(None, no_cache=True) is None

@@ -45,13 +45,9 @@ def test_the_options_say_what_the_table_does_not(run: Run, table: Path):
     run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *labels)
     scan = memscal.read_scan("scan.h5")
     assert scan.film == memscal.ElasticFilm(
-        young_modulus=2.2e6,
-        poisson_ratio=0.5,
-        thickness=2e-3,
-        young_modulus_uncertainty=0.1e6,
-        poisson_ratio_uncertainty=0.004,
-        thickness_uncertainty=0.02e-3,
-    )
+        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, young_modulus_uncertainty=0.1e6,
+        poisson_ratio_uncertainty=0.004, thickness_uncertainty=0.02e-3,
+    )  # fmt: skip
     assert scan.indenter == memscal.Rod(radius=0.25e-3, radius_uncertainty=0.002e-3)
     assert (scan.load, scan.load_uncertainty) == (1.0, 0.01)
     assert (scan.sensor.name, scan.sensor.model, scan.sensor.channel) == ("S1", "MEMS", "zz")
@@ -167,9 +163,7 @@ def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path):
     ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
     (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
 ])  # fmt: skip
-def test_what_is_missing_is_named_all_at_once(
-    run: Run, table: Path, folder: Path, arguments, hints
-):
+def test_all_that_is_missing_is_named(run: Run, table: Path, folder: Path, arguments, hints):
     refused = run("import", table, "-o", "scan.h5", *arguments).exits(2)
     assert all(hint in refused.err for hint in hints), refused.err
     assert names(folder) == ["scan.csv"]
@@ -180,9 +174,7 @@ def test_what_is_missing_is_named_all_at_once(
     (["--x-unit", "mV"], "mV"),
     (["--u-unit", "bananas"], "bananas"),
 ])  # fmt: skip
-def test_a_wrong_column_or_unit_is_refused_by_name(
-    run: Run, table: Path, folder: Path, change, word
-):
+def test_a_wrong_column_or_unit_is_named(run: Run, table: Path, folder: Path, change, word):
     run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *change).exits(3, word)
     assert names(folder) == ["scan.csv"]
 

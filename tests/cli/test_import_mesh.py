@@ -83,9 +83,7 @@ def test_a_mesh_of_another_kind_is_not_taken_for_a_table(run: Run, folder: Path)
     run("import", "film.frd", "-o", "film.h5", *MESH, "--sigma", "STRESS").exits(3, ".vtu")
 
 
-def test_without_meshio_its_installation_is_shown(
-    run: Run, mesh: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_without_meshio_it_is_named(run: Run, mesh: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "meshio", None)
     refused = run("import", mesh, "-o", "film.h5", *MESH, "--sigma", "S")
     refused.exits(3, 'pip install "memscal[fem-io]"')

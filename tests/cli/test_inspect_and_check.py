@@ -26,10 +26,11 @@ def artifact(shared_artifact: Path, folder: Path) -> Path:
 
 def test_inspect_shows_values_arrays_checks_and_provenance(run: Run, artifact: Path):
     shown = run("inspect", artifact).exits(0)
+    kind, array = "memscal-artifact", "/entry/apparatus_function/g "
     for text in (
-        "memscal-artifact",
+        kind,
+        array,
         "mV/Pa",
-        "/entry/apparatus_function/g ",
         "FAILED",
         "What the failures mean",
         "scan.h5",

@@ -39,9 +39,7 @@ def test_the_file_is_a_reference_with_errors(run: Run, artifact: Path, sphere: P
     assert run("check", "stress.h5").code == 0
 
 
-def test_a_wrong_expected_stress_is_exit_code_1(
-    run: Run, artifact: Path, sphere: Path, folder: Path
-):
+def test_another_expected_stress_is_code_1(run: Run, artifact: Path, sphere: Path, folder: Path):
     memscal.write_reference(pressed(1.0, np.inf).profile(), folder / "sticking.h5")
     memscal.write_reference(pressed(1.0).profile(), folder / "sliding.h5")
     wrong = run("restore", artifact, sphere, "--expected", "sticking.h5", "-o", "out.h5")

@@ -72,9 +72,7 @@ def test_the_commands_print_the_results(
     )
 
 
-def test_the_friction_of_a_contact_is_named(
-    restored: memscal.Restoration, contact: memscal.Contact
-):
+def test_friction_of_a_contact_is_named(restored: memscal.Restoration, contact: memscal.Contact):
     assert restored.to_dict()["calculated"]["origin"] == "calculated without friction"
     apparatus, scan = restored.apparatus, restored.scan
     rubbed = memscal.restore(scan, apparatus, expected=contact).to_dict()["calculated"]

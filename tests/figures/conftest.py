@@ -82,18 +82,11 @@ def transfer_function(resolved: float) -> TransferFunction:
 
 
 def build(
-    kind: str = "line",
-    points: int = 65,
-    *,
-    noise: float = 0.005,
-    seed: int = 1,
-    error: float = 0.03,
-    ripple: float = 0.0,
-    failed: int = 0,
-    sensor: StressSensor | None = None,
+    kind: str = "line", points: int = 65, *, noise: float = 0.005, seed: int = 1,
+    error: float = 0.03, ripple: float = 0.0, failed: int = 0, sensor: StressSensor | None = None,
     meaning: str = "The scan is not explained to within its noise.",
     message: str = "1 outlier was down-weighted at x = 2.25 mm.",
-) -> ApparatusData:
+) -> ApparatusData:  # fmt: skip
     """Return the data of a calibration that never ran."""
     grid = np.linspace(-3e-3, 3e-3, 61)
     g = sum(w * gaussian(np.hypot(grid, grid[:, None]), s) for w, s in _PARTS)
@@ -108,6 +101,9 @@ def build(
     numbers, spreads = np.array(list(values.values())).T
     r = np.linspace(0.0, 10e-3, 201)
     data = make_artifact()
+    contact = {"film": data.film, "indenter": data.indenter}
+    stress = _LOAD * gaussian(r, _WIDTH)
+    reference = StressProfile(r=r, sigma_zz=stress, load=_LOAD, **contact)
     return replace(
         data,
         field=ApparatusField(x=grid, y=grid, g=g, g_errors=np.full(g.shape, error * g.max())),
@@ -120,13 +116,7 @@ def build(
             for i, name in enumerate(names)
         ),
         sensor=sensor or StressSensor(name="array 3", model="MEMS membrane", channel="zz"),
-        reference=StressProfile(
-            r=r,
-            sigma_zz=_LOAD * gaussian(r, _WIDTH),
-            load=_LOAD,
-            film=data.film,
-            indenter=data.indenter,
-        ),
+        reference=reference,
         process=replace(data.process, messages=(Message("outlier", message),)),
         budget={
             "conversion_constant": {"noise": 9e-11, "load": 6e-11, "film thickness": 7e-11},

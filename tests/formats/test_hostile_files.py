@@ -314,9 +314,7 @@ def test_every_flipped_byte_of_a_heap_of_texts_is_met_without_hanging(tmp_path: 
 
 @pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
 @pytest.mark.parametrize("further", [0, 5, 30])
-def test_the_claims_of_an_attribute_are_found_wherever_hdf5_stores_it(
-    tmp_path: Path, libver, further
-):
+def test_the_claims_of_an_attribute_are_found_where_hdf5_stores_it(tmp_path: Path, libver, further):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w", libver=libver, track_order=further == 5) as file:
         for i in range(further):

@@ -351,15 +351,11 @@ def test_the_reader_of_a_mesh_sees_no_other_file_and_starts_nothing(
     ("import meshio.other", "No module named"),
     ("return types.SimpleNamespace(cells=[], points=[[print]], **NONE)", "ended by an error"),
 ], ids=["memory", "exit", "silence", "crash", "no mesh", "no module", "objects"])  # fmt: skip
-def test_whatever_ends_the_reader_of_a_mesh_is_an_error_of_ours(
-    hostile: Callable[[str], Path], code, words
-):
+def test_whatever_ends_the_reader_is_an_error_of_ours(hostile: Callable[[str], Path], code, words):
     refused(hostile(code), words)
 
 
-def test_an_endless_reader_is_ended(
-    hostile: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
-):
+def test_an_endless_reader_ends(hostile: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(child, "_SECONDS", 0.5)
     refused(hostile("while True:\n    pass"), "takes longer than 0.5", UnsafeFileError)
 

@@ -19,25 +19,17 @@ from memscal.formats.artifact import write_artifact
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
 
+BARE: dict[str, Any] = {
+    **dict.fromkeys(("u_zz_errors", "normal_load", "reference", "synthetic")),
+    **dict.fromkeys(("title", "start_time", "end_time", "notes"), ""),
+    "channels": {},
+}
 WRITERS: dict[str, Callable[[Path], None]] = {
     "line": lambda path: write_scan(make_scan("line"), path),
     "repeats": lambda path: write_scan(make_scan("repeats"), path),
     "raster": lambda path: write_scan(make_scan("raster"), path),
     "points": lambda path: write_scan(make_scan("points"), path),
-    "plain line": lambda path: write_scan(
-        make_scan(
-            u_zz_errors=None,
-            normal_load=None,
-            channels={},
-            reference=None,
-            synthetic=None,
-            title="",
-            start_time="",
-            end_time="",
-            notes="",
-        ),
-        path,
-    ),
+    "plain line": lambda path: write_scan(make_scan(**BARE), path),
     "reference": lambda path: write_reference(make_profile(), path),
     "artifact": lambda path: write_artifact(make_artifact(), path),
 }

@@ -283,9 +283,7 @@ def test_a_missing_part_is_named_by_its_path(tmp_path: Path, path):
     ("/entry/data/x", None, "has no unit"),
     ("/entry/indenter/load", None, "has no unit"),
 ])  # fmt: skip
-def test_a_wrong_or_missing_unit_is_named_with_its_path_and_the_right_one(
-    tmp_path: Path, path, units, wanted
-):
+def test_a_wrong_unit_is_named_with_its_path_and_the_right_one(tmp_path: Path, path, units, wanted):
     other_program(tmp_path / "scan.h5")
     with h5py.File(tmp_path / "scan.h5", "r+") as file:
         if units is None:

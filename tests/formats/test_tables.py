@@ -97,9 +97,7 @@ def test_equal_positions_without_a_column_of_repeats_are_one_line(tmp_path: Path
 
 
 @given(seed=st.integers(0, 2**16), spread=st.floats(0.0, 0.4))
-def test_a_single_line_has_no_note_of_repeats(
-    tmp_path_factory: pytest.TempPathFactory, seed, spread
-):
+def test_a_line_has_no_note_of_repeats(tmp_path_factory: pytest.TempPathFactory, seed, spread):
     rng = np.random.default_rng(seed)
     x = rng.permutation(np.arange(33.0) + spread * rng.uniform(-1, 1, 33))
     text = rows(x.tolist(), [1.0] * 33, header="x,u")
