@@ -11,6 +11,8 @@ import pytest
 from helpers.console import Run, names
 
 OLD = b"an artifact from last week"
+CALIBRATE = "memscal.calibration.calibrate.calibrate"
+Patch = pytest.MonkeyPatch
 
 
 @pytest.fixture
@@ -21,47 +23,33 @@ def old(folder: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def no_computing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fail the test if the calibration is reached."""
+def raising(error: BaseException) -> Callable[..., None]:
+    """A function that fails whatever it is given."""
 
-    def reached(*_: object, **__: object) -> None:
-        raise AssertionError("The calibration was reached.")
-
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", reached)
-
-
-def failing_after(count: int, code: int, original: Callable[..., object]) -> Callable[..., object]:
-    """A system call that fails with an error after it has worked some times."""
-    calls = 0
-
-    def call(*arguments: object) -> object:
-        nonlocal calls
-        calls += 1
-        if calls > count:
-            raise OSError(code, os.strerror(code))
-        return original(*arguments)
+    def call(*_: object, **__: object) -> None:
+        raise error
 
     return call
 
 
+@pytest.fixture
+def no_computing(monkeypatch: Patch) -> None:
+    """Fail the test if the calibration is reached."""
+    monkeypatch.setattr(CALIBRATE, raising(AssertionError("The calibration was reached.")))
+
+
 @pytest.mark.usefixtures("no_computing")
-def test_a_full_disk_is_known_before_computing(
-    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("os.fsync", failing_after(0, errno.ENOSPC, os.fsync))
-    refused = run("calibrate", scan, "-o", old, "--force")
-    assert refused.code == 4
-    assert "No space left" in refused.err
-    assert "Free some space" in refused.err
+def test_a_full_disk_is_known_first(
+    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
+):
+    monkeypatch.setattr("os.fsync", raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))))
+    run("calibrate", scan, "-o", old, "--force").exits(4, "No space left", "Free some space")
     assert old.read_bytes() == OLD
     assert names(folder) == ["out.h5", "scan.h5"]
 
 
 @pytest.mark.usefixtures("no_computing")
-def test_a_read_only_disk_is_known_before_computing(
-    run: Run, scan: Path, old: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_read_only_disk_is_known_first(run: Run, scan: Path, old: Path, monkeypatch: Patch):
     real_open = os.open
 
     def read_only(path: str, flags: int, *rest: int, **more: int) -> int:
@@ -70,117 +58,77 @@ def test_a_read_only_disk_is_known_before_computing(
         return real_open(path, flags, *rest, **more)
 
     monkeypatch.setattr("os.open", read_only)
-    refused = run("calibrate", scan, "-o", old, "--force")
-    assert refused.code == 4
-    assert "Read-only file system" in refused.err
+    run("calibrate", scan, "-o", old, "--force").exits(4, "Read-only file system")
     assert old.read_bytes() == OLD
 
 
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("name", ["--output", "--report", "--figure", "--sweep-figure"])
-def test_every_output_is_proven_writable_before_computing(
-    run: Run, scan: Path, folder: Path, name: str
-) -> None:
-    refused = run("calibrate", scan, name, "missing/out.png")
-    assert refused.code == 4
-    assert "missing" in refused.err
-    assert "Create the folder" in refused.err
+def test_every_output_is_proven_writable_before_computing(run: Run, scan: Path, folder: Path, name):
+    run("calibrate", scan, name, "missing/out.png").exits(4, "missing", "Create the folder")
     assert names(folder) == ["scan.h5"]
 
 
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("spelling", ["scan.h5", "./scan.h5", "link.h5", "twin.h5"])
-def test_an_output_is_never_an_input_even_if_forced(
-    run: Run, scan: Path, folder: Path, spelling: str
-) -> None:
+def test_an_output_is_never_an_input_even_if_forced(run: Run, scan: Path, folder: Path, spelling):
     before = scan.read_bytes()
     (folder / "link.h5").symlink_to("scan.h5")
     (folder / "twin.h5").hardlink_to(folder / "scan.h5")
-    refused = run("calibrate", "scan.h5", "-o", spelling, "--force")
-    assert refused.code == 4
-    assert "also an input" in refused.err
+    run("calibrate", "scan.h5", "-o", spelling, "--force").exits(4, "also an input")
     assert scan.read_bytes() == before
 
 
 @pytest.mark.usefixtures("no_computing")
-def test_a_report_does_not_replace_the_reference(run: Run, scan: Path) -> None:
+def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
     run("reference", "rod", "-o", "rod.h5")
     before = Path("rod.h5").read_bytes()
-    refused = run("calibrate", scan, "--reference", "rod.h5", "--report", "rod.h5", "--force")
-    assert refused.code == 4
+    run("calibrate", scan, "--reference", "rod.h5", "--report", "rod.h5", "--force").exits(4)
     assert Path("rod.h5").read_bytes() == before
 
 
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("name", [".", "/dev/null", "scan.h5/out.h5", "a" * 300])
-def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name: str) -> None:
-    refused = run("calibrate", scan, "-o", name, "--force")
-    assert refused.code == 4
+def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name):
+    refused = run("calibrate", scan, "-o", name, "--force").exits(4)
     assert refused.err.startswith("Error: The output ")
 
 
-def test_an_interruption_leaves_the_old_artifact(
-    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("memscal.formats.artifact.write_tree", interrupted)
-    stopped = run("calibrate", scan, "-o", old, "--force")
-    assert stopped.code == 130
+def test_an_interruption_keeps_the_old(
+    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
+):
+    monkeypatch.setattr("memscal.formats.artifact.write_tree", raising(KeyboardInterrupt()))
+    stopped = run("calibrate", scan, "-o", old, "--force").exits(130)
     assert "Interrupted" in stopped.err
     assert "Traceback" not in stopped.err
     assert old.read_bytes() == OLD
     assert names(folder) == ["out.h5", "scan.h5"]
 
 
-def test_a_figure_that_fails_leaves_nothing_half_done(
-    run: Run, scan: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(*_: object, **__: object) -> None:
-        raise ZeroDivisionError("division by zero")
-
-    monkeypatch.setattr("memscal.figures.calibration.calibration_figure", broken)
-    failed = run("calibrate", scan, "--figure", "a.png")
-    assert failed.code == 70
+def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, monkeypatch: Patch):
+    figure = "memscal.figures.calibration.calibration_figure"
+    monkeypatch.setattr(figure, raising(ZeroDivisionError("division by zero")))
+    run("calibrate", scan, "--figure", "a.png").exits(70)
     assert names(folder) == ["scan.h5"]
 
 
-def test_an_internal_error_is_owned_up_to_without_a_traceback(
-    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(*_: object, **__: object) -> None:
-        raise RuntimeError("the flux capacitor\nis empty")
-
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", broken)
-    failed = run("calibrate", scan)
-    assert failed.code == 70
+def test_an_internal_error_has_no_traceback(run: Run, scan: Path, monkeypatch: Patch):
+    monkeypatch.setattr(CALIBRATE, raising(RuntimeError("the flux capacitor\nis empty")))
+    failed = run("calibrate", scan).exits(70)
     assert "memscal itself failed" in failed.err
     assert "the flux capacitor is empty" in failed.err
     assert "--debug" in failed.err
     assert "Traceback" not in failed.err
     for arguments in (["--debug", "calibrate", scan], ["calibrate", scan, "--debug"]):
-        shown = run(*arguments)
-        assert shown.code == 70
-        assert "Traceback" in shown.err
-        assert "flux capacitor" in shown.err
+        run(*arguments).exits(70, "Traceback", "flux capacitor")
 
 
-def test_running_out_of_memory_is_said_plainly(
-    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def greedy(*_: object, **__: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", greedy)
-    failed = run("calibrate", scan)
-    assert failed.code == 70
-    assert "out of memory" in failed.err
+def test_running_out_of_memory_is_said_so(run: Run, scan: Path, monkeypatch: Patch):
+    monkeypatch.setattr(CALIBRATE, raising(MemoryError()))
+    run("calibrate", scan).exits(70, "out of memory")
 
 
-def test_a_python_warning_becomes_one_line_of_words(
-    run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_python_warning_becomes_one_line(run: Run, scan: Path, monkeypatch: Patch):
     import warnings
 
     from memscal.calibration.calibrate import calibrate
@@ -191,7 +139,6 @@ def test_a_python_warning_becomes_one_line_of_words(
             warnings.warn("the film is old", UserWarning, stacklevel=1)
         return calibrate(*given, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("memscal.calibration.calibrate.calibrate", warning)
-    done = run("calibrate", scan)
-    assert done.code == 0
+    monkeypatch.setattr(CALIBRATE, warning)
+    done = run("calibrate", scan).exits(0)
     assert "Warning: UserWarning: the film is old" in done.err.splitlines()

@@ -23,6 +23,8 @@ from memscal.simulation.rod_scan import PAPER_FILM
 
 CHECKED, USAGE, REFUSED, NOT_WRITTEN = CHECK_FAILED, 2, 3, 4
 MU = 0.15
+Give = Callable[..., None]
+Patch = pytest.MonkeyPatch
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +42,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def compare(run: Run, bench: Path, folder: Path) -> Callable[..., Any]:
+def compare(run: Run, bench: Path, folder: Path) -> Run:
     """Compare the bench's scans in an empty folder, with a cache that the tests share."""
 
     def compare_(*arguments: object, scans: tuple[str, ...] = ("dry.h5",)) -> Any:
@@ -55,7 +57,7 @@ QUICK = ("--friction", 0.2, "--friction", 0.1, "--loading", "incremental")
 
 
 @pytest.fixture
-def made_by_hand(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+def made_by_hand(monkeypatch: Patch) -> Callable[..., None]:
     """Let the comparison give a result made by hand, and remember what it was asked."""
 
     def give(found: Any = None, asked: dict[str, Any] | None = None) -> None:
@@ -69,9 +71,7 @@ def made_by_hand(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return give
 
 
-def test_it_finds_the_friction_of_an_experiment_from_its_files(
-    compare: Callable[..., Any], folder: Path
-) -> None:
+def test_it_finds_the_friction_of_an_experiment(compare: Run, folder: Path):
     done = compare(*QUICK, "--json", scans=("dry.h5", "lubricated.h5"))
     assert done.code in (0, CHECKED), done.err
     told = done.json
@@ -93,9 +93,7 @@ def test_it_finds_the_friction_of_an_experiment_from_its_files(
 
 
 @pytest.mark.usefixtures("folder")
-def test_measured_stress_gives_the_same_numbers_as_its_scans(
-    run: Run, compare: Callable[..., Any], bench: Path
-) -> None:
+def test_measured_stress_gives_the_numbers_of_its_scans(run: Run, compare: Run, bench: Path):
     scans = ("dry.h5", "lubricated.h5")
     written = bench / "contacts.stress.h5"
     run("apply", bench / "sensor.apparatus.h5", *(bench / n for n in scans), "-o", written)
@@ -115,9 +113,7 @@ def flat(told: Any) -> Iterator[Any]:
         yield told
 
 
-def test_stress_of_another_calibration_is_refused_or_overridden(
-    run: Run, compare: Callable[..., Any], bench: Path, folder: Path
-) -> None:
+def test_stress_of_another_sensor_is_refused(run: Run, compare: Run, bench: Path, folder: Path):
     known = memscal.load_apparatus(bench / "sensor.apparatus.h5")
     replace(known, load=2 * known.load).save(folder / "other.apparatus.h5")
     written = folder / "dry.stress.h5"
@@ -130,9 +126,7 @@ def test_stress_of_another_calibration_is_refused_or_overridden(
     refused(compare(*QUICK, scans=both), "other.apparatus.h5")
 
 
-def test_profiles_calculated_elsewhere_take_the_place_of_ours(
-    compare: Callable[..., Any], folder: Path
-) -> None:
+def test_profiles_calculated_elsewhere_replace_ours(compare: Run, folder: Path):
     tables = []
     for friction in (0.0, 0.3, float("inf")):
         contact = memscal.indent(PAPER_FILM, PAPER_SPHERE, load=2.75, friction=friction)
@@ -150,18 +144,14 @@ def test_profiles_calculated_elsewhere_take_the_place_of_ours(
     assert chi_square[0] < chi_square[1]  # it is lubricated
 
 
-def test_tables_name_every_load_and_stand_within_a_hundred_columns(
-    compare: Callable[..., Any],
-) -> None:
+def test_tables_name_every_load_within_a_hundred_columns(compare: Run):
     done = compare(*QUICK)
     assert max(map(len, done.out.splitlines())) < 100
     for words in ("1.37", "2.75", "S_max/p0_max", "by the profile", "Quality checks", "χ²"):
         assert words in done.out
 
 
-def test_a_second_run_takes_the_contacts_from_the_cache(
-    compare: Callable[..., Any], bench: Path
-) -> None:
+def test_a_second_run_takes_the_contacts_from_the_cache(compare: Run, bench: Path):
     first = compare(*QUICK, "--json")
     kept = {path.name: path.stat().st_ino for path in (bench / "cache").iterdir()}
     assert kept
@@ -170,7 +160,7 @@ def test_a_second_run_takes_the_contacts_from_the_cache(
     assert first.out == second.out
 
 
-def test_a_damaged_cache_is_made_anew(compare: Callable[..., Any], bench: Path) -> None:
+def test_a_damaged_cache_is_made_anew(compare: Run, bench: Path):
     first = compare(*QUICK, "--json")
     for path in (bench / "cache").iterdir():
         path.write_bytes(b"not a table")
@@ -186,9 +176,9 @@ def test_a_damaged_cache_is_made_anew(compare: Callable[..., Any], bench: Path) 
          "film"),
     ],
 )  # fmt: skip
-def test_another_sensor_channel_or_film_is_refused_and_both_are_named(
-    run: Run, bench: Path, folder: Path, change: dict[str, Any], words: str
-) -> None:
+def test_another_sensor_channel_or_film_is_refused(
+    run: Run, bench: Path, folder: Path, change, words
+):
     scan = replace(memscal.read_scan(bench / "dry.h5"), **change)
     memscal.write_scan(scan, folder / "other.h5")
     done = run("compare", bench / "sensor.apparatus.h5", "other.h5", "--no-cache", *QUICK)
@@ -203,14 +193,14 @@ def refused(done: Any, words: str) -> None:
     assert words in done.err
 
 
-def test_a_rod_scan_is_refused(run: Run, bench: Path, folder: Path) -> None:
+def test_a_rod_scan_is_refused(run: Run, bench: Path, folder: Path):
     memscal.write_scan(memscal.simulate(seed=1), folder / "rod.h5")
     done = run("compare", bench / "sensor.apparatus.h5", "rod.h5", "--no-cache")
     refused(done, "rod")
     assert "calibrate" in done.err
 
 
-def test_files_in_the_wrong_order_are_refused(run: Run, bench: Path) -> None:
+def test_files_in_the_wrong_order_are_refused(run: Run, bench: Path):
     done = run("compare", bench / "dry.h5", bench / "sensor.apparatus.h5", "--no-cache")
     refused(done, "memscal-artifact")
 
@@ -222,18 +212,14 @@ def without(scan: Scan, kept: np.ndarray) -> Scan:
     return replace(scan, **{n: v[..., kept] for n, v in given.items() if v is not None})
 
 
-def test_a_scan_that_does_not_come_down_to_its_baseline_is_refused(
-    run: Run, bench: Path, folder: Path
-) -> None:
+def test_a_scan_that_does_not_reach_its_baseline_is_refused(run: Run, bench: Path, folder: Path):
     scan = memscal.read_scan(bench / "dry.h5")
     memscal.write_scan(without(scan, np.abs(scan.x) < 3e-3), folder / "narrow.h5")
     done = run("compare", bench / "sensor.apparatus.h5", "narrow.h5", "--no-cache", *QUICK)
     refused(done, "narrow.h5, 1.37 N, dry")
 
 
-def test_a_run_of_missing_points_is_refused_with_its_place(
-    run: Run, bench: Path, folder: Path
-) -> None:
+def test_a_run_of_missing_points_is_refused_with_its_place(run: Run, bench: Path, folder: Path):
     scan = memscal.read_scan(bench / "dry.h5")
     u = scan.u_zz.copy()
     u[1, 8:24] = np.nan
@@ -243,50 +229,37 @@ def test_a_run_of_missing_points_is_refused_with_its_place(
 
 
 @pytest.mark.parametrize("missing", ["sensor.apparatus.h5", "dry.h5"])
-def test_a_missing_file_is_refused_by_its_name(
-    run: Run, bench: Path, folder: Path, missing: str
-) -> None:
+def test_a_missing_file_is_refused_by_its_name(run: Run, bench: Path, folder: Path, missing):
     files = {name: bench / name for name in ("sensor.apparatus.h5", "dry.h5")}
     files[missing] = folder / "missing.h5"
     done = run("compare", *files.values(), "--no-cache")
     refused(done, "missing.h5")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--friction", "-0.1"], "of at least 0"),
-        (["--friction", "0.1", "--friction", "0.1"], "twice"),
-        (["--loading", "sideways"], "incremental"),
-        (["--macroscopic-uncertainty", "0.1"], "--macroscopic"),
-        (["--interface"], "--macroscopic"),
-        (["--reference", "a.h5", "--friction", "0", "--friction", "inf"], "--reference"),
-        (["--cache", "here", "--no-cache"], "not both"),
-        (["--figure", "table.txt"], ".png"),
-    ],
-)
-def test_options_that_do_not_go_together_are_exit_code_2(
-    run: Run, bench: Path, arguments: list[str], words: str
-) -> None:
-    done = run("compare", bench / "sensor.apparatus.h5", bench / "dry.h5", *arguments)
-    assert done.code == USAGE
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--friction", "-0.1"], "of at least 0"),
+    (["--friction", "0.1", "--friction", "0.1"], "twice"),
+    (["--loading", "sideways"], "incremental"),
+    (["--macroscopic-uncertainty", "0.1"], "--macroscopic"),
+    (["--interface"], "--macroscopic"),
+    (["--reference", "a.h5", "--friction", "0", "--friction", "inf"], "--reference"),
+    (["--cache", "here", "--no-cache"], "not both"),
+    (["--figure", "table.txt"], ".png"),
+])  # fmt: skip
+def test_options_that_do_not_go_together_are_exit_code_2(run: Run, bench: Path, arguments, words):
+    done = run("compare", bench / "sensor.apparatus.h5", bench / "dry.h5", *arguments).exits(USAGE)
     assert done.out == ""
     assert words in done.err
 
 
-def test_a_failed_check_is_exit_code_1_and_the_results_are_printed(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None]
-) -> None:
+def test_a_failed_check_is_exit_code_1_after_the_results(compare: Run, made_by_hand: Give):
     made_by_hand(comparison(lubrications=("dry",), failed=True))
     done = compare()
-    assert done.code == CHECKED
-    assert "bracketing" in done.err
+    done.exits(CHECKED, "bracketing")
     assert "Effective friction coefficient" in done.out
 
 
-def test_the_options_reach_the_comparison(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None], bench: Path
-) -> None:
+def test_the_options_reach_the_comparison(compare: Run, made_by_hand: Give, bench: Path):
     asked: dict[str, Any] = {}
     made_by_hand(asked=asked)
     compare("--macroscopic", 1.6, "--macroscopic-uncertainty", 0.2, "--interface", "--override")
@@ -298,13 +271,10 @@ def test_the_options_reach_the_comparison(
     assert asked["cache"] == bench / "cache"
 
 
-def test_one_page_and_all_figures_are_written(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None], folder: Path
-) -> None:
+def test_a_page_and_all_figures_are_written(compare: Run, made_by_hand: Give, folder: Path):
     made_by_hand(comparison(lubrications=("dry",), loads=(1.37,), interface=interface_comparison()))
     options = ("--macroscopic", 1.6, "--interface", "--figures", "drawn", "--figure-format", "svg")
-    done = compare("--figure", "page.png", *options)
-    assert done.code == 0, done.err
+    done = compare("--figure", "page.png", *options).exits(0)
     assert (folder / "page.png").read_bytes().startswith(b"\x89PNG")
     assert names(folder / "drawn") == [
         "effective-friction.svg", "friction-set-dry.svg", "interface.svg", "likelihood.svg",
@@ -313,9 +283,7 @@ def test_one_page_and_all_figures_are_written(
     assert "Written: drawn/maxima.svg" in done.err.replace("\\", "/")
 
 
-def test_nothing_is_overwritten_without_force(
-    compare: Callable[..., Any], made_by_hand: Callable[..., None], folder: Path
-) -> None:
+def test_nothing_is_overwritten_without_force(compare: Run, made_by_hand: Give, folder: Path):
     made_by_hand()
     (folder / "drawn").mkdir()
     (folder / "drawn" / "maxima.png").write_bytes(b"mine")
@@ -326,9 +294,7 @@ def test_nothing_is_overwritten_without_force(
     assert (folder / "drawn" / "maxima.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_folder_that_cannot_be_made_is_known_before_computing(
-    compare: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_is_proven_writable_before_computing(compare: Run, monkeypatch: Patch):
     def reached(*_: object, **__: object) -> None:
         raise AssertionError("The comparison was reached.")
 
@@ -336,7 +302,7 @@ def test_a_folder_that_cannot_be_made_is_known_before_computing(
     assert compare("--figures", "no/such/folder").code == NOT_WRITTEN
 
 
-def test_the_cache_is_the_users_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_cache_is_the_users_own(monkeypatch: Patch, tmp_path: Path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert user_cache_folder() == tmp_path / "memscal" / "contacts"
     assert cache_from(None, no_cache=True) is None

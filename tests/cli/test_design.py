@@ -8,7 +8,7 @@ import pytest
 from helpers.console import Run, names
 
 
-def test_options_reach_the_plan(run: Run) -> None:
+def test_options_reach_the_plan(run: Run):
     film = ["--thickness", 1.5, "--thickness-uncertainty", 0.01, "--poisson-ratio", 0.48]
     told = run(
         "design", *film, "--radius", 0.2, "--load", 0.5, "--noise-voltage", 0.05,
@@ -20,68 +20,60 @@ def test_options_reach_the_plan(run: Run) -> None:
     assert told["expected"]["conversion_constant"]["budget"]["load"] == 0
 
 
-def test_a_wish_is_reached(run: Run) -> None:
+def test_a_wish_is_reached(run: Run):
     told = run("design", "--noise", 1, "--want", "sigma=2.8%", "--vary", "repeats", "--json").json
     assert told["wanted_si"] == {"sigma": 0.028}
     assert told["expected"]["gaussian_sigma"]["relative_uncertainty"] <= 0.028
     assert told["plan"]["repeats"] > 1
 
 
-def test_a_resolved_wavenumber_is_wanted_in_rad_per_mm(run: Run) -> None:
+def test_a_resolved_wavenumber_is_wanted_in_rad_per_mm(run: Run):
     told = run("design", "--want", "resolved=3", "--vary", "step", "--json").json
     assert told["resolved_wavenumber"]["value"] >= 3
     assert told["plan"]["step"]["value"] > 0.25
 
 
-def test_a_wish_out_of_reach_is_an_error_with_the_best(run: Run) -> None:
+def test_a_wish_out_of_reach_is_an_error_with_the_best(run: Run):
     failed = run("design", "--want", "sigma=1%", "--vary", "repeats")
     assert (failed.code, failed.out) == (3, "")
     assert "the best is" in failed.err
     assert "thickness" in failed.err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--step", -1], "--step"),
-        (["--noise", 0], "--noise"),
-        (["--repeats", 0], "--repeats"),
-        (["--want", "sigma=1%"], "--want and --vary go together"),
-        (["--vary", "step"], "--want and --vary go together"),
-        (["--want", "sigma", "--vary", "step"], "is no wish"),
-        (["--want", "sigma=much%", "--vary", "step"], "is no wish"),
-        (["--want", "sigma=0.01", "--vary", "step"], "write the %"),
-        (["--want", "resolved=4%", "--vary", "step"], "without %"),
-        (["--weight", 0.5, "--weight", 0.5], "--weight"),
-        (["--figure", "design.gif"], ".png"),
-    ],
-)
-def test_wrong_use_is_told_before_anything_is_computed(
-    run: Run, arguments: list[object], told: str
-) -> None:
+@pytest.mark.parametrize(("arguments", "told"), [
+    (["--step", -1], "--step"),
+    (["--noise", 0], "--noise"),
+    (["--repeats", 0], "--repeats"),
+    (["--want", "sigma=1%"], "--want and --vary go together"),
+    (["--vary", "step"], "--want and --vary go together"),
+    (["--want", "sigma", "--vary", "step"], "is no wish"),
+    (["--want", "sigma=much%", "--vary", "step"], "is no wish"),
+    (["--want", "sigma=0.01", "--vary", "step"], "write the %"),
+    (["--want", "resolved=4%", "--vary", "step"], "without %"),
+    (["--weight", 0.5, "--weight", 0.5], "--weight"),
+    (["--figure", "design.gif"], ".png"),
+])  # fmt: skip
+def test_wrong_use_is_told_before_anything_is_computed(run: Run, arguments, told):
     failed = run("design", *arguments)
     assert (failed.code, failed.out) == (2, "")
     assert told in failed.err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--want", "colour=1%", "--vary", "step"], "no wish that is known"),
-        (["--step", 4], "positions"),
-        (["--half-range", 2, "--centre", 3], "not passed over"),
-        (["--half-range", 0.8, "--step", 0.1, "--noise", 1], "not told apart from zero"),
-        (["--radius", 1.5], "The rod is 3 mm wide"),
-        (["--method", "magic"], "magic"),
-    ],
-)
-def test_a_plan_that_cannot_be_is_refused(run: Run, arguments: list[object], told: str) -> None:
+@pytest.mark.parametrize(("arguments", "told"), [
+    (["--want", "colour=1%", "--vary", "step"], "no wish that is known"),
+    (["--step", 4], "positions"),
+    (["--half-range", 2, "--centre", 3], "not passed over"),
+    (["--half-range", 0.8, "--step", 0.1, "--noise", 1], "not told apart from zero"),
+    (["--radius", 1.5], "The rod is 3 mm wide"),
+    (["--method", "magic"], "magic"),
+])  # fmt: skip
+def test_a_plan_that_cannot_be_is_refused(run: Run, arguments, told):
     failed = run("design", *arguments)
     assert (failed.code, failed.out) == (3, "")
     assert told in failed.err
 
 
-def test_figures_are_written_and_not_overwritten(run: Run, folder: Path) -> None:
+def test_figures_are_written_and_not_overwritten(run: Run, folder: Path):
     assert run("design", "--figure", "d.svg", "--figure", "d.png").code == 0
     assert names(folder) == ["d.png", "d.svg"]
     before = (folder / "d.png").read_bytes()

@@ -24,31 +24,29 @@ def options(command: click.Command) -> list[click.Option]:
     return [option for option in command.params if isinstance(option, click.Option)]
 
 
-def test_the_list_of_commands_names_and_describes_each(run: Run) -> None:
-    shown = run("--help")
-    assert shown.code == 0
+def test_the_list_of_commands_names_and_describes_each(run: Run):
+    shown = run("--help").exits(0)
     assert list(commands()) == list(COMMANDS)
     for name, (_, about) in COMMANDS.items():
         assert re.search(rf"^  {name} +{re.escape(about)}$", shown.out, re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_shows_examples_that_name_it(run: Run, name: str) -> None:
-    shown = run(name, "--help")
-    assert shown.code == 0
+def test_every_command_shows_examples_that_name_it(run: Run, name):
+    shown = run(name, "--help").exits(0)
     examples = shown.out[shown.out.index("Examples:") :]
     assert f"memscal {name} " in examples
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_options_in_the_examples_exist(name: str) -> None:
+def test_the_options_in_the_examples_exist(name):
     command = commands()[name]
     known = {text for option in options(command) for text in (*option.opts, *option.secondary_opts)}
     assert set(re.findall(r" (--?[a-z][a-z-]*)", command.epilog or "")) <= known | {"--help"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_option_with_a_unit_says_it_in_words(name: str) -> None:
+def test_every_option_with_a_unit_says_it_in_words(name):
     for option in options(commands()[name]):
         unit = getattr(option.type, "unit", None)
         if unit not in (None, "ratio"):
@@ -56,55 +54,46 @@ def test_every_option_with_a_unit_says_it_in_words(name: str) -> None:
         assert option.help, option.name
 
 
-def test_version_is_that_of_the_package(run: Run) -> None:
+def test_version_is_that_of_the_package(run: Run):
     shown = run("--version")
     assert (shown.code, shown.out) == (0, f"memscal {__version__}\n")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "hint"),
-    [
-        (["calibrat", "scan.h5"], "Did you mean calibrate?"),
-        (["import", "t.csv", "-o", "a.h5", "--x-units", "mm"], "--x-unit"),
-        (["reference", "cone"], "rod"),
-        (["reference", "rod", "--load", "0"], "above 0"),
-        (["reference", "rod", "--load", "nan"], "(in N)"),
-        (["reference", "rod", "--radius", "a quarter"], "(in mm)"),
-        (["reference", "rod", "--poisson-ratio", "0.7"], "at most 0.5"),
-        (["calibrate"], "SCAN"),
-        (["completion", "tcsh"], "fish"),
-        (["--verbose"], "--version"),
-    ],
-)
-def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments: list[str], hint: str) -> None:
-    refused = run(*arguments)
-    assert refused.code == 2
-    assert hint in refused.err
+@pytest.mark.parametrize(("arguments", "hint"), [
+    (["calibrat", "scan.h5"], "Did you mean calibrate?"),
+    (["import", "t.csv", "-o", "a.h5", "--x-units", "mm"], "--x-unit"),
+    (["reference", "cone"], "rod"),
+    (["reference", "rod", "--load", "0"], "above 0"),
+    (["reference", "rod", "--load", "nan"], "(in N)"),
+    (["reference", "rod", "--radius", "a quarter"], "(in mm)"),
+    (["reference", "rod", "--poisson-ratio", "0.7"], "at most 0.5"),
+    (["calibrate"], "SCAN"),
+    (["completion", "tcsh"], "fish"),
+    (["--verbose"], "--version"),
+])  # fmt: skip
+def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments, hint):
+    refused = run(*arguments).exits(2, hint)
     assert refused.out == ""
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_shell_gets_its_completion_script(run: Run, shell: str) -> None:
-    done = run("completion", shell)
-    assert done.code == 0
+def test_a_shell_gets_its_completion_script(run: Run, shell):
+    done = run("completion", shell).exits(0)
     assert f"_MEMSCAL_COMPLETE={shell}_complete" in done.out
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["memscal", "ca"], {"calibrate"}),
-        (["memscal", "calibrate", "--met"], {"--method"}),
-        (["memscal", "calibrate", "--method", "white"], {"white-noise", "white-noise-draw"}),
-        (["memscal", "reference", ""], {"rod", "sphere", "cone", "profile"}),
-    ],
-)
+@pytest.mark.parametrize(("words", "expected"), [
+    (["memscal", "ca"], {"calibrate"}),
+    (["memscal", "calibrate", "--met"], {"--method"}),
+    (["memscal", "calibrate", "--method", "white"], {"white-noise", "white-noise-draw"}),
+    (["memscal", "reference", ""], {"rod", "sphere", "cone", "profile"}),
+])  # fmt: skip
 def test_words_are_completed(
-    words: list[str],
-    expected: set[str],
+    words,
+    expected,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:
+):
     monkeypatch.setenv("_MEMSCAL_COMPLETE", "bash_complete")
     monkeypatch.setenv("COMP_WORDS", " ".join(words))
     monkeypatch.setenv("COMP_CWORD", str(len(words) - 1))
@@ -114,7 +103,7 @@ def test_words_are_completed(
     assert {line.partition(",")[2] for line in lines} == expected
 
 
-def test_figures_end_as_the_room_that_draws_them_allows() -> None:
+def test_figures_end_as_the_room_that_draws_them_allows():
     from memscal.figures.style import FIGURE_SUFFIXES as DRAWN
 
     assert FIGURE_SUFFIXES == DRAWN

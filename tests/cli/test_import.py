@@ -32,36 +32,29 @@ def table(folder: Path) -> Path:
     return write_table(folder / "scan.csv", "position,voltage", rows)
 
 
-def test_an_imported_scan_can_be_calibrated(run: Run, table: Path) -> None:
-    done = run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP)
-    assert done.code == 0, done.err
+def test_an_imported_scan_can_be_calibrated(run: Run, table: Path):
+    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP).exits(0)
     assert run("calibrate", "scan.h5").code == 0
     found = memscal.load_apparatus("scan.apparatus.h5")
     direct = memscal.calibrate(memscal.simulate(seed=1, state_noise=False)).apparatus
     assert found.conversion_constant == pytest.approx(direct.conversion_constant, rel=1e-6)
 
 
-def test_the_options_say_what_the_table_does_not(run: Run, table: Path) -> None:
+def test_the_options_say_what_the_table_does_not(run: Run, table: Path):
     labels = ["--sensor-name", "S1", "--sensor-model", "MEMS", "--title", "Monday's scan"]
     run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *labels)
     scan = memscal.read_scan("scan.h5")
     assert scan.film == memscal.ElasticFilm(
-        young_modulus=2.2e6,
-        poisson_ratio=0.5,
-        thickness=2e-3,
-        young_modulus_uncertainty=0.1e6,
-        poisson_ratio_uncertainty=0.004,
-        thickness_uncertainty=0.02e-3,
-    )
+        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, young_modulus_uncertainty=0.1e6,
+        poisson_ratio_uncertainty=0.004, thickness_uncertainty=0.02e-3,
+    )  # fmt: skip
     assert scan.indenter == memscal.Rod(radius=0.25e-3, radius_uncertainty=0.002e-3)
     assert (scan.load, scan.load_uncertainty) == (1.0, 0.01)
     assert (scan.sensor.name, scan.sensor.model, scan.sensor.channel) == ("S1", "MEMS", "zz")
     assert scan.title == "Monday's scan"
 
 
-def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(
-    run: Run, folder: Path
-) -> None:
+def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(run: Run, folder: Path):
     rows = np.stack([np.arange(9.0), np.arange(9.0), np.linspace(0.3, 0.4, 9)], axis=1)
     write_table(folder / "scan.csv", "position,voltage,force", rows)
     wet = ["--load-scatter", 2, "--lubrication", "lubricated", "--lubricant", "glycerol"]
@@ -77,54 +70,47 @@ def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(
     assert "glycerol" in run("inspect", "each.h5").out
 
 
-def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path) -> None:
+def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
     x, sets, passes = np.arange(9.0), (2.0, 0.5), (1, 2)
     rows = np.array([(p, s, place, 10 * s + p) for p in passes for s in sets for place in x])
     rows = np.delete(rows, 4, axis=0)  # a contact that was never made
     write_table(folder / "sphere.csv", "pass,set,position,voltage", rows)
     sphere = [*COLUMNS, *SET_UP[2:], "--indenter", "sphere", "--load-column", "set"]
     both = ["--repeat", "set", "--repeat", "pass", "--position-error", 5]
-    done = run("import", "sphere.csv", "-o", "sphere.h5", *sphere, *both)
-    assert done.code == 0, done.err
+    run("import", "sphere.csv", "-o", "sphere.h5", *sphere, *both).exits(0)
     scan = memscal.read_scan("sphere.h5")
     assert scan.u_zz.shape == (35,)
     np.testing.assert_allclose(scan.x_errors, np.full(35, 5e-6))
     passes = [(0.5, 6e-3), (0.5, 7e-3), (2.0, 21e-3), (2.0, 22e-3)]
     for i, (load, voltage) in enumerate(passes):
         line = scan.only_passes(i)
-        assert line.normal_load is not None
         assert line.x.size == (8 if i == 2 else 9)
         np.testing.assert_allclose(line.normal_load, load)
         np.testing.assert_allclose(line.u_zz, voltage)
 
 
-def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(
-    run: Run, folder: Path
-) -> None:
+def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: Run, folder: Path):
     rows = np.array([(s, place, s) for s in (0.5, 2.0) for place in range(9)])
     write_table(folder / "mixed.csv", "set,position,voltage", rows[[0, 10, 2, 12, 4, 14]])
     loads = [*COLUMNS, *SET_UP[2:], "--load-column", "set"]
     sphere = run("import", "mixed.csv", "-o", "sphere.h5", *loads, "--indenter", "sphere")
-    assert sphere.code == 0, sphere.err
-    assert "--repeat" in sphere.err
+    sphere.exits(0, "--repeat")
     rod = run("import", "mixed.csv", "-o", "rod.h5", *loads)
     assert (rod.code, "--repeat" in rod.err) == (0, False)
 
 
-def test_a_fem_table_becomes_a_reference(run: Run, folder: Path) -> None:
+def test_a_fem_table_becomes_a_reference(run: Run, folder: Path):
     film = memscal.simulate().film
     profile = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=1.0).profile()
     rows = np.stack([profile.r * 1e3, -profile.sigma_zz * 1e-6], axis=1)
     write_table(folder / "fem.csv", "r,S33", rows)
     columns = ["--r", "r", "--r-unit", "mm", "--sigma", "S33", "--sigma-unit", "MPa", "--load", 1]
     wrong = run("import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns)
-    assert wrong.code == 3
-    assert "--sign -1" in wrong.err
-    done = run(
+    wrong.exits(3, "--sign -1")
+    run(
         "import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns, "--sign", "-1",
         "--solver", "a FEM program",
-    )  # fmt: skip
-    assert done.code == 0, done.err
+    ).exits(0)  # fmt: skip
     found = memscal.read_reference("rod.h5")
     np.testing.assert_allclose(found.sigma_zz, profile.sigma_zz, rtol=1e-12, atol=1e-9)
     assert found.solver == "a FEM program"
@@ -133,97 +119,73 @@ def test_a_fem_table_becomes_a_reference(run: Run, folder: Path) -> None:
         "import", "fem.csv", "--format", "reference", "-o", "kilo.h5", *columns[:-3], "kPa",
         "--load", 1, "--sign", "-1",
     )  # fmt: skip
-    assert lossy.code == 3
-    assert '"kPa"' in lossy.err
-    assert "times the load" in lossy.err
+    lossy.exits(3, '"kPa"', "times the load")
 
 
-def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folder: Path) -> None:
+def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folder: Path):
     """The shipped table is by finite elements, with S13 for the third axis upward."""
     table = Path(__file__).parents[2] / "calibration_data" / "rod_reference_fem.csv"
     done = run(
         "import", table, "--format", "reference", "-o", "rod.h5", "--load", 1, "--sign", "-1",
         "--r", "r (mm)", "--r-unit", "mm", "--sigma", "S33 (MPa)", "--sigma-unit", "MPa",
         "--shear", "S13 (MPa)", "--shear-sign", "-1",
-    )  # fmt: skip
-    assert done.code == 0, done.err
+    ).exits(0)  # fmt: skip
     assert "SYNTHETIC" in done.out
     found = memscal.read_reference("rod.h5")
     ours = memscal.indent(memscal.simulate().film, memscal.Rod(radius=0.25e-3), load=1.0)
     shear = ours.base_shear(found.r)
-    assert found.sigma_rz is not None
     np.testing.assert_allclose(found.sigma_rz, shear, atol=2e-3 * np.abs(shear).max())
     assert found.force == pytest.approx(1.0, abs=1e-4)
 
 
-def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path) -> None:
+def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path):
     r = np.linspace(0, 8, 81)
     sigma = np.exp(-(r**2) / 2) / (2 * np.pi)
     write_table(folder / "fem.csv", "r,S33,S13", np.stack([r, -sigma, -0.1 * r * sigma], axis=1))
-    done = run(
+    run(
         "import", "fem.csv", "--format", "reference", "-o", "rod.h5", "--r", "r", "--r-unit", "mm",
         "--sigma", "S33", "--sigma-unit", "MPa", "--sign", "-1", "--load", 1,
         "--shear", "S13", "--shear-sign", "-1",
-    )  # fmt: skip
-    assert done.code == 0, done.err
+    ).exits(0)  # fmt: skip
     shear = memscal.read_reference("rod.h5").sigma_rz
-    assert shear is not None
     np.testing.assert_allclose(shear, 0.1e6 * r * sigma, rtol=1e-12)
     write_table(folder / "scan.csv", "position,voltage", np.stack([r, -sigma], axis=1))
-    done = run("import", "scan.csv", "-o", "scan.h5", *COLUMNS, *SET_UP, "--u-sign", "-1")
-    assert done.code == 0, done.err
+    run("import", "scan.csv", "-o", "scan.h5", *COLUMNS, *SET_UP, "--u-sign", "-1").exits(0)
     np.testing.assert_allclose(memscal.read_scan("scan.h5").u_zz, sigma * 1e-3, rtol=1e-12)
     refused = run("import", "scan.csv", "-o", "s.h5", *COLUMNS, *SET_UP, "--shear-sign", "-1")
-    assert refused.code == 2
-    assert "--shear-sign" in refused.err
+    refused.exits(2, "--shear-sign")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "hints"),
-    [
-        ([], ["--x", "--x-unit", "--u", "--u-unit"]),
-        (COLUMNS, ["--load-column"]),
-        ([*COLUMNS, "--load", 1], ["--young-modulus", "--poisson-ratio", "--thickness"]),
-        ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
-        (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
-    ],
-)
-def test_what_is_missing_is_named_all_at_once(
-    run: Run, table: Path, folder: Path, arguments: list[object], hints: list[str]
-) -> None:
-    refused = run("import", table, "-o", "scan.h5", *arguments)
-    assert refused.code == 2
+@pytest.mark.parametrize(("arguments", "hints"), [
+    ([], ["--x", "--x-unit", "--u", "--u-unit"]),
+    (COLUMNS, ["--load-column"]),
+    ([*COLUMNS, "--load", 1], ["--young-modulus", "--poisson-ratio", "--thickness"]),
+    ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
+    (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
+])  # fmt: skip
+def test_all_that_is_missing_is_named(run: Run, table: Path, folder: Path, arguments, hints):
+    refused = run("import", table, "-o", "scan.h5", *arguments).exits(2)
     assert all(hint in refused.err for hint in hints), refused.err
     assert names(folder) == ["scan.csv"]
 
 
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [
-        (["--x", "place"], "Its columns are: position, voltage"),
-        (["--x-unit", "mV"], "mV"),
-        (["--u-unit", "bananas"], "bananas"),
-    ],
-)
-def test_a_wrong_column_or_unit_is_refused_by_name(
-    run: Run, table: Path, folder: Path, change: list[str], word: str
-) -> None:
-    refused = run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *change)
-    assert refused.code == 3
-    assert word in refused.err
+@pytest.mark.parametrize(("change", "word"), [
+    (["--x", "place"], "Its columns are: position, voltage"),
+    (["--x-unit", "mV"], "mV"),
+    (["--u-unit", "bananas"], "bananas"),
+])  # fmt: skip
+def test_a_wrong_column_or_unit_is_named(run: Run, table: Path, folder: Path, change, word):
+    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *change).exits(3, word)
     assert names(folder) == ["scan.csv"]
 
 
-def test_the_table_itself_is_never_replaced(run: Run, table: Path) -> None:
+def test_the_table_itself_is_never_replaced(run: Run, table: Path):
     before = table.read_bytes()
-    refused = run("import", table, "-o", table, *COLUMNS, *SET_UP, "--force")
-    assert refused.code == 4
+    run("import", table, "-o", table, *COLUMNS, *SET_UP, "--force").exits(4)
     assert table.read_bytes() == before
 
 
-def test_a_force_that_is_not_the_load_is_warned_of_beside_the_results(
-    run: Run, folder: Path
-) -> None:
+def test_a_force_that_is_not_the_load_is_warned_of_beside_the_results(run: Run, folder: Path):
     r = np.linspace(0, 8, 200)
     sigma = np.exp(-(r**2) / 2) / (2 * np.pi)  # 1 N, in MPa and mm
     write_table(folder / "fem.csv", "r,s", np.stack([r, sigma], axis=1))
@@ -231,6 +193,5 @@ def test_a_force_that_is_not_the_load_is_warned_of_beside_the_results(
         "import", "fem.csv", "--format", "reference", "-o", "fem.h5", "--load", 1.1,
         "--r", "r", "--r-unit", "mm", "--sigma", "s", "--sigma-unit", "MPa",
     )  # fmt: skip
-    assert done.code == 0
-    assert "Warning: the table's force differs from the load" in done.err
+    done.exits(0, "Warning: the table's force differs from the load")
     assert "Warning" not in done.out

@@ -24,13 +24,13 @@ def artifact(shared_artifact: Path, folder: Path) -> Path:
     return Path(shutil.copy(shared_artifact, folder / "a.h5"))
 
 
-def test_inspect_shows_values_arrays_checks_and_provenance(run: Run, artifact: Path) -> None:
-    shown = run("inspect", artifact)
-    assert shown.code == 0
+def test_inspect_shows_values_arrays_checks_and_provenance(run: Run, artifact: Path):
+    shown = run("inspect", artifact).exits(0)
+    kind, array = "memscal-artifact", "/entry/apparatus_function/g "
     for text in (
-        "memscal-artifact",
+        kind,
+        array,
         "mV/Pa",
-        "/entry/apparatus_function/g ",
         "FAILED",
         "What the failures mean",
         "scan.h5",
@@ -39,7 +39,7 @@ def test_inspect_shows_values_arrays_checks_and_provenance(run: Run, artifact: P
         assert text in shown.out
 
 
-def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path) -> None:
+def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path):
     run("simulate", "-o", "scan.h5", "--seed", 1)
     with h5py.File("scan.h5", "r+") as file:  # as another program may write it
         del file.attrs["memscal_content_sha256"]
@@ -56,37 +56,32 @@ def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path) ->
     assert quantities["thickness"]["unit"] == "um"
 
 
-def test_inspect_refuses_what_is_not_ours(run: Run, folder: Path) -> None:
+def test_inspect_refuses_what_is_not_ours(run: Run, folder: Path):
     Path("notes.txt").write_text("hello")
-    refused = run("inspect", "notes.txt")
-    assert refused.code == 3
+    refused = run("inspect", "notes.txt").exits(3)
     assert refused.out == ""
 
 
-def test_check_passes_a_file_as_it_was_written(run: Run, artifact: Path) -> None:
-    done = run("check", artifact)
-    assert done.code == 0
+def test_check_passes_a_file_as_it_was_written(run: Run, artifact: Path):
+    done = run("check", artifact).exits(0)
     assert done.err == ""
     assert [line.split()[1] for line in done.out.splitlines()[3:]] == ["passed"] * 4
 
 
-def test_check_finds_a_number_that_was_changed(run: Run, artifact: Path) -> None:
+def test_check_finds_a_number_that_was_changed(run: Run, artifact: Path):
     with h5py.File(artifact, "r+") as file:
         file["/entry/parameters/conversion_constant"][()] *= 1.01
-    done = run("check", artifact, "--json")
-    assert done.code == 3
+    done = run("check", artifact, "--json").exits(3)
     assert done.json["passed"] is False
     (failed,) = [finding for finding in done.json["findings"] if not finding["passed"]]
     assert failed["name"] == "digest"
     assert "not in order" in done.err
-    shown = run("check", artifact)
-    assert shown.code == 3
+    shown = run("check", artifact).exits(3)
     assert "FAILED" in shown.out
 
 
 @pytest.mark.parametrize("name", ["missing.h5", ".", "truncated.h5"])
-def test_check_of_what_cannot_be_read_is_exit_code_3(run: Run, artifact: Path, name: str) -> None:
+def test_check_of_what_cannot_be_read_is_exit_code_3(run: Run, artifact: Path, name):
     Path("truncated.h5").write_bytes(artifact.read_bytes()[:5000])
-    done = run("check", name)
-    assert done.code == 3
+    done = run("check", name).exits(3)
     assert "Traceback" not in done.err

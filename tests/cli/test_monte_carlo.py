@@ -8,7 +8,7 @@ from helpers.console import Run
 import memscal
 
 
-def test_draws_are_given_as_json_in_the_units_of_the_rest(run: Run, scan: Path) -> None:
+def test_draws_are_given_as_json_in_the_units_of_the_rest(run: Run, scan: Path):
     arguments = ("calibrate", scan, "--method", "evidence", "--monte-carlo", 80, "--seed", 4)
     found = run(*arguments, "--json").json["monte_carlo"]
     assert (found["draws"], found["seed"]) == (80, 4)
@@ -27,8 +27,6 @@ def test_draws_are_given_as_json_in_the_units_of_the_rest(run: Run, scan: Path) 
 
 
 @pytest.mark.parametrize("draws", ["1", "0", "many", "-5"])
-def test_a_number_of_draws_that_makes_no_sense_is_refused(run: Run, scan: Path, draws: str) -> None:
-    refused = run("calibrate", scan, f"--monte-carlo={draws}")
-    assert refused.code == 2
-    assert "--monte-carlo" in refused.err
+def test_a_number_of_draws_that_makes_no_sense_is_refused(run: Run, scan: Path, draws):
+    run("calibrate", scan, f"--monte-carlo={draws}").exits(2, "--monte-carlo")
     assert not scan.with_suffix(".apparatus.h5").exists()

@@ -26,26 +26,21 @@ def stream(encoding: str) -> io.TextIOWrapper:
 
 
 TABLE = Table(
-    "Quality checks",
-    ("check", "result"),
-    [("drift", "passed"), ("[bold]symmetry", "FAILED")],
+    "Quality checks", ("check", "result"), [("drift", "passed"), ("[bold]symmetry", "FAILED")],
     frozenset({1}),
-)
+)  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("encoding", "text"),
-    [
-        ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"),
-        ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
-        ("latin-1", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
-    ],
-)
-def test_a_number_stays_the_same_in_every_encoding(encoding: str, text: str) -> None:
+@pytest.mark.parametrize(("encoding", "text"), [
+    ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"),
+    ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
+    ("latin-1", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
+])  # fmt: skip
+def test_a_number_stays_the_same_in_every_encoding(encoding, text):
     assert readable("σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa", stream(encoding)) == text
 
 
-def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]):
     emit_tables(TABLE, Table("empty", ("a",), []))
     assert capsys.readouterr().out == (
         "Quality checks\n"
@@ -56,9 +51,7 @@ def test_a_plain_table_is_aligned(capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
-def test_a_terminal_gets_a_drawn_table_in_which_cells_are_text(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_terminal_gets_a_drawn_table_with_cells_as_text(monkeypatch: pytest.MonkeyPatch):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stdout", terminal)
     monkeypatch.setenv("TERM", "xterm-256color")
@@ -71,9 +64,7 @@ def test_a_terminal_gets_a_drawn_table_in_which_cells_are_text(
     assert "─" in shown
 
 
-def test_progress_appears_when_work_is_long_and_leaves_no_trace(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_progress_of_long_work_leaves_no_trace(monkeypatch: pytest.MonkeyPatch):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setattr("memscal.cli.output._FIRST_AFTER", 0.0)
@@ -83,7 +74,7 @@ def test_progress_appears_when_work_is_long_and_leaves_no_trace(
     assert terminal.getvalue().endswith("\r\x1b[K")
 
 
-def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_is_silent_where_nobody_watches(capsys: pytest.CaptureFixture[str]):
     with working("Sweeping"):
         pass
     assert capsys.readouterr().err == ""

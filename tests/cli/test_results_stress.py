@@ -43,7 +43,7 @@ def planned() -> memscal.Design:
 
 
 @pytest.mark.parametrize("name", ["stress", "restored", "contact", "planned"])
-def test_text_mapping_notebook_figure_and_arrays(name: str, request: pytest.FixtureRequest) -> None:
+def test_text_mapping_notebook_figure_and_arrays(name, request: pytest.FixtureRequest):
     result = request.getfixturevalue(name)
     assert str(result) == result.summary()
     assert "\n" not in repr(result)
@@ -57,7 +57,7 @@ def test_text_mapping_notebook_figure_and_arrays(name: str, request: pytest.Fixt
 
 def test_the_commands_print_the_results(
     run: Run, folder: Path, apparatus: memscal.ApparatusFunction, contact: memscal.Contact
-) -> None:
+):
     scan = contact_scan(1, load=LOADS)
     apparatus.save(folder / "a.h5")
     memscal.write_scan(scan, folder / "scan.h5")
@@ -72,16 +72,14 @@ def test_the_commands_print_the_results(
     )
 
 
-def test_a_contact_with_friction_is_not_called_frictionless(
-    restored: memscal.Restoration, contact: memscal.Contact
-) -> None:
+def test_friction_of_a_contact_is_named(restored: memscal.Restoration, contact: memscal.Contact):
     assert restored.to_dict()["calculated"]["origin"] == "calculated without friction"
     apparatus, scan = restored.apparatus, restored.scan
     rubbed = memscal.restore(scan, apparatus, expected=contact).to_dict()["calculated"]
     assert rubbed["origin"] == "calculated with friction 0.3"
 
 
-def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.MeasuredStress) -> None:
+def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.MeasuredStress):
     arrays, table = stress.to_xarray(), stress.to_dataframe()
     assert arrays.s_zz.dims == ("profile", "point")
     assert (arrays.s_zz.attrs["units"], arrays.r.attrs["units"]) == ("Pa", "m")
@@ -93,7 +91,7 @@ def test_arrays_are_in_si_units_and_tables_in_shown_ones(stress: memscal.Measure
     assert len(table) == sum(profile.r.size for profile in stress.profiles)
 
 
-def test_forces_of_one_sensor_are_correlated(stress: memscal.MeasuredStress) -> None:
+def test_forces_of_one_sensor_are_correlated(stress: memscal.MeasuredStress):
     numbers = stress.ufloats()
     first, second = stress.profiles
     assert numbers["force_1"].nominal_value == first.force
@@ -104,9 +102,7 @@ def test_forces_of_one_sensor_are_correlated(stress: memscal.MeasuredStress) -> 
     assert total.std_dev < first.force_uncertainty + second.force_uncertainty
 
 
-def test_the_numbers_of_a_restoration_have_their_joint_covariance(
-    restored: memscal.Restoration,
-) -> None:
+def test_numbers_of_a_restoration_have_their_joint_covariance(restored: memscal.Restoration):
     numbers = restored.ufloats()
     assert list(numbers) == ["force", "stress_on_axis", "centre", "baseline"]
     assert numbers["force"].nominal_value == pytest.approx(restored.force)
@@ -120,7 +116,7 @@ def test_the_numbers_of_a_restoration_have_their_joint_covariance(
     assert total.std_dev < apart
 
 
-def test_a_design_says_what_it_was_varied_to_reach(planned: memscal.Design) -> None:
+def test_a_design_says_what_it_was_varied_to_reach(planned: memscal.Design):
     assert planned.to_dict()["wanted_si"] == {"sigma": 0.028}
     sigma = planned.ufloats()["gaussian_sigma"]
     assert sigma.std_dev / sigma.nominal_value == pytest.approx(
@@ -128,7 +124,7 @@ def test_a_design_says_what_it_was_varied_to_reach(planned: memscal.Design) -> N
     )
 
 
-def test_a_contact_has_no_uncertainty(contact: memscal.Contact) -> None:
+def test_a_contact_has_no_uncertainty(contact: memscal.Contact):
     with pytest.raises(InputError, match="no such form"):
         contact.ufloats()
     table = contact.to_dataframe()

@@ -25,13 +25,11 @@ def scans(folder: Path) -> dict[str, memscal.Scan]:
 
 
 def truth(scan: memscal.Scan) -> dict[str, Any]:
-    assert scan.synthetic is not None
     return dict(scan.synthetic)
 
 
-def test_the_defaults_are_those_of_the_library(run: Run, folder: Path) -> None:
-    done = run(*SPHERE)
-    assert done.code == 0, done.err
+def test_the_defaults_are_those_of_the_library(run: Run, folder: Path):
+    run(*SPHERE).exits(0)
     assert names(folder) == ["synthetic_experiment"]
     assert names(folder / "synthetic_experiment") == sorted(FILES)
     own = memscal.simulate_experiment()
@@ -52,14 +50,13 @@ def test_the_defaults_are_those_of_the_library(run: Run, folder: Path) -> None:
                 np.testing.assert_allclose(ours, theirs, rtol=1e-12)
 
 
-def test_options_mean_their_units(run: Run, folder: Path) -> None:
+def test_options_mean_their_units(run: Run, folder: Path):
     options = [
         *FEW, "--friction", 0.3, "--loading", "total", "--sphere-radius", 100, "--repeats", 2,
         "--sphere-radius-uncertainty", 0.2, "--load-scatter", 1, "--position-error", 5,
         "--points", 33, "--thickness", 3, "--gain", 1.05, "--thickness-factor", 0.95,
     ]  # fmt: skip
-    done = run(*SPHERE, "-o", "run", *options, "--json")
-    assert done.code == 0, done.err
+    done = run(*SPHERE, "-o", "run", *options, "--json").exits(0)
     rod, dry, lubricated = scans(folder / "run").values()
     assert rod.u_zz.shape == (33,)
     assert dry.u_zz.shape == lubricated.u_zz.shape == (2, 9)
@@ -75,27 +72,22 @@ def test_options_mean_their_units(run: Run, folder: Path) -> None:
     assert done.json["scans"][1]["truth_si"]["position_error"] == pytest.approx(5e-6)
 
 
-def test_laws_of_the_interface_and_their_units_are_stored_as_truth(run: Run, folder: Path) -> None:
+def test_laws_of_the_interface_and_their_units_are_stored_as_truth(run: Run, folder: Path):
     still = [*FEW, "--load-scatter", 0]
     slip = ["--friction", "inf", "--slip-length", 3]
-    done = run(*SPHERE, "-o", "slip", *still, *slip, "--json")
-    assert done.code == 0, done.err
+    done = run(*SPHERE, "-o", "slip", *still, *slip, "--json").exits(0)
     told = truth(memscal.read_scan("slip/sphere_dry.h5"))
     assert (told["friction"], told["slip_length"]) == (np.inf, pytest.approx(3e-6))
     assert done.json["scans"][1]["truth_si"]["friction"] == "inf"
-    done = run(*SPHERE, "-o", "rough", *still, "--exponential", 1, 0.5)
-    assert done.code == 0, done.err
+    run(*SPHERE, "-o", "rough", *still, "--exponential", 1, 0.5).exits(0)
     for name in FILES[1:]:
         told = truth(memscal.read_scan(f"rough/{name}"))
         assert told["decay_length"] == pytest.approx(1e-6)
         assert told["reference_pressure"] == pytest.approx(0.5e6)
 
 
-def test_the_experiment_is_labelled_as_synthetic_wherever_it_is_shown(
-    run: Run, folder: Path
-) -> None:
-    done = run(*SPHERE, "-o", "run", *FEW, "--draw-inputs", "--record-loads")
-    assert done.code == 0, done.err
+def test_the_experiment_is_labelled_as_synthetic_wherever_it_is_shown(run: Run, folder: Path):
+    done = run(*SPHERE, "-o", "run", *FEW, "--draw-inputs", "--record-loads").exits(0)
     assert "Synthetic experiment (calculated, not measured)" in done.out
     assert "friction coefficient" in done.out
     assert "nothing in them was measured" in done.err
@@ -108,13 +100,11 @@ def test_the_experiment_is_labelled_as_synthetic_wherever_it_is_shown(
     assert f"{told['thickness'] * 1e3:.6g} mm" in done.out
 
 
-def test_existing_scans_are_replaced_only_if_it_is_asked_for(run: Run, folder: Path) -> None:
+def test_existing_scans_are_replaced_only_if_it_is_asked_for(run: Run, folder: Path):
     assert run(*SPHERE, "-o", "run", *FEW).code == 0
     before = {name: (folder / "run" / name).read_bytes() for name in FILES}
     (folder / "run" / FILES[0]).unlink()
-    refused = run(*SPHERE, "-o", "run", *FEW, "--seed", 1)
-    assert refused.code == 4
-    assert "exists already" in refused.err
+    run(*SPHERE, "-o", "run", *FEW, "--seed", 1).exits(4, "exists already")
     assert names(folder / "run") == sorted(FILES[1:])
     assert (folder / "run" / FILES[1]).read_bytes() == before[FILES[1]]
     (folder / "run" / "notes.txt").write_text("mine")
@@ -123,7 +113,7 @@ def test_existing_scans_are_replaced_only_if_it_is_asked_for(run: Run, folder: P
     assert truth(memscal.read_scan(f"run/{FILES[1]}"))["seed"] == 1
 
 
-def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path) -> None:
+def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path):
     command = [sys.executable, "-m", "memscal", *SPHERE, "-o", "run", *map(str, FEW)]
     # The last file has a longer table of contacts than the first, which alone would fit.
     done = subprocess.run(
@@ -136,41 +126,31 @@ def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path) -> None
     assert names(folder) == []
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "hint"),
-    [
-        (["--raster"], 2, "--raster belongs to --experiment rod"),
-        (["--half-range", 5, "--raster"], 2, "--half-range, --raster belong"),
-        (["--load", 1, "--load", 1], 2, "given twice"),
-        (["--lubricated-load", 1, "--lubricated-load", 1], 2, "given twice"),
-        (["--greenwood-tripp", 1, 1, 1, "--exponential", 1, 1], 2, "one normal law"),
-        (["--load-scatter", 11], 2, "(in percent)"),
-        (["--friction", -1], 2, "of at least 0"),
-        (["--contacts", 1], 2, "2<=x<=4096"),
-        (["--load", 1e7], 3, "film"),
-        (["-o", "no/such/folder"], 4, "Create the folder first"),
-        (["-o", "file"], 4, "not a folder"),
-    ],
-)
-def test_what_makes_no_experiment_is_refused(
-    run: Run, folder: Path, arguments: list[object], code: int, hint: str
-) -> None:
+@pytest.mark.parametrize(("arguments", "code", "hint"), [
+    (["--raster"], 2, "--raster belongs to --experiment rod"),
+    (["--half-range", 5, "--raster"], 2, "--half-range, --raster belong"),
+    (["--load", 1, "--load", 1], 2, "given twice"),
+    (["--lubricated-load", 1, "--lubricated-load", 1], 2, "given twice"),
+    (["--greenwood-tripp", 1, 1, 1, "--exponential", 1, 1], 2, "one normal law"),
+    (["--load-scatter", 11], 2, "(in percent)"),
+    (["--friction", -1], 2, "of at least 0"),
+    (["--contacts", 1], 2, "2<=x<=4096"),
+    (["--load", 1e7], 3, "film"),
+    (["-o", "no/such/folder"], 4, "Create the folder first"),
+    (["-o", "file"], 4, "not a folder"),
+])  # fmt: skip
+def test_what_makes_no_experiment_is_refused(run: Run, folder: Path, arguments, code, hint):
     (folder / "file").write_text("mine")
     refused = run(*SPHERE, *arguments)
     assert (refused.code, hint in refused.err) == (code, True), refused.err
     assert names(folder) == ["file"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "hint"),
-    [
-        (["--friction", 0.2], "--friction belongs to --experiment sphere"),
-        (["--gain", 1, "--slip-length", 2], "--slip-length, --gain belong"),
-    ],
-)
-def test_a_rod_scan_refuses_what_only_a_sphere_has(
-    run: Run, folder: Path, arguments: list[object], hint: str
-) -> None:
+@pytest.mark.parametrize(("arguments", "hint"), [
+    (["--friction", 0.2], "--friction belongs to --experiment sphere"),
+    (["--gain", 1, "--slip-length", 2], "--slip-length, --gain belong"),
+])  # fmt: skip
+def test_a_rod_scan_refuses_what_only_a_sphere_has(run: Run, folder: Path, arguments, hint):
     refused = run("simulate", *arguments)
     assert (refused.code, hint in refused.err) == (2, True), refused.err
     assert names(folder) == []

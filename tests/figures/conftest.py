@@ -59,13 +59,9 @@ def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolut
     spread = noise * float(np.max(clean))
     u = clean + rng.normal(0.0, spread, r.size)
     return Reconvolution(
-        x=x,
-        u_zz=u,
-        u_zz_errors=np.full(r.size, spread),
-        u_zz_predicted=clean,
-        u_zz_gaussian=single,
-        residual=u - clean,
-    )
+        x=x, u_zz=u, u_zz_errors=np.full(r.size, spread), u_zz_predicted=clean,
+        u_zz_gaussian=single, residual=u - clean,
+    )  # fmt: skip
 
 
 def radial_profile(error: float, ripple: float) -> ApparatusRadial:
@@ -86,34 +82,28 @@ def transfer_function(resolved: float) -> TransferFunction:
 
 
 def build(
-    kind: str = "line",
-    points: int = 65,
-    *,
-    noise: float = 0.005,
-    seed: int = 1,
-    error: float = 0.03,
-    ripple: float = 0.0,
-    failed: int = 0,
-    sensor: StressSensor | None = None,
+    kind: str = "line", points: int = 65, *, noise: float = 0.005, seed: int = 1,
+    error: float = 0.03, ripple: float = 0.0, failed: int = 0, sensor: StressSensor | None = None,
     meaning: str = "The scan is not explained to within its noise.",
     message: str = "1 outlier was down-weighted at x = 2.25 mm.",
-) -> ApparatusData:
+) -> ApparatusData:  # fmt: skip
     """Return the data of a calibration that never ran."""
     grid = np.linspace(-3e-3, 3e-3, 61)
     g = sum(w * gaussian(np.hypot(grid, grid[:, None]), s) for w, s in _PARTS)
     names = ("reconvolution", "symmetry", "tail_share", "resolved_band", "gaussian_misfit")
     values = {
-        "conversion_constant": (_CONSTANT, 1.3e-10),
-        "gaussian_sigma": (_SIGMA, 3.4e-6),
-        "gaussian_sigma_deconvolved": (0.544e-3, 5.1e-6),
-        "centre": (_CENTRE, 4.2e-6),
+        "conversion_constant": (_CONSTANT, 1.3e-10), "gaussian_sigma": (_SIGMA, 3.4e-6),
+        "gaussian_sigma_deconvolved": (0.544e-3, 5.1e-6), "centre": (_CENTRE, 4.2e-6),
         "baseline": (_BASELINE, 1.1e-6),
-    }
+    }  # fmt: skip
     if kind != "line":
         values["centre_y"] = (0.0, 4.4e-6)
     numbers, spreads = np.array(list(values.values())).T
     r = np.linspace(0.0, 10e-3, 201)
     data = make_artifact()
+    contact = {"film": data.film, "indenter": data.indenter}
+    stress = _LOAD * gaussian(r, _WIDTH)
+    reference = StressProfile(r=r, sigma_zz=stress, load=_LOAD, **contact)
     return replace(
         data,
         field=ApparatusField(x=grid, y=grid, g=g, g_errors=np.full(g.shape, error * g.max())),
@@ -126,13 +116,7 @@ def build(
             for i, name in enumerate(names)
         ),
         sensor=sensor or StressSensor(name="array 3", model="MEMS membrane", channel="zz"),
-        reference=StressProfile(
-            r=r,
-            sigma_zz=_LOAD * gaussian(r, _WIDTH),
-            load=_LOAD,
-            film=data.film,
-            indenter=data.indenter,
-        ),
+        reference=reference,
         process=replace(data.process, messages=(Message("outlier", message),)),
         budget={
             "conversion_constant": {"noise": 9e-11, "load": 6e-11, "film thickness": 7e-11},

@@ -37,13 +37,10 @@ def texts(figure):
 def test_every_axis_names_its_quantity_and_unit(drawn):
     axes = panels(drawn())
     units = {
-        "scan": (None, "mV"),
-        "residuals": (None, "$u$"),
-        "scan_log": ("mm", "mV"),
-        "radial": (None, "1/mm$^2$"),
-        "radial_log": ("mm", "1/mm$^2$"),
+        "scan": (None, "mV"), "residuals": (None, "$u$"), "scan_log": ("mm", "mV"),
+        "radial": (None, "1/mm$^2$"), "radial_log": ("mm", "1/mm$^2$"),
         "transfer": ("rad/mm", "(1)"),
-    }
+    }  # fmt: skip
     for name, (along, up) in units.items():
         assert up in axes[name].get_ylabel()
         if along:
@@ -109,9 +106,7 @@ def test_logarithmic_panels_hold_no_value_that_is_not_positive(drawn, kind):
     assert np.min(band(axes["radial_log"])[:, 1]) > 0
 
 
-def test_each_point_is_a_measurement_or_an_upper_limit_on_the_logarithmic_axis(
-    make_apparatus, drawn
-):
+def test_each_point_is_a_value_or_an_upper_limit_on_the_logarithmic_axis(make_apparatus, drawn):
     data = make_apparatus(noise=0.03)
     axes = panels(drawn(noise=0.03))["scan_log"]
     scan = data.reconvolution

@@ -31,7 +31,7 @@ def curve(axes, color: str, style: str) -> Line2D:
     return found
 
 
-def test_one_contact_shows_its_tractions_and_its_base() -> None:
+def test_one_contact_shows_its_tractions_and_its_base():
     contact = indent(FILM, SPHERE, load=1.0, friction=0.2)
     figure = contact_figure([contact])
     interface, base = figure.axes
@@ -49,7 +49,7 @@ def test_one_contact_shows_its_tractions_and_its_base() -> None:
     assert places >= {contact.contact_radius * 1e3, contact.stick_radius * 1e3}
 
 
-def test_several_contacts_show_load_against_depth() -> None:
+def test_several_contacts_show_load_against_depth():
     contacts = indent(FILM, SPHERE, load=[0.5, 1.0, 2.0])
     figure = contact_figure(contacts)
     loading = figure.axes[2]
@@ -59,7 +59,7 @@ def test_several_contacts_show_load_against_depth() -> None:
     assert {"0.5 N", "1 N", "2 N", "contact radius"} <= named
 
 
-def test_a_rod_s_unbounded_pressure_does_not_hide_the_rest() -> None:
+def test_a_rod_s_unbounded_pressure_does_not_hide_the_rest():
     contact = indent(FILM, Rod(radius=0.25e-3), load=1.0, friction=math.inf)
     figure = contact_figure([contact])
     mean = 1.0 / (math.pi * 0.25e-3**2) * 1e-3
@@ -67,7 +67,7 @@ def test_a_rod_s_unbounded_pressure_does_not_hide_the_rest() -> None:
     assert render_figure(figure, "png").startswith(b"\x89PNG")
 
 
-def test_no_contact_is_no_figure() -> None:
+def test_no_contact_is_no_figure():
     with pytest.raises(InputError, match="no contact"):
         contact_figure([])
 
@@ -77,7 +77,7 @@ def planned() -> Design:
     return memscal.design(step=0.5e-3, repeats=2)
 
 
-def test_curves_are_the_designs_own(planned: Design) -> None:
+def test_curves_are_the_designs_own(planned: Design):
     radial, transfer, varied = design_figure(planned, vary="repeats").axes
     (g,) = (line for line in radial.lines if line.get_label() == "G expected")
     shown = np.asarray(g.get_ydata())
@@ -92,20 +92,20 @@ def test_curves_are_the_designs_own(planned: Design) -> None:
 
 
 @pytest.mark.parametrize("vary", ["step", "half_range", "repeats"])
-def test_less_noise_is_less_uncertainty_along_every_axis(planned: Design, vary: str) -> None:
+def test_less_noise_is_less_uncertainty_along_every_axis(planned: Design, vary):
     axes = design_figure(planned, vary=vary).axes[2]
     (sigma,) = (line for line in axes.lines if line.get_label() == "σ")
     first, last = sigma.get_ydata()[0], sigma.get_ydata()[-1]
     assert (last > first) == (vary == "step")
 
 
-def test_a_plan_with_many_positions_is_not_varied_beyond_reason() -> None:
+def test_a_plan_with_many_positions_is_not_varied_beyond_reason():
     dense = memscal.design(step=0.02e-3, half_range=8e-3)
     axes = design_figure(dense, vary="step").axes[2]
     (a,) = (line for line in axes.lines if line.get_label() == "A")
     assert min(a.get_xdata()) >= 16 / 1025
 
 
-def test_what_cannot_be_varied_is_refused(planned: Design) -> None:
+def test_what_cannot_be_varied_is_refused(planned: Design):
     with pytest.raises(InputError, match="'weather'"):
         design_figure(planned, vary="weather")

@@ -40,7 +40,7 @@ def bars(axes: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return drawn
 
 
-def test_profiles_are_drawn_with_their_standard_uncertainties(found: FrictionComparison) -> None:
+def test_profiles_are_drawn_with_their_standard_uncertainties(found: FrictionComparison):
     figure = profile_figure(found, lubrication="lubricated")
     profiles = found.measured.profiles[len(LOADS) :]
     for (r, s, u), profile in zip(bars(figure.axes[0]), profiles, strict=True):
@@ -49,9 +49,7 @@ def test_profiles_are_drawn_with_their_standard_uncertainties(found: FrictionCom
         np.testing.assert_allclose(u, profile.s_zz_errors * 1e-3)
 
 
-def test_the_limits_of_friction_pass_through_the_calculated_profiles(
-    found: FrictionComparison,
-) -> None:
+def test_limits_of_friction_pass_through_the_calculated_profiles(found: FrictionComparison):
     axes = profile_figure(found).axes[0]
     solid = [
         line for line in axes.lines if line.get_ls() == "-" and np.size(line.get_xdata()) > 100
@@ -66,7 +64,7 @@ def test_the_limits_of_friction_pass_through_the_calculated_profiles(
             )
 
 
-def test_every_residual_is_within_its_panel(found: FrictionComparison) -> None:
+def test_every_residual_is_within_its_panel(found: FrictionComparison):
     figure = profile_figure(found)
     for axes, index in zip(figure.axes[2:], (0, -1), strict=True):
         low, high = axes.get_ylim()
@@ -79,9 +77,7 @@ def test_every_residual_is_within_its_panel(found: FrictionComparison) -> None:
             assert np.all((z > low) & (z < high))
 
 
-def test_a_logarithmic_scale_shows_every_positive_stress_of_three_decades(
-    found: FrictionComparison,
-) -> None:
+def test_a_logarithmic_scale_shows_every_stress_of_three_decades(found: FrictionComparison):
     axes = profile_figure(found).axes[1]
     low, high = axes.get_ylim()
     assert high / low > 1e3
@@ -91,7 +87,7 @@ def test_a_logarithmic_scale_shows_every_positive_stress_of_three_decades(
     np.testing.assert_allclose(drawn, np.sort(expected[expected > 0]) * 1e-3)
 
 
-def test_a_load_has_one_colour_in_all_panels() -> None:
+def test_a_load_has_one_colour_in_all_panels():
     found = comparison()
     fewer = {name: loads[:-2] for name, loads in found.loads.items()}
     object.__setattr__(found, "loads", fewer)
@@ -106,9 +102,7 @@ def test_a_load_has_one_colour_in_all_panels() -> None:
     assert len(set(colours[0].values())) == len(LOADS)
 
 
-def test_a_set_of_coefficients_is_drawn_less_the_frictionless_profile(
-    found: FrictionComparison,
-) -> None:
+def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionComparison):
     figure = friction_set_figure(found, loading="total")
     differences = figure.axes[len(LOADS) : 2 * len(LOADS)]
     dry = [one for one in found.loads["total"] if one.lubrication == "dry"]
@@ -119,7 +113,7 @@ def test_a_set_of_coefficients_is_drawn_less_the_frictionless_profile(
         np.testing.assert_allclose(u, 100 * one.profile.s_zz_errors / one.p0_max)
 
 
-def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest() -> None:
+def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest():
     found = comparison()
     doubled = {name: (*loads, *loads) for name, loads in found.loads.items()}
     many = comparison()
@@ -129,9 +123,7 @@ def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest() -> Non
     assert (titles[0], titles[-1]) == ("0.34 N", "2.75 N")
 
 
-def test_ratios_stand_at_their_loads_among_the_calculated_curves(
-    found: FrictionComparison,
-) -> None:
+def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: FrictionComparison):
     figure = maxima_figure(found)
     assert len(figure.axes) == len(found.loadings)
     for axes, loads in zip(figure.axes, found.loads.values(), strict=True):
@@ -147,7 +139,7 @@ def test_ratios_stand_at_their_loads_among_the_calculated_curves(
         )
 
 
-def test_both_readings_stand_within_their_intervals(found: FrictionComparison) -> None:
+def test_both_readings_stand_within_their_intervals(found: FrictionComparison):
     axes = effective_friction_figure(found).axes[0]
     intervals = [line for line in axes.lines if line.get_gid() == "interval"]
     values = [line for line in axes.lines if line.get_label() == "_value"]
@@ -160,7 +152,7 @@ def test_both_readings_stand_within_their_intervals(found: FrictionComparison) -
         np.testing.assert_allclose(point.get_ydata(), friction_position([reading.value]))
 
 
-def test_an_open_interval_is_an_arrow_to_infinity_without_a_value() -> None:
+def test_an_open_interval_is_an_arrow_to_infinity_without_a_value():
     sticking = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
     (axes,) = effective_friction_figure(sticking).axes
     open_ends = [line for line in axes.lines if line.get_label() == "_open"]
@@ -171,7 +163,7 @@ def test_an_open_interval_is_an_arrow_to_infinity_without_a_value() -> None:
     assert not [line for line in axes.lines if line.get_label() == "_value"]
 
 
-def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionComparison) -> None:
+def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionComparison):
     axes = likelihood_figure(found).axes[0]
     curves = {line.get_label(): line for line in axes.lines}
     one, joint = found.loads["incremental"][0], found.joint["dry"]["incremental"]
@@ -181,21 +173,21 @@ def test_likelihoods_touch_zero_at_the_best_coefficient(found: FrictionCompariso
         assert t[np.argmin(rise)] == pytest.approx(float(friction_position(reading.best)))
 
 
-def test_loads_that_were_recorded_look_as_their_neighbours() -> None:
+def test_loads_that_were_recorded_look_as_their_neighbours():
     looks = load_looks(comparison(loads=(1.36, 1.37, 2.75), lubrications=("dry",)))
     assert looks[1.36] == looks[1.37]
     assert looks[1.37] != looks[2.75]
     assert looks[2.75][1] == "2.75 N"
 
 
-def test_an_axis_of_friction_is_monotone_and_ends_at_infinity() -> None:
+def test_an_axis_of_friction_is_monotone_and_ends_at_infinity():
     t = friction_position(FRICTION)
     assert np.all(np.diff(t) > 0)
     assert (t[0], t[-1]) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("first", [0.0, 1e-9, 0.2e-3])
-def test_a_profile_between_the_measured_radii_is_even_and_smooth(first: float) -> None:
+def test_a_profile_between_the_measured_radii_is_even_and_smooth(first):
     width = 1e-3
     r = np.concatenate([[first], np.sort(np.r_[0.25e-3:6e-3:0.3e-3, 0.4e-3:6e-3:0.3e-3])])
     fine = np.linspace(0.0, r[-1], 500)
@@ -203,7 +195,7 @@ def test_a_profile_between_the_measured_radii_is_even_and_smooth(first: float) -
     np.testing.assert_allclose(found, np.exp(-0.5 * (fine / width) ** 2), atol=2e-3)
 
 
-def test_all_figures_have_the_names_that_the_command_line_proves() -> None:
+def test_all_figures_have_the_names_that_the_command_line_proves():
     for lubrications in (("dry", "lubricated"), ("lubricated",), ("",)):
         found = comparison(lubrications=lubrications)
         assert list(comparison_figures(found)) == figure_stems(lubrications)
@@ -212,12 +204,12 @@ def test_all_figures_have_the_names_that_the_command_line_proves() -> None:
 
 
 @pytest.mark.parametrize("stem", figure_stems(["dry", "lubricated"]))
-def test_every_figure_renders(found: FrictionComparison, stem: str) -> None:
+def test_every_figure_renders(found: FrictionComparison, stem):
     figure = comparison_figures(found)[stem]()
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
-def test_the_likelihood_of_a_slip_length_touches_zero_at_it() -> None:
+def test_the_likelihood_of_a_slip_length_touches_zero_at_it():
     figure = interface_figure(comparison(interface=interface_comparison(1.8e-6)))
     curves = {line.get_label(): line for line in figure.axes[0].lines}
     t, rise = (np.asarray(values) for values in curves["tangential, dry"].get_data())
@@ -225,31 +217,29 @@ def test_the_likelihood_of_a_slip_length_touches_zero_at_it() -> None:
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
-def test_evidence_is_drawn_below_that_of_the_best_law() -> None:
+def test_evidence_is_drawn_below_that_of_the_best_law():
     laws = interface_comparison()
     axes = interface_figure(comparison(interface=laws)).axes[1]
     drawn = [float(line.get_xdata()[0]) for line in axes.lines if line.get_marker() == "o"]
-    assert laws.tangential is not None
-    assert laws.normal is not None
     tangential = [law.log_evidence for law in laws.tangential.laws]
     normal = [law.log_evidence for law in laws.normal.laws]
     expected = [v - max(tangential) for v in tangential] + [v - max(normal) for v in normal]
     np.testing.assert_allclose(drawn, expected)
 
 
-def test_without_laws_of_the_interface_there_is_nothing_to_draw(found: FrictionComparison) -> None:
+def test_without_laws_of_the_interface_there_is_nothing_to_draw(found: FrictionComparison):
     with pytest.raises(InputError, match="interface=True"):
         interface_figure(found)
 
 
-def test_one_load_and_one_loading_are_enough() -> None:
+def test_one_load_and_one_loading_are_enough():
     found = comparison(lubrications=("",), loadings=("",), loads=(1.37,), macroscopic=None)
     figures = [comparison_figure(found), *(draw() for draw in comparison_figures(found).values())]
     for figure in figures:
         assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
-def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionComparison) -> None:
+def test_what_was_not_measured_or_compared_is_refused_by_name(found: FrictionComparison):
     with pytest.raises(InputError, match="sideways"):
         profile_figure(found, loading="sideways")
     with pytest.raises(InputError, match="not stated"):

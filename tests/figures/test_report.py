@@ -130,11 +130,9 @@ def test_every_table_has_a_caption_and_headers_with_a_scope(page):
 
 def test_hostile_strings_are_text_and_nothing_else(make_apparatus):
     data = make_apparatus(
-        sensor=StressSensor(name=_HOSTILE, model=_HOSTILE, channel=_HOSTILE),
-        meaning=_HOSTILE,
-        failed=1,
-        message=_HOSTILE,
-    )
+        sensor=StressSensor(name=_HOSTILE, model=_HOSTILE, channel=_HOSTILE), meaning=_HOSTILE,
+        failed=1, message=_HOSTILE,
+    )  # fmt: skip
     object.__setattr__(data.process, "configuration", {_HOSTILE: _HOSTILE})
     page = Page(html_report(data))
     assert page.open == []

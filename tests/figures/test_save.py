@@ -33,14 +33,11 @@ def test_an_svg_is_xml_that_refers_to_nothing_outside_itself(drawn):
                 assert value.startswith(("#", "data:"))
 
 
-@pytest.mark.parametrize(
-    ("file_format", "start", "end"),
-    [
-        ("png", b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"),
-        ("svg", b"<?xml", b"</svg>\n"),
-        ("pdf", b"%PDF-", b"%%EOF\n"),
-    ],
-)
+@pytest.mark.parametrize(("file_format", "start", "end"), [
+    ("png", b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"),
+    ("svg", b"<?xml", b"</svg>\n"),
+    ("pdf", b"%PDF-", b"%%EOF\n"),
+])  # fmt: skip
 def test_a_file_begins_and_ends_as_its_kind_and_holds_no_date(drawn, file_format, start, end):
     data = render_figure(drawn(), file_format)
     assert data.startswith(start)

@@ -32,7 +32,7 @@ def points(axes: Axes) -> np.ndarray:
     return together[np.lexsort(together.T)]
 
 
-def test_both_panels_show_every_point(stress: MeasuredStress) -> None:
+def test_both_panels_show_every_point(stress: MeasuredStress):
     rows = [np.column_stack([p.r * 1e3, p.s_zz * 1e-3]) for p in stress.profiles]
     wanted = np.concatenate(rows)
     wanted = wanted[np.lexsort(wanted.T)]
@@ -40,7 +40,7 @@ def test_both_panels_show_every_point(stress: MeasuredStress) -> None:
         np.testing.assert_allclose(points(axes), wanted)
 
 
-def test_the_bars_are_those_of_95_percent(stress: MeasuredStress) -> None:
+def test_the_bars_are_those_of_95_percent(stress: MeasuredStress):
     bars = measured_stress_figure(stress).axes[0].collections
     assert len(bars) == len(stress.profiles)
     for bar, profile in zip(bars, stress.profiles, strict=True):
@@ -48,7 +48,7 @@ def test_the_bars_are_those_of_95_percent(stress: MeasuredStress) -> None:
         np.testing.assert_allclose(lengths, 2 * 1.96 * profile.s_zz_errors * 1e-3)
 
 
-def test_the_logarithmic_panel_shows_three_decades(stress: MeasuredStress) -> None:
+def test_the_logarithmic_panel_shows_three_decades(stress: MeasuredStress):
     axes = measured_stress_figure(stress).axes[1]
     low, high = axes.get_ylim()
     top = max(profile.s_zz.max() for profile in stress.profiles) * 1e-3
@@ -57,9 +57,7 @@ def test_the_logarithmic_panel_shows_three_decades(stress: MeasuredStress) -> No
     assert high > top
 
 
-def test_dry_and_lubricated_differ_in_mark_and_line_and_share_the_colour_of_their_load(
-    stress: MeasuredStress,
-) -> None:
+def test_dry_and_lubricated_differ_in_line_and_share_a_colour(stress: MeasuredStress):
     axes = measured_stress_figure(stress).axes[0]
     curves = [line for line in axes.lines if len(line.get_xdata()) > 100]
     styles = [line.get_linestyle() for line in curves]
@@ -68,14 +66,14 @@ def test_dry_and_lubricated_differ_in_mark_and_line_and_share_the_colour_of_thei
     assert colours[0] == colours[2] != colours[1]
 
 
-def test_the_contact_radii_are_marked(stress: MeasuredStress) -> None:
+def test_the_contact_radii_are_marked(stress: MeasuredStress):
     axes = measured_stress_figure(stress).axes[0]
     marked = [line.get_xdata()[0] for line in axes.lines if line.get_xdata()[0] > 1.0]
     for profile in stress.profiles:
         assert np.any(np.isclose(marked, profile.contact_radius * 1e3))
 
 
-def test_the_legend_names_loads_and_states(stress: MeasuredStress) -> None:
+def test_the_legend_names_loads_and_states(stress: MeasuredStress):
     figure = measured_stress_figure(stress)
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words[:2] == ["0.34 N", "2.75 N"]
@@ -92,7 +90,7 @@ def lines(axes) -> dict[str, object]:
     return {line.get_label(): line for line in axes.lines}
 
 
-def test_the_curves_are_those_of_the_restoration(restoration: Restoration) -> None:
+def test_the_curves_are_those_of_the_restoration(restoration: Restoration):
     drawn = lines(restoration_figure(restoration).axes[0])
     by_word = {
         word: next(line for label, line in drawn.items() if word in label)
@@ -108,14 +106,14 @@ def test_the_curves_are_those_of_the_restoration(restoration: Restoration) -> No
     np.testing.assert_allclose(by_word["scan"].get_ydata(), restoration.measured_stress * 1e-3)
 
 
-def test_the_band_is_two_standard_uncertainties(restoration: Restoration) -> None:
+def test_the_band_is_two_standard_uncertainties(restoration: Restoration):
     (band,) = restoration_figure(restoration).axes[0].collections
     upper = band.get_paths()[0].vertices[:, 1].max()
     highest = restoration.sigma_zz + 2 * restoration.stress_uncertainty(restoration.r)
     assert upper == pytest.approx(highest.max() * 1e-3)
 
 
-def test_residuals_beyond_the_axis_stand_at_its_edge(restoration: Restoration) -> None:
+def test_residuals_beyond_the_axis_stand_at_its_edge(restoration: Restoration):
     scan = sphere_scan(pressed(), seed=1)
     u = scan.u_zz.copy()
     u[5] += 100 * scan.u_zz_errors[5]
@@ -128,7 +126,7 @@ def test_residuals_beyond_the_axis_stand_at_its_edge(restoration: Restoration) -
     assert np.all((shown > low) & (shown < high))
 
 
-def test_a_restoration_renders_without_a_comparison(restoration: Restoration) -> None:
+def test_a_restoration_renders_without_a_comparison(restoration: Restoration):
     figure = restoration_figure(replace(restoration, comparison=None))
     assert not any("calculated" in label for label in lines(figure.axes[0]))
     assert render_figure(figure, "png").startswith(b"\x89PNG")

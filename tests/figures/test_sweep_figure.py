@@ -23,14 +23,10 @@ def make_sweep(seeds: int = 12, tail: float = 1.0) -> Sweep:
         return values[:, None] * spread
 
     return Sweep(
-        amplitude=amplitude,
-        conversion_constant=constant,
-        gaussian_sigma_deconvolved=sigma,
-        relative_rms=misfit,
-        seed_conversion_constant=draws(constant),
-        seed_gaussian_sigma=draws(sigma),
-        seed_relative_rms=draws(misfit),
-    )
+        amplitude=amplitude, conversion_constant=constant, gaussian_sigma_deconvolved=sigma,
+        relative_rms=misfit, seed_conversion_constant=draws(constant),
+        seed_gaussian_sigma=draws(sigma), seed_relative_rms=draws(misfit),
+    )  # fmt: skip
 
 
 def line(axes, label):

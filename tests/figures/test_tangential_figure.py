@@ -19,7 +19,7 @@ def sheared() -> ApparatusData:
     return memscal.calibrate(shear_scan(seed=1), channel="xz", method="evidence").apparatus
 
 
-def test_axes_and_curves_name_the_channel(sheared: ApparatusData) -> None:
+def test_axes_and_curves_name_the_channel(sheared: ApparatusData):
     figure = calibration_figure(sheared)
     labels = " ".join(axes.get_ylabel() for axes in figure.axes)
     assert "U_{xz}" in labels
@@ -27,7 +27,7 @@ def test_axes_and_curves_name_the_channel(sheared: ApparatusData) -> None:
     assert "zz" not in labels
 
 
-def test_the_reference_is_the_shear_with_its_sides(sheared: ApparatusData) -> None:
+def test_the_reference_is_the_shear_with_its_sides(sheared: ApparatusData):
     axes = Figure().subplots()
     draw_scan(axes, sheared)
     [curve] = [line for line in axes.lines if "reference" in str(line.get_label())]
@@ -38,7 +38,7 @@ def test_the_reference_is_the_shear_with_its_sides(sheared: ApparatusData) -> No
     assert np.corrcoef(along, scan.u_zz)[0, 1] > 0.95
 
 
-def test_both_sides_stand_above_zero_on_the_logarithmic_axis(sheared: ApparatusData) -> None:
+def test_both_sides_stand_above_zero_on_the_logarithmic_axis(sheared: ApparatusData):
     axes = Figure().subplots()
     draw_scan_log(axes, sheared)
     [curve] = [line for line in axes.lines if line.get_label() == "reconvolved, G"]

@@ -54,19 +54,12 @@ def test_an_existing_file_is_replaced_only_when_that_is_allowed(target: Path):
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "open", "replace"])
-@pytest.mark.parametrize(
-    ("code", "cure"),
-    [
-        (errno.ENOSPC, "Free some space"),
-        (errno.EROFS, "read-only"),
-        (errno.EACCES, "may write"),
-        (errno.EDQUOT, "quota"),
-        (errno.EIO, "another folder"),
-    ],
-    ids=["full disk", "read-only disk", "forbidden", "quota", "broken disk"],
-)
+@pytest.mark.parametrize(("code", "cure"), [
+    (errno.ENOSPC, "Free some space"), (errno.EROFS, "read-only"), (errno.EACCES, "may write"),
+    (errno.EDQUOT, "quota"), (errno.EIO, "another folder"),
+], ids=["full disk", "read-only disk", "forbidden", "quota", "broken disk"])  # fmt: skip
 def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
-    target: Path, monkeypatch: pytest.MonkeyPatch, call: str, code: int, cure: str
+    target: Path, monkeypatch: pytest.MonkeyPatch, call, code, cure
 ):
     with monkeypatch.context() as patch:
         patch.setattr(os, call, fail_with(code))
@@ -77,9 +70,7 @@ def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
     assert_untouched(target)
 
 
-def test_a_disk_that_fills_half_way_leaves_the_old_output(
-    target: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_disk_that_fills_up_leaves_the_old_output(target: Path, monkeypatch: pytest.MonkeyPatch):
     write, written = os.write, []
 
     def short_write(descriptor: int, data: Any) -> int:
@@ -128,9 +119,7 @@ def test_a_process_killed_before_the_last_step_leaves_the_old_output(target: Pat
     assert target.read_bytes() == OLD
 
 
-def test_a_file_that_appears_meanwhile_is_not_replaced(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_file_that_appears_late_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     target = tmp_path / "out.h5"
     fsync = os.fsync
 
@@ -145,9 +134,7 @@ def test_a_file_that_appears_meanwhile_is_not_replaced(
     assert_untouched(target)
 
 
-def test_a_file_system_without_hard_links_is_written_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_disk_without_hard_links_is_written_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(os, "link", fail_with(errno.EPERM))
     atomic_write_bytes(tmp_path / "a", b"new")
     assert (tmp_path / "a").read_bytes() == b"new"
@@ -172,7 +159,7 @@ def test_a_symbolic_link_is_followed_and_stays(target: Path):
 
 
 @pytest.mark.parametrize("name", ["same", "hard link", "symbolic link"])
-def test_an_input_is_never_written_over_under_any_name(target: Path, name: str):
+def test_an_input_is_never_written_over_under_any_name(target: Path, name):
     given = {
         "same": target,
         "hard link": target.parent / "hard.h5",
@@ -204,16 +191,11 @@ def test_a_folder_a_pipe_and_a_device_are_refused_as_outputs(tmp_path: Path):
             atomic_write_bytes(path, b"", overwrite=True)
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("missing/out.h5", "Create the folder"),
-        ("file/out.h5", "a file, not a folder"),
-        ("a" * 300, "shorter name"),
-        ("", "not the name"),
-    ],
-)
-def test_a_path_that_cannot_exist_is_refused_with_its_cure(tmp_path: Path, name: str, words: str):
+@pytest.mark.parametrize(("name", "words"), [
+    ("missing/out.h5", "Create the folder"), ("file/out.h5", "a file, not a folder"),
+    ("a" * 300, "shorter name"), ("", "not the name"),
+])  # fmt: skip
+def test_a_path_that_cannot_exist_is_refused_with_its_cure(tmp_path: Path, name, words):
     (tmp_path / "file").write_bytes(b"")
     path = str(tmp_path / name) if name else ""
     with pytest.raises(OutputError, match=words):
@@ -229,9 +211,7 @@ def test_a_folder_in_which_nothing_can_be_made_is_refused_before_the_work():
 
 
 @pytest.mark.parametrize("call", ["write", "fsync"])
-def test_a_full_disk_is_found_before_the_work(
-    target: Path, monkeypatch: pytest.MonkeyPatch, call: str
-):
+def test_a_full_disk_is_found_before_the_work(target: Path, monkeypatch: pytest.MonkeyPatch, call):
     with monkeypatch.context() as patch:
         patch.setattr(os, call, fail_with(errno.ENOSPC))
         with pytest.raises(OutputError, match="Free some space"):

@@ -28,40 +28,34 @@ def table(values: int = 3) -> dict[str, FloatArray]:
     rng = np.random.default_rng(1)
     whole, part = (values, 2, 64), (values, 2)
     return {
-        "value": np.append(np.arange(values - 1) / 3, np.inf),
-        "load": np.array([0.34, 2.75]),
-        "k": np.linspace(1.0, 1e4, 64),
-        "spectra": rng.normal(size=whole),
-        "by_load": rng.normal(size=whole),
-        "change_thickness": rng.normal(size=whole),
-        "change_poisson_ratio": rng.normal(size=whole),
-        "depths": np.full(part, np.nan),
-        "contact_radii": rng.normal(size=part),
-        "convergence": rng.normal(size=part),
-    }
+        "value": np.append(np.arange(values - 1) / 3, np.inf), "load": np.array([0.34, 2.75]),
+        "k": np.linspace(1.0, 1e4, 64), "spectra": rng.normal(size=whole),
+        "by_load": rng.normal(size=whole), "change_thickness": rng.normal(size=whole),
+        "change_poisson_ratio": rng.normal(size=whole), "depths": np.full(part, np.nan),
+        "contact_radii": rng.normal(size=part), "convergence": rng.normal(size=part),
+    }  # fmt: skip
 
 
 def entry(folder: Path, key: str = KEY) -> Path:
     return folder / f"{key}.h5"
 
 
-def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_path: Path) -> None:
+def test_a_table_comes_back_bit_for_bit_also_what_is_infinite_or_unknown(tmp_path: Path):
     one = table()
     assert keep_contact_table(tmp_path / "made" / "anew", KEY, one)
     found = find_contact_table(tmp_path / "made" / "anew", KEY)
-    assert found is not None
     assert list(found) == list(one)
     for name, array in one.items():
         np.testing.assert_array_equal(found[name], array)
 
 
-def test_what_was_never_kept_is_not_found(tmp_path: Path) -> None:
+def test_what_was_never_kept_is_not_found(tmp_path: Path):
     assert find_contact_table(tmp_path, KEY) is None
     assert find_contact_table(tmp_path / "no" / "folder", KEY) is None
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
-def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share: float) -> None:
+def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, share):
     keep_contact_table(tmp_path, KEY, table())
     data = entry(tmp_path).read_bytes()
     entry(tmp_path).write_bytes(data[: int(share * len(data))])
@@ -70,14 +64,14 @@ def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, sh
     assert find_contact_table(tmp_path, KEY) is not None
 
 
-def test_a_number_that_was_changed_is_noticed(tmp_path: Path) -> None:
+def test_a_number_that_was_changed_is_noticed(tmp_path: Path):
     keep_contact_table(tmp_path, KEY, table())
     with h5py.File(entry(tmp_path), "r+") as file:
         file["/entry/contacts/load"][0] = 0.35
     assert find_contact_table(tmp_path, KEY) is None
 
 
-def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path) -> None:
+def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path):
     keep_contact_table(tmp_path, KEY, table())
     data, one = entry(tmp_path).read_bytes(), table()
     for place in np.linspace(0, len(data) - 1, 60).astype(int):
@@ -88,14 +82,14 @@ def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path) -> Non
         assert found is None or np.array_equal(found["spectra"], one["spectra"])
 
 
-def test_a_table_under_the_name_of_another_is_not_taken_for_it(tmp_path: Path) -> None:
+def test_a_table_under_the_name_of_another_is_not_taken_for_it(tmp_path: Path):
     other = table_key({"load": 2.75})
     keep_contact_table(tmp_path, other, table())
     entry(tmp_path, other).rename(entry(tmp_path))
     assert find_contact_table(tmp_path, KEY) is None
 
 
-def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path) -> None:
+def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path):
     write_tree(file_tree("memscal-scan", Group("NXentry", {"key": KEY})), entry(tmp_path))
     assert find_contact_table(tmp_path, KEY) is None
     keep_contact_table(tmp_path, KEY, table())
@@ -104,12 +98,12 @@ def test_a_file_of_another_kind_or_version_is_not_found(tmp_path: Path) -> None:
     assert find_contact_table(tmp_path, KEY) is None
 
 
-def test_a_name_that_is_no_key_is_refused(tmp_path: Path) -> None:
+def test_a_name_that_is_no_key_is_refused(tmp_path: Path):
     with pytest.raises(FormatError, match="not the key"):
         find_contact_table(tmp_path, "../elsewhere")
 
 
-def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path: Path):
     (tmp_path / "file").write_text("not a folder")
     assert not keep_contact_table(tmp_path / "file", KEY, table())
     assert not keep_contact_table(tmp_path / "file" / "below", KEY, table())
@@ -117,9 +111,7 @@ def test_a_folder_that_cannot_be_made_costs_no_result(tmp_path: Path) -> None:
     assert (tmp_path / "file").read_text() == "not a folder"
 
 
-def test_the_tables_used_longest_ago_make_room(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_tables_used_longest_ago_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(contact_table, "_MOST_ENTRIES", 3)
     keys = [table_key({"number": number}) for number in range(4)]
     for age, key in enumerate(keys[:3]):
@@ -131,16 +123,14 @@ def test_the_tables_used_longest_ago_make_room(
     assert kept == {keys[0], keys[2], keys[3]}
 
 
-def test_a_folder_keeps_to_its_bytes_but_always_holds_the_last(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_keeps_to_its_limit_of_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(contact_table, "_MOST_BYTES", 1)
     for number in range(3):
         keep_contact_table(tmp_path, table_key({"number": number}), table())
     assert [path.name for path in tmp_path.iterdir()] == [f"{table_key({'number': 2})}.h5"]
 
 
-def test_clearing_removes_tables_and_nothing_else(tmp_path: Path) -> None:
+def test_clearing_removes_tables_and_nothing_else(tmp_path: Path):
     keep_contact_table(tmp_path, KEY, table())
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "scan.h5").write_text("mine too")
@@ -153,7 +143,7 @@ def test_clearing_removes_tables_and_nothing_else(tmp_path: Path) -> None:
     assert clear_contact_tables(tmp_path / "none") == 0
 
 
-def test_several_may_write_and_read_one_entry_at_a_time(tmp_path: Path) -> None:
+def test_several_may_write_and_read_one_entry_at_a_time(tmp_path: Path):
     large = table(3)
     small = {name: array for name, array in large.items() if not name.startswith("change_")}
 

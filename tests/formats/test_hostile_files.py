@@ -67,12 +67,9 @@ def edited(tmp_path: Path) -> Edit:
 def run_sweep(path: Path, sweep: str) -> tuple[int, int]:
     """Run a sweep over damaged copies; return how many were read and how many refused."""
     done = subprocess.run(
-        [sys.executable, "-c", sweep, str(path)],
-        capture_output=True,
-        text=True,
-        timeout=300,
+        [sys.executable, "-c", sweep, str(path)], capture_output=True, text=True, timeout=300,
         check=False,
-    )
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     read, refused = map(int, done.stdout.split())
     return read, refused
@@ -109,11 +106,6 @@ def test_an_external_link_to_a_pipe_is_refused_without_waiting(edited: Edit, tmp
     assert_refused_cheaply(path, "link")
 
 
-def test_a_soft_link_is_refused(edited: Edit):
-    path = edited(lambda g: g.__setitem__("u_zz", h5py.SoftLink("/entry/data/x")))
-    assert_refused_cheaply(path, "link")
-
-
 def test_a_soft_link_half_way_along_the_path_is_refused(tmp_path: Path):
     path = tmp_path / "scan.h5"
     write_scan(make_scan(), path)
@@ -124,9 +116,7 @@ def test_a_soft_link_half_way_along_the_path_is_refused(tmp_path: Path):
         read_scan(path)
 
 
-def test_external_raw_storage_is_refused_and_the_other_file_stays_unread(
-    edited: Edit, tmp_path: Path
-):
+def test_external_storage_is_refused_and_the_other_file_stays_unread(edited: Edit, tmp_path: Path):
     secret = tmp_path / "secret.bin"
     secret.write_bytes(np.full(33, 42.0).tobytes())
     before = secret.stat().st_atime_ns
@@ -135,21 +125,30 @@ def test_external_raw_storage_is_refused_and_the_other_file_stays_unread(
     assert secret.stat().st_atime_ns == before
 
 
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda g: g.__setitem__("u_zz", h5py.SoftLink("/entry/data/x")), "link"),
+    (lambda g: g.create_dataset("u_zz", (2**45,), "f8", chunks=(1024,)),
+     "claims 281,474,976,710,656 bytes"),
+    (lambda g: g.create_dataset("u_zz", (2**40, 2**22), "f8", chunks=(1, 1024)), "claims"),
+    (lambda g: g.create_dataset("u_zz", (1,), "f8", maxshape=(None,), chunks=(2**26,)),
+     "chunks of 536,870,912 bytes"),
+    (lambda g: g.create_dataset("u_zz", (2**23,), "f8", chunks=(1,)), "8,388,608 chunks"),
+    (lambda g: g.create_dataset("u_zz", (33,), "f8"), "never written"),
+    (lambda g: g.create_dataset("u_zz", (33,), "f8", chunks=(11,)), "never written"),
+    (lambda g: g.create_dataset("u_zz", data=[g.ref] * 3, dtype=h5py.ref_dtype), "references"),
+    (lambda g: g.create_dataset("u_zz", data=h5py.Empty("f8")), "null dataspace"),
+], ids=["link", "256 TiB", "overflow", "huge chunk", "many chunks", "unwritten", "unwritten chunks",
+        "references", "null"])  # fmt: skip
+def test_a_dataset_that_cannot_be_read_safely_is_refused(edited: Edit, make, words):
+    path = edited(make)
+    assert path.stat().st_size < 2**20
+    assert_refused_cheaply(path, words)
+
+
 def test_a_virtual_dataset_with_a_missing_source_is_refused(edited: Edit):
     layout = h5py.VirtualLayout((33,), "f8")
     layout[:] = h5py.VirtualSource("missing.h5", "/x", (33,))
     assert_refused_cheaply(edited(lambda g: g.create_virtual_dataset("u_zz", layout)), "virtual")
-
-
-def test_a_small_file_that_claims_256_tebibytes_is_refused(edited: Edit):
-    path = edited(lambda g: g.create_dataset("u_zz", (2**45,), "f8", chunks=(1024,)))
-    assert path.stat().st_size < 2**17
-    assert_refused_cheaply(path, "claims 281,474,976,710,656 bytes")
-
-
-def test_a_shape_whose_product_overflows_64_bits_is_refused(edited: Edit):
-    path = edited(lambda g: g.create_dataset("u_zz", (2**40, 2**22), "f8", chunks=(1, 1024)))
-    assert_refused_cheaply(path, "claims")
 
 
 def test_a_filter_listed_twice_is_refused(edited: Edit):
@@ -163,7 +162,7 @@ def test_a_filter_listed_twice_is_refused(edited: Edit):
 
 
 @pytest.mark.parametrize("code", [h5py.h5z.FILTER_LZF, 32015])
-def test_a_filter_that_may_load_foreign_code_is_refused(edited: Edit, code: int):
+def test_a_filter_that_may_load_foreign_code_is_refused(edited: Edit, code):
     def prepare(plist: Any) -> None:
         plist.set_chunk((33,))
         plist.set_filter(code, h5py.h5z.FLAG_OPTIONAL)
@@ -172,36 +171,16 @@ def test_a_filter_that_may_load_foreign_code_is_refused(edited: Edit, code: int)
     assert_refused_cheaply(path, f"filter {code}")
 
 
-def test_a_huge_chunk_around_one_number_is_refused(edited: Edit):
-    path = edited(lambda g: g.create_dataset("u_zz", (1,), "f8", maxshape=(None,), chunks=(2**26,)))
-    assert_refused_cheaply(path, "chunks of 536,870,912 bytes")
-
-
-def test_a_dataset_cut_into_millions_of_chunks_is_refused(edited: Edit):
-    path = edited(lambda g: g.create_dataset("u_zz", (2**23,), "f8", chunks=(1,)))
-    assert_refused_cheaply(path, "8,388,608 chunks")
-
-
-@pytest.mark.parametrize("chunks", [None, (11,)])
-def test_values_that_were_never_written_do_not_read_as_zeros(edited: Edit, chunks: Any):
-    path = edited(lambda g: g.create_dataset("u_zz", (33,), "f8", chunks=chunks))
-    assert_refused_cheaply(path, "never written")
-
-
-@pytest.mark.parametrize(
-    ("dtype", "value"),
-    [
-        (h5py.vlen_dtype(np.float64), np.zeros(3)),
-        (h5py.string_dtype(), "text"),
-        (np.dtype([("a", "f8"), ("b", "i4")]), (1.0, 2)),
-        (np.dtype("c16"), 1j),
-        (np.dtype("S8"), b"text"),
-        (np.dtype("V8"), b"12345678"),
-        (h5py.enum_dtype({"a": 1}), 1),
-    ],
-    ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"],
-)
-def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype: Any, value: Any):
+@pytest.mark.parametrize(("dtype", "value"), [
+    (h5py.vlen_dtype(np.float64), np.zeros(3)),
+    (h5py.string_dtype(), "text"),
+    (np.dtype([("a", "f8"), ("b", "i4")]), (1.0, 2)),
+    (np.dtype("c16"), 1j),
+    (np.dtype("S8"), b"text"),
+    (np.dtype("V8"), b"12345678"),
+    (h5py.enum_dtype({"a": 1}), 1),
+], ids=["vlen", "vlen text", "compound", "complex", "text", "opaque", "enum"])  # fmt: skip
+def test_a_type_that_is_no_plain_number_is_refused(edited: Edit, dtype, value):
     def make(group: h5py.Group) -> Any:
         dataset = group.create_dataset("u_zz", (33,), dtype)
         dataset[0] = value
@@ -219,23 +198,12 @@ def test_a_bomb_of_references_to_one_long_vector_is_refused(edited: Edit):
     assert_refused_cheaply(edited(make), "numbers")
 
 
-def test_object_references_are_refused(edited: Edit):
-    path = edited(lambda g: g.create_dataset("u_zz", data=[g.ref] * 3, dtype=h5py.ref_dtype))
-    assert_refused_cheaply(path, "references")
-
-
-def test_a_null_dataspace_is_refused(edited: Edit):
-    assert_refused_cheaply(
-        edited(lambda g: g.create_dataset("u_zz", data=h5py.Empty("f8"))), "null dataspace"
-    )
-
-
 def test_a_group_in_the_place_of_a_dataset_is_refused(edited: Edit):
     with pytest.raises(FormatError, match=f"{SIGNAL} is not a dataset"):
         read_scan(edited(lambda g: g.create_group("u_zz")))
 
 
-def test_one_large_dataset_linked_under_many_names_meets_the_limit_of_the_file(
+def test_one_dataset_of_many_names_meets_the_limit_of_the_file(
     edited: Edit, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(hdf5_reader, "_MAX_TOTAL_BYTES", 1500)
@@ -248,18 +216,14 @@ def test_one_large_dataset_linked_under_many_names_meets_the_limit_of_the_file(
         read_scan(edited(make))
 
 
-@pytest.mark.parametrize(
-    "value",
-    [
-        h5py.Empty("f8"),
-        np.array([b"mm"] * 100),
-        np.array([[b"m", b"V"], [b"m", b"V"]]),
-        np.array([h5py.Reference()], dtype=h5py.ref_dtype),
-        b"m" * 60_000,
-    ],
-    ids=["null", "many", "table", "reference", "long"],
-)
-def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value: Any):
+@pytest.mark.parametrize("value", [
+    h5py.Empty("f8"),
+    np.array([b"mm"] * 100),
+    np.array([[b"m", b"V"], [b"m", b"V"]]),
+    np.array([h5py.Reference()], dtype=h5py.ref_dtype),
+    b"m" * 60_000,
+], ids=["null", "many", "table", "reference", "long"])  # fmt: skip
+def test_an_attribute_that_is_no_short_text_is_refused(edited: Edit, value):
     path = edited(lambda g: g.create_dataset("u_zz", data=np.zeros(33)))
     with h5py.File(path, "r+") as file:
         if isinstance(value, np.ndarray) and value.dtype == h5py.ref_dtype:
@@ -294,9 +258,7 @@ def test_text_of_variable_length_as_other_programs_write_it_is_read(tmp_path: Pa
 
 @pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
 @pytest.mark.parametrize("further", [0, 5, 30])
-def test_variable_text_is_read_in_every_version_of_the_format(
-    tmp_path: Path, libver: str, further: int
-):
+def test_variable_text_is_read_in_every_version_of_the_format(tmp_path: Path, libver, further):
     """Where attributes are many, HDF5 moves them out of the object's header."""
     write_scan(make_scan(), tmp_path / "ours.h5")
     with (
@@ -319,9 +281,7 @@ def test_variable_text_is_read_in_every_version_of_the_format(
 
 @pytest.mark.parametrize("further", [0, 30])
 @pytest.mark.parametrize("place", ["dataset", "attribute"])
-def test_a_variable_text_that_claims_four_gibibytes_is_refused_before_memory_is_taken(
-    tmp_path: Path, further: int, place: str
-):
+def test_a_variable_text_that_claims_four_gibibytes_is_refused(tmp_path: Path, further, place):
     path = tmp_path / "scan.h5"
     marker = "a text of 33 bytes to be found..."
     write_scan(make_scan(), path)
@@ -354,9 +314,7 @@ def test_every_flipped_byte_of_a_heap_of_texts_is_met_without_hanging(tmp_path: 
 
 @pytest.mark.parametrize("libver", ["earliest", "v108", "latest"])
 @pytest.mark.parametrize("further", [0, 5, 30])
-def test_the_claims_of_an_attribute_are_found_wherever_hdf5_stores_it(
-    tmp_path: Path, libver: str, further: int
-):
+def test_the_claims_of_an_attribute_are_found_where_hdf5_stores_it(tmp_path: Path, libver, further):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w", libver=libver, track_order=further == 5) as file:
         for i in range(further):
@@ -376,21 +334,13 @@ def test_a_text_dataset_longer_than_any_text_is_refused(tmp_path: Path):
         read_scan(path)
 
 
-def test_a_folder_is_refused(tmp_path: Path):
+def test_a_folder_a_device_and_a_pipe_are_refused_without_waiting(tmp_path: Path):
+    os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is not a regular file"):
         read_scan(tmp_path)
-
-
-def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path: Path):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    with pytest.raises(UnsafeFileError, match="not a regular file"):
-        read_scan(pipe)
-
-
-def test_a_device_is_refused():
-    with pytest.raises(UnsafeFileError, match="not a regular file"):
-        read_scan(os.devnull)
+    for path in (tmp_path / "pipe", os.devnull):
+        with pytest.raises(UnsafeFileError, match="not a regular file"):
+            read_scan(path)
 
 
 def test_a_missing_file_and_a_name_that_is_none_are_input_errors(tmp_path: Path):
@@ -434,8 +384,8 @@ def artifact_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1), dense=st.booleans(), bit=st.integers(0, 7))
-def test_an_artifact_with_a_flipped_bit_is_read_unchanged_or_refused(
-    artifact_bytes: bytes, tmp_path: Path, where: float, dense: bool, bit: int
+def test_a_flipped_bit_of_an_artifact_is_refused_or_harmless(
+    artifact_bytes: bytes, tmp_path: Path, where, dense, bit
 ):
     damaged = bytearray(artifact_bytes)
     # Half of the flips go to the first pages, where the structure is densest.

@@ -27,7 +27,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["scan", "reference", "artifact"])
-def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: Path, name: str):
+def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: Path, name):
     path = folder / f"{name}.h5"
     assert [(f.name, f.passed) for f in check(path)] == [
         ("safety", True),
@@ -43,7 +43,7 @@ def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: P
 @pytest.mark.parametrize(
     ("name", "title"), [("S1", "Apparatus function of S1"), ("", "Apparatus function")]
 )
-def test_an_artifact_is_titled_by_its_sensor_alone(tmp_path: Path, name: str, title: str):
+def test_an_artifact_is_titled_by_its_sensor_alone(tmp_path: Path, name, title):
     data = make_artifact(sensor=StressSensor(name=name))
     write_artifact(data, tmp_path / "a.h5")
     assert describe(tmp_path / "a.h5")["title"] == title
@@ -62,7 +62,7 @@ def test_an_uncertainty_is_told_in_the_unit_of_its_quantity(folder: Path):
 
 
 @pytest.mark.parametrize(("name", "passed"), [("scan", True), ("artifact", False)])
-def test_only_an_artifact_must_have_a_digest(folder: Path, name: str, passed: bool):
+def test_only_an_artifact_must_have_a_digest(folder: Path, name, passed):
     with h5py.File(folder / f"{name}.h5", "r+") as file:
         del file.attrs["memscal_content_sha256"]
     digest = next(f for f in check(folder / f"{name}.h5") if f.name == "digest")

@@ -62,7 +62,6 @@ def assert_is_the_section(found: ImportedProfile, *, turned: int = 1) -> None:
     profile = found.profile
     np.testing.assert_allclose(profile.r, RADII * 1e-3, rtol=1e-12)
     np.testing.assert_allclose(profile.sigma_zz, 1e6 * pressure(RADII), rtol=1e-12)
-    assert profile.sigma_rz is not None
     shear = -turned * 1e6 * tensor(RADII, 0.0)[:, 3]
     np.testing.assert_allclose(profile.sigma_rz, shear, rtol=1e-12, atol=1e-9)
 
@@ -76,7 +75,6 @@ def test_another_programs_film_has_the_stress_that_hankel_transforms_give():
     film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     normal = base_normal_stress(film, GaussianPressure(), found.r)
     shear = base_shear_stress(film, GaussianPressure(), found.r)
-    assert found.sigma_rz is not None
     np.testing.assert_allclose(found.sigma_zz, normal, atol=3e-3 * normal.max())
     np.testing.assert_allclose(found.sigma_rz, shear, atol=6e-3 * np.abs(shear).max())
     assert shear.min() < 0  # the base holds back a film that is squeezed outward
@@ -92,30 +90,18 @@ def test_a_mesh_as_paraview_writes_it_is_read_at_its_nodes_and_in_its_cells():
     assert found.profile.sigma_rz is None
 
 
-@pytest.mark.parametrize(
-    ("name", "options"),
-    [
-        ("film.vtu", {}),
-        ("film.vtu", {"compression": "lzma"}),
-        ("film.vtu", {"compression": None}),
-        ("film.vtu", {"header_type": "UInt64"}),
-        ("film.vtk", {}),
-        ("film.vtk", {"fmt_version": "4.2"}),
-        ("film.xdmf", {}),
-        ("film.xdmf", {"data_format": "XML"}),
-    ],
-)
-def test_every_kind_of_file_gives_the_same_stress(
-    tmp_path: Path, name: str, options: dict[str, Any]
-):
+@pytest.mark.parametrize(("name", "options"), [
+    ("film.vtu", {}), ("film.vtu", {"compression": "lzma"}), ("film.vtu", {"compression": None}),
+    ("film.vtu", {"header_type": "UInt64"}), ("film.vtk", {}), ("film.vtk", {"fmt_version": "4.2"}),
+    ("film.xdmf", {}), ("film.xdmf", {"data_format": "XML"}),
+])  # fmt: skip
+def test_every_kind_of_file_gives_the_same_stress(tmp_path: Path, name, options):
     path = saved(section(), tmp_path / name, **options)
     assert_is_the_section(imported(path, "S9"))
 
 
 @pytest.mark.parametrize("compression", [None, "zlib"])
-def test_appended_raw_bytes_are_read_as_paraview_writes_them(
-    tmp_path: Path, compression: str | None
-):
+def test_appended_raw_bytes_are_read_as_paraview_writes_them(tmp_path: Path, compression):
     path = tmp_path / "film.vtu"
     saved(section(), path, compression=compression, header_type="UInt64")
     raw = b""
@@ -137,9 +123,7 @@ def test_appended_raw_bytes_are_read_as_paraview_writes_them(
 @pytest.mark.parametrize(
     ("sigma", "plane"), [("S4", "xy"), ("S4", "yz"), ("S6", "xz"), ("S6", "yz"), ("S9", "xz")]
 )
-def test_the_components_of_a_tensor_are_found_in_every_plane(
-    tmp_path: Path, sigma: str, plane: str
-):
+def test_the_components_of_a_tensor_are_found_in_every_plane(tmp_path: Path, sigma, plane):
     assert_is_the_section(imported(saved(section(plane), tmp_path / "film.vtu"), sigma))
 
 
@@ -153,7 +137,10 @@ def test_the_axis_across_the_film_can_be_named(tmp_path: Path):
 
 
 def test_one_value_or_one_component_is_taken_as_it_is_named(tmp_path: Path):
-    path = saved(section(), tmp_path / "film.vtu")
+    mesh = section()
+    mesh.point_data["S:2"] = mesh.point_data["S33"]
+    path = saved(mesh, tmp_path / "film.vtu")
+    assert_is_the_section(imported(path, "S:2", shear="S13"))
     assert imported(path, "S33").profile.sigma_rz is None
     assert_is_the_section(imported(path, "S33", shear="S13"))
     assert_is_the_section(imported(path, "S9:5", shear="S6:4"))
@@ -162,18 +149,10 @@ def test_one_value_or_one_component_is_taken_as_it_is_named(tmp_path: Path):
         imported(path, "S6:7")
 
 
-def test_a_field_whose_name_has_a_colon_is_found(tmp_path: Path):
-    mesh = section()
-    mesh.point_data["S:2"] = mesh.point_data["S33"]
-    found = imported(saved(mesh, tmp_path / "film.vtu"), "S:2")
-    assert found.profile.force == pytest.approx(1.0, rel=1e-5)
-
-
 def test_a_stress_in_the_cells_brings_its_shear_too(tmp_path: Path):
     found = imported(saved(section(), tmp_path / "film.vtk"), "C4").profile
     middles = (RADII[1:] + RADII[:-1]) / 2
     np.testing.assert_allclose(found.sigma_zz, 1e6 * pressure(middles), rtol=1e-12)
-    assert found.sigma_rz is not None
     np.testing.assert_allclose(found.sigma_rz, -1e6 * middles * pressure(middles) / 4, rtol=1e-12)
     assert found.force == pytest.approx(1.0, rel=1e-3)
 
@@ -233,16 +212,12 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path: Pa
     assert any("39 nodes repeat a radius" in note.text for note in found.notes)
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "centre"),
-    [
-        (np.linspace(0, 8, 41), np.linspace(0, 8, 41), (0.0, 0.0)),
-        (np.linspace(-8, 8, 81), np.linspace(-8, 8, 81), (0.0, 0.0)),
-        (np.linspace(-8, 8, 81), np.linspace(0, 8, 41), (0.5, 0.0)),
-    ],
-    ids=["quarter", "whole", "half, off the centre"],
-)
-def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x: Any, y: Any, centre: Any):
+@pytest.mark.parametrize(("x", "y", "centre"), [
+    (np.linspace(0, 8, 41), np.linspace(0, 8, 41), (0.0, 0.0)),
+    (np.linspace(-8, 8, 81), np.linspace(-8, 8, 81), (0.0, 0.0)),
+    (np.linspace(-8, 8, 81), np.linspace(0, 8, 41), (0.5, 0.0)),
+], ids=["quarter", "whole", "half, off the centre"])  # fmt: skip
+def test_a_film_in_3d_is_averaged_over_circles(tmp_path: Path, x, y, centre):
     """Linear interpolation on squares of 0.2 mm costs at most 0.2² / 4 of the curvature."""
     path = saved(block(x, y, centre=centre), tmp_path / "film.vtu")
     place = (1e-3 * centre[0], 1e-3 * centre[1]) if any(centre) else None
@@ -280,12 +255,10 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
         return_inverse=True,
     )
     mesh = FieldMesh(
-        points=1e-3 * points,
-        triangles=index.reshape(6, -1).T,
-        displacement=1e-6 * points,
+        points=1e-3 * points, triangles=index.reshape(6, -1).T, displacement=1e-6 * points,
         stress=1e6 * tensor(*points.T),
         notes="A film -- with a -->comment<!-- in its notes, E = 2.2 MPa ---",
-    )
+    )  # fmt: skip
     write_mesh(mesh, tmp_path / "film.vtu")
     found = imported(tmp_path / "film.vtu", "stress_Pa", sigma_unit="Pa")
     assert_is_the_section(found)
@@ -299,11 +272,9 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
 
 def test_a_mesh_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     mesh = FieldMesh(
-        points=[[0, 0], [1, 0], [0, 1]],
-        triangles=[[0, 1, 2]],
-        displacement=np.zeros((3, 2)),
+        points=[[0, 0], [1, 0], [0, 1]], triangles=[[0, 1, 2]], displacement=np.zeros((3, 2)),
         stress=np.zeros((3, 4)),
-    )
+    )  # fmt: skip
     path = tmp_path / "film.vtu"
     path.write_text("mine")
     with pytest.raises(MemscalError, match="exists already"):
@@ -324,7 +295,6 @@ def test_what_was_taken_for_what_stays_with_the_profile(tmp_path: Path):
     again = read_reference(tmp_path / "rod.h5")
     assert again.notes.splitlines() == marked_texts(found.notes)
     assert "tension" not in again.notes
-    assert found.profile.source is not None
     assert found.profile.source.sha256 in again.notes
     assert (again.film, again.indenter, again.solver) == (film, rod, "a program")
     assert again.discretisation == "164 nodes, 120 cells, 41 nodes on the base"
@@ -371,32 +341,25 @@ def test_a_field_that_may_mean_several_things_is_not_guessed_at(tmp_path: Path):
         imported(path, "S33", shear="C33")
 
 
-@pytest.mark.parametrize(
-    ("mesh", "options", "words"),
-    [
-        (section(), {"base": 0.1e-3}, "nearest node is at 0 mm"),
-        (section(heights=[0.0, 1.0]), {"vertical": "x"}, "Only 2 nodes"),
-        (section(), {"centre": (0.0, 0.0)}, "--centre"),
-        (section(radii=np.linspace(-8, 8, 41)), {}, "negative radius"),
-        (block(RADII, RADII), {"shear": "S33"}, "sections only"),
-        (meshio.Mesh(section().points, [("vertex", [[0], [1]])]), {}, "a line or a point"),
-        (section(radii=RADII[:3]), {}, "Only 3 nodes"),
-        (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
-        (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
-    ],
-)
-def test_a_mesh_without_a_base_that_can_be_used_is_refused(
-    tmp_path: Path, mesh: meshio.Mesh, options: dict[str, Any], words: str
-):
+@pytest.mark.parametrize(("mesh", "options", "words"), [
+    (section(), {"base": 0.1e-3}, "nearest node is at 0 mm"),
+    (section(heights=[0.0, 1.0]), {"vertical": "x"}, "Only 2 nodes"),
+    (section(), {"centre": (0.0, 0.0)}, "--centre"),
+    (section(radii=np.linspace(-8, 8, 41)), {}, "negative radius"),
+    (block(RADII, RADII), {"shear": "S33"}, "sections only"),
+    (meshio.Mesh(section().points, [("vertex", [[0], [1]])]), {}, "a line or a point"),
+    (section(radii=RADII[:3]), {}, "Only 3 nodes"),
+    (section(radii=[0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9]), {}, "2 radii only"),
+    (meshio.Mesh(section().points[:, ::2], [("line", [[0, 1]])]), {}, "a line or a point"),
+])  # fmt: skip
+def test_a_mesh_without_a_base_that_can_be_used_is_refused(tmp_path: Path, mesh, options, words):
     path = saved(mesh, tmp_path / "film.vtk")
     with pytest.raises(InputError, match=words) as caught:
         imported(path, **options)
     assert caught.value.cure
 
 
-def test_a_mesh_with_one_node_at_its_lowest_level_is_refused_with_the_options_named(
-    tmp_path: Path,
-):
+def test_a_mesh_with_one_node_at_its_lowest_level_is_refused_with_the_options_named(tmp_path: Path):
     mesh = section()
     mesh.points[:, 1] += 0.01 * mesh.points[:, 0]
     with pytest.raises(InputError, match=r"Only 1 nodes(.|\n)*--vertical(.|\n)*--base"):

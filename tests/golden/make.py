@@ -120,12 +120,10 @@ def _summary(numbers: list[float | None]) -> dict[str, Any]:
     finite = [float(number) for number in numbers if number is not None]
     step, count = math.ceil(len(numbers) / 5), max(len(finite), 1)
     return {
-        "length": len(numbers),
-        "missing": len(numbers) - len(finite),
-        "some": reduced(numbers[step // 2 :: step]),
-        "mean": reduced(math.fsum(finite) / count),
+        "length": len(numbers), "missing": len(numbers) - len(finite),
+        "some": reduced(numbers[step // 2 :: step]), "mean": reduced(math.fsum(finite) / count),
         "root_mean_square": reduced(math.sqrt(math.fsum(x**2 for x in finite) / count)),
-    }
+    }  # fmt: skip
 
 
 OF_ONE_KIND = {"value", "some", "maximum"}

@@ -40,7 +40,7 @@ def digests(folder: Path, hash_seed: str) -> dict[str, str]:
     }
 
 
-def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
+def test_two_runs_write_the_same_bytes(tmp_path: Path):
     first, second = (digests(tmp_path / seed, hash_seed=seed) for seed in "12")
     assert first == second
     kinds = {Path(name).suffix for name in first}

@@ -48,17 +48,17 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_prints_the_golden_results(name: str, runs: Runs) -> None:
+def test_a_command_prints_the_golden_results(name, runs: Runs):
     tolerance = TOLERANCE_OF_DRAWS if name in {"calibrate-draw", "calibrate-sweep"} else TOLERANCE
     changes = list(differences(load(name), runs[name], tolerance))
     assert not changes, "\n".join(changes[:20])
 
 
-def test_every_golden_output_has_its_command() -> None:
+def test_every_golden_output_has_its_command():
     assert {path.stem for path in Path(OUTPUTS).glob("*.json")} == set(COMMANDS)
 
 
-def test_public_signatures_are_those_of_the_text_file() -> None:
+def test_public_signatures_are_those_of_the_text_file():
     assert signatures() == SIGNATURES.read_text(encoding="utf-8"), (
         "A public signature changed. If that is meant, run `python tests/golden/make.py`, and read"
         " the diff of tests/golden/signatures.txt: is each change in the changelog, and does old"
@@ -66,7 +66,7 @@ def test_public_signatures_are_those_of_the_text_file() -> None:
     )
 
 
-def test_files_of_version_0_1_say_what_they_said(runs: Runs) -> None:
+def test_files_of_version_0_1_say_what_they_said(runs: Runs):
     line, raster, reference, apparatus, stress = (
         read(runs.folder / "files" / name) for name, (read, _) in FILES.items()
     )

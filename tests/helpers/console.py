@@ -29,6 +29,13 @@ class Outcome:
         assert isinstance(value, dict)
         return value
 
+    def exits(self, code: int, *words: str) -> Outcome:
+        """Assert the exit code, and that words stand in the messages."""
+        assert self.code == code, self.err
+        for word in words:
+            assert word in self.err, self.err
+        return self
+
 
 Run = Callable[..., Outcome]
 """Run ``memscal`` with arguments."""
