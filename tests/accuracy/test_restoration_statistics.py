@@ -107,9 +107,7 @@ def test_the_force_is_the_load_as_often_as_it_says() -> None:
 
 
 @pytest.mark.parametrize("kernel", [GAUSSIAN, RING], ids=["gaussian", "ring"])
-def test_the_uncertainty_of_a_calibrated_sensor_is_counted(
-    kernel: memscal.GaussianMixture,
-) -> None:
+def test_the_uncertainty_of_a_calibrated_sensor_is_counted(kernel: memscal.GaussianMixture) -> None:
     within = []
     for seed in range(2 * SEEDS):
         rod = simulated(kernel=kernel, noise=0.01, seed=500 + seed, load_uncertainty=None)

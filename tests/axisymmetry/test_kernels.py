@@ -16,10 +16,7 @@ from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
 
-@given(
-    shares=st.lists(st.floats(-2, 2), min_size=0, max_size=3),
-    data=st.data(),
-)
+@given(shares=st.lists(st.floats(-2, 2), min_size=0, max_size=3), data=st.data())
 def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: Any) -> None:
     weights = (*shares, 1.0 - sum(shares))
     widths = data.draw(

@@ -10,11 +10,7 @@ from hypothesis import strategies as st
 from memscal.axisymmetry.hankel import gauss_panels
 
 
-@given(
-    degree=st.integers(0, 31),
-    upper=st.floats(1e-6, 1e6),
-    panels=st.integers(1, 7),
-)
+@given(degree=st.integers(0, 31), upper=st.floats(1e-6, 1e6), panels=st.integers(1, 7))
 def test_a_rule_of_sixteen_nodes_is_exact_to_degree_thirty_one(
     degree: int, upper: float, panels: int
 ) -> None:

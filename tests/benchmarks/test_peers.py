@@ -58,10 +58,7 @@ CASES = {
     for sigma in (0.45e-3, 0.561e-3, 0.75e-3)
     for noise in (0.001, 0.005, 0.02)
 }
-CASES |= {
-    "tails": Case(TAILS, 0.003, repeats=2),
-    "ring": Case(RING, 0.003, repeats=2),
-}
+CASES |= {"tails": Case(TAILS, 0.003, repeats=2), "ring": Case(RING, 0.003, repeats=2)}
 CASES["disc"] = Case(memscal.SmoothedDisc(0.8e-3, 0.3e-3), 0.003, repeats=2, seeds=DISC_SEEDS)
 
 

@@ -55,12 +55,7 @@ def found(
 def families(made: Experiment, kept: Path) -> dict[str, ProfileFamily]:
     """The contacts of the comparison, from its folder."""
     family = amontons_family(
-        made.dry.film,
-        made.dry.indenter,
-        [0.69, 2.75],
-        friction=FRICTION,
-        reach=24e-3,
-        cache=kept,
+        made.dry.film, made.dry.indenter, [0.69, 2.75], friction=FRICTION, reach=24e-3, cache=kept
     )
     return {"incremental": family}
 
@@ -166,9 +161,7 @@ def test_the_messages_say_synthetic_and_hold_the_macroscopic_coefficient_against
 
 
 def test_a_stress_beyond_full_stick_fails_checks(
-    made: Experiment,
-    apparatus: memscal.ApparatusFunction,
-    families: dict[str, ProfileFamily],
+    made: Experiment, apparatus: memscal.ApparatusFunction, families: dict[str, ProfileFamily]
 ) -> None:
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
@@ -178,9 +171,7 @@ def test_a_stress_beyond_full_stick_fails_checks(
 
 
 def test_noise_that_is_understated_fails_the_chi_square(
-    made: Experiment,
-    apparatus: memscal.ApparatusFunction,
-    families: dict[str, ProfileFamily],
+    made: Experiment, apparatus: memscal.ApparatusFunction, families: dict[str, ProfileFamily]
 ) -> None:
     wrong = scaled(made.dry, 1.0, noise=0.25)
     found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
@@ -244,10 +235,7 @@ def test_scans_of_different_films_or_spheres_are_refused(
     ],
 )
 def test_options_that_make_no_sense_are_refused(
-    made: Experiment,
-    apparatus: memscal.ApparatusFunction,
-    options: dict[str, object],
-    words: str,
+    made: Experiment, apparatus: memscal.ApparatusFunction, options: dict[str, object], words: str
 ) -> None:
     with pytest.raises(InputError, match=words):
         memscal.compare(made.lubricated, apparatus, **options)

@@ -117,11 +117,7 @@ def make_artifact(**changes: Any) -> ApparatusData:
     data = ApparatusData(
         field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g),
         radial_profile=ApparatusRadial(
-            r=r,
-            g=radial,
-            g_errors=errors,
-            g_gaussian=radial,
-            g_covariance=np.diag(errors**2),
+            r=r, g=radial, g_errors=errors, g_gaussian=radial, g_covariance=np.diag(errors**2)
         ),
         transfer=TransferFunction(
             k=k,

@@ -110,9 +110,7 @@ def test_shear_holds_back_what_the_pressure_would_move() -> None:
     assert np.all(solve_rod(0.01, 0.0, sticking=True).traction(1.0, 1.0).shear(r) > 0)
 
 
-def test_a_solution_that_has_not_settled_is_not_given_away(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_solution_that_has_not_settled_is_not_given_away(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rod, "_MOST_TERMS", 16)
     with pytest.raises(ConvergenceError, match="in the last refinement"):
         solve_rod(37.5, 0.5, sticking=False)

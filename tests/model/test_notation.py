@@ -52,10 +52,7 @@ def test_a_negative_uncertainty_is_refused():
         format_measured(1.0, -0.1, "mm")
 
 
-@given(
-    value=st.floats(-1e30, 1e30),
-    uncertainty=st.floats(1e-30, 1e30),
-)
+@given(value=st.floats(-1e30, 1e30), uncertainty=st.floats(1e-30, 1e30))
 def test_what_is_read_back_differs_by_no_more_than_the_rounding(value, uncertainty):
     assume(uncertainty > 1e-11 * abs(value))
     text = format_measured(value, uncertainty, "m")

@@ -76,9 +76,7 @@ def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film()
 
 
 @pytest.mark.parametrize("face", [RodFace(0.25, 0.05), SphereFace(0.3)])
-def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(
-    face: RodFace | SphereFace,
-) -> None:
+def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(face: RodFace | SphereFace) -> None:
     s = np.linspace(0.0, 0.4, 8001)
     points, tangents, _ = face.contour(s)
     assert np.hypot(*tangents) == pytest.approx(1.0)
@@ -111,10 +109,7 @@ def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool) -> Non
     # Only the flat part of its end touches then: a rod of that radius.
     (state,) = solve_finite_strain(FILM, ROD, (Depth(1e-10),), sticking=sticking, edge=EDGE)
     linear = indent(
-        FILM,
-        Rod(radius=ROD.radius - EDGE),
-        depth=1e-10,
-        friction=np.inf if sticking else 0.0,
+        FILM, Rod(radius=ROD.radius - EDGE), depth=1e-10, friction=np.inf if sticking else 0.0
     )
     # The stress at the edge of the flat is singular, and the mesh no finer than the rounding's.
     assert state.load == pytest.approx(linear.load, rel=5e-3)
@@ -131,9 +126,7 @@ def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]) -> None:
         assert state.inside.base_spectrum(np.zeros(1))[0] == pytest.approx(state.load, rel=1e-5)
 
 
-def test_the_work_of_the_rod_is_the_energy_of_the_film(
-    pressed_rods: tuple[Contact, ...],
-) -> None:
+def test_the_work_of_the_rod_is_the_energy_of_the_film(pressed_rods: tuple[Contact, ...]) -> None:
     last = pressed_rods[-1]
     assert last.work == pytest.approx(last.elastic_energy, rel=1e-3)
 
