@@ -63,7 +63,6 @@ def test_the_first_command_calibrates_the_shipped_scan(fresh_folder: Path) -> No
 
 def test_the_commands_for_the_best_estimate_and_its_plan_run(fresh_folder: Path) -> None:
     best = next(block for block in COMMANDS if "--method bayesian" in block)
-    installed = Path(sys.executable).with_name("memscal")
     for line in best.strip().splitlines():
         run_installed(shlex.split(line)[1:])
     assert (fresh_folder / "best.apparatus.h5").is_file()

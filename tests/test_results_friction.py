@@ -13,12 +13,10 @@ import pytest
 from helpers.friction_results import FRICTION, LOADS, comparison, interface_comparison
 
 import memscal
+from memscal import BoundedEstimate, ElasticFilm, FrictionComparison, Interval, Sphere
 from memscal.friction.checks import comparison_checks, comparison_messages, in_words
 from memscal.friction.effective import bracketed_share
-from memscal.friction.results import BoundedEstimate, FrictionComparison, Interval
 from memscal.model.checks import Message, QualityCheck, failed_check_messages
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Sphere
 from memscal.summaries.comparison import notes, tables
 
 

@@ -14,8 +14,7 @@ from helpers.bounds import FULL
 from scipy.stats import chi2
 
 import memscal
-from memscal.model.apparatus import ParameterSet
-from memscal.planning.plan import Plan
+from memscal import ParameterSet, Plan
 from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy

@@ -18,12 +18,9 @@ from helpers.bounds import FULL
 from numpy.typing import NDArray
 from scipy.special import j0
 
-from memscal.mechanics.contact import Contact
+from memscal import Contact, ElasticFilm, Rod, indent
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
-from memscal.mechanics.indent import indent
 from memscal.mechanics.solver.problem import Depth
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
 
 felupe = pytest.importorskip(
     "felupe", reason="FElupe, the independent program at finite strain, is not installed"

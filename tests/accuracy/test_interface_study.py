@@ -19,6 +19,7 @@ from helpers.bounds import FULL
 from scipy.stats import binom
 
 import memscal
+from memscal import ElasticFilm, Interface, LawComparison
 from memscal.friction.calculated import (
     FRICTIONS,
     SLIP_LENGTHS,
@@ -27,9 +28,6 @@ from memscal.friction.calculated import (
 )
 from memscal.friction.family import ProfileFamily
 from memscal.friction.model_comparison import compare_interface
-from memscal.friction.results import LawComparison
-from memscal.mechanics.interface import Interface
-from memscal.model.film import ElasticFilm
 from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.simulation.rod_scan import PAPER_FILM
 

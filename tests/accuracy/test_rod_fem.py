@@ -7,11 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from memscal import ElasticFilm, Rod, indent
 from memscal.mechanics.elements.element_film import ElementFilm
-from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
 
 RADIUS = 0.25e-3
 

@@ -14,11 +14,9 @@ from helpers.timing import once, show, turns
 from scipy.optimize import curve_fit
 
 import memscal
-from memscal.axisymmetry.grids import EvenGrid
+from memscal import EvenGrid, Scan, StressProfile
 from memscal.deconvolution.division import DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
 
 pytestmark = pytest.mark.benchmark
 

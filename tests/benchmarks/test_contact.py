@@ -11,14 +11,12 @@ from scipy.integrate import quad
 from scipy.optimize import nnls
 from scipy.special import ellipk
 
+from memscal import ElasticFilm, Interface, Sphere
 from memscal.mechanics.hankel_film import HankelFilm
-from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.path import follow
 from memscal.mechanics.solver.problem import ContactProblem, ContactState, Depth, Load
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Sphere
 
 pytestmark = pytest.mark.benchmark
 

@@ -10,9 +10,8 @@ import pytest
 from helpers.scans import simulated
 
 import memscal
+from memscal import FleetCalibration, Scan
 from memscal.calibration import many as fleet
-from memscal.calibration.many import FleetCalibration
-from memscal.model.scan import Scan
 from memscal.parallel import worker_pool
 
 

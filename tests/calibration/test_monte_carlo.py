@@ -8,12 +8,11 @@ import pytest
 from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, shear_scan, simulated
 
 import memscal
-from memscal.calibration.calibrate import Calibration
+from memscal import Calibration, Scan
 from memscal.calibration.monte_carlo import DrawnScans, shortest_interval
 from memscal.calibration.uncertainty import BUDGETED
 from memscal.deconvolution.division import Division, DivisionProblem, create_regulariser
 from memscal.errors import FitError
-from memscal.model.scan import Scan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 

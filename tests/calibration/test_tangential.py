@@ -17,11 +17,8 @@ from helpers.scans import CENTRE, SHEAR_CONVERSION, SHEAR_SIGMA, shear_scan
 from scipy.stats import binom, norm
 
 import memscal
-from memscal.axisymmetry.kernels import GaussianMixture
-from memscal.calibration.calibrate import Calibration
+from memscal import Calibration, GaussianMixture, QualityCheck, Scan
 from memscal.errors import InputError
-from memscal.model.checks import QualityCheck
-from memscal.model.scan import Scan
 
 SEEDS = 300 if os.environ.get("MEMSCAL_FULL_STUDY") else 60
 CHANCE = 1e-4

@@ -18,9 +18,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import memscal
+from memscal import ElasticFilm, Indenter
 from memscal.formats.inspection import check
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
 
 DATA = Path(__file__).parents[2] / "calibration_data"
 README = (DATA / "README.md").read_text(encoding="utf-8")

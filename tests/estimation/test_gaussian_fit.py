@@ -11,13 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import memscal
+from memscal import Scan, fit_gaussian
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectrum
-from memscal.model.scan import Scan
 
 
 def forward(scan: Scan) -> ForwardModel:

@@ -9,13 +9,12 @@ import pytest
 from helpers.scans import CENTRE, shear_scan
 
 import memscal
-from memscal.axisymmetry.kernels import GaussianMixture
+from memscal import GaussianMixture, StressProfile
 from memscal.errors import InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.reference import carried_force, reference_spectra
 from memscal.model.arrays import FloatArray
-from memscal.model.stress import StressProfile
 
 KERNEL = GaussianMixture((1.4, -0.4), (450e-6, 250e-6))
 

@@ -11,6 +11,7 @@ import pytest
 from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart, profiles
 from helpers.rounding import assert_same_to_rounding
 
+from memscal import ElasticFilm, ExponentialCompliance, Interface, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError
 from memscal.friction.calculated import (
     FRICTIONS,
@@ -20,11 +21,7 @@ from memscal.friction.calculated import (
     normal_compliance_family,
 )
 from memscal.friction.family import ProfileFamily
-from memscal.mechanics.indent import indent
-from memscal.mechanics.interface import ExponentialCompliance, Interface
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
 
 LENGTHS = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0]) * 1.82e-6
 

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 import memscal
+from memscal import Experiment, Scan, StressSensor
 from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
 from memscal.friction.family import ProfileFamily
-from memscal.model.scan import Scan, StressSensor
-from memscal.simulation.experiment import Experiment
 
 FRICTION = (0.0, 0.1, 0.2, 0.3, math.inf)
 LOADINGS = ("incremental", "total")

@@ -10,11 +10,10 @@ import pytest
 from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart
 from helpers.rounding import assert_same_to_rounding
 
+from memscal import StressProfile, indent
 from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.external import external_family
-from memscal.mechanics.indent import indent
-from memscal.model.stress import StressProfile
 
 FRICTIONS = (0.0, 0.3, math.inf)
 

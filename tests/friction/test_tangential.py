@@ -16,15 +16,11 @@ import pytest
 from scipy.stats import binom
 
 import memscal
-from memscal.apparatus import ApparatusFunction
-from memscal.axisymmetry.kernels import GaussianMixture
+from memscal import ApparatusFunction, Experiment, GaussianMixture, MeasuredStress, compare_shear
 from memscal.errors import InputError
 from memscal.friction.calculated import FRICTIONS, amontons_family
-from memscal.friction.compare import compare_shear
 from memscal.friction.likelihood import LoadPoints, predict, sensor_of
 from memscal.model.arrays import FloatArray
-from memscal.model.measured_stress import MeasuredStress
-from memscal.simulation.experiment import Experiment
 
 EXPERIMENTS = 80 if os.environ.get("MEMSCAL_FULL_STUDY") else 8
 TRUTHS = (0.0, 0.1, 0.2, 1.0)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from memscal import ElasticFilm, Process, Rod, Scan, SourceFile, StressProfile, StressSensor
 from memscal.model.apparatus import (
     ApparatusData,
     ApparatusField,
@@ -16,11 +17,6 @@ from memscal.model.apparatus import (
     TransferFunction,
 )
 from memscal.model.checks import Message, QualityCheck
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
-from memscal.model.provenance import Process, SourceFile
-from memscal.model.scan import Scan, StressSensor
-from memscal.model.stress import StressProfile
 
 SIGMA = 561e-6
 CONVERSION = 3.0e-8

@@ -17,9 +17,8 @@ from scipy.optimize import brentq
 from scipy.stats import binom, t
 
 import memscal
-from memscal.axisymmetry.kernels import RadialKernel
+from memscal import RadialKernel, Scan
 from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
 
 METHOD = "evidence"
 FULL_SEEDS, FEW_SEEDS = 200, 12

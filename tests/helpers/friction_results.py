@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from memscal import Message, QualityCheck, SourceFile
 from memscal.friction.results import (
     BayesFactor,
     BoundedEstimate,
@@ -22,8 +23,6 @@ from memscal.friction.results import (
     LoadComparison,
     PriorChoice,
 )
-from memscal.model.checks import Message, QualityCheck
-from memscal.model.provenance import SourceFile
 
 FRICTION = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, math.inf])
 LOADS = (0.34, 0.69, 1.37, 2.75)

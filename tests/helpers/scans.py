@@ -10,15 +10,12 @@ import numpy as np
 from helpers.builders import make_artifact
 
 import memscal
+from memscal import MeasuredStress, Process, RadialKernel, Scan, StressSensor
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
-from memscal.axisymmetry.kernels import RadialKernel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectrum
 from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
-from memscal.model.measured_stress import MeasuredStress
-from memscal.model.provenance import Process
-from memscal.model.scan import Scan, StressSensor
 from memscal.simulation.contact_scan import simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 

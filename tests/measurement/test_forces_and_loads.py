@@ -10,11 +10,10 @@ from helpers.builders import make_scan
 from helpers.scans import EXACT_FILM, LOADS, SIGMA, contact_scan, known_apparatus, measured
 
 import memscal
+from memscal import MeasuredStress, SourceFile
 from memscal.errors import InputError
 from memscal.measurement.measure_stress import pooled_force
 from memscal.measurement.measured_profile import single_loads
-from memscal.model.measured_stress import MeasuredStress
-from memscal.model.provenance import SourceFile
 
 SENSOR = known_apparatus()
 QUIET = {"noise": 0.001, "load_scatter": 0.002, "position_error": 0.0}

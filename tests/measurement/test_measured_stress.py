@@ -22,14 +22,12 @@ from helpers.scans import (
 )
 
 import memscal
+from memscal import MeasuredProfile, Scan, SourceFile, StressSensor
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.measurement.measure_stress import joined_stress
 from memscal.measurement.measured_profile import contact_signal, prepared_scan, single_loads
 from memscal.measurement.restore import restore_known
-from memscal.model.measured_stress import MeasuredProfile
-from memscal.model.provenance import SourceFile
-from memscal.model.scan import Scan, StressSensor
 
 QUIET = {"noise": 0.0, "load_scatter": 0.0, "position_error": 0.0}
 SEEDS = 5

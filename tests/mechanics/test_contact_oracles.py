@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
+from memscal import Cone, Contact, ElasticFilm, Profile, Rod, Sphere, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
-from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
 from memscal.mechanics.rod import solve_rod
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Cone, Profile, Rod, Sphere
 
 SPHERE = Sphere(radius=128.8e-3)
 LOADS = (0.34, 0.69, 1.37, 2.75)

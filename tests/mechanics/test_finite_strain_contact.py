@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from memscal import Cone, ElasticFilm, Interface, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError
-from memscal.mechanics.indent import indent
-from memscal.mechanics.interface import Interface
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Cone, Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD, SPHERE = Rod(radius=0.25e-3), Sphere(radius=128.8e-3)

@@ -11,12 +11,9 @@ from helpers.rounding import assert_same_to_rounding
 from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
+from memscal import Contact, ElasticFilm, Rod, Sphere, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import DomainError, InputError
-from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD = Rod(radius=0.25e-3)

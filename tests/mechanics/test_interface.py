@@ -9,12 +9,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from memscal import Contact, ElasticFilm, Rod, Sphere, indent
 from memscal.errors import InputError
-from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = Sphere(radius=128.8e-3)

@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from memscal import Cone, ElasticFilm, Profile, Rod, Sphere
 from memscal.errors import InputError
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Cone, Profile, Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 

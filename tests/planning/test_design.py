@@ -11,17 +11,16 @@ from helpers.rounding import assert_same_to_rounding
 from helpers.scans import EXACT_FILM, EXACT_ROD, estimated, simulated
 
 import memscal
+from memscal import Plan, fit_gaussian
 from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
 from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectrum
 from memscal.planning.design import varied_designs
 from memscal.planning.expected import Design, expected_calibration
-from memscal.planning.plan import Plan
 
 EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 

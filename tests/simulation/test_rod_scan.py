@@ -11,8 +11,7 @@ from scipy.signal import fftconvolve
 from scipy.special import j1
 from scipy.stats import chi2
 
-from memscal import ElasticFilm, GaussianMixture, Rod, SmoothedDisc, indent, simulate
-from memscal.axisymmetry.kernels import RadialKernel
+from memscal import ElasticFilm, GaussianMixture, RadialKernel, Rod, SmoothedDisc, indent, simulate
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 import skfem
 
+from memscal import Contact, ElasticFilm, Rod, Sphere, indent
 from memscal.errors import ConvergenceError
-from memscal.mechanics.contact import Contact
 from memscal.mechanics.finite_strain.film_elements import FilmElements, NeoHookean
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
-from memscal.mechanics.indent import indent
 from memscal.mechanics.solver.problem import Depth, Load
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD = Rod(radius=0.25e-3)

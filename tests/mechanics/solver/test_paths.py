@@ -7,9 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from memscal.mechanics.indent import indent
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
+from memscal import ElasticFilm, Rod, Sphere, indent
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = Sphere(radius=128.8e-3)
