@@ -72,8 +72,7 @@ def test_the_commands_for_the_best_estimate_and_its_plan_run(fresh_folder: Path)
 def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
     printed = run_installed(shlex.split(SPHERE)[1:])
     assert (fresh_folder / "sphere.png").is_file()
-    shown = README.split(SPHERE)[1].split("```text\n")[1].split("```")[0]
-    expected = shown.splitlines()
+    expected = README.split(SPHERE)[1].split("```text\n")[1].split("```")[0].splitlines()
     assert printed[:2] == expected[:2]
     for ours, theirs in zip(printed[3:], expected[3:], strict=True):
         # Depths, radii and stresses; the last digit of another machine may differ.

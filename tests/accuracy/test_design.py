@@ -138,5 +138,4 @@ def test_nothing_scatters_more_than_noise_and_prior_together_allow(number: int) 
     # A and FWHM scatter more than the part called noise, and less than the whole.
     found = study(number)
     scatter = np.std(found.found, axis=0, ddof=1)
-    high = chi2.ppf(1 - CHANCE, SEEDS - 1) / (SEEDS - 1)
-    assert np.all(scatter < found.own * np.sqrt(high))
+    assert np.all(scatter < found.own * np.sqrt(chi2.ppf(1 - CHANCE, SEEDS - 1) / (SEEDS - 1)))

@@ -39,8 +39,7 @@ WAVENUMBERS = np.array([0.5, 1.0, 1.5, 2.0])  # rad/mm
 def graded(start: float, end: float, first: float, growth: float, widest: float) -> list[float]:
     points, step = [start], first
     while points[-1] < end:
-        left = end - points[-1]
-        points.append(end if left < 1.5 * step else points[-1] + step)
+        points.append(end if (end - points[-1]) < 1.5 * step else points[-1] + step)
         step = min(step * growth, widest)
     return points
 
@@ -51,8 +50,7 @@ def film_of_quadrilaterals(refinement: float) -> Any:
     first, growth = 0.01 / refinement, 1 + 0.15 / refinement
     inner = [a - x for x in graded(0.0, a, first, growth, 0.03)]
     near = graded(a, 4.0, first, growth, 0.1 / refinement)
-    far = graded(4.0, 25.0, 0.1 / refinement, growth, 0.5)
-    r = np.unique(np.concatenate([inner, near, far]))
+    r = np.unique(np.concatenate([inner, near, graded(4.0, 25.0, 0.1 / refinement, growth, 0.5)]))
     z = h - np.array(graded(0.0, h, first, growth, 0.1 / refinement))[::-1]
     Z, R = np.meshgrid(z, r, indexing="ij")
     number = np.arange(Z.size).reshape(Z.shape)
@@ -78,8 +76,7 @@ def press_with_felupe(state: Contact, refinement: float) -> Answer:
     shear = FILM.shear_modulus * 1e-6
     material = felupe.ThreeFieldVariation(felupe.NeoHooke(mu=shear, bulk=5000 * shear))
     solid = felupe.SolidBody(umat=material, field=field)
-    touching = state.inside.pressed.touching
-    last = state.inside.pressing.elements.nodes[0][touching[-1]]
+    last = state.inside.pressing.elements.nodes[0][state.inside.pressed.touching[-1]]
     moved = (z > 2.0 - 1e-9) & (r < last + 1e-9)
     bounds = {
         "base": felupe.Boundary(field[0], mask=z < 1e-9),

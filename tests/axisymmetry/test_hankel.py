@@ -58,8 +58,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(offset: float) -> Non
     k = np.linspace(0.1, 6.0, 12)
     errors = []
     for count in (20, 40, 80, 160):
-        step = 10.0 / count
-        r = step * (np.arange(count + 1) + offset)
+        r = (10.0 / count) * (np.arange(count + 1) + offset)
         errors.append(np.abs(hankel_transform(r, gaussian(r), k) - np.exp(-(k**2) / 2)).max())
     # Three halvings would give 16^3 = 4096; an order of 3.5 gives 1448.
     assert errors[0] / errors[-1] > 1448

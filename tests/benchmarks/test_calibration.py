@@ -82,8 +82,7 @@ def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(
     exact = gaussian(problem.grid.radius, np.sqrt(BLURRED_WIDTH**2 - STRESS_WIDTH**2))
     np.testing.assert_allclose(quarter, exact, atol=0.05 * exact.max())
     # The central pixel is the axis; the quarter lies to the lower right, less the last edge.
-    same = 1e-6 * quarter.max()
-    np.testing.assert_allclose(plain()[256:, 256:], quarter[:-1, :-1], atol=same)
+    np.testing.assert_allclose(plain()[256:, 256:], quarter[:-1, :-1], atol=1e-6 * quarter.max())
 
 
 def test_a_quarter_plane_divides_faster_than_a_plain_complex_transform(
@@ -123,15 +122,13 @@ def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
     weakest = 0.02 * np.abs([u.sum(), sigma.sum()]) / pixels
     u = u + 0.1 * weakest[0] * rng.normal(size=u.shape)
     sigma = sigma + 0.1 * weakest[1] * rng.normal(size=u.shape)
-    quotient = np.fft.fft2(u) / np.fft.fft2(sigma)
-    g = np.fft.fftshift(np.fft.ifft2(quotient).real) / pixel**2
+    g = np.fft.fftshift(np.fft.ifft2(np.fft.fft2(u) / np.fft.fft2(sigma)).real) / pixel**2
     rows = slice(pixels // 2 - 100, pixels // 2 + 101)
 
     def bell(distance: FloatArray, constant: float, width: float) -> FloatArray:
         return constant * gaussian(distance, width)
 
-    near = r[rows, rows].ravel()
-    fit, _ = curve_fit(bell, near, g[rows, rows].ravel(), p0=(1e-7, 0.5e-3))
+    fit, _ = curve_fit(bell, r[rows, rows].ravel(), g[rows, rows].ravel(), p0=(1e-7, 0.5e-3))
     return np.asarray(fit)
 
 

@@ -105,8 +105,7 @@ def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str) -> None:
     scan = replace(simulated(**stated, load_uncertainty=0.01), position_scale_uncertainty=1e-3)
     model = drawn_scans(memscal.calibrate(scan, method="evidence"))
     standard = dict.fromkeys(model.effects, np.asarray(0.0))
-    nominal = model.voltages(standard)
-    change = model.voltages(standard | {source: np.asarray(3.0)}) - nominal
+    change = model.voltages(standard | {source: np.asarray(3.0)}) - model.voltages(standard)
     truth = simulated(**(stated | TRUTHS[source])).u_zz - scan.u_zz
     assert np.abs(change - truth).max() < 0.02 * np.abs(truth).max()
 
@@ -206,8 +205,7 @@ def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle()
 
 
 def test_outliers_are_drawn_again_and_noise_alone_is_said_to_be() -> None:
-    calibration = replace(uncertain(noise=0.004), effects={})
-    found = memscal.monte_carlo(calibration, draws=3)
+    found = memscal.monte_carlo(replace(uncertain(noise=0.004), effects={}), draws=3)
     assert found.sources == ("noise",)
     assert [m.kind for m in found.messages][:1] == ["uncertainty_unstated"]
     assert "3 draws of noise" in repr(found)

@@ -35,8 +35,7 @@ def truncated_mean_bound(count: int, cut: float) -> float:
     has, the density's slope being at most sqrt(2/e)/pi, an expectation of 2 sqrt(2/e) cut^2.
     """
     odds = np.log(4 / RARE)
-    variance = 2 * np.log(1 / cut) + 1
-    bernstein = np.sqrt(2 * variance * odds / count) + 2 * odds / (3 * cut * count)
+    bernstein = np.sqrt(2 * (2 * np.log(1 / cut) + 1) * odds / count) + 2 * odds / (3 * cut * count)
     return float(np.sqrt(2) * bernstein + 2 * np.sqrt(2 / np.e) * cut**2)
 
 

@@ -76,8 +76,7 @@ def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
             a, s = found.conversion_constant + shift[0], found.sigma + shift[1]
             centre = found.centre.copy()
             centre[0, :plane] += shift[2 : 2 + plane]
-            kernel = a * gaussian_transfer(model.k, s)
-            signal = model.signal(model.geometry(centre), kernel)
+            signal = model.signal(model.geometry(centre), a * gaussian_transfer(model.k, s))
             return signal + model.drift_columns @ (found.drift + shift[2 + plane :])
 
         # The ellipse of a raster, whose slopes follow, is tested where it is at home.

@@ -73,8 +73,7 @@ def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sens
 
 
 def test_the_signal_is_odd_along_its_component_and_even_across() -> None:
-    rng = np.random.default_rng()
-    x, y = rng.uniform(-4e-3, 4e-3, (2, 8))
+    x, y = np.random.default_rng().uniform(-4e-3, 4e-3, (2, 8))
     signals = []
     for sx, sy in ((1, 1), (-1, 1), (1, -1)):
         model = model_at(sx * x, sy * y)

@@ -74,8 +74,7 @@ def test_a_family_holds_the_contacts_that_indent_finds(friction: float, loading:
     contacts = indent(FILM, SPHERE, load=LOADS, friction=friction, loading=loading)
     truth = np.array([contact.base_spectrum(family.wavenumbers.k) for contact in contacts])
     assert apart(family, family.spectra[0], truth) < 3e-4
-    depths = [contact.depth for contact in contacts]
-    np.testing.assert_allclose(family.depths[0], depths, rtol=2e-4)
+    np.testing.assert_allclose(family.depths[0], [contact.depth for contact in contacts], rtol=2e-4)
     assert np.all(family.convergence < 1e-3)
 
 

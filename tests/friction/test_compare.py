@@ -139,7 +139,6 @@ def test_no_value_comes_without_interval_and_budget(found: memscal.FrictionCompa
 def test_a_clean_experiment_passes_its_checks_of_friction(
     found: memscal.FrictionComparison,
 ) -> None:
-    names = {check.name for check in found.checks}
     assert {
         "applied_force_1",
         "profile_chi_square_4",
@@ -147,7 +146,7 @@ def test_a_clean_experiment_passes_its_checks_of_friction(
         "joint_chi_square_dry",
         "joint_chi_square_lubricated",
         "lubricated_frictionless",
-    } <= names
+    } <= {check.name for check in found.checks}
     assert "lubricated_frictionless" not in failed(found)
 
 

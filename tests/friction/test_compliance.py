@@ -184,8 +184,7 @@ def test_the_bayes_factor_depends_on_the_prior_as_its_density_does() -> None:
 
 
 def normal(truth: ProfileFamily, value: float) -> LawComparison:
-    points = read_without_error(truth, value, PRECISE)
-    return weigh_normal_compliance(measured(points, yielding()))
+    return weigh_normal_compliance(measured(read_without_error(truth, value, PRECISE), yielding()))
 
 
 def test_a_rigid_lubricated_interface_gives_an_upper_bound() -> None:

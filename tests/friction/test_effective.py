@@ -65,8 +65,7 @@ def test_values_scatter_as_their_uncertainties_say() -> None:
         if one.value is not None and one.standard_uncertainty is not None
     ]
     assert len(apart) > 0.9 * SEEDS
-    spread = np.sqrt(np.mean(np.square(apart)))
-    assert abs(spread - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
+    assert abs(np.sqrt(np.mean(np.square(apart))) - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
 
 
 def test_the_budget_is_the_uncertainty_where_the_likelihood_is_a_parabola() -> None:
@@ -86,8 +85,7 @@ def test_all_loads_together_tell_more_than_each() -> None:
 
 
 def test_lubricated_contacts_reach_no_friction() -> None:
-    reached = sum(one.interval.low == 0 for one in found(0.0))
-    assert reached >= binom.ppf(CHANCE, SEEDS, 0.95)
+    assert sum(one.interval.low == 0 for one in found(0.0)) >= binom.ppf(CHANCE, SEEDS, 0.95)
 
 
 def test_the_fine_values_hold_those_that_were_calculated() -> None:

@@ -26,8 +26,7 @@ def saturating(value: float) -> float:
 
 def family() -> ProfileFamily:
     rise = np.array([saturating(value) for value in VALUES])
-    shape = LOADS[:, None] * np.exp(-((NODES.k * 1e-3) ** 2))
-    spectra = (1 + 0.2 * rise)[:, None, None] * shape
+    spectra = (1 + 0.2 * rise)[:, None, None] * (LOADS[:, None] * np.exp(-((NODES.k * 1e-3) ** 2)))
     number = np.ones((VALUES.size, LOADS.size))
     return ProfileFamily(
         name="amontons",
@@ -110,8 +109,7 @@ def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
         one.spectra[0, 0, 0] = 0.0
     with pytest.raises(TypeError):
         one.changes["thickness"] = one.spectra  # type: ignore[index]
-    again = pickle.loads(pickle.dumps(one))
-    assert_same_to_rounding(again.at(0.2).spectra, one.at(0.2).spectra)
+    assert_same_to_rounding(pickle.loads(pickle.dumps(one)).at(0.2).spectra, one.at(0.2).spectra)
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,8 @@ def value_at(t: float) -> float:
 
 
 def estimate(chi_square: FloatArray, last: float = np.inf, level: float = 0.95) -> BoundedEstimate:
-    values = np.array([value_at(t) for t in COORDINATES])
     return profile_estimate(
-        values,
+        np.array([value_at(t) for t in COORDINATES]),
         COORDINATES,
         chi_square,
         value_at,
@@ -78,8 +77,7 @@ def test_a_flat_likelihood_identifies_nothing() -> None:
 
 def test_what_is_flat_beyond_a_value_bounds_from_below_only() -> None:
     """The shape of the real thing: chi-square falls to a value, and stays."""
-    fall = 60 * np.maximum(0.5 - COORDINATES, 0) ** 2 * 100
-    found = estimate(fall)
+    found = estimate(60 * np.maximum(0.5 - COORDINATES, 0) ** 2 * 100)
     assert found.interval.high is None
     assert found.interval.low == pytest.approx(value_at(0.5 - np.sqrt(3.84 / 6000)), rel=1e-2)
 

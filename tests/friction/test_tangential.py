@@ -115,8 +115,7 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None
     outward = [
         predict(at(offset + s * np.sign(offset)), sensor, members, 1).signal for s in (step, -step)
     ]
-    slope = (outward[0] - outward[1]) / (2 * step)
-    np.testing.assert_allclose(found.slope, slope, rtol=1e-5)
+    np.testing.assert_allclose(found.slope, (outward[0] - outward[1]) / (2 * step), rtol=1e-5)
 
 
 def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_end(

@@ -92,11 +92,9 @@ def press_rod(
     """Press a flat rod down by a tenth of a millimetre; the problem is linear."""
     depth = 0.1
     mesh = rod_mesh(radius, film.thickness, halvings)
-    top = mesh.nodes[:, -1]
-    under = top[mesh.r[:, -1] < radius * (1 + 1e-9)]
     deck = [
         *_film_deck(film, mesh),
-        *_node_set("ROD", under),
+        *_node_set("ROD", mesh.nodes[:, -1][mesh.r[:, -1] < radius * (1 + 1e-9)]),
         "*STEP",
         "*STATIC",
         "*BOUNDARY",

@@ -220,8 +220,7 @@ class Outcome:
     @property
     def bias_error(self) -> float:
         """Standard error of :attr:`bias`: the estimate scatters by its own, not the stated size."""
-        scatter = self.a.std(ddof=1) / np.sqrt(self.a.size)
-        return float(scatter / np.sqrt(np.mean(self.u_a**2)))
+        return float((self.a.std(ddof=1) / np.sqrt(self.a.size)) / np.sqrt(np.mean(self.u_a**2)))
 
     def coverage(self, band: str) -> tuple[float, float]:
         """How often a band held the truth, and its standard error over the seeds.
@@ -286,8 +285,7 @@ def study(name: str, seeds: int = SEEDS) -> Outcome:
 
 def mean_efficiency(outcomes: list[Outcome]) -> tuple[float, int]:
     """RMS error of A over its bound, of all cases with a bound; and how many seeds they had."""
-    ratios = [o.a / o.case.bound for o in outcomes if o.case.bound is not None]
-    together = np.concatenate(ratios)
+    together = np.concatenate([o.a / o.case.bound for o in outcomes if o.case.bound is not None])
     return float(np.sqrt(np.mean(together**2))), together.size
 
 
@@ -297,5 +295,4 @@ def mean_coverage(outcomes: list[Outcome], band: str) -> tuple[float, float]:
     share, error = np.array([o.coverage(band) for o in having]).T
     # A case without a miss says no more than that misses are rarer than its seeds.
     least = 1 / (1 + np.array([o.g.size for o in having]))
-    together = np.linalg.norm(np.maximum(error, least)) / len(having)
-    return float(share.mean()), float(together)
+    return float(share.mean()), float(np.linalg.norm(np.maximum(error, least)) / len(having))

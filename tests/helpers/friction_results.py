@@ -38,8 +38,7 @@ _COMMON = 0.008  # relative uncertainty of all stresses together
 def stress(r: Any, load: float, friction: float, loading: str) -> Any:
     """Return a Gaussian of the load's force, which narrows as friction grows; in Pa."""
     p0 = np.interp(load, LOADS, _MAXIMA)
-    full = np.interp(load, LOADS, _GAINS[loading])
-    top = p0 * (1 + full * (1.0 - math.exp(-friction / 0.12)))
+    top = p0 * (1 + np.interp(load, LOADS, _GAINS[loading]) * (1.0 - math.exp(-friction / 0.12)))
     return top * np.exp(-np.pi * top * np.asarray(r) ** 2 / load)
 
 
@@ -71,8 +70,7 @@ def reading(
 def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -> Any:
     """Return a stand-in of a measured profile: what tables and figures read of one."""
     x = np.linspace(-8e-3, 8e-3, 33) - 0.14e-3
-    order = np.argsort(np.abs(x))
-    x = x[order]
+    x = x[np.argsort(np.abs(x))]
     r = np.abs(x)
     clean = stress(r, load, friction, "incremental")
     errors = np.hypot(0.004 * clean.max(), 0.01 * clean) * np.ones(r.size)
@@ -118,7 +116,6 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> LoadCompari
     p0 = float(stress(0.0, load, 0.0, loading))
     low, high = calculated[0], calculated[-1]
     between = np.clip(profile.s_zz, np.minimum(low, high), np.maximum(low, high))
-    inside = np.abs(profile.s_zz - between) <= 1.96 * profile.s_zz_errors
     return LoadComparison(
         profile=profile,
         loading=loading,
@@ -134,7 +131,7 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> LoadCompari
         chi_square=np.array([misfit(mu) for mu in grid]),
         p_values=np.full(grid.size, 0.2),
         degrees=29,
-        bracketed=float(inside.mean()),
+        bracketed=float((np.abs(profile.s_zz - between) <= 1.96 * profile.s_zz_errors).mean()),
         by_maximum=reading(fine, datum, degrees=0),
         by_profile=reading(fine, curve),
     )

@@ -104,8 +104,7 @@ class Film:
             (AXIS, r < 1e-9),
             (TOP, (z > thickness - 1e-9) & (r < self.contact + 1e-9)),
         ):
-            faces = self.mesh.faces_from_pid(np.flatnonzero(inside))
-            self.mesh.set_region(region, faces)
+            self.mesh.set_region(region, self.mesh.faces_from_pid(np.flatnonzero(inside)))
 
     def space(self, degree, region=None, without_axis=False):
         """Lagrange elements on the mesh, or their traces on a boundary, with their radii."""
@@ -116,8 +115,7 @@ class Film:
             return elements, None
         degrees = elements.basic_dof_on_region(region)
         if without_axis:
-            axis = elements.basic_dof_on_region(AXIS)
-            degrees = np.setdiff1d(degrees, axis)
+            degrees = np.setdiff1d(degrees, elements.basic_dof_on_region(AXIS))
         radii = elements.basic_dof_nodes()[0][np.sort(degrees)]
         return self.getfem.MeshFem("partial", elements, degrees), radii
 

@@ -46,8 +46,7 @@ def gaussian_family(loads: Sequence[float] = LOADS) -> ProfileFamily:
 def gaussian_sensor() -> Sensor:
     """A Gaussian G of 0.56 mm; A uncertain by 1 %, the width by 2 %."""
     g = np.exp(-0.5 * (0.56e-3 * NODES.k) ** 2)
-    wider = -0.02 * (0.56e-3 * NODES.k) ** 2 * g
-    changes = CONVERSION * np.stack([0.01 * g, wider], axis=1)
+    changes = CONVERSION * np.stack([0.01 * g, (-0.02 * (0.56e-3 * NODES.k) ** 2 * g)], axis=1)
     return Sensor(NODES, CONVERSION * g, changes, CONVERSION)
 
 
@@ -89,8 +88,7 @@ class Laboratory:
         return cls(family, gaussian_sensor(), (every,) * family.loads.size)
 
     def predicted(self, friction: float, load: int, points: LoadPoints | None = None) -> Predicted:
-        members = self.family.at(friction)
-        return predict(points or self.points[load], self.sensor, members, load)
+        return predict(points or self.points[load], self.sensor, self.family.at(friction), load)
 
     def drawn(self, friction: float, seed: int) -> Confrontation:
         """Draw everything that the likelihood counts, and hold it against the family."""

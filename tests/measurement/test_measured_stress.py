@@ -171,8 +171,7 @@ def test_repeats_at_one_position_are_averaged() -> None:
 
 
 def test_a_rod_is_measured_like_a_sphere() -> None:
-    scan = memscal.simulate(seed=2, points=33)
-    [profile] = memscal.measure_stress(scan, SENSOR).profiles
+    [profile] = memscal.measure_stress(memscal.simulate(seed=2, points=33), SENSOR).profiles
     assert abs(profile.force - 1.0) < 4 * profile.force_uncertainty
 
 

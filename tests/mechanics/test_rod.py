@@ -63,8 +63,7 @@ def test_a_thin_compressible_film_is_compressed_uniaxially() -> None:
     # P -> pi a^2 M delta/h with M = 2G (1-nu)/(1-2nu), again with an edge of the order h.
     nu, ratios = 0.3, np.array([10.0, 20.0])
     kappa = np.array([solve_rod(ratio, nu, sticking=False).stiffness_factor for ratio in ratios])
-    limit = np.pi * (1 - nu) ** 2 / (2 * (1 - 2 * nu)) * ratios
-    root = np.sqrt(kappa / limit)
+    root = np.sqrt(kappa / (np.pi * (1 - nu) ** 2 / (2 * (1 - 2 * nu)) * ratios))
     assert 2 * root[1] - root[0] == pytest.approx(1, abs=3e-3)
 
 
@@ -97,8 +96,7 @@ def test_transforms_belong_to_the_tractions(nu: float, sticking: bool) -> None:
 
 def test_sticking_stiffens_the_film_and_sliding_needs_no_shear() -> None:
     sliding = solve_rod(0.5, 0.5, sticking=False)
-    sticking = solve_rod(0.5, 0.5, sticking=True)
-    assert sticking.stiffness_factor > sliding.stiffness_factor
+    assert solve_rod(0.5, 0.5, sticking=True).stiffness_factor > sliding.stiffness_factor
     assert sliding.shear_terms.size == 0
 
 

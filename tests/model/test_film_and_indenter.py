@@ -70,8 +70,7 @@ def test_a_rod_is_flat_to_its_edge_and_ends_there() -> None:
 
 def test_a_sphere_is_round() -> None:
     sphere = Sphere(radius=5e-3)
-    height = sphere.height(R)
-    np.testing.assert_allclose(R**2 + (5e-3 - height) ** 2, 25e-6, rtol=1e-14)
+    np.testing.assert_allclose(R**2 + (5e-3 - sphere.height(R)) ** 2, 25e-6, rtol=1e-14)
     assert sphere.height(5.1e-3) == np.inf
     # Far from its radius a sphere is a parabola, to the last digit.
     assert Sphere(radius=1e6).height(1e-3) == pytest.approx(0.5e-12, rel=1e-12)

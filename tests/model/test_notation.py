@@ -58,7 +58,6 @@ def test_what_is_read_back_differs_by_no_more_than_the_rounding(value, uncertain
     text = format_measured(value, uncertainty, "m")
     match = re.fullmatch(r"\((-?[\d.]+) ± ([\d.]+)\)(?:×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))? m", text)
     assert match is not None, text
-    ordinary = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-    factor = 10.0 ** int((match[3] or "0").translate(ordinary))
+    factor = 10.0 ** int((match[3] or "0").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
     assert float(match[2]) * factor == pytest.approx(uncertainty, rel=0.0501)
     assert abs(float(match[1]) * factor - value) <= 0.0501 * uncertainty + 1e-14 * abs(value)

@@ -130,10 +130,8 @@ def test_the_force_of_uneven_radii_is_exact_where_a_spline_is(
     steps = np.random.default_rng(seed).uniform(0.05, 1.0, count)
     r = np.cumsum(steps) - (steps[0] if axis else 0.0)
     reach = r[-1]
-    sigma = 1.0 + curvature * (r / reach) ** 2
-    profile = make_profile(r=r, sigma_zz=sigma, sigma_rz=None)
-    exact = np.pi * reach**2 * (1.0 + curvature / 2)
-    assert profile.force == pytest.approx(exact, rel=1e-9)
+    profile = make_profile(r=r, sigma_zz=1.0 + curvature * (r / reach) ** 2, sigma_rz=None)
+    assert profile.force == pytest.approx(np.pi * reach**2 * (1.0 + curvature / 2), rel=1e-9)
 
 
 def test_a_single_radius_carries_the_force_of_an_even_pressure_or_none() -> None:

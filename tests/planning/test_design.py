@@ -46,8 +46,7 @@ def test_sigma_has_the_bound_of_cramer_and_rao_by_finite_differences() -> None:
     theta, steps = np.array([1e-7, 561e-6, 0.0]), np.array([1e-9, 1e-6, 1e-6])
     columns = [(voltages(*(theta + h)) - voltages(*(theta - h))) / 2 for h in np.diag(steps)]
     jacobian = np.stack([*columns, np.ones_like(x), x / x.max()], axis=1)
-    covariance = np.linalg.inv(jacobian.T @ jacobian) * plan.point_noise**2
-    bound = np.sqrt(covariance[1, 1]) * steps[1]
+    bound = np.sqrt((np.linalg.inv(jacobian.T @ jacobian) * plan.point_noise**2)[1, 1]) * steps[1]
     assert planned.parameters.uncertainty("gaussian_sigma") == pytest.approx(bound, rel=1e-3)
 
 
@@ -162,8 +161,7 @@ def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design
 
 
 def test_less_noise_resolves_more(paper: Design) -> None:
-    finer = memscal.design(repeats=16)
-    assert finer.resolved_wavenumber > 1.05 * paper.resolved_wavenumber
+    assert memscal.design(repeats=16).resolved_wavenumber > 1.05 * paper.resolved_wavenumber
 
 
 def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
@@ -307,8 +305,7 @@ def test_positions_are_whole_steps_within_the_range(
 
 def test_noise_is_a_share_of_the_signal_above_the_sensor() -> None:
     plan = Plan(noise=0.02)
-    largest = float(plan.scan().u_zz.max())
-    assert plan.point_noise == pytest.approx(0.02 * largest, rel=1e-6)
+    assert plan.point_noise == pytest.approx(0.02 * float(plan.scan().u_zz.max()), rel=1e-6)
     assert Plan(noise_voltage=3e-5).point_noise == 3e-5
 
 

@@ -145,8 +145,7 @@ def test_each_source_of_error_has_numbers_of_its_own(seed: int) -> None:
 
 def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -> None:
     heavy = simulate_contacts(load=[1.0], load_scale=1.1, **EXACT)
-    true = simulate_contacts(load=[1.1], **EXACT)
-    np.testing.assert_allclose(heavy.u_zz, true.u_zz, rtol=1e-12)
+    np.testing.assert_allclose(heavy.u_zz, simulate_contacts(load=[1.1], **EXACT).u_zz, rtol=1e-12)
     assert (heavy.load, truth(heavy)["load_1"]) == pytest.approx((1.0, 1.1))
     np.testing.assert_array_equal(heavy.normal_load, np.ones(33))
 
@@ -260,8 +259,7 @@ def test_what_is_drawn_scatters_as_it_is_stated() -> None:
     assert max(sampled["ratio"]) <= 0
     own = np.array([values for name, values in sampled.items() if name != "ratio"])
     assert np.all(np.abs(own.mean(axis=1)) < 6 / np.sqrt(len(draws)))
-    between = np.corrcoef(own) - np.eye(len(own))
-    assert np.abs(between).max() < 6 / np.sqrt(len(draws))
+    assert np.abs(np.corrcoef(own) - np.eye(len(own))).max() < 6 / np.sqrt(len(draws))
 
 
 def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_ones() -> None:
@@ -301,8 +299,7 @@ def test_a_gain_is_on_the_contacts_only() -> None:
 
 def test_a_thicker_film_than_is_stated_is_under_all_indenters() -> None:
     wrong = memscal.simulate_experiment(**FEW, **EXACT, thickness_factor=1.05)
-    thick = replace(PAPER_FILM, thickness=2.1e-3)
-    right = memscal.simulate_experiment(**FEW, **EXACT, film=thick)
+    right = memscal.simulate_experiment(**FEW, **EXACT, film=replace(PAPER_FILM, thickness=2.1e-3))
     for one, other in zip(wrong.scans.values(), right.scans.values(), strict=True):
         np.testing.assert_allclose(one.u_zz, other.u_zz, rtol=1e-12)
         assert (one.film.thickness, truth(one)["thickness"]) == (2e-3, pytest.approx(2.1e-3))

@@ -41,8 +41,7 @@ def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: Radia
     scan = simulate(
         raster=True, load=2.0, kernel=kernel, conversion_constant=3e-8, **options, **STILL
     )
-    total = scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2
-    assert total == pytest.approx(3e-8 * 2.0, rel=1e-6)
+    assert (scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2) == pytest.approx(3e-8 * 2.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
@@ -140,8 +139,7 @@ def test_repeats_at_one_load_share_their_signal_but_not_their_noise() -> None:
     assert scan.u_zz.shape == (3, 17)
     assert scan.normal_load is None
     assert np.unique(scan.u_zz).size == 51
-    still = simulate(repeats=3, points=17, **STILL)
-    assert np.ptp(still.u_zz, axis=0).max() == 0
+    assert np.ptp(simulate(repeats=3, points=17, **STILL).u_zz, axis=0).max() == 0
 
 
 def test_the_truth_travels_with_the_scan() -> None:

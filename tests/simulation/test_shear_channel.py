@@ -77,8 +77,7 @@ def test_the_laboratory_s_channel_is_calibrated_to_its_truth() -> None:
     for seed in range(10):
         scan = memscal.simulate(seed=seed, **BOTH)
         found = memscal.calibrate(scan, channel="xz", method="evidence").apparatus
-        u = found.parameters.uncertainty("gaussian_sigma")
-        off.append((found.gaussian_sigma - 400e-6) / u)
+        off.append((found.gaussian_sigma - 400e-6) / found.parameters.uncertainty("gaussian_sigma"))
     # Ten standard normal deviates, at a chance of one in ten thousand for each bound.
     assert abs(np.mean(off)) < 1.24
     assert np.sum(np.square(off)) < 35.6

@@ -24,8 +24,7 @@ def film_with(nu: float) -> ElasticFilm:
 
 @cache
 def elements(nu: float, width: float, rings: int = 120, refinement: int = 1) -> ElementFilm:
-    r = np.linspace(0, width * H, rings + 1)
-    return ElementFilm(film_with(nu), r, refinement=refinement)
+    return ElementFilm(film_with(nu), np.linspace(0, width * H, rings + 1), refinement=refinement)
 
 
 def tractions(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -87,8 +86,7 @@ def test_the_base_carries_the_load(nu: float) -> None:
     ours = elements(nu, 0.5)
     p, q = tractions(ours.r)
     load = ours.compliance.areas @ p
-    spectrum = ours.field(p, q).base_spectrum(np.array([0.0]))
-    assert spectrum[0] == pytest.approx(load, rel=1e-7)
+    assert ours.field(p, q).base_spectrum(np.array([0.0]))[0] == pytest.approx(load, rel=1e-7)
 
 
 def test_tractions_and_displacements_are_reciprocal() -> None:
@@ -161,8 +159,7 @@ def test_a_film_model_can_be_copied() -> None:
     p, q = tractions(ours.r)
     field = ours.field(p, q)
     r = np.array([0.0, 1e-3])
-    twin = copy.deepcopy(field)
-    assert_same_to_rounding(twin.depression(r), field.depression(r))
+    assert_same_to_rounding(copy.deepcopy(field).depression(r), field.depression(r))
     assert copy.deepcopy(ours).discretisation == ours.discretisation
 
 

@@ -32,14 +32,12 @@ def test_the_triangles_cover_the_film_once(name: str, radius: float) -> None:
     mesh = film_triangles(RINGS[name], radius=radius, thickness=1.0)
     assert areas(mesh).sum() == pytest.approx(radius, rel=1e-12)
     assert areas(mesh).min() > 0
-    used = np.unique(mesh.triangles)
-    np.testing.assert_array_equal(used, np.arange(mesh.points.shape[0]))
+    np.testing.assert_array_equal(np.unique(mesh.triangles), np.arange(mesh.points.shape[0]))
     # Every side belongs to two triangles, but those on the boundary: no node hangs.
     sides = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     pairs, count = np.unique(sides, axis=0, return_counts=True)
     (r1, d1), (r2, d2) = np.moveaxis(mesh.points[pairs[count == 1]], 0, -1)
-    straight = ((r1 == r2) & np.isin(r1, [0, radius])) | ((d1 == d2) & np.isin(d1, [0, 1]))
-    assert np.all(straight)
+    assert np.all(((r1 == r2) & np.isin(r1, [0, radius])) | ((d1 == d2) & np.isin(d1, [0, 1])))
     assert count.max() == 2
 
 

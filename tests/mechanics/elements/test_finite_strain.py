@@ -149,8 +149,7 @@ def test_a_mesh_of_the_state_carries_stress_and_displacement(
     for side, (start, end) in enumerate([(0, 1), (1, 2), (2, 0)]):
         middle = mesh.points[mesh.triangles[:, [start, end]]].mean(axis=1)
         assert mesh.points[mesh.triangles[:, 3 + side]] == pytest.approx(middle)
-    base = mesh.points[:, 1] < 1e-12
-    near = base & (mesh.points[:, 0] < 2e-3)
+    near = (mesh.points[:, 1] < 1e-12) & (mesh.points[:, 0] < 2e-3)
     expected = -state.inside.base_normal(mesh.points[near, 0])
     assert mesh.stress[near, 1] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
     assert mesh.displacement[:, 1].min() == pytest.approx(-state.depth, rel=1e-6)
