@@ -80,9 +80,7 @@ def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
         assert numbers[0] == pytest.approx(numbers[1], rel=2e-3)
 
 
-def test_the_way_from_contacts_to_friction_prints_what_is_shown(
-    fresh_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_way_from_contacts_to_friction_prints_what_is_shown(fresh_folder, monkeypatch) -> None:
     """The whole chain, from files only; in a cache of its own, so that it starts from cold."""
     monkeypatch.setenv("XDG_CACHE_HOME", os.fspath(fresh_folder / "cache"))
     lines = [shlex.split(line)[1:] for line in CHAIN.strip().splitlines()]
@@ -104,4 +102,4 @@ def test_the_example_in_python_runs() -> None:
     names: dict[str, object] = {}
     for example in EXAMPLES:
         exec(compile(example, "README.md", "exec"), names)
-    assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)  # type: ignore[attr-defined]
+    assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)

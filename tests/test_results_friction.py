@@ -102,7 +102,6 @@ def test_rows_hold_every_load_by_every_loading(found: FrictionComparison) -> Non
 
 def test_a_comparison_draws_itself_and_its_laws(found: FrictionComparison) -> None:
     assert len(found.plot().axes) == 4
-    assert found.interface is not None
     assert len(found.interface.plot().axes) == 3
     assert set(found.interface.messages) <= set(notes(found))
 

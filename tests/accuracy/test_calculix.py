@@ -44,9 +44,7 @@ def films(nu: float) -> tuple[Film, memscal.ElasticFilm]:
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
 @pytest.mark.parametrize("nu", RATIOS)
-def test_calculix_converges_to_the_rods_stiffness_and_base_stress(
-    nu: float, friction: float, tmp_path: Path
-) -> None:
+def test_calculix_converges_to_the_rods_stiffness_and_base_stress(nu, friction, tmp_path) -> None:
     theirs, ours = films(nu)
     contact = memscal.indent(ours, memscal.Rod(radius=ROD * 1e-3), load=1.0, friction=friction)
     stiffness = contact.load / contact.depth * 1e-3

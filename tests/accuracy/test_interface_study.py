@@ -148,7 +148,6 @@ def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
 
 def test_the_effective_coefficient_grows_with_the_load() -> None:
     for one in experiments(MACROSCOPIC, SLIP_LENGTH, "known"):
-        assert one.implied is not None
         assert np.all(np.diff(one.implied.friction[:, 1]) > 0)
         assert one.implied.friction[-1, 1] > 1.5 * one.implied.friction[0, 1]
 

@@ -33,9 +33,7 @@ def random_lattice(rng: np.random.Generator) -> Lattice:
 
 
 @given(count=st.integers(3, 24), spacing=st.floats(1e-5, 10.0), seed=SEEDS)
-def test_a_quarter_plane_gives_the_complex_transform_of_its_mirrored_plane(
-    count: int, spacing: float, seed: int
-) -> None:
+def test_a_quarter_plane_gives_the_complex_transform_of_its_mirrored_plane(count, spacing, seed):
     grid = EvenGrid(count, spacing)
     quarter = np.random.default_rng(seed).normal(size=(count, count))
     # One period of the plane, which the two edges share: 2 (count - 1) points from the axis on.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -104,11 +102,7 @@ def test_nodes_resolve_the_radii_that_they_are_made_for(product: float, k_max: f
         ),
     ],
 )
-def test_synthesis_inverts_transforms_known_in_closed_form(
-    function: Callable[[FloatArray], FloatArray],
-    transform: Callable[[FloatArray], FloatArray],
-    k_max: float,
-) -> None:
+def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, k_max) -> None:
     r = np.linspace(0.0, 30.0, 24).reshape(4, 6)
     wavenumbers = Wavenumbers.covering(k_max, 30.0)
     spectrum = RadialSpectrum(wavenumbers, transform(wavenumbers.k))

@@ -42,9 +42,7 @@ def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: 
         ((float("nan"),), (1e-3,), "add up to nan"),
     ],
 )
-def test_a_mixture_that_is_no_apparatus_function_is_refused(
-    weights: tuple[float, ...], sigmas: tuple[float, ...], problem: str
-) -> None:
+def test_a_mixture_that_is_no_apparatus_function_is_refused(weights, sigmas, problem) -> None:
     with pytest.raises(InputError, match=problem):
         GaussianMixture(weights, sigmas)
 

@@ -75,9 +75,7 @@ def reference(scan: Scan) -> StressProfile:
     return memscal.indent(scan.film, scan.indenter, load=scan.load).profile()
 
 
-def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(
-    problem: DivisionProblem, plain: PlainDivision
-) -> None:
+def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(problem, plain) -> None:
     quarter = WhiteNoise().divide(problem).field
     exact = gaussian(problem.grid.radius, np.sqrt(BLURRED_WIDTH**2 - STRESS_WIDTH**2))
     np.testing.assert_allclose(quarter, exact, atol=0.05 * exact.max())
@@ -85,9 +83,7 @@ def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(
     np.testing.assert_allclose(plain()[256:, 256:], quarter[:-1, :-1], atol=1e-6 * quarter.max())
 
 
-def test_a_quarter_plane_divides_faster_than_a_plain_complex_transform(
-    problem: DivisionProblem, plain: PlainDivision
-) -> None:
+def test_a_quarter_plane_divides_faster_than_a_plain_complex_transform(problem, plain) -> None:
     # Even against the bare quotient, without window or way back.
     def bare() -> FloatArray:
         return np.fft.fft2(plain.voltage) / (np.fft.fft2(plain.stress) + plain.noise2)
@@ -132,9 +128,7 @@ def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
     return np.asarray(fit)
 
 
-def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(
-    scan: Scan, reference: StressProfile
-) -> None:
+def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(scan, reference) -> None:
     apparatus = memscal.calibrate(scan, reference=reference).apparatus
     assert apparatus.conversion_constant == pytest.approx(1e-7, rel=0.03)
     assert apparatus.gaussian_sigma == pytest.approx(561e-6, rel=0.03)

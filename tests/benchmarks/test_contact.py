@@ -53,9 +53,7 @@ def plain_contact(problem: ContactProblem, depth: float) -> FloatArray:
     return whole
 
 
-def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(
-    smooth: ContactProblem,
-) -> None:
+def test_a_contact_costs_a_few_dense_solutions_and_less_than_least_squares(smooth) -> None:
     right = np.ones(smooth.size)
     depth = contact(smooth).depth
     assert depth == pytest.approx(43.766e-6, rel=1e-4)

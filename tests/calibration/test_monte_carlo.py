@@ -154,9 +154,7 @@ def test_poissons_ratio_never_exceeds_one_half_and_the_reason_says_so() -> None:
     assert not found.agrees
 
 
-def test_draws_do_not_depend_on_the_number_of_processes(
-    paper: Calibration, hundred: memscal.MonteCarlo
-) -> None:
+def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
     told: list[tuple[int, int]] = []
     two = memscal.monte_carlo(
         paper, draws=34, seed=8, workers=2, progress=lambda *numbers: told.append(numbers)
@@ -252,9 +250,7 @@ def test_draws_that_fail_are_left_out_and_told() -> None:
         ({"workers": 0}, "workers is 0"),
     ],
 )
-def test_numbers_that_make_no_sense_are_refused(
-    paper: Calibration, options: dict[str, object], named: str
-) -> None:
+def test_numbers_that_make_no_sense_are_refused(paper, options, named) -> None:
     with pytest.raises(memscal.MemscalError, match=named):
         memscal.monte_carlo(paper, **options)
 

@@ -66,9 +66,7 @@ def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there
 
 
 @given(seed=SEEDS, amplitude=st.floats(0.1, 10), weakest=st.floats(0.1, 10))
-def test_tikhonov_is_the_solution_of_its_normal_equations(
-    seed: int, amplitude: float, weakest: float
-) -> None:
+def test_tikhonov_is_the_solution_of_its_normal_equations(seed, amplitude, weakest) -> None:
     rng = np.random.default_rng(seed)
     grid = small_lattice()
     voltage, reference = rng.normal(size=(2, 7, 9))

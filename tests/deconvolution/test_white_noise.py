@@ -101,9 +101,7 @@ def noise_alone(
     return WhiteNoiseDraw(amplitude=amplitude, seed=seed).divide(problem).field
 
 
-def test_a_seed_gives_the_same_draw_and_another_seed_another(
-    gaussians: Callable, seed: int
-) -> None:
+def test_a_seed_gives_the_same_draw_and_another_seed_another(gaussians, seed) -> None:
     problem = gaussians().problem
     first = WhiteNoiseDraw(seed=seed).divide(problem).field
     np.random.default_rng(seed).normal(size=100)

@@ -60,9 +60,7 @@ def test_less_noise_resolves_more_and_the_relevant_band_lies_within_the_resolved
 
 @pytest.mark.parametrize("noise", [0.02, 0.005])
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), TAILS, RING])
-def test_within_the_band_the_data_speak_and_beyond_it_the_prior(
-    kernel: memscal.GaussianMixture, noise: float
-) -> None:
+def test_within_the_band_the_data_speak_and_beyond_it_the_prior(kernel, noise) -> None:
     places = np.array([0.8, 1.5])
     errors, kept = [], []
     for seed in range(16):

@@ -45,9 +45,7 @@ def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
 
 
 @pytest.mark.parametrize("channel", ["xz", "yz"])
-def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(
-    channel: str,
-) -> None:
+def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(channel) -> None:
     # The film's traction on every element of the base, weighed by G: in Cartesian coordinates,
     # with the indenter at (x, y) and the sensor at the centre.
     contact = memscal.indent(memscal.simulate().film, memscal.simulate().indenter, load=2.0)
@@ -148,7 +146,6 @@ def test_the_points_of_a_channel_are_its_own_voltages_and_noise() -> None:
     scan = shear_scan(seed=2)
     points = measured_points(scan, "xz")
     np.testing.assert_array_equal(points.u, scan.channels["u_xz"])
-    assert points.u_errors is not None
     np.testing.assert_array_equal(points.u_errors, scan.channels["u_xz_errors"])
     assert (points.order, measured_points(scan).order) == (1, 0)
     without = replace(scan, channels={"u_xz": scan.channels["u_xz"]})

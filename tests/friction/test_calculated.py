@@ -57,9 +57,7 @@ def normal(law: str) -> Build:
     ],
     ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"],
 )
-def test_interpolated_profiles_are_those_of_contacts_solved_between(
-    build: Build, grid: list[float], between: list[float]
-) -> None:
+def test_interpolated_profiles_are_those_of_contacts_solved_between(build, grid, between) -> None:
     family = build(FILM, SPHERE, list(LOADS), list(grid))
     solved = build(FILM, SPHERE, list(LOADS), between)
     for index, value in enumerate(between):
@@ -229,7 +227,7 @@ def test_a_request_that_makes_no_sense_is_refused(changed: dict[str, object], sa
     request = {"indenter": SPHERE, "loads": [0.34], "friction": [0.1], "reach": REACH} | changed
     film_indenter_loads = FILM, request.pop("indenter"), request.pop("loads")
     with pytest.raises(InputError, match=said):
-        amontons_family(*film_indenter_loads, **request)  # type: ignore[arg-type]
+        amontons_family(*film_indenter_loads, **request)
 
 
 def test_laws_without_meaning_are_refused() -> None:

@@ -60,7 +60,6 @@ def families(made: Experiment, kept: Path) -> dict[str, ProfileFamily]:
 
 
 def scaled(scan: Scan, factor: float, noise: float = 1.0) -> Scan:
-    assert scan.u_zz_errors is not None
     return replace(scan, u_zz=factor * scan.u_zz, u_zz_errors=noise * scan.u_zz_errors)
 
 
@@ -81,9 +80,7 @@ def test_every_load_meets_every_loading(found: memscal.FrictionComparison) -> No
     assert "dry, incremental: " in repr(found)
 
 
-def test_what_is_calculated_is_the_contact_blurred_by_g(
-    found: memscal.FrictionComparison, apparatus: memscal.ApparatusFunction, made: Experiment
-) -> None:
+def test_what_is_calculated_is_the_contact_blurred_by_g(found, apparatus, made) -> None:
     one = found.loads["incremental"][1]
     r = np.linspace(0.0, 30e-3, 1200)
     contact = memscal.indent(made.dry.film, made.dry.indenter, load=2.75, friction=0.3)
@@ -95,9 +92,7 @@ def test_what_is_calculated_is_the_contact_blurred_by_g(
     assert one.ratio == pytest.approx(one.s_max / one.p0_max)
 
 
-def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(
-    found: memscal.FrictionComparison,
-) -> None:
+def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(found) -> None:
     for one in found.loads["total"]:
         assert one.chi_square.shape == one.p_values.shape == (len(FRICTION),)
         assert one.chi_square.min() >= one.by_profile.least - 1e-6
@@ -106,9 +101,7 @@ def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(
         assert one.by_profile.chi_square[where] == pytest.approx(one.chi_square)
 
 
-def test_lubricated_contacts_are_found_frictionless_and_dry_ones_not(
-    found: memscal.FrictionComparison,
-) -> None:
+def test_lubricated_contacts_are_found_frictionless_and_dry_ones_not(found) -> None:
     for loading in LOADINGS:
         assert found.joint["lubricated"][loading].interval.low == 0
         assert found.joint["dry"][loading].interval.low > 0
@@ -136,9 +129,7 @@ def test_no_value_comes_without_interval_and_budget(found: memscal.FrictionCompa
             )
 
 
-def test_a_clean_experiment_passes_its_checks_of_friction(
-    found: memscal.FrictionComparison,
-) -> None:
+def test_a_clean_experiment_passes_its_checks_of_friction(found) -> None:
     assert {
         "applied_force_1",
         "profile_chi_square_4",
@@ -150,17 +141,13 @@ def test_a_clean_experiment_passes_its_checks_of_friction(
     assert "lubricated_frictionless" not in failed(found)
 
 
-def test_the_messages_say_synthetic_and_hold_the_macroscopic_coefficient_against_it(
-    found: memscal.FrictionComparison,
-) -> None:
+def test_the_messages_say_synthetic_and_hold_the_macroscopic_coefficient_against_it(found) -> None:
     kinds = [message.kind for message in found.messages]
     assert kinds.count("synthetic") == 1
     assert kinds.count("macroscopic") == len(found.loadings)
 
 
-def test_a_stress_beyond_full_stick_fails_checks(
-    made: Experiment, apparatus: memscal.ApparatusFunction, families: dict[str, ProfileFamily]
-) -> None:
+def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families) -> None:
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
     found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
@@ -168,18 +155,14 @@ def test_a_stress_beyond_full_stick_fails_checks(
     assert found.joint["dry"]["incremental"].value is None
 
 
-def test_noise_that_is_understated_fails_the_chi_square(
-    made: Experiment, apparatus: memscal.ApparatusFunction, families: dict[str, ProfileFamily]
-) -> None:
+def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, families) -> None:
     wrong = scaled(made.dry, 1.0, noise=0.25)
     found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
     assert "joint_chi_square_dry" in failed(found)
     assert found.joint["dry"]["incremental"].p_value < 1e-6
 
 
-def test_profiles_from_elsewhere_take_the_place_of_ours(
-    made: Experiment, apparatus: memscal.ApparatusFunction
-) -> None:
+def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus) -> None:
     tables = [
         contact.profile()
         for mu in (0.0, 0.3)
@@ -213,9 +196,7 @@ def test_an_artifact_of_another_channel_or_sensor_is_refused_unless_overridden(
     assert found.measured.overridden
 
 
-def test_scans_of_different_films_or_spheres_are_refused(
-    made: Experiment, apparatus: memscal.ApparatusFunction
-) -> None:
+def test_scans_of_different_films_or_spheres_are_refused(made, apparatus) -> None:
     film = replace(made.dry.film, young_modulus=2.3e6)
     with pytest.raises(InputError, match="another film or sphere"):
         memscal.compare([made.lubricated, replace(made.dry, film=film)], apparatus)
@@ -232,15 +213,13 @@ def test_scans_of_different_films_or_spheres_are_refused(
         ({"macroscopic": -0.1}, "macroscopic"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(
-    made: Experiment, apparatus: memscal.ApparatusFunction, options: dict[str, object], words: str
-) -> None:
+def test_options_that_make_no_sense_are_refused(made, apparatus, options, words) -> None:
     with pytest.raises(InputError, match=words):
         memscal.compare(made.lubricated, apparatus, **options)
 
 
 def test_what_is_no_scan_is_refused(apparatus: memscal.ApparatusFunction) -> None:
     with pytest.raises(InputError, match="where a Scan is needed"):
-        memscal.compare([1.0], apparatus)  # type: ignore[list-item]
+        memscal.compare([1.0], apparatus)
     with pytest.raises(InputError, match="no scan"):
         memscal.compare([], apparatus)

@@ -81,7 +81,6 @@ def test_friction_shows() -> None:
 
 def test_an_error_of_the_conversion_constant_scales_the_difference_alone() -> None:
     one = compared(0.2, 1)
-    assert one is not None
     noise = np.sqrt(2) * bare_points().noise[0] / CONVERSION
     assert one.difference_errors == pytest.approx(np.hypot(noise, 0.01 * one.difference))
     assert one.maximum_uncertainty == pytest.approx(

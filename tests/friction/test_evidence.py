@@ -32,9 +32,7 @@ def tables(residual: np.ndarray, systematic: np.ndarray, noise: np.ndarray) -> T
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(
-    seed: int,
-) -> None:
+def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(seed) -> None:
     rng = np.random.default_rng(seed)
     residual, systematic = rng.normal(size=12), rng.normal(size=(12, 3))
     noise = rng.uniform(0.3, 2.0, 12)
@@ -105,9 +103,7 @@ class Linear:
 
 @pytest.mark.parametrize("loads", [1, 2, 4])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(
-    seed: int, loads: int
-) -> None:
+def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, loads) -> None:
     # The systematic changes correlate the parameters: alone each is known ten times worse.
     model = Linear(seed, loads)
     exact, best, errors = model.exact()

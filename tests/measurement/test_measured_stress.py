@@ -142,7 +142,6 @@ def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
     ratios = []
     for seed in range(SEEDS):
         scan = contact_scan(seed)
-        assert scan.u_zz_errors is not None
         found = memscal.measure_stress(replace(scan, u_zz_errors=None), SENSOR)
         truth = float(scan.u_zz_errors[0, 0])
         ratios += [float(p.points["zz"].noise.min()) / truth for p in found.profiles]
@@ -193,10 +192,8 @@ def test_profiles_of_several_scans_know_theirs() -> None:
         ({"film": replace(EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
     ],
 )
-def test_what_does_not_belong_together_is_refused_by_both_names(
-    changes: dict[str, object], words: str
-) -> None:
-    scan = replace(contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)  # type: ignore[arg-type]
+def test_what_does_not_belong_together_is_refused_by_both_names(changes, words) -> None:
+    scan = replace(contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)
     with pytest.raises(InputError, match=rf"s\.h5 does not belong to the artifact: .*{words}"):
         memscal.measure_stress(scan, SENSOR)
 
@@ -256,7 +253,6 @@ def test_a_scan_that_ends_on_one_side_of_the_contact_is_refused() -> None:
 
 def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
     scan = contact_scan(load=(1.37,))
-    assert scan.normal_load is not None
     heavy = replace(scan, normal_load=scan.normal_load * 1e6, source=SourceFile("heavy.h5", ""))
     with pytest.raises(DomainError, match=r"heavy\.h5, 1\.37e\+06 N, dry"):
         memscal.measure_stress(heavy, SENSOR)
@@ -296,6 +292,6 @@ def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
 
 def test_what_is_no_scan_is_refused() -> None:
     with pytest.raises(InputError, match="a float where a Scan is needed"):
-        memscal.measure_stress([1.0], SENSOR)  # type: ignore[list-item]
+        memscal.measure_stress([1.0], SENSOR)
     with pytest.raises(InputError, match="no scan"):
         memscal.measure_stress([], SENSOR)

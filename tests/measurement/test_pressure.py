@@ -23,9 +23,7 @@ def hankel(order: int, profile: np.ndarray, r: np.ndarray, weights: np.ndarray) 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 3.5])
 @pytest.mark.parametrize("shear", [0.0, -0.4])
-def test_the_transform_is_that_of_pressure_and_shear_through_the_film(
-    exponent: float, shear: float
-) -> None:
+def test_the_transform_is_that_of_pressure_and_shear_through_the_film(exponent, shear) -> None:
     radius = WIDTH * math.sqrt(2 * (exponent + 2))
     r, weights = gauss_between(np.linspace(0.0, radius, 40), 16)
     pressure = (1 - (r / radius) ** 2) ** exponent

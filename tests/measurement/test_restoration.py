@@ -152,7 +152,6 @@ def test_the_direction_of_a_scan_changes_nothing() -> None:
 
 def test_a_wrong_unit_of_the_voltage_fails_the_force() -> None:
     scan = sphere_scan(pressed(), seed=1)
-    assert scan.u_zz_errors is not None
     in_mv = replace(scan, u_zz=1e3 * scan.u_zz, u_zz_errors=1e3 * scan.u_zz_errors)
     failed = {c.name for c in memscal.restore(in_mv, EXACT).checks if not c.passed}
     assert "restored_force" in failed
@@ -179,7 +178,6 @@ def test_a_spoilt_point_is_named_and_moves_little() -> None:
 def test_the_table_is_a_reference_with_uncertainties() -> None:
     found = restored(1.0, 0.0, 0)
     profile = found.profile()
-    assert profile.sigma_zz_errors is not None
     np.testing.assert_allclose(profile.sigma_zz_errors, found.stress_uncertainty(found.r))
     assert profile.load == found.scan.load
 
@@ -225,7 +223,7 @@ BAD = {
 def test_what_cannot_be_restored_is_refused_with_a_reason(case: str) -> None:
     scan, apparatus, text = BAD[case]
     with pytest.raises(memscal.MemscalError) as caught:
-        memscal.restore(scan, apparatus)  # type: ignore[arg-type]
+        memscal.restore(scan, apparatus)
     assert text in str(caught.value)
     assert caught.value.cure
 
@@ -233,7 +231,7 @@ def test_what_cannot_be_restored_is_refused_with_a_reason(case: str) -> None:
 @pytest.mark.parametrize("expected", [3, pressed(2.75)])
 def test_an_expected_stress_that_does_not_fit_is_refused(expected: object) -> None:
     with pytest.raises(memscal.MemscalError):
-        memscal.restore(SCAN, EXACT, expected=expected)  # type: ignore[arg-type]
+        memscal.restore(SCAN, EXACT, expected=expected)
 
 
 def test_a_radius_beyond_what_was_computed_is_refused() -> None:

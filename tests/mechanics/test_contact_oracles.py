@@ -47,9 +47,7 @@ def test_a_cone_on_a_thick_film_is_sneddon_s() -> None:
 
 @pytest.mark.parametrize("friction", [0.1, 1.0, math.inf])
 @pytest.mark.parametrize("loading", ["incremental", "total"])
-def test_friction_changes_nothing_on_an_incompressible_half_space(
-    friction: float, loading: str
-) -> None:
+def test_friction_changes_nothing_on_an_incompressible_half_space(friction, loading) -> None:
     thick = film(0.5, thickness=2.0)
     smooth = indent(thick, SPHERE, load=1e-2)
     rough = indent(thick, SPHERE, load=1e-2, friction=friction, loading=loading)
@@ -72,9 +70,7 @@ def test_a_thin_compressible_film_is_a_row_of_springs() -> None:
 
 
 @pytest.mark.parametrize(("friction", "grip"), [(0.0, 1), (math.inf, 4)])
-def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(
-    friction: float, grip: float
-) -> None:
+def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -> None:
     # w = -h^3 / 3G div grad p with a free surface, four times stiffer where both faces stick:
     # P = grip pi G a^6 / (32 R h^3), delta = a^2 / 4R.  The error falls as h/a.
     excess = []
@@ -143,7 +139,7 @@ def test_the_base_carries_the_load(friction: float, loading: str) -> None:
 def test_signorini_s_and_amontons_conditions_hold(nu: float, friction: float, loading: str) -> None:
     for contact in indent(film(nu), SPHERE, load=LOADS[1::2], friction=friction, loading=loading):
         a, peak = contact.contact_radius, contact.max_interface_stress
-        r = contact.traction.rings  # type: ignore[attr-defined]
+        r = contact.traction.rings
         p, q = contact.interface_pressure(r), contact.interface_shear(r)
         # What sticks may pull a little at the very edge of its contact: the last rings.
         assert p[r < 0.98 * a].min() >= 0
@@ -226,9 +222,7 @@ def test_a_load_that_outgrows_the_film_the_model_or_the_tip_is_refused() -> None
         indent(film(), short, load=1.0)
 
 
-def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(monkeypatch) -> None:
     monkeypatch.setattr("memscal.mechanics.solver.step._MOST_ITERATIONS", 4)
     with pytest.raises(ConvergenceError, match="did not settle") as caught:
         indent(film(0.3), SPHERE, load=[0.011, 1.111], friction=0.123, rings=64)

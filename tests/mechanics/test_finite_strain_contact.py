@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -42,8 +41,6 @@ def test_a_light_rod_stresses_the_base_as_in_the_linear_film() -> None:
         (SPHERE, {"load": 500.0}, DomainError, "contact would be"),
     ],
 )
-def test_what_is_not_modelled_at_finite_strain_is_refused(
-    indenter: Any, asked: dict[str, Any], error: type[Exception], message: str
-) -> None:
+def test_what_is_not_modelled_at_finite_strain_is_refused(indenter, asked, error, message) -> None:
     with pytest.raises(error, match=message):
         indent(FILM, indenter, **{"load": 0.1, "strain": "finite", **asked})

@@ -48,9 +48,7 @@ def test_a_film_that_cannot_be_is_refused_by_name(changes: dict[str, Any], named
 
 @pytest.mark.parametrize("radius", [0.0, -1e-3, float("nan"), float("inf")])
 @pytest.mark.parametrize("kind", [Rod, Sphere])
-def test_an_indenter_without_a_radius_is_refused_by_its_shape(
-    kind: type[Rod | Sphere], radius: float
-) -> None:
+def test_an_indenter_without_a_radius_is_refused_by_its_shape(kind, radius) -> None:
     with pytest.raises(InputError, match=f"{kind.__name__.lower()} radius"):
         kind(radius=radius)
 
@@ -118,8 +116,6 @@ def test_profiles_of_equal_tables_are_equal() -> None:
         ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0], "3 heights"),
     ],
 )
-def test_a_profile_that_cannot_touch_is_refused(
-    r: list[float], z: list[float], message: str
-) -> None:
+def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
     with pytest.raises(InputError, match=f"(?i){message}"):
         Profile(r=r, z=z)

@@ -38,7 +38,6 @@ def seed() -> int:
 
 
 def truth(scan: Scan) -> dict[str, Any]:
-    assert scan.synthetic is not None
     return dict(scan.synthetic)
 
 
@@ -58,7 +57,6 @@ def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int) ->
     options: dict[str, Any] = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
     options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
     scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)
-    assert scan.normal_load is not None
     contacts = memscal.indent(
         PAPER_FILM, PAPER_SPHERE, load=np.sort(scan.normal_load, axis=None), friction=0.15
     )
@@ -93,7 +91,6 @@ def test_the_noise_is_the_same_voltage_at_every_load(seed: int) -> None:
     options: dict[str, Any] = {"repeats": 40, "load": [0.34, 2.75], "load_scatter": 0.0}
     noisy, clean = (simulate_contacts(noise=s, seed=seed, **options) for s in (0.01, 0.0))
     stated = noisy.u_zz_errors
-    assert stated is not None
     assert np.ptp(stated) == 0
     largest = simulate_contacts(load=[2.75], **EXACT).u_zz.max()
     assert stated.flat[0] == pytest.approx(0.01 * largest, rel=1e-4)
@@ -109,8 +106,6 @@ def test_loads_and_places_scatter_as_stated_and_are_seen_in_the_voltage(seed: in
     options: dict[str, Any] = {"load": [0.69], "repeats": 80, **STILL, "seed": seed}
     exact = simulate_contacts(load_scatter=0.0, position_error=0.0, **options)
     loads = simulate_contacts(load_scatter=0.02, position_error=0.0, record_loads=True, **options)
-    assert loads.normal_load is not None
-    assert loads.normal_load_errors is not None
     np.testing.assert_allclose(loads.normal_load_errors, 0.002 * loads.normal_load)
     ratio = loads.normal_load / 0.69 - 1
     low, high = chi2.ppf([RARE, 1 - RARE], ratio.size) * (0.02**2 + 0.002**2)
@@ -194,9 +189,7 @@ def test_the_defaults_are_the_papers_scan() -> None:
         ({"kernel": 561e-6}, InputError, "transform"),
     ],
 )
-def test_what_cannot_be_scanned_is_refused(
-    options: dict[str, Any], error: type[Exception], problem: str
-) -> None:
+def test_what_cannot_be_scanned_is_refused(options, error, problem) -> None:
     with pytest.raises(error, match=problem):
         simulate_contacts(**{"load": [0.34], **options})
 
@@ -329,8 +322,6 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> No
         ({"repeats": 0}, "one row"),
     ],
 )
-def test_an_experiment_that_cannot_be_made_is_refused(
-    options: dict[str, Any], problem: str
-) -> None:
+def test_an_experiment_that_cannot_be_made_is_refused(options, problem) -> None:
     with pytest.raises(InputError, match=problem):
         memscal.simulate_experiment(**{**FEW, **options})

@@ -82,7 +82,6 @@ def test_offset_and_drift_are_shares_of_the_largest_signal() -> None:
     assert added.mean() == pytest.approx(0.02 * largest, rel=1e-9)
     assert added[-1] - added[0] == pytest.approx(0.01 * largest, rel=1e-9)
     np.testing.assert_allclose(np.diff(added, 2), 0.0, atol=1e-12 * largest)
-    assert scan.synthetic is not None
     assert scan.synthetic["baseline"] == pytest.approx(0.02 * largest)
     assert scan.synthetic["drift"] == pytest.approx(0.01 * largest)
 
@@ -95,7 +94,6 @@ def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed:
     assert noisy.u_zz_errors is not None
     stated = noisy.u_zz_errors
     assert np.ptp(stated) == 0
-    assert noisy.synthetic is not None
     assert noisy.synthetic["noise"] == stated.flat[0]
     largest = simulate(**{**options, **STILL}).u_zz[-1].max() / 1.5
     assert stated.flat[0] == pytest.approx(noise * largest, rel=1e-9)
@@ -127,7 +125,6 @@ def test_several_loads_give_a_repeat_each_in_proportion() -> None:
     assert scan.kind == "repeats"
     assert scan.u_zz.shape == (6, 17)
     loads = np.array([0.34, 0.34, 0.69, 0.69, 1.37, 1.37])
-    assert scan.normal_load is not None
     np.testing.assert_array_equal(scan.normal_load, np.tile(loads[:, None], 17))
     np.testing.assert_allclose(scan.u_zz / loads[:, None], np.tile(scan.u_zz[0] / 0.34, (6, 1)))
     assert scan.load == pytest.approx(0.8)
@@ -145,7 +142,6 @@ def test_repeats_at_one_load_share_their_signal_but_not_their_noise() -> None:
 def test_the_truth_travels_with_the_scan() -> None:
     scan = simulate(conversion_constant=2e-8, centre=(0.1e-3, 0.2e-3), seed=11, points=9)
     truth = scan.synthetic
-    assert truth is not None
     assert truth["conversion_constant"] == 2e-8
     assert truth["gaussian_sigma"] == 561e-6
     assert (truth["centre"], truth["centre_y"]) == (0.1e-3, 0.2e-3)
@@ -154,7 +150,6 @@ def test_the_truth_travels_with_the_scan() -> None:
     assert scan.indenter == PAPER_ROD
     assert "Synthetic" in scan.notes
     mixed = simulate(kernel=RING, points=9).synthetic
-    assert mixed is not None
     assert "gaussian_sigma" not in mixed
     assert mixed["kernel_weights"] == "1.8, -0.8"
     assert mixed["kernel_sigmas_um"] == "700, 450"
@@ -197,10 +192,8 @@ def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: s
 def test_the_stored_truth_rebuilds_the_kernel() -> None:
     kernel = GaussianMixture((1 / 3, 2 / 3), (0.5e-3, 1e-3))
     truth = simulate(kernel=kernel, points=9).synthetic
-    assert truth is not None
     assert tuple(float(w) for w in str(truth["kernel_weights"]).split(",")) == kernel.weights
     truth = simulate(kernel=DISC, points=9).synthetic
-    assert truth is not None
     assert "disc" in str(truth["kernel"])
     assert "gaussian_sigma" not in truth
     assert float(truth["kernel_radius_um"]) * 1e-6 == pytest.approx(DISC.radius)
@@ -227,7 +220,6 @@ class Own:
 def test_any_object_with_the_three_methods_is_a_kernel() -> None:
     own, disc = simulate(kernel=Own(), seed=3), simulate(kernel=DISC, seed=3)
     np.testing.assert_allclose(own.u_zz, disc.u_zz, rtol=1e-12)
-    assert own.synthetic is not None
     assert own.synthetic["kernel"] == "my own"
     assert own.synthetic["centre_of_mass"] == 0.0
 

@@ -138,9 +138,7 @@ def test_the_film_drapes_itself_around_the_rod(pressed_rods: tuple[Contact, ...]
     assert np.all(deepest.traction.pressures >= 0)
 
 
-def test_a_mesh_of_the_state_carries_stress_and_displacement(
-    pressed_rods: tuple[Contact, ...],
-) -> None:
+def test_a_mesh_of_the_state_carries_stress_and_displacement(pressed_rods) -> None:
     state = pressed_rods[-1]
     mesh = state.mesh()
     a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))

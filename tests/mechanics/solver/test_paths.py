@@ -48,7 +48,6 @@ def test_work_is_stored_or_lost_to_friction(nu: float, friction: float) -> None:
     previous = 0.0
     for contact in indent(film, SPHERE, load=[0.5, 2.0, 1.0, 2.0], friction=friction, rings=96):
         assert contact.work is not None
-        assert contact.dissipated_energy is not None
         assert contact.dissipated_energy > previous
         balance = contact.elastic_energy + contact.dissipated_energy
         assert contact.work == pytest.approx(balance, rel=2e-3)
@@ -104,8 +103,6 @@ def test_a_rod_slips_in_proportion_while_it_is_loaded() -> None:
     assert whole.stick_radius == pytest.approx(half.stick_radius, rel=1e-6)
     # On the way back a part sticks that had slipped: less is given back than was put in.
     assert back.depth > half.depth * 1.0001
-    assert back.work is not None
-    assert half.work is not None
     assert back.work > half.work
 
 
