@@ -82,8 +82,7 @@ def test_a_comparison_prints_tables_within_a_hundred_columns(found: FrictionComp
 
 def test_json_is_standard_and_says_null_and_why_where_there_is_no_value() -> None:
     bound = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
-    told = json.loads(json.dumps(bound.to_dict(), allow_nan=False))
-    for load in told["loads"]:
+    for load in json.loads(json.dumps(bound.to_dict(), allow_nan=False))["loads"]:
         readings = load["by_loading"]["incremental"]["effective_friction_coefficient"]
         for estimate in readings.values():
             assert (estimate["value"], estimate["interval"]["high"]) == (None, None)

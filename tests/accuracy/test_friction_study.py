@@ -150,8 +150,7 @@ def test_a_mistaken_gain_raises_friction_and_a_thicker_film_lowers_it() -> None:
     seeds = range(min(SEEDS, 16))
 
     def values(**mistakes: float) -> list[float]:
-        found = [outcome(0.1, seed, **mistakes).joint for seed in seeds]
-        return [one.best for one in found]
+        return [outcome(0.1, seed, **mistakes).joint.best for seed in seeds]
 
     clean = np.array(values())
     assert np.median(values(gain=1.05) - clean) > 0.01

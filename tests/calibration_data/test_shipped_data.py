@@ -151,8 +151,7 @@ def test_lines_loads_and_raster_give_the_same_conversion_constant(name, calibrat
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT])
 def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -> None:
     shipped, made = memscal.read_scan(DATA / name), memscal.read_scan(rebuilt / name)
-    arrays = ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors")
-    for field in arrays:
+    for field in ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
         expected, found = getattr(shipped, field), getattr(made, field)
         assert (expected is None) == (found is None), field
         if expected is not None:

@@ -63,8 +63,7 @@ def test_a_family_of_shear_is_that_of_contacts_between_its_values(cache: Path) -
     r = np.linspace(0.0, 8e-3, 41)
     for friction in (0.07, 0.22, 0.5):
         member = family.at(friction)
-        contacts = memscal.indent(film, sphere, load=LOADS, friction=friction)
-        for i, contact in enumerate(contacts):
+        for i, contact in enumerate(memscal.indent(film, sphere, load=LOADS, friction=friction)):
             found = family.wavenumbers.synthesise(member.spectra[0, i], r, order=1)
             exact = contact.base_shear(r)
             np.testing.assert_allclose(found, exact, atol=1e-3 * np.abs(exact).max())

@@ -34,8 +34,7 @@ def test_there_is_a_check_for_each_load_and_one_for_all() -> None:
     assert len(values) == len(measured(0).checks)
     assert values["applied_force_3"].meaning.startswith("1.37 N, dry: ")
     for name in names:
-        p = values[name].p_value
-        assert (p > 0.05) == (values[name].value < 1.96)
+        assert (values[name].p_value > 0.05) == (values[name].value < 1.96)
 
 
 def test_one_profile_has_no_check_of_all() -> None:

@@ -125,8 +125,7 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
 def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> None:
     """A contact that sticks follows its load by up to 40 % more than one that slides."""
     options = {**QUIET, "load_scatter": 0.03, "record_loads": True, "load_reading": 0.0}
-    found = measured(4, **options, state_noise=False, friction=friction)
-    for profile in found.profiles:
+    for profile in measured(4, **options, state_noise=False, friction=friction).profiles:
         truth = blurred(profile.load, profile.r, friction)
         np.testing.assert_allclose(profile.s_zz, truth, atol=2e-3 * truth.max())
 

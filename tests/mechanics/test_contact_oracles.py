@@ -93,11 +93,10 @@ def test_every_load_increment_is_a_flat_punch_s(nu: float, friction: float) -> N
     # What is in contact goes down together, and sticks, if it does, where it touched: between two
     # loads a contact is stiff as a rod of its radius (Mossakovskii's argument, on any film).
     path = indent(film(nu), SPHERE, load=list(np.linspace(1.0, 1.6, 7)), friction=friction)
-    radii = np.array([contact.contact_radius for contact in path])
     stiffness = [
         2 * film(nu).contact_modulus * a
         * solve_rod(a / 2e-3, nu, sticking=friction > 0).stiffness_factor
-        for a in radii
+        for a in np.array([contact.contact_radius for contact in path])
     ]  # fmt: skip
     depth = simpson(1 / np.array(stiffness), x=np.array([contact.load for contact in path]))
     # Where a film of nu = 0 sticks, its tractions oscillate towards the edge, which blurs it.

@@ -82,8 +82,7 @@ def test_the_laboratory_s_channel_is_calibrated_to_its_truth() -> None:
 
 
 def test_a_whole_experiment_has_the_channel_in_all_of_its_scans() -> None:
-    found = simulate_experiment(loads=[0.69], lubricated_loads=[0.69], **BOTH)
-    for scan in found.scans.values():
+    for scan in simulate_experiment(loads=[0.69], lubricated_loads=[0.69], **BOTH).scans.values():
         assert "u_xz" in scan.channels
         assert scan.synthetic["conversion_constant_xz"] == 4e-8
 
