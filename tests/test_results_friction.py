@@ -29,16 +29,10 @@ def reading(
     value: float | None, low: float, high: float | None, *, u: float | None = 0.02, **fields: Any
 ) -> BoundedEstimate:
     made = BoundedEstimate(
-        value=value,
-        standard_uncertainty=u,
-        interval=Interval(low, high),
-        reason="" if value is not None else "a lower bound",
-        values=np.array([0.0, 0.1, math.inf]),
-        chi_square=np.array([40.0, 30.0, 50.0]),
-        degrees=29,
-        least=30.0,
-        p_value=0.4,
-    )
+        value=value, standard_uncertainty=u, interval=Interval(low, high),
+        reason="" if value is not None else "a lower bound", values=np.array([0.0, 0.1, math.inf]),
+        chi_square=np.array([40.0, 30.0, 50.0]), degrees=29, least=30.0, p_value=0.4,
+    )  # fmt: skip
     return replace(made, **fields)
 
 

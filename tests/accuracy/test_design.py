@@ -77,15 +77,10 @@ def study(number: int) -> Study:
     stated, found = [], []
     for seed in range(SEEDS):
         scan = memscal.simulate(
-            film=plan.film,
-            kernel=plan.kernel,
-            half_range=plan.step * (plan.positions - 1) / 2,
-            points=plan.positions,
-            repeats=plan.repeats,
-            noise=plan.noise,
-            load_uncertainty=plan.load_uncertainty,
-            seed=seed,
-        )
+            film=plan.film, kernel=plan.kernel, half_range=plan.step * (plan.positions - 1) / 2,
+            points=plan.positions, repeats=plan.repeats, noise=plan.noise,
+            load_uncertainty=plan.load_uncertainty, seed=seed,
+        )  # fmt: skip
         result = memscal.calibrate(scan, method="evidence").apparatus
         profile = result.radial_profile
         stated.append(shares(result.parameters, profile.r, profile.g_errors, sigma))

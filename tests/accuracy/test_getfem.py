@@ -51,18 +51,10 @@ def python() -> str:
 def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> list[dict[str, Any]]:
     """States of the paper's sphere and film at the paper's loads, in mm, N and MPa."""
     case = {
-        "young_modulus": 2.2,
-        "poisson_ratio": 0.5,
-        "thickness": 2.0,
-        "radius": 128.8,
-        "friction": min(friction, STICKING),
-        "loads": LOADS,
-        "steps": steps,
-        "contact": 4.2,
-        "step": step,
-        "layers": LAYERS,
-        "first_depth": 2e-3,
-    }
+        "young_modulus": 2.2, "poisson_ratio": 0.5, "thickness": 2.0, "radius": 128.8,
+        "friction": min(friction, STICKING), "loads": LOADS, "steps": steps, "contact": 4.2,
+        "step": step, "layers": LAYERS, "first_depth": 2e-3,
+    }  # fmt: skip
     done = subprocess.run(
         [python, str(PROGRAM)],
         input=json.dumps(case),

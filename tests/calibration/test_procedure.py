@@ -294,14 +294,9 @@ def test_lengths_and_voltages_of_any_size_give_the_same() -> None:
     small = simulated(
         film=replace(large.film, thickness=large.film.thickness * 1e-2),
         rod=memscal.Rod(radius=large.indenter.radius * 1e-2),
-        kernel=memscal.GaussianMixture((1.0,), (SIGMA * 1e-2,)),
-        half_range=8e-5,
-        centre=(0.14e-5, 0.0),
-        load=1e-4,
-        conversion_constant=1e-2,
-        noise=0.005,
-        seed=3,
-    )
+        kernel=memscal.GaussianMixture((1.0,), (SIGMA * 1e-2,)), half_range=8e-5,
+        centre=(0.14e-5, 0.0), load=1e-4, conversion_constant=1e-2, noise=0.005, seed=3,
+    )  # fmt: skip
     one, other = memscal.calibrate(large).apparatus, memscal.calibrate(small).apparatus
     assert other.gaussian_sigma == pytest.approx(one.gaussian_sigma * 1e-2, rel=1e-6)
     assert other.conversion_constant == pytest.approx(one.conversion_constant * 1e5, rel=1e-6)

@@ -30,15 +30,9 @@ def found_and_searched(
     assert found is not None
     robust = np.isfinite(knee)
     searched = least_squares(
-        lambda p: curve(p) - data,
-        start,
-        jac=slope,
-        loss="soft_l1" if robust else "linear",
-        f_scale=knee if robust else 1.0,
-        xtol=1e-14,
-        ftol=1e-14,
-        gtol=1e-14,
-    )
+        lambda p: curve(p) - data, start, jac=slope, loss="soft_l1" if robust else "linear",
+        f_scale=knee if robust else 1.0, xtol=1e-14, ftol=1e-14, gtol=1e-14,
+    )  # fmt: skip
     return found, searched.x
 
 

@@ -23,18 +23,10 @@ def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
     """Points anywhere on the plane, at a load of 2 N."""
     n = x.size
     return ScanPoints(
-        x=x,
-        y=y,
-        u=np.zeros(n),
-        load=np.full(n, 2.0),
-        u_errors=None,
-        x_errors=np.zeros(n),
-        repeat=np.zeros(n, dtype=np.intp),
-        scan=np.zeros(n, dtype=np.intp),
-        free=np.array([[True, True]]),
-        missing=0,
-        channel=channel,
-    )
+        x=x, y=y, u=np.zeros(n), load=np.full(n, 2.0), u_errors=None, x_errors=np.zeros(n),
+        repeat=np.zeros(n, dtype=np.intp), scan=np.zeros(n, dtype=np.intp),
+        free=np.array([[True, True]]), missing=0, channel=channel,
+    )  # fmt: skip
 
 
 def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:

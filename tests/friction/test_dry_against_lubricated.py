@@ -25,14 +25,10 @@ def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
     stress = points.u / CONVERSION
     noise = np.diag((points.noise / CONVERSION) ** 2)
     return SimpleNamespace(
-        lubrication=lubrication,
-        load=load,
-        x=points.offset,
-        s_zz=stress,
+        lubrication=lubrication, load=load, x=points.offset, s_zz=stress,
         covariances={"noise": noise, "conversion_constant": 1e-4 * np.outer(stress, stress)},
-        maximum=float(stress.max()),
-        maximum_budget={"noise": 100.0, "apparatus": 500.0},
-    )
+        maximum=float(stress.max()), maximum_budget={"noise": 100.0, "apparatus": 500.0},
+    )  # fmt: skip
 
 
 def compared(

@@ -31,14 +31,9 @@ KERNEL = GaussianMixture(sigmas=(400e-6,))
 
 def experiment(friction: float, seed: int) -> Experiment:
     return memscal.simulate_experiment(
-        friction=friction,
-        loads=LOADS,
-        lubricated_loads=LOADS[:1],
-        channels=("zz", "xz"),
-        shear_kernel=KERNEL,
-        draw_inputs=True,
-        seed=seed,
-    )
+        friction=friction, loads=LOADS, lubricated_loads=LOADS[:1], channels=("zz", "xz"),
+        shear_kernel=KERNEL, draw_inputs=True, seed=seed,
+    )  # fmt: skip
 
 
 def measured_with(made: Experiment) -> tuple[MeasuredStress, ApparatusFunction]:

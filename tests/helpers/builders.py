@@ -41,21 +41,11 @@ def make_profile(**changes: Any) -> StressProfile:
     width = 1.0e-3
     sigma = np.exp(-(r**2) / (2 * width**2)) / (2 * np.pi * width**2)
     profile = StressProfile(
-        r=r,
-        sigma_zz=sigma,
-        sigma_rz=sigma * r / width * 0.1,
-        load=1.0,
-        depth=0.587e-3,
-        contact_radius=0.25e-3,
-        stick_radius=0.0,
-        friction_coefficient=0.0,
-        loading="incremental",
-        film=make_film(),
-        indenter=Rod(radius=0.25e-3),
-        solver="closed form",
-        discretisation="none",
+        r=r, sigma_zz=sigma, sigma_rz=sigma * r / width * 0.1, load=1.0, depth=0.587e-3,
+        contact_radius=0.25e-3, stick_radius=0.0, friction_coefficient=0.0, loading="incremental",
+        film=make_film(), indenter=Rod(radius=0.25e-3), solver="closed form", discretisation="none",
         convergence=1e-9,
-    )
+    )  # fmt: skip
     return replace(profile, **changes)
 
 
@@ -74,25 +64,16 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
     u = u.copy()
     u[..., 5] = np.nan
     scan = Scan(
-        x=x,
-        y=y if kind in ("raster", "points") else None,
-        repeat=np.arange(33) % 3 + 1 if kind == "points" else None,
-        u_zz=u,
-        u_zz_errors=np.full(u.shape, 1e-5),
-        normal_load=np.full(u.shape, 1.01),
-        channels={"u_xz": 0.1 * u},
-        load=1.0,
-        load_uncertainty=0.01,
-        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6),
-        film=make_film(),
-        sensor=StressSensor(name="S1", model="MEMS", channel="zz"),
-        title="A scan",
-        start_time="2024-01-02T03:04:05+00:00",
-        end_time="2024-01-02T04:04:05+00:00",
-        notes="Two lines\nof notes, with an é.",
-        reference=make_profile(),
+        x=x, y=y if kind in ("raster", "points") else None,
+        repeat=np.arange(33) % 3 + 1 if kind == "points" else None, u_zz=u,
+        u_zz_errors=np.full(u.shape, 1e-5), normal_load=np.full(u.shape, 1.01),
+        channels={"u_xz": 0.1 * u}, load=1.0, load_uncertainty=0.01,
+        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6), film=make_film(),
+        sensor=StressSensor(name="S1", model="MEMS", channel="zz"), title="A scan",
+        start_time="2024-01-02T03:04:05+00:00", end_time="2024-01-02T04:04:05+00:00",
+        notes="Two lines\nof notes, with an é.", reference=make_profile(),
         synthetic={"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "shape": "gaussian"},
-    )
+    )  # fmt: skip
     return replace(scan, **changes)
 
 

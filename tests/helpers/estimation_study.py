@@ -96,15 +96,10 @@ class Case:
     def scan(self, seed: int) -> Scan:
         """Return one scan; the seeds of different cases have nothing in common."""
         return simulated(
-            kernel=self.kernel,
-            noise=self.noise,
-            points=self.points,
-            repeats=self.repeats,
-            centre=(self.centre, 0.0),
-            baseline=0.01 if self.off else 0.0,
-            drift=0.005 if self.off else 0.0,
-            seed=crc32(self.name.encode()) + seed,
-        )
+            kernel=self.kernel, noise=self.noise, points=self.points, repeats=self.repeats,
+            centre=(self.centre, 0.0), baseline=0.01 if self.off else 0.0,
+            drift=0.005 if self.off else 0.0, seed=crc32(self.name.encode()) + seed,
+        )  # fmt: skip
 
 
 _GAUSSIAN = ((0.001, 0.02), (0.005, 0.06), (0.02, 0.15))
@@ -138,16 +133,12 @@ def _cases() -> Iterator[Case]:
     yield Case(*middle, 0.005, 0.5e-3, 1, False)
     yield Case(*wide, 0.02, 0.5e-3, 2, True)
     others = [
-        _disc(0.8, 0.3),
-        _sum("mixture", (0.75, 0.25), 0.5, 1.0),
-        _sum("ring", (1.3, -0.3), 0.6, 0.3),
-        _disc(0.6, 0.25),
-        _sum("mixture", (0.6, 0.4), 0.45, 0.9),
-        _sum("ring", (1.4, -0.4), 0.55, 0.3),
-        _disc(1.0, 0.3),
-        _sum("mixture", (0.85, 0.15), 0.55, 1.3),
+        _disc(0.8, 0.3), _sum("mixture", (0.75, 0.25), 0.5, 1.0),
+        _sum("ring", (1.3, -0.3), 0.6, 0.3), _disc(0.6, 0.25),
+        _sum("mixture", (0.6, 0.4), 0.45, 0.9), _sum("ring", (1.4, -0.4), 0.55, 0.3),
+        _disc(1.0, 0.3), _sum("mixture", (0.85, 0.15), 0.55, 1.3),
         _sum("ring", (1.25, -0.25), 0.7, 0.35),
-    ]
+    ]  # fmt: skip
     others_scans = [(0.001, 0.25e-3, 1), (0.005, 0.25e-3, 1), (0.02, 0.25e-3, 3)]
     others_scans += [(0.003, 0.5e-3, 3), (0.005, 0.5e-3, 2), (0.001, 0.5e-3, 1)]
     for i, kernel in enumerate(others):

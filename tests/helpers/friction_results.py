@@ -53,18 +53,11 @@ def reading(
     value = None if high is None else float(values[np.argmin(chi_square)])
     spread = None if value is None else float(np.ptp(close)) / 2 or 0.01
     return BoundedEstimate(
-        value=value,
-        standard_uncertainty=spread,
-        interval=Interval(float(inside[0]), high),
+        value=value, standard_uncertainty=spread, interval=Interval(float(inside[0]), high),
         reason="" if value is not None else "A large coefficient is not excluded: a lower bound.",
         budget={} if spread is None else {"noise": 0.8 * spread, "thickness": 0.6 * spread},
-        values=values,
-        chi_square=chi_square,
-        degrees=degrees,
-        least=least,
-        p_value=0.31,
-        **fields,
-    )
+        values=values, chi_square=chi_square, degrees=degrees, least=least, p_value=0.31, **fields,
+    )  # fmt: skip
 
 
 def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -> Any:
@@ -77,18 +70,10 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
     errors = np.maximum(errors * np.exp(-r / 2e-3), 2e-4 * clean.max())
     top = float(clean.max())
     return SimpleNamespace(
-        scan=_scan(lubrication),
-        lubrication=lubrication,
-        x=x,
-        r=r,
-        s_zz=clean + rng.normal(0.0, errors),
-        s_zz_errors=errors,
-        load=load,
-        force=load * 1.003,
-        force_uncertainty=0.01 * load,
-        maximum=top,
-        maximum_uncertainty=0.01 * top,
-    )
+        scan=_scan(lubrication), lubrication=lubrication, x=x, r=r,
+        s_zz=clean + rng.normal(0.0, errors), s_zz_errors=errors, load=load, force=load * 1.003,
+        force_uncertainty=0.01 * load, maximum=top, maximum_uncertainty=0.01 * top,
+    )  # fmt: skip
 
 
 def _scan(lubrication: str) -> Any:
@@ -117,24 +102,16 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> LoadCompari
     low, high = calculated[0], calculated[-1]
     between = np.clip(profile.s_zz, np.minimum(low, high), np.maximum(low, high))
     return LoadComparison(
-        profile=profile,
-        loading=loading,
-        s_max=profile.maximum,
-        s_max_uncertainty=profile.maximum_uncertainty,
-        p0_max=p0,
-        p0_max_uncertainty=_COMMON * p0,
-        ratio=profile.maximum / p0,
-        ratio_uncertainty=0.012,
-        calculated=calculated,
+        profile=profile, loading=loading, s_max=profile.maximum,
+        s_max_uncertainty=profile.maximum_uncertainty, p0_max=p0, p0_max_uncertainty=_COMMON * p0,
+        ratio=profile.maximum / p0, ratio_uncertainty=0.012, calculated=calculated,
         calculated_errors=_COMMON * calculated,
         p_max=np.array([float(stress(0.0, load, mu, loading)) for mu in grid]),
-        chi_square=np.array([misfit(mu) for mu in grid]),
-        p_values=np.full(grid.size, 0.2),
+        chi_square=np.array([misfit(mu) for mu in grid]), p_values=np.full(grid.size, 0.2),
         degrees=29,
         bracketed=float((np.abs(profile.s_zz - between) <= 1.96 * profile.s_zz_errors).mean()),
-        by_maximum=reading(fine, datum, degrees=0),
-        by_profile=reading(fine, curve),
-    )
+        by_maximum=reading(fine, datum, degrees=0), by_profile=reading(fine, curve),
+    )  # fmt: skip
 
 
 def comparison(
@@ -176,15 +153,10 @@ def comparison(
         overridden=(),
     )
     given: dict[str, Any] = {
-        "measured": measured,
-        "friction": friction_grid,
-        "loads": by_loading,
-        "joint": joint,
-        "dry_against_lubricated": _differences(profiles),
-        "macroscopic": macroscopic,
-        "checks": checks,
-        "messages": (),
-    }
+        "measured": measured, "friction": friction_grid, "loads": by_loading, "joint": joint,
+        "dry_against_lubricated": _differences(profiles), "macroscopic": macroscopic,
+        "checks": checks, "messages": (),
+    }  # fmt: skip
     return FrictionComparison(**(given | fields))
 
 

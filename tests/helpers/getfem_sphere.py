@@ -185,15 +185,11 @@ class Film:
             "load": self.integral("X(1)*pressure", TOP),
             "depth": float(self.model.variable("depth")[0]),
             "stick_radius": float(r[slides & (r > 0)].min(initial=self.contact)),
-            "iterations": iterations,
-            "r": r.tolist(),
-            "pressure": pressure.tolist(),
-            "shear": shear.tolist(),
-            "base_r": base_r.tolist(),
-            "base_normal": (-base_normal).tolist(),
-            "base_shear_r": shear_r.tolist(),
+            "iterations": iterations, "r": r.tolist(), "pressure": pressure.tolist(),
+            "shear": shear.tolist(), "base_r": base_r.tolist(),
+            "base_normal": (-base_normal).tolist(), "base_shear_r": shear_r.tolist(),
             "base_shear": (-base_shear).tolist(),
-        }
+        }  # fmt: skip
 
 
 def increments(loads, steps):

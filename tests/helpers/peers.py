@@ -129,14 +129,9 @@ def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
     response /= response.sum(axis=1).max()
     with others_warnings():
         fit = dl.snlls(
-            voltage / voltage.max(),
-            response,
-            lbl=np.zeros(ring.size),
-            reg=True,
-            regparam="aic",
-            regop=dl.regoperator(ring / RING_STEP, 2),
-            uq=False,
-        )
+            voltage / voltage.max(), response, lbl=np.zeros(ring.size), reg=True, regparam="aic",
+            regop=dl.regoperator(ring / RING_STEP, 2), uq=False,
+        )  # fmt: skip
     return np.interp(RADII, ring, fit.lin) / (area @ fit.lin)
 
 

@@ -105,14 +105,9 @@ def sphere_scan(
     u = signal + top * (0.01 + 0.0025 * x / half_range + rng.normal(0.0, noise, x.size))
     assert isinstance(contact.indenter, memscal.Sphere | memscal.Rod)
     return Scan(
-        x=x,
-        u_zz=u,
-        u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
-        load=contact.load,
-        indenter=contact.indenter,
-        film=contact.film,
-        sensor=SENSOR,
-    )
+        x=x, u_zz=u, u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
+        load=contact.load, indenter=contact.indenter, film=contact.film, sensor=SENSOR,
+    )  # fmt: skip
 
 
 def known_apparatus(
