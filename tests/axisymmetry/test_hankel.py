@@ -109,14 +109,6 @@ def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, 
     np.testing.assert_allclose(spectrum.at(r), function(r), atol=1e-12)
 
 
-@pytest.mark.parametrize("r_max", [0.5, 3.0, 200.0])
-def test_the_integral_is_the_transform_at_zero(r_max: float) -> None:
-    # A ring: one Gaussian taken off another; its integral over the plane is 4 pi - pi.
-    k = Wavenumbers.covering(12.0, r_max)
-    ring = RadialSpectrum(k, 4 * np.pi * np.exp(-(k.k**2)) - np.pi * np.exp(-(k.k**2) / 4))
-    assert ring.integral == pytest.approx(3 * np.pi, rel=1e-10)
-
-
 @pytest.mark.parametrize("width", [5e-3, 3e-3, 1e-3])
 def test_a_narrow_peak_in_a_long_table_is_transformed_as_well_as_it_is_tabulated(width: float):
     r = np.concatenate([np.linspace(0, 10 * width, 400), np.linspace(10 * width, 8, 400)[1:]])

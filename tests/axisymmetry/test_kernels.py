@@ -86,10 +86,6 @@ def test_a_disc_of_no_size_is_its_gaussian_and_one_far_away_is_zero() -> None:
     np.testing.assert_allclose(far, 0.0, atol=1e-12 / 0.8e-3**2)
 
 
-def test_no_radii_give_no_values() -> None:
-    assert SmoothedDisc(radius=1e-3, sigma=0.3e-3).radial(np.empty((0, 3))).shape == (0, 3)
-
-
 @pytest.mark.parametrize(
     ("radius", "sigma", "problem"),
     [

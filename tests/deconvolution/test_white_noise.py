@@ -101,14 +101,6 @@ def noise_alone(
     return WhiteNoiseDraw(amplitude=amplitude, seed=seed).divide(problem).field
 
 
-def test_a_seed_gives_the_same_draw_and_another_seed_another(gaussians, seed) -> None:
-    problem = gaussians().problem
-    first = WhiteNoiseDraw(seed=seed).divide(problem).field
-    np.random.default_rng(seed).normal(size=100)
-    np.testing.assert_array_equal(first, WhiteNoiseDraw(seed=seed).divide(problem).field)
-    assert not np.array_equal(first, WhiteNoiseDraw(seed=seed + 1).divide(problem).field)
-
-
 @pytest.mark.parametrize(("weakest", "error"), [(1e-3, 0.03), (1e-5, 5e-3), (1e-7, 1e-3)])
 def test_without_noise_the_quotient_is_the_kernel_up_to_what_the_window_takes(
     on_each_grid: Callable, weakest: float, error: float

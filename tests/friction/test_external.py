@@ -58,12 +58,6 @@ def test_a_table_serves_a_load_within_one_percent_in_proportion() -> None:
     assert family.loads.tolist() == asked
 
 
-def test_the_order_of_the_tables_does_not_matter() -> None:
-    one = external_family(tables(), LOADS, reach=REACH)
-    other = external_family(tables()[::-1], LOADS, reach=REACH)
-    assert_same_to_rounding(one.spectra, other.spectra)
-
-
 def test_tables_that_say_nothing_of_film_and_sphere_count_as_proportional() -> None:
     family = external_family([bare(one) for one in tables()], LOADS, reach=REACH)
     ours = external_family(tables(), LOADS, reach=REACH)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -92,15 +91,6 @@ def test_some_of_the_loads_are_picked_in_the_order_given() -> None:
     assert turned.loads.tolist() == [1.0, 0.5]
     assert_same_to_rounding(turned.at(0.2).spectra, one.at(0.2).spectra[:, ::-1])
     assert_same_to_rounding(turned.changes["thickness"], one.changes["thickness"][:, ::-1])
-
-
-def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
-    one = family()
-    with pytest.raises(ValueError, match="read-only"):
-        one.spectra[0, 0, 0] = 0.0
-    with pytest.raises(TypeError):
-        one.changes["thickness"] = one.spectra
-    assert_same_to_rounding(pickle.loads(pickle.dumps(one)).at(0.2).spectra, one.at(0.2).spectra)
 
 
 @pytest.mark.parametrize(

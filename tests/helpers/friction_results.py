@@ -129,9 +129,7 @@ def comparison(
         for lubrication in lubrications
     }
     checks = tuple(
-        memscal.QualityCheck(
-            name, 2.4 if bad else 0.7, 1.0, not bad, "The force is not the load.", 0.4
-        )
+        memscal.QualityCheck(name, 2.4 if bad else 0.7, 1.0, not bad, "Not the load.", 0.4)
         for name, bad in (("restored_force", False), ("bracketing", failed))
     )
     measured = SimpleNamespace(
@@ -195,9 +193,7 @@ def _laws(
         lubrication=lubrication,
         loads=np.array(LOADS),
         laws=laws,
-        factors=(
-            memscal.BayesFactor(names[better], names[worse], abs(evidence[-1] - evidence[0])),
-        ),
+        factors=(factor,),
         length=memscal.BoundedEstimate(
             value=length,
             standard_uncertainty=0.1 * length,

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.special import ellipe, ellipk, j0, j1
 
 from memscal.mechanics.half_space import coupling_integrals, singular_integrals
-from memscal.mechanics.rings import RingTraction, hat_transforms
+from memscal.mechanics.rings import hat_transforms
 
 FloatArray = NDArray[np.float64]
 
@@ -44,11 +44,6 @@ def test_a_linear_outward_traction_is_integrated_as_adaptive_quadrature_does(rin
         assert found[0] == pytest.approx(exact, rel=1e-8)
 
 
-def test_on_the_axis_nothing_moves_sideways() -> None:
-    assert np.all(singular_integrals(np.zeros(1), EVEN)[1] == 0)
-    assert np.all(coupling_integrals(np.zeros(1), EVEN)[1] == 0)
-
-
 def test_the_coupling_is_elementary() -> None:
     x = np.array([0.0, 0.013, 0.5, 1.0, 3.0])
     beyond, within = coupling_integrals(x, EVEN)
@@ -63,14 +58,3 @@ def test_the_transforms_of_the_hats_sum_to_those_of_simple_tractions() -> None:
     of_pressure, of_shear = hat_transforms(EVEN, k)
     np.testing.assert_allclose(of_pressure @ np.ones(41), j1(k) / k, rtol=1e-12)
     np.testing.assert_allclose(of_shear @ EVEN, (2 * j1(k) / k - j0(k)) / k, atol=1e-14)
-
-
-def test_a_ring_traction_transforms_as_the_sum_of_its_hats() -> None:
-    p, q = np.random.default_rng().uniform(size=(2, EVEN.size))
-    traction = RingTraction(EVEN, p, q)
-    k = np.array([[0.0, 1.0], [7.0, 30.0]])
-    of_pressure, of_shear = hat_transforms(EVEN, k.ravel())
-    np.testing.assert_allclose(traction.pressure_transform(k).ravel(), of_pressure @ p, rtol=1e-11)
-    np.testing.assert_allclose(
-        traction.shear_transform(k).ravel(), of_shear @ q, rtol=1e-11, atol=1e-16
-    )

@@ -95,14 +95,6 @@ def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
     assert repr(profile) == "<Profile: 4 radii to 3 mm, heights to 9 um>"
 
 
-def test_profiles_of_equal_tables_are_equal() -> None:
-    one, same = (Profile.from_function(lambda r: r**2, extent=1e-3) for _ in range(2))
-    other = Profile.from_function(lambda r: 2 * r**2, extent=1e-3)
-    assert one == same
-    assert hash(one) == hash(same)
-    assert one != other
-
-
 @pytest.mark.parametrize(
     ("r", "z", "message"),
     [

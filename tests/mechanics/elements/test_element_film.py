@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 from functools import cache
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
 
 from memscal.errors import DomainError
 from memscal.mechanics.elements.element_film import ElementFilm
@@ -152,15 +150,6 @@ def test_beyond_the_edge_there_is_neither_stress_nor_surface() -> None:
     assert field.base_shear(np.array([[26e-3]]))[0, 0] == 0
     with pytest.raises(DomainError, match=r"no surface at 0\.026 m: the film ends at 0\.025 m"):
         field.depression(np.array([1e-3, 26e-3]))
-
-
-def test_a_film_model_can_be_copied() -> None:
-    ours = elements(0.5, 0.5)
-    p, q = tractions(ours.r)
-    field = ours.field(p, q)
-    r = np.array([0.0, 1e-3])
-    assert_same_to_rounding(copy.deepcopy(field).depression(r), field.depression(r))
-    assert copy.deepcopy(ours).discretisation == ours.discretisation
 
 
 def test_a_ring_beyond_the_edge_is_refused() -> None:

@@ -50,26 +50,3 @@ def test_corners_on_the_surface_are_rings_and_the_last_ring_is_one(name: str) ->
     assert inside[-1] == rings[-1]
     # A quartic has four intervals between its nodes: no ring is without a node of its own.
     assert np.max(np.diff(np.searchsorted(rings, inside))) <= 2
-
-
-@pytest.mark.parametrize("name", ["even", "edge"])
-def test_no_triangle_is_flat_where_the_rings_grade_gently(name: str) -> None:
-    mesh = film_triangles(RINGS[name], radius=12.5, thickness=1.0)
-    assert quality(mesh).min() > 0.1
-    assert np.median(quality(mesh)) > 0.7
-
-
-def test_twice_as_many_rings_cost_less_than_twice_as_many_triangles() -> None:
-    few, many = (
-        film_triangles(np.linspace(0, 1, n + 1), radius=12.5, thickness=1.0).triangles.shape[0]
-        for n in (200, 400)
-    )
-    assert few < 800
-    assert many < 1.8 * few
-
-
-def test_refinement_shortens_all_sides() -> None:
-    meshes = [film_triangles(EVEN, radius=12.5, thickness=1.0, refinement=n) for n in (1, 2, 4)]
-    longest = [areas(mesh).max() for mesh in meshes]
-    assert longest[1] < longest[0] / 2.5
-    assert longest[2] < longest[1] / 2.5
