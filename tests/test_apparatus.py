@@ -1,7 +1,5 @@
 """The apparatus function in use, against closed forms and direct quadrature."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any

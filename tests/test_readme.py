@@ -1,7 +1,5 @@
 """What the README promises to a new user is what happens."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Results of a calibration show themselves as the command line, JSON and arrays say it."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Comparisons show themselves: as text within 100 columns, JSON, rows and figures."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for finer meshes and both Poisson's ratios.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import shutil

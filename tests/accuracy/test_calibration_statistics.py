@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 200 seeds in place of 24.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

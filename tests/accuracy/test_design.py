@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for ten designs of 40 seeds in place of three of 16.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 

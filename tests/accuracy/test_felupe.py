@@ -6,8 +6,6 @@ sideways.  Its film is nearly incompressible (a bulk modulus 5000 times the shea
 bilinear quadrilaterals with constant pressure and volume ratio, finer if MEMSCAL_FULL_STUDY is set.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ Everything is drawn that a laboratory does not know: noise, the loads and their 
 film, radii.  Set MEMSCAL_FULL_STUDY for 60 experiments a case in place of 4.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -5,8 +5,6 @@ loads and positions, and film, radii and loads drawn from their uncertainties.  
 MEMSCAL_FULL_STUDY for the 50 seeds and four coefficients of docs/friction.md in place of 3 and two.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

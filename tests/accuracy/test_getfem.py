@@ -4,8 +4,6 @@ GetFEM is run by the Python that it belongs to.  Set MEMSCAL_FULL_STUDY for a fi
 smaller steps.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -6,8 +6,6 @@ length to better than a factor; *precise* ones, of less noise, with loads that a
 more repeats, do; those on a film that is *known* better than the paper's do within 20 %.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import lru_cache

@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 400 seeds in place of 60.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache

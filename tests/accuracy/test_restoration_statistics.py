@@ -4,8 +4,6 @@ Set MEMSCAL_FULL_STUDY for 40 seeds a case and three noises in place of 3 and tw
 radii of one scan share their error: the scan, not the radius, is the unit of every bound.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """The rod by its own series against finite elements on rings that crowd towards its edge."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Both grids against complex FFTs, direct sums, closed forms and linear convolution."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Hankel transforms against pairs in closed form and adaptive quadrature."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Kernels against quadrature in the plane: closed transform and radial function are a pair."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Composite Gauss-Legendre rules against the integrals they are for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

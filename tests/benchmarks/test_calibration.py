@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 400 scans in place of 100.
 """
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Speed of the contact mechanics, each beside the plain way to the same numbers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Speed of families of profiles and of their likelihood, as ratios on the same machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from statistics import median
 

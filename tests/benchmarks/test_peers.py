@@ -6,8 +6,6 @@ settings by the G that is looked for (see tests/helpers/peers.py); ours is given
 Set MEMSCAL_FULL_STUDY for 40 seeds in place of a few.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Several scans of one sensor, fitted together; correlated noise, positions, and inputs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The calibration end to end: exact without noise, independent of its grid, and honest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 300 seeds in place of 60.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Uncertainties against brute force, the budget's own sums, and the functionals of G(r)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

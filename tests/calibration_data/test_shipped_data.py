@@ -1,7 +1,5 @@
 """The shipped data are what their README says: synthetic, in order, and made by its commands."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import os

@@ -1,7 +1,5 @@
 """Division by a spectral window: the quotient, the window, and the formulas of the windows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The paper's steps on arrays, against closed forms of Gaussians."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Regularisers by name: ours, others', and the names that do not exist."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The classical restorations: centre, units and scale, and what each of them promises."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

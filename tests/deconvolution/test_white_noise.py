@@ -1,7 +1,5 @@
 """The paper's white noise: its expectation, its draws, and what holds for any seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The band: rings tile the plane, and the noise of a component is what simulation finds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from helpers.scans import RING, TAILS, estimated, simulated

@@ -1,7 +1,5 @@
 """Bayesian model averaging against the formulas of linear Gaussian models; shapes of departure."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from helpers.scans import CONVERSION, RING, SIGMA, TAILS, estimated, plane_error, simulated

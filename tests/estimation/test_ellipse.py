@@ -1,7 +1,5 @@
 """An elliptic apparatus function: its response by harmonics, and its estimate from a raster."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """The Gaussian fit: exact without noise, right in its derivatives, and robust at its start."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

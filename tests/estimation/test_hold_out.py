@@ -1,7 +1,5 @@
 """Predicting a repeat or a load from the others: the covariance is right, and faults are found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

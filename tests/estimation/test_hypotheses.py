@@ -1,7 +1,5 @@
 """The tests of symmetry, linearity and roundness: rare false alarms, and real departures found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Points: what is left out is counted, and what cannot be calibrated is refused plainly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

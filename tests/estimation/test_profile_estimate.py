@@ -1,7 +1,5 @@
 """The estimated profile: noise, outliers, departures from a Gaussian, and refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residuals that do not depend on G: exact size, no order, and real causes that break them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The forward model of a tangential channel, against a 2-D convolution that knows no transform."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Families of calculated profiles, against contacts that are solved one by one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

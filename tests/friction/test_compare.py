@@ -1,7 +1,5 @@
 """compare(): from scans and an artifact to friction, its checks, and what it refuses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Laws of the interface weighed by what was calculated: each is found where it is the truth."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

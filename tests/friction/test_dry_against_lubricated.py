@@ -1,7 +1,5 @@
 """Dry against lubricated voltages: nothing where there is nothing, and what friction adds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """The effective friction coefficient over many cheap experiments: coverage, bounds, budgets."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

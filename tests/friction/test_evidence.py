@@ -1,7 +1,5 @@
 """Evidence against closed forms: Gaussians are integrated exactly, whatever is free in them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal

@@ -1,7 +1,5 @@
 """Families of tables that were calculated elsewhere."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A family between its values: bounded coordinate, interpolation, and what it refuses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

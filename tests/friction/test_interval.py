@@ -1,7 +1,5 @@
 """Intervals of a profile likelihood: two ends, one end, none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

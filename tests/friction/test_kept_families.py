@@ -1,7 +1,5 @@
 """Families that are kept in a folder: the same numbers, for the same request only."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Chi-square with nuisances against the same computed by dense matrices, and its uncertainties."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 80 experiments in place of 8.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Small self-consistent objects that many tests need."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

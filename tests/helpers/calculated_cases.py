@@ -1,7 +1,5 @@
 """Film, sphere and loads of the paper, and how far profiles are apart."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from memscal import ElasticFilm, Sphere

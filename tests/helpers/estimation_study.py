@@ -3,8 +3,6 @@
 Limits are on what the truth says: error of G and of A, and how often the stated bands hold it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Comparisons that never ran: contacts of closed form, so that every number is known."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from types import SimpleNamespace

@@ -12,8 +12,6 @@ quadratic ones, the tractions of the base.  The load is prescribed and the depth
 Displacements are small: the gap is taken at the undeformed radius.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import sys

@@ -1,7 +1,5 @@
 """Points as a sensor would read them without any error, whose errors are stated all the same."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

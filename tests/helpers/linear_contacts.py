@@ -1,9 +1,8 @@
 """Contacts of closed form and voltages drawn from the likelihood's own model: cheap experiments."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -70,7 +69,7 @@ class Laboratory:
     points: tuple[LoadPoints, ...]
 
     @classmethod
-    def of(cls, *, points: LoadPoints | None = None) -> Laboratory:
+    def of(cls, *, points: LoadPoints | None = None) -> Self:
         family = gaussian_family()
         every = bare_points() if points is None else points
         return cls(family, gaussian_sensor(), (every,) * family.loads.size)

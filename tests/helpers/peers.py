@@ -6,8 +6,6 @@ estimator has to find; those that leave their regularisation to the user are als
 is looked for, and return the best that any of their settings finds.  Repeats are averaged.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Floats that two computations find alike, but for the order of their sums."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scans of known truth: with a rod, with a sphere, with a tangential channel; and their steps."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Time as a ratio: two computations that take turns on the same machine."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from time import perf_counter

@@ -1,7 +1,5 @@
 """Loads taken apart, and the force check: what it sees, what it does not, how often it is wrong."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measured stress is the pressed contact's, blurred, as far as its uncertainty says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Shapes of pressure: closed forms against quadrature, and what the film makes of a shear."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The way back: what is restored is what was pressed, as far as its uncertainty says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

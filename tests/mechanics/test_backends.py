@@ -1,7 +1,5 @@
 """Two methods that share nothing but the contact: Hankel transforms and finite elements."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

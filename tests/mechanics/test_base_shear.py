@@ -1,7 +1,5 @@
 """The base shear's transform of order one, against closed forms and the shear itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from helpers.rounding import assert_same_to_rounding

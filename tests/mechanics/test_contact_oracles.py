@@ -1,7 +1,5 @@
 """Contacts against closed forms, limits, tables, and the rod's independent solution."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Finite strain behind the same door as all other contacts."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The surface of a half-space under rings of traction, against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """The film's surface by Hankel transforms: reciprocity, limits, and the rod's own condition."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pressing a rod on a film: loads, depths, base stress, and requests that are refused."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

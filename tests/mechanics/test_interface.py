@@ -1,7 +1,5 @@
 """Laws of a rough interface, alone and between a sphere and a film."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

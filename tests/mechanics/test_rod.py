@@ -1,7 +1,5 @@
 """The rod problem against closed forms, tables and an independent integral equation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.special import j0, j1, spherical_jn

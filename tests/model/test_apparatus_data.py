@@ -1,7 +1,5 @@
 """Parameters, checks and the short cuts to them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

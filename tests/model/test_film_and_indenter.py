@@ -1,7 +1,5 @@
 """Films and indenters: their ranges, their moduli, and that they stay as they were made."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

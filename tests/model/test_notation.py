@@ -1,7 +1,5 @@
 """Measured values in words: rounding, exponents, and what is said when nothing is known."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

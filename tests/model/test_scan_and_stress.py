@@ -1,7 +1,5 @@
 """Scans and stress profiles: shapes, values, and what is kept from later changes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The checks that the data classes share: what passes, what does not, and what is said."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Expected uncertainties of a plan: laws that they follow, and limits in which they are known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Synthetic contact scans and whole experiments: mechanics, force, statistics, stated truth."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 from typing import Any

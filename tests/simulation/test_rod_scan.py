@@ -1,7 +1,5 @@
 """Synthetic scans against direct convolution, conservation of force, and statistics."""
 
-from __future__ import annotations
-
 import logging
 from typing import Any
 

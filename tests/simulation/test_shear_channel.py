@@ -1,7 +1,5 @@
 """The simulated tangential channel: its parity, its size, and nothing moved in the other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

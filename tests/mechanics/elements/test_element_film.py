@@ -1,7 +1,5 @@
 """The film by finite elements: against Hankel transforms, and against what must hold exactly."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

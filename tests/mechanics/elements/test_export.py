@@ -1,7 +1,5 @@
 """The mesh that leaves the house holds the same field as the film model."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The mesh of the film's cross-section covers it, follows the rings, and stays small."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The film at finite strain: closed forms, balances, and the linear model where strain is small."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import skfem

@@ -1,7 +1,5 @@
 """Friction along a path: history, energy, unloading, and the two loadings."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
