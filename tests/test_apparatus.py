@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.builders import CONVERSION, SIGMA, make_artifact
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS
 from hypothesis import given, settings
 from hypothesis import strategies as st

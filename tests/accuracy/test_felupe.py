@@ -37,7 +37,7 @@ WAVENUMBERS = np.array([0.5, 1.0, 1.5, 2.0])  # rad/mm
 def graded(start: float, end: float, first: float, growth: float, widest: float) -> list[float]:
     points, step = [start], first
     while points[-1] < end:
-        points.append(end if (end - points[-1]) < 1.5 * step else points[-1] + step)
+        points.append(end if end - points[-1] < 1.5 * step else points[-1] + step)
         step = min(step * growth, widest)
     return points
 

@@ -19,7 +19,7 @@ import pytest
 from helpers import getfem_sphere
 from helpers.bounds import FULL
 from helpers.getfem_sphere import contact_radius, load_beyond
-from helpers.timing import once
+from helpers.machine import once
 
 import memscal
 from memscal.mechanics.solver.refinement import solve_on_rings

@@ -113,4 +113,4 @@ def test_the_uncertainty_of_a_calibrated_sensor_is_counted(kernel: memscal.Gauss
         contact = pressed((0.34, 1.0, 2.75)[seed % 3], (0.0, np.inf)[seed % 2])
         scan = sphere_scan(contact, kernel=kernel, noise=0.003, seed=seed)
         within.append(outcome(memscal.restore(scan, sensor), contact)[0])
-    assert np.mean(within) > 0.92 - (SIGMAS * np.std(within) / np.sqrt(len(within)))
+    assert np.mean(within) > 0.92 - SIGMAS * np.std(within) / np.sqrt(len(within))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.timing import once, show, turns
+from helpers.machine import once, show, turns
 from scipy.optimize import curve_fit
 
 import memscal

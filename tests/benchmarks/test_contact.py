@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.timing import once, show, turns
+from helpers.machine import once, show, turns
 from scipy.integrate import quad
 from scipy.optimize import nnls
 from scipy.special import ellipk

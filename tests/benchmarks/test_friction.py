@@ -5,7 +5,7 @@ from statistics import median
 
 import pytest
 from helpers.linear_contacts import Laboratory
-from helpers.timing import once, show
+from helpers.machine import once, show
 
 from memscal import ElasticFilm, Sphere
 from memscal.friction.calculated import amontons_family

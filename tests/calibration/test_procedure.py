@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from helpers.scans import CONVERSION, RING, SIGMA, TAILS, as_points, plane_error, simulated
 
 import memscal

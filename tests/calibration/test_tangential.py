@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from helpers.scans import CENTRE, SHEAR_CONVERSION, SHEAR_SIGMA, shear_scan
 from scipy.stats import binom, norm
 

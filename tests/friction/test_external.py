@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 
 from memscal import StressProfile, indent
 from memscal.errors import InputError

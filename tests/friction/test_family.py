@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError

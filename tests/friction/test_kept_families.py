@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.calculated_cases import FILM, REACH, SPHERE
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 
 from memscal.friction import family as assembly
 from memscal.friction.calculated import amontons_family, normal_compliance_family

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from scipy.integrate import simpson
 from scipy.special import j1
 

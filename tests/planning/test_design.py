@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from helpers.scans import EXACT_FILM, EXACT_ROD, estimated, simulated
 
 import memscal
