@@ -101,7 +101,7 @@ def test_the_convolution_is_that_of_the_lifted_fields() -> None:
 def test_the_force_is_kept_up_to_the_integral_of_the_apparatus_function() -> None:
     apparatus = with_kernel(lambda r: 0.9 * gaussian(r, SIGMA))
     blurred = apparatus.convolve(RADII, 3.0 * gaussian(RADII, 0.8e-3))
-    assert (2 * np.pi * np.trapezoid(blurred * RADII, RADII)) == pytest.approx(0.9 * 3.0, rel=1e-4)
+    assert 2 * np.pi * np.trapezoid(blurred * RADII, RADII) == pytest.approx(0.9 * 3.0, rel=1e-4)
 
 
 @settings(max_examples=25)

@@ -59,7 +59,7 @@ def study(noise: float) -> dict[str, np.ndarray]:
 def test_a_and_the_width_are_found_without_bias(noise: float) -> None:
     for errors in study(noise).values():
         # A third of a standard uncertainty, and what chance adds to the mean of so many.
-        assert abs(errors.mean()) < (1 / 3 + norm.isf(CHANCE) * errors.std() / np.sqrt(SEEDS))
+        assert abs(errors.mean()) < 1 / 3 + norm.isf(CHANCE) * errors.std() / np.sqrt(SEEDS)
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.02])

@@ -20,7 +20,7 @@ def named(regulariser: Regulariser) -> str:
 def test_the_integral_is_the_conversion_constant(regulariser, on_each_grid) -> None:
     gaussians = on_each_grid()
     image = gaussians.problem.grid.to_image(regulariser.divide(gaussians.problem).field)
-    assert (image.sum() * gaussians.problem.grid.cell_area) == pytest.approx(3e-8, rel=1e-3)
+    assert image.sum() * gaussians.problem.grid.cell_area == pytest.approx(3e-8, rel=1e-3)
 
 
 @pytest.mark.parametrize(

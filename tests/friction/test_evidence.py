@@ -86,7 +86,7 @@ class Linear:
         information = design.T @ np.linalg.solve(covariance, design)
         best = np.linalg.solve(information, design.T @ np.linalg.solve(covariance, data))
         left = data - design @ best
-        log = -((left @ np.linalg.solve(covariance, left)) + np.linalg.slogdet(covariance)[1]) / 2
+        log = -(left @ np.linalg.solve(covariance, left) + np.linalg.slogdet(covariance)[1]) / 2
         log += (len(self.shapes) * LOG_2PI - np.linalg.slogdet(information)[1]) / 2
         return log, best, np.sqrt(np.diag(np.linalg.inv(information)))
 

@@ -23,7 +23,7 @@ def saturating(value: float) -> float:
 
 def family() -> ProfileFamily:
     rise = np.array([saturating(value) for value in VALUES])
-    spectra = (1 + 0.2 * rise)[:, None, None] * (LOADS[:, None] * np.exp(-((NODES.k * 1e-3) ** 2)))
+    spectra = (1 + 0.2 * rise)[:, None, None] * LOADS[:, None] * np.exp(-((NODES.k * 1e-3) ** 2))
     number = np.ones((VALUES.size, LOADS.size))
     return ProfileFamily(
         name="amontons", loading="incremental", wavenumbers=NODES, loads=LOADS, values=VALUES,

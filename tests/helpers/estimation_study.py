@@ -209,7 +209,7 @@ class Outcome:
     @property
     def bias_error(self) -> float:
         """Standard error of :attr:`bias`: the estimate scatters by its own, not the stated size."""
-        return float((self.a.std(ddof=1) / np.sqrt(self.a.size)) / np.sqrt(np.mean(self.u_a**2)))
+        return float(self.a.std(ddof=1) / np.sqrt(self.a.size) / np.sqrt(np.mean(self.u_a**2)))
 
     def coverage(self, band: str) -> tuple[float, float]:
         """How often a band held the truth, and its standard error over the seeds.

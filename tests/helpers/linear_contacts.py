@@ -38,7 +38,7 @@ def gaussian_family(loads: Sequence[float] = LOADS) -> ProfileFamily:
 def gaussian_sensor() -> Sensor:
     """A Gaussian G of 0.56 mm; A uncertain by 1 %, the width by 2 %."""
     g = np.exp(-0.5 * (0.56e-3 * NODES.k) ** 2)
-    changes = CONVERSION * np.stack([0.01 * g, (-0.02 * (0.56e-3 * NODES.k) ** 2 * g)], axis=1)
+    changes = CONVERSION * np.stack([0.01 * g, -0.02 * (0.56e-3 * NODES.k) ** 2 * g], axis=1)
     return Sensor(NODES, CONVERSION * g, changes, CONVERSION)
 
 

@@ -39,7 +39,7 @@ def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: Radia
     scan = simulate(
         raster=True, load=2.0, kernel=kernel, conversion_constant=3e-8, **options, **STILL
     )
-    assert (scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2) == pytest.approx(3e-8 * 2.0, rel=1e-6)
+    assert scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2 == pytest.approx(3e-8 * 2.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
