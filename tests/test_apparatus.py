@@ -1,16 +1,13 @@
 """The apparatus function in use, against closed forms and direct quadrature."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers.builders import CONVERSION, SIGMA, make_artifact
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -61,9 +58,7 @@ def apparatus() -> ApparatusFunction:
 
 @settings(max_examples=25)
 @given(width=st.floats(0.2e-3, 1.5e-3), load=st.floats(0.01, 100.0))
-def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(
-    width: float, load: float
-) -> None:
+def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(width, load) -> None:
     apparatus = with_kernel(lambda r: gaussian(r, SIGMA))
     blurred = apparatus.convolve(RADII, load * gaussian(RADII, width))
     exact = load * gaussian(RADII, float(np.hypot(width, SIGMA)))
@@ -71,9 +66,7 @@ def test_a_gaussian_convolved_with_a_gaussian_is_a_wider_gaussian(
 
 
 @pytest.mark.parametrize("place", [0.0, 0.7e-3, 2.3e-3])
-def test_the_convolution_is_the_double_integral_at_a_point(
-    apparatus: ApparatusFunction, place: float
-) -> None:
+def test_the_convolution_is_the_double_integral_at_a_point(apparatus, place) -> None:
     # A stress with a flank, 1/(1 + (r/w)^4), which is no sum of Gaussians.
     def stress(r: Any) -> Any:
         return 1e5 / (1 + (r / 1e-3) ** 4)
@@ -108,8 +101,7 @@ def test_the_convolution_is_that_of_the_lifted_fields() -> None:
 def test_the_force_is_kept_up_to_the_integral_of_the_apparatus_function() -> None:
     apparatus = with_kernel(lambda r: 0.9 * gaussian(r, SIGMA))
     blurred = apparatus.convolve(RADII, 3.0 * gaussian(RADII, 0.8e-3))
-    force = 2 * np.pi * np.trapezoid(blurred * RADII, RADII)
-    assert force == pytest.approx(0.9 * 3.0, rel=1e-4)
+    assert 2 * np.pi * np.trapezoid(blurred * RADII, RADII) == pytest.approx(0.9 * 3.0, rel=1e-4)
 
 
 @settings(max_examples=25)
@@ -137,17 +129,13 @@ def test_a_voltage_is_the_blurred_stress_times_the_constant(apparatus: Apparatus
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (2, 5)])
-def test_a_measured_stress_has_the_shape_of_its_voltage(
-    apparatus: ApparatusFunction, shape: tuple[int, ...]
-) -> None:
+def test_a_measured_stress_has_the_shape_of_its_voltage(apparatus, shape) -> None:
     found = apparatus.stress(np.full(shape, 6e-3))
     assert np.shape(found) == shape
     np.testing.assert_allclose(found, 6e-3 / CONVERSION)
 
 
-def test_the_radial_profile_is_that_of_the_table_between_its_radii(
-    apparatus: ApparatusFunction,
-) -> None:
+def test_the_radial_profile_is_that_of_the_table_between_its_radii(apparatus) -> None:
     r = np.linspace(-SUPPORT, SUPPORT, 997).reshape(-1, 1)
     np.testing.assert_allclose(apparatus.radial(r), gaussian(r, SIGMA), atol=1e-2)
     np.testing.assert_allclose(apparatus.radial_uncertainty(r), 0.02 * gaussian(r, SIGMA), atol=1)
@@ -179,9 +167,7 @@ def test_beyond_the_support_there_is_nothing() -> None:
         ([0.0], [1.0], "cannot be interpolated"),
     ],
 )
-def test_a_table_that_cannot_be_convolved_is_refused(
-    apparatus: ApparatusFunction, r: Any, sigma: Any, problem: str
-) -> None:
+def test_a_table_that_cannot_be_convolved_is_refused(apparatus, r, sigma, problem) -> None:
     for method in (apparatus.convolve, apparatus.predict):
         with pytest.raises(InputError, match=problem) as caught:
             method(r, sigma)
@@ -195,9 +181,7 @@ def test_steps_may_be_coarse_where_there_is_no_stress(apparatus: ApparatusFuncti
     assert found[0] == pytest.approx(gaussian(np.zeros(1), np.hypot(0.9e-3, SIGMA))[0], rel=1e-5)
 
 
-def test_saving_and_loading_changes_no_prediction(
-    apparatus: ApparatusFunction, tmp_path: Path
-) -> None:
+def test_saving_and_loading_changes_no_prediction(apparatus, tmp_path) -> None:
     path = tmp_path / "apparatus.h5"
     apparatus.save(path)
     loaded = load_apparatus(path)

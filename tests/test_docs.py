@@ -1,7 +1,5 @@
 """Numbers that stand in the documentation are those that memscal calculates."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What importing memscal loads, and which of its names are public."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

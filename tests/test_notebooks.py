@@ -1,7 +1,5 @@
 """Each notebook is a pair: a script that is edited and reviewed, and a notebook that is read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import jupytext

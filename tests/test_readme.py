@@ -1,7 +1,5 @@
 """What the README promises to a new user is what happens."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -72,8 +70,7 @@ def test_the_commands_for_the_best_estimate_and_its_plan_run(fresh_folder: Path)
 def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
     printed = run_installed(shlex.split(SPHERE)[1:])
     assert (fresh_folder / "sphere.png").is_file()
-    shown = README.split(SPHERE)[1].split("```text\n")[1].split("```")[0]
-    expected = shown.splitlines()
+    expected = README.split(SPHERE)[1].split("```text\n")[1].split("```")[0].splitlines()
     assert printed[:2] == expected[:2]
     for ours, theirs in zip(printed[3:], expected[3:], strict=True):
         # Depths, radii and stresses; the last digit of another machine may differ.
@@ -81,9 +78,7 @@ def test_the_sphere_s_command_prints_what_is_shown(fresh_folder: Path) -> None:
         assert numbers[0] == pytest.approx(numbers[1], rel=2e-3)
 
 
-def test_the_way_from_contacts_to_friction_prints_what_is_shown(
-    fresh_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_way_from_contacts_to_friction_prints_what_is_shown(fresh_folder, monkeypatch) -> None:
     """The whole chain, from files only; in a cache of its own, so that it starts from cold."""
     monkeypatch.setenv("XDG_CACHE_HOME", os.fspath(fresh_folder / "cache"))
     lines = [shlex.split(line)[1:] for line in CHAIN.strip().splitlines()]
@@ -105,4 +100,4 @@ def test_the_example_in_python_runs() -> None:
     names: dict[str, object] = {}
     for example in EXAMPLES:
         exec(compile(example, "README.md", "exec"), names)
-    assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)  # type: ignore[attr-defined]
+    assert names["apparatus"].gaussian_sigma == pytest.approx(561e-6, rel=0.05)

@@ -1,7 +1,5 @@
 """Results of a calibration show themselves as the command line, JSON and arrays say it."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
@@ -43,12 +41,7 @@ def printed(capsys: pytest.CaptureFixture[str], scan: Path, *options: str) -> st
     return capsys.readouterr().out
 
 
-def test_print_shows_the_tables_of_the_command(
-    calibration: memscal.Calibration,
-    drawn: memscal.MonteCarlo,
-    scan: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_print_shows_the_tables_of_the_command(calibration, drawn, scan, capsys) -> None:
     shown = printed(capsys, scan, "--sweep", "--monte-carlo", "6")
     sweep = calibration.sweep()
     assert shown == f"{calibration}\n\n{sweep}\n\n{drawn}\n"
@@ -60,9 +53,7 @@ def test_print_shows_the_tables_of_the_command(
         assert "\n" not in repr(result)
 
 
-def test_an_artifact_from_a_file_shows_what_it_holds(
-    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction
-) -> None:
+def test_an_artifact_from_a_file_shows_what_it_holds(calibration, loaded) -> None:
     lines, of_file = str(calibration).splitlines(), str(loaded).splitlines()
     assert [line for line in lines if not line.startswith("  reconvolution with")] == of_file
     values = calibration.to_dict()
@@ -86,9 +77,7 @@ def test_html_holds_values_and_checks(calibration: memscal.Calibration) -> None:
     assert 'class="failed"' in html
 
 
-def test_ufloats_have_the_covariance_of_the_parameters(
-    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction, scan: Path
-) -> None:
+def test_ufloats_have_the_covariance_of_the_parameters(calibration, loaded, scan) -> None:
     uncertainties = pytest.importorskip("uncertainties")
     (fleet,) = memscal.calibrate_many([scan])
     for result, parameters in (
@@ -109,9 +98,7 @@ def test_ufloats_have_the_covariance_of_the_parameters(
     assert ratio.nominal_value == pytest.approx(1, abs=0.1)
 
 
-def test_arrays_stand_on_their_axes_in_si_units(
-    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction
-) -> None:
+def test_arrays_stand_on_their_axes_in_si_units(calibration, loaded) -> None:
     pytest.importorskip("xarray")
     for result, apparatus in ((calibration, calibration.apparatus), (loaded, loaded)):
         arrays = result.to_xarray()
@@ -141,7 +128,6 @@ def test_draws_and_scans_are_rows_of_data_frames(drawn: memscal.MonteCarlo, scan
     fleet = memscal.calibrate_many([scan, "missing.h5"])
     rows = pandas.concat([result.to_dataframe() for result in fleet])
     assert list(rows.index) == [0, 1]
-    assert fleet[0].parameters is not None
     u = fleet[0].parameters.uncertainty("conversion_constant")
     assert rows["u(conversion_constant) (V/Pa)"][0] == pytest.approx(u)
     assert "missing.h5" in rows["error"][1]
@@ -153,9 +139,7 @@ def test_draws_and_scans_are_rows_of_data_frames(drawn: memscal.MonteCarlo, scan
         fleet[1].ufloats()
 
 
-def test_figures_are_those_of_the_command(
-    calibration: memscal.Calibration, loaded: memscal.ApparatusFunction, drawn: memscal.MonteCarlo
-) -> None:
+def test_figures_are_those_of_the_command(calibration, loaded, drawn) -> None:
     assert len(calibration.plot().axes) == len(loaded.plot().axes)
     labels = [axes.get_ylabel() for axes in calibration.sweep(amplitudes=3, draws=1).plot().axes]
     assert any("rms misfit" in label for label in labels)
@@ -165,9 +149,7 @@ def test_figures_are_those_of_the_command(
         drawn.to_xarray()
 
 
-def test_a_missing_library_is_named_with_the_extra_that_brings_it(
-    calibration: memscal.Calibration, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_library_is_named_with_the_extra_that_brings_it(calibration, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(
         memscal.MemscalError, match=r"(?s)xarray is not installed.*memscal\[interop\]"

@@ -1,7 +1,5 @@
 """Comparisons show themselves: as text within 100 columns, JSON, rows and figures."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -13,12 +11,10 @@ import pytest
 from helpers.friction_results import FRICTION, LOADS, comparison, interface_comparison
 
 import memscal
+from memscal import BoundedEstimate, ElasticFilm, FrictionComparison, Interval, Sphere
 from memscal.friction.checks import comparison_checks, comparison_messages, in_words
 from memscal.friction.effective import bracketed_share
-from memscal.friction.results import BoundedEstimate, FrictionComparison, Interval
 from memscal.model.checks import Message, QualityCheck, failed_check_messages
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Sphere
 from memscal.summaries.comparison import notes, tables
 
 
@@ -31,16 +27,10 @@ def reading(
     value: float | None, low: float, high: float | None, *, u: float | None = 0.02, **fields: Any
 ) -> BoundedEstimate:
     made = BoundedEstimate(
-        value=value,
-        standard_uncertainty=u,
-        interval=Interval(low, high),
-        reason="" if value is not None else "a lower bound",
-        values=np.array([0.0, 0.1, math.inf]),
-        chi_square=np.array([40.0, 30.0, 50.0]),
-        degrees=29,
-        least=30.0,
-        p_value=0.4,
-    )
+        value=value, standard_uncertainty=u, interval=Interval(low, high),
+        reason="" if value is not None else "a lower bound", values=np.array([0.0, 0.1, math.inf]),
+        chi_square=np.array([40.0, 30.0, 50.0]), degrees=29, least=30.0, p_value=0.4,
+    )  # fmt: skip
     return replace(made, **fields)
 
 
@@ -84,8 +74,7 @@ def test_a_comparison_prints_tables_within_a_hundred_columns(found: FrictionComp
 
 def test_json_is_standard_and_says_null_and_why_where_there_is_no_value() -> None:
     bound = comparison(friction=math.inf, lubrications=("dry",), loadings=("incremental",))
-    told = json.loads(json.dumps(bound.to_dict(), allow_nan=False))
-    for load in told["loads"]:
+    for load in json.loads(json.dumps(bound.to_dict(), allow_nan=False))["loads"]:
         readings = load["by_loading"]["incremental"]["effective_friction_coefficient"]
         for estimate in readings.values():
             assert (estimate["value"], estimate["interval"]["high"]) == (None, None)
@@ -104,7 +93,6 @@ def test_rows_hold_every_load_by_every_loading(found: FrictionComparison) -> Non
 
 def test_a_comparison_draws_itself_and_its_laws(found: FrictionComparison) -> None:
     assert len(found.plot().axes) == 4
-    assert found.interface is not None
     assert len(found.interface.plot().axes) == 3
     assert set(found.interface.messages) <= set(notes(found))
 

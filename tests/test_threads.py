@@ -1,7 +1,5 @@
 """Linear algebra runs on one thread inside the public functions, and as before outside."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Through how many files a reader of each main job has to go: those whose functions it calls."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

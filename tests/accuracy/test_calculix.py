@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for finer meshes and both Poisson's ratios.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import shutil
@@ -44,9 +42,7 @@ def films(nu: float) -> tuple[Film, memscal.ElasticFilm]:
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
 @pytest.mark.parametrize("nu", RATIOS)
-def test_calculix_converges_to_the_rods_stiffness_and_base_stress(
-    nu: float, friction: float, tmp_path: Path
-) -> None:
+def test_calculix_converges_to_the_rods_stiffness_and_base_stress(nu, friction, tmp_path) -> None:
     theirs, ours = films(nu)
     contact = memscal.indent(ours, memscal.Rod(radius=ROD * 1e-3), load=1.0, friction=friction)
     stiffness = contact.load / contact.depth * 1e-3

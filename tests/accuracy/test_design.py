@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for ten designs of 40 seeds in place of three of 16.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -14,8 +12,7 @@ from helpers.bounds import FULL
 from scipy.stats import chi2
 
 import memscal
-from memscal.model.apparatus import ParameterSet
-from memscal.planning.plan import Plan
+from memscal import ParameterSet, Plan
 from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy
@@ -78,15 +75,10 @@ def study(number: int) -> Study:
     stated, found = [], []
     for seed in range(SEEDS):
         scan = memscal.simulate(
-            film=plan.film,
-            kernel=plan.kernel,
-            half_range=plan.step * (plan.positions - 1) / 2,
-            points=plan.positions,
-            repeats=plan.repeats,
-            noise=plan.noise,
-            load_uncertainty=plan.load_uncertainty,
-            seed=seed,
-        )
+            film=plan.film, kernel=plan.kernel, half_range=plan.step * (plan.positions - 1) / 2,
+            points=plan.positions, repeats=plan.repeats, noise=plan.noise,
+            load_uncertainty=plan.load_uncertainty, seed=seed,
+        )  # fmt: skip
         result = memscal.calibrate(scan, method="evidence").apparatus
         profile = result.radial_profile
         stated.append(shares(result.parameters, profile.r, profile.g_errors, sigma))
@@ -139,5 +131,4 @@ def test_nothing_scatters_more_than_noise_and_prior_together_allow(number: int) 
     # A and FWHM scatter more than the part called noise, and less than the whole.
     found = study(number)
     scatter = np.std(found.found, axis=0, ddof=1)
-    high = chi2.ppf(1 - CHANCE, SEEDS - 1) / (SEEDS - 1)
-    assert np.all(scatter < found.own * np.sqrt(high))
+    assert np.all(scatter < found.own * np.sqrt(chi2.ppf(1 - CHANCE, SEEDS - 1) / (SEEDS - 1)))

@@ -4,8 +4,6 @@ Set MEMSCAL_FULL_STUDY for all cases of docs/estimation.md and 200 seeds in plac
 says which limits a case does not keep; no other may be exceeded, and no other kind may be listed.
 """
 
-from __future__ import annotations
-
 import runpy
 from functools import lru_cache
 from pathlib import Path

@@ -6,8 +6,6 @@ sideways.  Its film is nearly incompressible (a bulk modulus 5000 times the shea
 bilinear quadrilaterals with constant pressure and volume ratio, finer if MEMSCAL_FULL_STUDY is set.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -18,12 +16,9 @@ from helpers.bounds import FULL
 from numpy.typing import NDArray
 from scipy.special import j0
 
-from memscal.mechanics.contact import Contact
+from memscal import Contact, ElasticFilm, Rod, indent
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
-from memscal.mechanics.indent import indent
 from memscal.mechanics.solver.problem import Depth
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
 
 felupe = pytest.importorskip(
     "felupe", reason="FElupe, the independent program at finite strain, is not installed"
@@ -42,8 +37,7 @@ WAVENUMBERS = np.array([0.5, 1.0, 1.5, 2.0])  # rad/mm
 def graded(start: float, end: float, first: float, growth: float, widest: float) -> list[float]:
     points, step = [start], first
     while points[-1] < end:
-        left = end - points[-1]
-        points.append(end if left < 1.5 * step else points[-1] + step)
+        points.append(end if end - points[-1] < 1.5 * step else points[-1] + step)
         step = min(step * growth, widest)
     return points
 
@@ -54,8 +48,7 @@ def film_of_quadrilaterals(refinement: float) -> Any:
     first, growth = 0.01 / refinement, 1 + 0.15 / refinement
     inner = [a - x for x in graded(0.0, a, first, growth, 0.03)]
     near = graded(a, 4.0, first, growth, 0.1 / refinement)
-    far = graded(4.0, 25.0, 0.1 / refinement, growth, 0.5)
-    r = np.unique(np.concatenate([inner, near, far]))
+    r = np.unique(np.concatenate([inner, near, graded(4.0, 25.0, 0.1 / refinement, growth, 0.5)]))
     z = h - np.array(graded(0.0, h, first, growth, 0.1 / refinement))[::-1]
     Z, R = np.meshgrid(z, r, indexing="ij")
     number = np.arange(Z.size).reshape(Z.shape)
@@ -81,8 +74,7 @@ def press_with_felupe(state: Contact, refinement: float) -> Answer:
     shear = FILM.shear_modulus * 1e-6
     material = felupe.ThreeFieldVariation(felupe.NeoHooke(mu=shear, bulk=5000 * shear))
     solid = felupe.SolidBody(umat=material, field=field)
-    touching = state.inside.pressed.touching
-    last = state.inside.pressing.elements.nodes[0][touching[-1]]
+    last = state.inside.pressing.elements.nodes[0][state.inside.pressed.touching[-1]]
     moved = (z > 2.0 - 1e-9) & (r < last + 1e-9)
     bounds = {
         "base": felupe.Boundary(field[0], mask=z < 1e-9),

@@ -4,8 +4,6 @@ Everything is drawn that a laboratory does not know: noise, the loads and their 
 film, radii.  Set MEMSCAL_FULL_STUDY for 60 experiments a case in place of 4.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 
@@ -58,9 +56,7 @@ def test_a_gain_that_is_wrong_by_five_percent_is_seen(gain: float) -> None:
     assert alarmed(gain=gain) >= binom.ppf(CHANCE, EXPERIMENTS, 0.9)
 
 
-def test_a_film_five_percent_thicker_than_stated_is_not_seen_by_force_but_by_the_width_of_g() -> (
-    None
-):
+def test_a_film_five_percent_thicker_than_stated_is_not_seen_by_force_but_by_the_width_of_g():
     thick = {"thickness_factor": 1.05}
     assert alarmed(**thick) <= binom.ppf(1 - CHANCE, EXPERIMENTS, 0.1)
     wider = np.array([s[3] for s in study(**thick)]) / np.array([s[3] for s in study()])

@@ -5,8 +5,6 @@ loads and positions, and film, radii and loads drawn from their uncertainties.  
 MEMSCAL_FULL_STUDY for the 50 seeds and four coefficients of docs/friction.md in place of 3 and two.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -106,8 +104,7 @@ def test_the_intervals_of_single_loads_hold_the_truth() -> None:
             for one in outcomes(*FRICTIONS)
         ]
     )
-    allowed = 4 * held.mean(axis=1).std() / math.sqrt(len(held))
-    assert held.mean() > 0.92 - allowed
+    assert held.mean() > 0.92 - 4 * held.mean(axis=1).std() / math.sqrt(len(held))
 
 
 def test_full_stick_is_a_lower_bound_and_no_number() -> None:
@@ -126,8 +123,7 @@ def test_lubricated_contacts_reach_no_friction() -> None:
 
 
 def test_chi_square_is_as_large_as_its_degrees_say() -> None:
-    chances = [one.joint.p_value for one in outcomes(*FRICTIONS)]
-    assert kstest(chances, "uniform").pvalue > CHANCE
+    assert kstest([one.joint.p_value for one in outcomes(*FRICTIONS)], "uniform").pvalue > CHANCE
 
 
 def test_dry_and_lubricated_differ_where_there_is_friction_only() -> None:
@@ -152,8 +148,7 @@ def test_a_mistaken_gain_raises_friction_and_a_thicker_film_lowers_it() -> None:
     seeds = range(min(SEEDS, 16))
 
     def values(**mistakes: float) -> list[float]:
-        found = [outcome(0.1, seed, **mistakes).joint for seed in seeds]
-        return [one.best for one in found]
+        return [outcome(0.1, seed, **mistakes).joint.best for seed in seeds]
 
     clean = np.array(values())
     assert np.median(values(gain=1.05) - clean) > 0.01

@@ -4,8 +4,6 @@ GetFEM is run by the Python that it belongs to.  Set MEMSCAL_FULL_STUDY for a fi
 smaller steps.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import math
@@ -21,7 +19,7 @@ import pytest
 from helpers import getfem_sphere
 from helpers.bounds import FULL
 from helpers.getfem_sphere import contact_radius, load_beyond
-from helpers.timing import once
+from helpers.machine import once
 
 import memscal
 from memscal.mechanics.solver.refinement import solve_on_rings
@@ -51,18 +49,10 @@ def python() -> str:
 def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> list[dict[str, Any]]:
     """States of the paper's sphere and film at the paper's loads, in mm, N and MPa."""
     case = {
-        "young_modulus": 2.2,
-        "poisson_ratio": 0.5,
-        "thickness": 2.0,
-        "radius": 128.8,
-        "friction": min(friction, STICKING),
-        "loads": LOADS,
-        "steps": steps,
-        "contact": 4.2,
-        "step": step,
-        "layers": LAYERS,
-        "first_depth": 2e-3,
-    }
+        "young_modulus": 2.2, "poisson_ratio": 0.5, "thickness": 2.0, "radius": 128.8,
+        "friction": min(friction, STICKING), "loads": LOADS, "steps": steps, "contact": 4.2,
+        "step": step, "layers": LAYERS, "first_depth": 2e-3,
+    }  # fmt: skip
     done = subprocess.run(
         [python, str(PROGRAM)],
         input=json.dumps(case),
@@ -88,8 +78,7 @@ def by_memscal(friction: float) -> list[memscal.Contact]:
 def edge(state: dict[str, Any]) -> float:
     """Contact radius in mm."""
     r, pressure = state["r"], state["pressure"]
-    last = r[pressure > 0.02 * pressure.max()].max()
-    return contact_radius(r, load_beyond(r, pressure), last)
+    return contact_radius(r, load_beyond(r, pressure), r[pressure > 0.02 * pressure.max()].max())
 
 
 def differences(contact: memscal.Contact, state: dict[str, Any]) -> dict[str, float]:
@@ -126,8 +115,7 @@ def worst(friction: float, states: list[dict[str, Any]]) -> dict[str, float]:
 
 def test_getfem_agrees_on_the_sphere_without_friction(python: str) -> None:
     # Without friction the path is of no account, and a step per load is enough.
-    states = by_getfem(python, 0.0, len(LOADS), 0.025 if FULL else 0.05)
-    found = worst(0.0, states)
+    found = worst(0.0, by_getfem(python, 0.0, len(LOADS), 0.025 if FULL else 0.05))
     assert found["depth"] < 1e-4
     assert found["contact radius"] < 1e-3
     assert found["highest base stress"] < 3e-4

@@ -6,8 +6,6 @@ length to better than a factor; *precise* ones, of less noise, with loads that a
 more repeats, do; those on a film that is *known* better than the paper's do within 20 %.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import lru_cache
@@ -19,6 +17,7 @@ from helpers.bounds import FULL
 from scipy.stats import binom
 
 import memscal
+from memscal import ElasticFilm, Interface, LawComparison
 from memscal.friction.calculated import (
     FRICTIONS,
     SLIP_LENGTHS,
@@ -27,9 +26,6 @@ from memscal.friction.calculated import (
 )
 from memscal.friction.family import ProfileFamily
 from memscal.friction.model_comparison import compare_interface
-from memscal.friction.results import LawComparison
-from memscal.mechanics.interface import Interface
-from memscal.model.film import ElasticFilm
 from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
 from memscal.simulation.rod_scan import PAPER_FILM
 
@@ -150,7 +146,6 @@ def test_on_a_film_known_as_the_papers_it_is_recovered_most_often() -> None:
 
 def test_the_effective_coefficient_grows_with_the_load() -> None:
     for one in experiments(MACROSCOPIC, SLIP_LENGTH, "known"):
-        assert one.implied is not None
         assert np.all(np.diff(one.implied.friction[:, 1]) > 0)
         assert one.implied.friction[-1, 1] > 1.5 * one.implied.friction[0, 1]
 

@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 400 seeds in place of 60.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -68,8 +66,7 @@ def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
     for seed in range(first, first + SEEDS):
         residuals = residuals_of(estimated(SENSORS[sensor](noise, seed)))
         runs = runs_test(residuals)
-        kept = residuals.independent[1]
-        same = int(np.sum(np.diff(residuals.sequence[kept]) == 0))
+        same = int(np.sum(np.diff(residuals.sequence[residuals.independent[1]]) == 0))
         changes = round(same * (1 - runs.value))
         rows.append(
             {

@@ -1,17 +1,13 @@
 """The rod by its own series against finite elements on rings that crowd towards its edge."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 
+from memscal import ElasticFilm, Rod, indent
 from memscal.mechanics.elements.element_film import ElementFilm
-from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
 
 RADIUS = 0.25e-3
 
@@ -35,8 +31,7 @@ def press(elements: ElementFilm, *, sticking: bool) -> tuple[FloatArray, FloatAr
 @pytest.mark.parametrize("nu", [0.2, 0.5])
 def test_the_rod_agrees_with_finite_elements(nu: float, friction: float) -> None:
     film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
-    rings = np.append(RADIUS * (1 - np.geomspace(1.0, 1e-6, 160)), RADIUS)
-    elements = ElementFilm(film, rings)
+    elements = ElementFilm(film, np.append(RADIUS * (1 - np.geomspace(1.0, 1e-6, 160)), RADIUS))
     pressure, shear = press(elements, sticking=math.isinf(friction))
     stiffness = elements.compliance.areas @ pressure
     field = elements.field(pressure / stiffness, shear / stiffness)

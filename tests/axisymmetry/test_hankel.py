@@ -1,9 +1,5 @@
 """Hankel transforms against pairs in closed form and adaptive quadrature."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -58,8 +54,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(offset: float) -> Non
     k = np.linspace(0.1, 6.0, 12)
     errors = []
     for count in (20, 40, 80, 160):
-        step = 10.0 / count
-        r = step * (np.arange(count + 1) + offset)
+        r = (10.0 / count) * (np.arange(count + 1) + offset)
         errors.append(np.abs(hankel_transform(r, gaussian(r), k) - np.exp(-(k**2) / 2)).max())
     # Three halvings would give 16^3 = 4096; an order of 3.5 gives 1448.
     assert errors[0] / errors[-1] > 1448
@@ -105,23 +100,11 @@ def test_nodes_resolve_the_radii_that_they_are_made_for(product: float, k_max: f
         ),
     ],
 )
-def test_synthesis_inverts_transforms_known_in_closed_form(
-    function: Callable[[FloatArray], FloatArray],
-    transform: Callable[[FloatArray], FloatArray],
-    k_max: float,
-) -> None:
+def test_synthesis_inverts_transforms_known_in_closed_form(function, transform, k_max) -> None:
     r = np.linspace(0.0, 30.0, 24).reshape(4, 6)
     wavenumbers = Wavenumbers.covering(k_max, 30.0)
     spectrum = RadialSpectrum(wavenumbers, transform(wavenumbers.k))
     np.testing.assert_allclose(spectrum.at(r), function(r), atol=1e-12)
-
-
-@pytest.mark.parametrize("r_max", [0.5, 3.0, 200.0])
-def test_the_integral_is_the_transform_at_zero(r_max: float) -> None:
-    # A ring: one Gaussian taken off another; its integral over the plane is 4 pi - pi.
-    k = Wavenumbers.covering(12.0, r_max)
-    ring = RadialSpectrum(k, 4 * np.pi * np.exp(-(k.k**2)) - np.pi * np.exp(-(k.k**2) / 4))
-    assert ring.integral == pytest.approx(3 * np.pi, rel=1e-10)
 
 
 @pytest.mark.parametrize("width", [5e-3, 3e-3, 1e-3])

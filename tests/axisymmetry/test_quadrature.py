@@ -1,7 +1,5 @@
 """Composite Gauss-Legendre rules against the integrals they are for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,14 +8,8 @@ from hypothesis import strategies as st
 from memscal.axisymmetry.hankel import gauss_panels
 
 
-@given(
-    degree=st.integers(0, 31),
-    upper=st.floats(1e-6, 1e6),
-    panels=st.integers(1, 7),
-)
-def test_a_rule_of_sixteen_nodes_is_exact_to_degree_thirty_one(
-    degree: int, upper: float, panels: int
-) -> None:
+@given(degree=st.integers(0, 31), upper=st.floats(1e-6, 1e6), panels=st.integers(1, 7))
+def test_a_rule_of_sixteen_nodes_is_exact_to_degree_thirty_one(degree, upper, panels) -> None:
     nodes, weights = gauss_panels(upper, upper / panels * 1.0001, order=16)
     assert weights @ (nodes / upper) ** degree == pytest.approx(upper / (degree + 1), rel=1e-12)
 
@@ -31,9 +23,7 @@ def test_a_panel_integrates_the_phase_that_its_nodes_resolve(order: int, phase: 
 
 
 @given(upper=st.floats(1e-3, 1e3), longest=st.floats(1e-1, 1e4), order=st.integers(1, 20))
-def test_no_panel_is_longer_than_allowed_and_none_is_spent_needlessly(
-    upper: float, longest: float, order: int
-) -> None:
+def test_no_panel_is_longer_than_allowed_and_none_is_spent_needlessly(upper, longest, order):
     nodes, weights = gauss_panels(upper, longest, order)
     panels = nodes.size // order
     assert upper / panels <= longest * (1 + 1e-12)

@@ -3,22 +3,18 @@
 Set MEMSCAL_FULL_STUDY for 400 scans in place of 100.
 """
 
-from __future__ import annotations
-
 import os
 
 import numpy as np
 import pytest
 from helpers.bounds import FULL
-from helpers.timing import once, show, turns
+from helpers.machine import once, show, turns
 from scipy.optimize import curve_fit
 
 import memscal
-from memscal.axisymmetry.grids import EvenGrid
+from memscal import EvenGrid, Scan, StressProfile
 from memscal.deconvolution.division import DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
 
 pytestmark = pytest.mark.benchmark
 
@@ -77,20 +73,15 @@ def reference(scan: Scan) -> StressProfile:
     return memscal.indent(scan.film, scan.indenter, load=scan.load).profile()
 
 
-def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(
-    problem: DivisionProblem, plain: PlainDivision
-) -> None:
+def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(problem, plain) -> None:
     quarter = WhiteNoise().divide(problem).field
     exact = gaussian(problem.grid.radius, np.sqrt(BLURRED_WIDTH**2 - STRESS_WIDTH**2))
     np.testing.assert_allclose(quarter, exact, atol=0.05 * exact.max())
     # The central pixel is the axis; the quarter lies to the lower right, less the last edge.
-    same = 1e-6 * quarter.max()
-    np.testing.assert_allclose(plain()[256:, 256:], quarter[:-1, :-1], atol=same)
+    np.testing.assert_allclose(plain()[256:, 256:], quarter[:-1, :-1], atol=1e-6 * quarter.max())
 
 
-def test_a_quarter_plane_divides_faster_than_a_plain_complex_transform(
-    problem: DivisionProblem, plain: PlainDivision
-) -> None:
+def test_a_quarter_plane_divides_faster_than_a_plain_complex_transform(problem, plain) -> None:
     # Even against the bare quotient, without window or way back.
     def bare() -> FloatArray:
         return np.fft.fft2(plain.voltage) / (np.fft.fft2(plain.stress) + plain.noise2)
@@ -125,21 +116,17 @@ def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
     weakest = 0.02 * np.abs([u.sum(), sigma.sum()]) / pixels
     u = u + 0.1 * weakest[0] * rng.normal(size=u.shape)
     sigma = sigma + 0.1 * weakest[1] * rng.normal(size=u.shape)
-    quotient = np.fft.fft2(u) / np.fft.fft2(sigma)
-    g = np.fft.fftshift(np.fft.ifft2(quotient).real) / pixel**2
+    g = np.fft.fftshift(np.fft.ifft2(np.fft.fft2(u) / np.fft.fft2(sigma)).real) / pixel**2
     rows = slice(pixels // 2 - 100, pixels // 2 + 101)
 
     def bell(distance: FloatArray, constant: float, width: float) -> FloatArray:
         return constant * gaussian(distance, width)
 
-    near = r[rows, rows].ravel()
-    fit, _ = curve_fit(bell, near, g[rows, rows].ravel(), p0=(1e-7, 0.5e-3))
+    fit, _ = curve_fit(bell, r[rows, rows].ravel(), g[rows, rows].ravel(), p0=(1e-7, 0.5e-3))
     return np.asarray(fit)
 
 
-def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(
-    scan: Scan, reference: StressProfile
-) -> None:
+def test_a_calibration_costs_no_more_than_a_few_plain_pipelines(scan, reference) -> None:
     apparatus = memscal.calibrate(scan, reference=reference).apparatus
     assert apparatus.conversion_constant == pytest.approx(1e-7, rel=0.03)
     assert apparatus.gaussian_sigma == pytest.approx(561e-6, rel=0.03)

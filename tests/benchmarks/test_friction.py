@@ -1,21 +1,18 @@
 """Speed of families of profiles and of their likelihood, as ratios on the same machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from statistics import median
 
 import pytest
 from helpers.linear_contacts import Laboratory
-from helpers.timing import once, show
+from helpers.machine import once, show
 
+from memscal import ElasticFilm, Sphere
 from memscal.friction.calculated import amontons_family
 from memscal.friction.effective import fine_values
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import likelihood
 from memscal.mechanics.solver.refinement import solve_on_rings
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Sphere
 
 pytestmark = pytest.mark.benchmark
 

@@ -6,8 +6,6 @@ settings by the G that is looked for (see tests/helpers/peers.py); ours is given
 Set MEMSCAL_FULL_STUDY for 40 seeds in place of a few.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -58,10 +56,7 @@ CASES = {
     for sigma in (0.45e-3, 0.561e-3, 0.75e-3)
     for noise in (0.001, 0.005, 0.02)
 }
-CASES |= {
-    "tails": Case(TAILS, 0.003, repeats=2),
-    "ring": Case(RING, 0.003, repeats=2),
-}
+CASES |= {"tails": Case(TAILS, 0.003, repeats=2), "ring": Case(RING, 0.003, repeats=2)}
 CASES["disc"] = Case(memscal.SmoothedDisc(0.8e-3, 0.3e-3), 0.003, repeats=2, seeds=DISC_SEEDS)
 
 

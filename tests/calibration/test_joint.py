@@ -1,7 +1,5 @@
 """Several scans of one sensor, fitted together; correlated noise, positions, and inputs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -64,8 +62,7 @@ def test_a_scan_along_y_says_what_one_along_x_says() -> None:
 
 def test_lines_and_a_raster_are_fitted_together() -> None:
     raster = simulated(raster=True, points=21, noise=0.003, centre=(0.2e-3, -0.1e-3), kernel=TAILS)
-    line = simulated(noise=0.003, kernel=TAILS)
-    apparatus = joint([line, raster])
+    apparatus = joint([simulated(noise=0.003, kernel=TAILS), raster])
     deviation = apparatus.conversion_constant - CONVERSION
     assert abs(deviation) < 4 * apparatus.parameters.uncertainty("conversion_constant")
     assert apparatus.parameters["centre_y_2"] == pytest.approx(-0.1e-3, abs=0.02e-3)
@@ -153,8 +150,7 @@ def test_the_scale_of_the_stage_moves_the_width_as_it_is_counted() -> None:
     scan = replace(simulated(noise=0.002), position_scale_uncertainty=0.01)
     usual, stretched = joint([scan]), joint([replace(scan, x=scan.x * 1.01)])
     counted = usual.budget["gaussian_sigma"]["position_scale"]
-    moved = abs(stretched.gaussian_sigma - usual.gaussian_sigma)
-    assert counted == pytest.approx(moved, rel=0.1)
+    assert counted == pytest.approx(abs(stretched.gaussian_sigma - usual.gaussian_sigma), rel=0.1)
 
 
 def test_correlated_inputs_combine_as_their_correlation_says() -> None:

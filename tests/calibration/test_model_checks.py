@@ -1,7 +1,5 @@
 """The checks of the model: which there are, what they say, and that good scans pass."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -8,12 +6,11 @@ import pytest
 from helpers.scans import EXACT_FILM, EXACT_ROD, TAILS, shear_scan, simulated
 
 import memscal
-from memscal.calibration.calibrate import Calibration
+from memscal import Calibration, Scan
 from memscal.calibration.monte_carlo import DrawnScans, shortest_interval
 from memscal.calibration.uncertainty import BUDGETED
 from memscal.deconvolution.division import Division, DivisionProblem, create_regulariser
 from memscal.errors import FitError
-from memscal.model.scan import Scan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 
@@ -106,8 +103,7 @@ def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str) -> None:
     scan = replace(simulated(**stated, load_uncertainty=0.01), position_scale_uncertainty=1e-3)
     model = drawn_scans(memscal.calibrate(scan, method="evidence"))
     standard = dict.fromkeys(model.effects, np.asarray(0.0))
-    nominal = model.voltages(standard)
-    change = model.voltages(standard | {source: np.asarray(3.0)}) - nominal
+    change = model.voltages(standard | {source: np.asarray(3.0)}) - model.voltages(standard)
     truth = simulated(**(stated | TRUTHS[source])).u_zz - scan.u_zz
     assert np.abs(change - truth).max() < 0.02 * np.abs(truth).max()
 
@@ -156,9 +152,7 @@ def test_poissons_ratio_never_exceeds_one_half_and_the_reason_says_so() -> None:
     assert not found.agrees
 
 
-def test_draws_do_not_depend_on_the_number_of_processes(
-    paper: Calibration, hundred: memscal.MonteCarlo
-) -> None:
+def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
     told: list[tuple[int, int]] = []
     two = memscal.monte_carlo(
         paper, draws=34, seed=8, workers=2, progress=lambda *numbers: told.append(numbers)
@@ -207,8 +201,7 @@ def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle()
 
 
 def test_outliers_are_drawn_again_and_noise_alone_is_said_to_be() -> None:
-    calibration = replace(uncertain(noise=0.004), effects={})
-    found = memscal.monte_carlo(calibration, draws=3)
+    found = memscal.monte_carlo(replace(uncertain(noise=0.004), effects={}), draws=3)
     assert found.sources == ("noise",)
     assert [m.kind for m in found.messages][:1] == ["uncertainty_unstated"]
     assert "3 draws of noise" in repr(found)
@@ -255,9 +248,7 @@ def test_draws_that_fail_are_left_out_and_told() -> None:
         ({"workers": 0}, "workers is 0"),
     ],
 )
-def test_numbers_that_make_no_sense_are_refused(
-    paper: Calibration, options: dict[str, object], named: str
-) -> None:
+def test_numbers_that_make_no_sense_are_refused(paper, options, named) -> None:
     with pytest.raises(memscal.MemscalError, match=named):
         memscal.monte_carlo(paper, **options)
 

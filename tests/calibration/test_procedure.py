@@ -1,14 +1,12 @@
 """The calibration end to end: exact without noise, independent of its grid, and honest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from helpers.scans import CONVERSION, RING, SIGMA, TAILS, as_points, plane_error, simulated
 
 import memscal
@@ -66,8 +64,7 @@ def test_the_result_does_not_depend_on_the_grid(monkeypatch, spacing, extent) ->
     changed = memscal.calibrate(scan).apparatus
     for name in ("conversion_constant", "gaussian_sigma_deconvolved"):
         assert changed.parameters[name] == pytest.approx(usual.parameters[name], rel=2e-4)
-    peak = usual.radial(0.0)
-    np.testing.assert_allclose(changed.radial(R), usual.radial(R), atol=2e-4 * peak)
+    np.testing.assert_allclose(changed.radial(R), usual.radial(R), atol=2e-4 * usual.radial(0.0))
 
 
 def test_the_messy_scan_is_the_normal_case() -> None:
@@ -76,19 +73,16 @@ def test_the_messy_scan_is_the_normal_case() -> None:
     u[0, 10] = np.nan
     u[1, 20:24] = np.nan
     u[2, 40] += 0.4 * np.nanmax(u)
-    rng = np.random.default_rng(7)
-    order = rng.permutation(65)
+    order = np.random.default_rng(7).permutation(65)
     messy = replace(clean, x=clean.x[order], u_zz=u[:, order], u_zz_errors=None)
-    calibration = memscal.calibrate(messy)
-    apparatus = calibration.apparatus
+    apparatus = memscal.calibrate(messy).apparatus
     for name, truth in [
         ("conversion_constant", CONVERSION),
         ("gaussian_sigma", SIGMA),
         ("centre", 1.2e-3),
         ("baseline", clean.synthetic["baseline"]),
     ]:
-        error = apparatus.parameters[name] - truth
-        assert abs(error) < 5 * apparatus.parameters.uncertainty(name)
+        assert abs(apparatus.parameters[name] - truth) < 5 * apparatus.parameters.uncertainty(name)
     text = "\n".join(map(str, apparatus.process.messages))
     assert "5 points of the scan are missing" in text
     assert f"Outlier at x = {clean.x[40] * 1e3:.4g} mm" in text
@@ -137,8 +131,7 @@ def test_a_raster_is_used_as_it_is_and_agrees_with_a_line() -> None:
         ("centre_y", -0.4e-3),
     ]:
         assert abs(parameters[name] - truth) < 5 * parameters.uncertainty(name)
-    kernel = memscal.GaussianMixture()
-    assert plane_error(R, raster.apparatus.radial(R), kernel.radial(R)) < 0.15
+    assert plane_error(R, raster.apparatus.radial(R), memscal.GaussianMixture().radial(R)) < 0.15
     assert {c.name for c in raster.apparatus.checks} >= {"axisymmetry", "reconvolution"}
     # Not lifted: the field keeps the noise of its own points, which no two directions share.
     g = raster.apparatus.field.g
@@ -192,8 +185,7 @@ def test_a_raster_s_points_may_repeat_and_lie_off_their_places(method: str) -> N
 
 @pytest.mark.parametrize("name", regulariser_names()[:6])
 def test_every_method_gives_a_near_the_truth_and_says_what_it_is(name: str) -> None:
-    calibration = memscal.calibrate(simulated(noise=0.002), method=name)
-    apparatus = calibration.apparatus
+    apparatus = memscal.calibrate(simulated(noise=0.002), method=name).apparatus
     assert apparatus.process.configuration["method"] == name
     assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=0.05)
     assert apparatus.gaussian_sigma == pytest.approx(SIGMA, rel=0.02)
@@ -212,8 +204,7 @@ def test_a_method_may_be_an_object_and_options_reach_it() -> None:
 
 
 def test_a_failed_check_marks_the_result_and_is_said_first() -> None:
-    scan = simulated(kernel=TAILS, noise=0.001)
-    calibration = memscal.calibrate(scan)
+    calibration = memscal.calibrate(simulated(kernel=TAILS, noise=0.001))
     assert not calibration.passed
     assert not check(calibration, "gaussian_misfit").passed
     assert check(calibration, "reconvolution").passed
@@ -264,8 +255,7 @@ def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
 
 def test_positions_in_the_wrong_unit_fail_a_check() -> None:
     scan = simulated()
-    tenfold = memscal.calibrate(replace(scan, x=10 * scan.x))
-    assert not check(tenfold, "width_over_thickness").passed
+    assert not check(memscal.calibrate(replace(scan, x=10 * scan.x)), "width_over_thickness").passed
 
 
 def test_a_draw_whose_width_went_astray_does_not_pass_for_good() -> None:
@@ -299,18 +289,12 @@ def test_a_raster_may_miss_whole_rows_and_columns() -> None:
 
 def test_lengths_and_voltages_of_any_size_give_the_same() -> None:
     large = simulated(noise=0.005, seed=3)
-    film = replace(large.film, thickness=large.film.thickness * 1e-2)
     small = simulated(
-        film=film,
+        film=replace(large.film, thickness=large.film.thickness * 1e-2),
         rod=memscal.Rod(radius=large.indenter.radius * 1e-2),
-        kernel=memscal.GaussianMixture((1.0,), (SIGMA * 1e-2,)),
-        half_range=8e-5,
-        centre=(0.14e-5, 0.0),
-        load=1e-4,
-        conversion_constant=1e-2,
-        noise=0.005,
-        seed=3,
-    )
+        kernel=memscal.GaussianMixture((1.0,), (SIGMA * 1e-2,)), half_range=8e-5,
+        centre=(0.14e-5, 0.0), load=1e-4, conversion_constant=1e-2, noise=0.005, seed=3,
+    )  # fmt: skip
     one, other = memscal.calibrate(large).apparatus, memscal.calibrate(small).apparatus
     assert other.gaussian_sigma == pytest.approx(one.gaussian_sigma * 1e-2, rel=1e-6)
     assert other.conversion_constant == pytest.approx(one.conversion_constant * 1e5, rel=1e-6)

@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 300 seeds in place of 60.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from functools import lru_cache
@@ -12,16 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from helpers.scans import CENTRE, SHEAR_CONVERSION, SHEAR_SIGMA, shear_scan
 from scipy.stats import binom, norm
 
 import memscal
-from memscal.axisymmetry.kernels import GaussianMixture
-from memscal.calibration.calibrate import Calibration
+from memscal import Calibration, GaussianMixture, QualityCheck, Scan
 from memscal.errors import InputError
-from memscal.model.checks import QualityCheck
-from memscal.model.scan import Scan
 
 SEEDS = 300 if os.environ.get("MEMSCAL_FULL_STUDY") else 60
 CHANCE = 1e-4
@@ -39,10 +34,9 @@ def checks_of(scan: Scan) -> dict[str, QualityCheck]:
 @lru_cache
 def study(noise: float) -> dict[str, np.ndarray]:
     """Errors in standard uncertainties; the film and the rod are exact, and so is the load."""
-    scan = memscal.simulate()
     exact = {
         "film": memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3),
-        "rod": replace(scan.indenter, radius_uncertainty=None),
+        "rod": replace(memscal.simulate().indenter, radius_uncertainty=None),
         "load_uncertainty": None,
     }
     truth = {
@@ -65,8 +59,7 @@ def study(noise: float) -> dict[str, np.ndarray]:
 def test_a_and_the_width_are_found_without_bias(noise: float) -> None:
     for errors in study(noise).values():
         # A third of a standard uncertainty, and what chance adds to the mean of so many.
-        allowed = 1 / 3 + norm.isf(CHANCE) * errors.std() / np.sqrt(SEEDS)
-        assert abs(errors.mean()) < allowed
+        assert abs(errors.mean()) < 1 / 3 + norm.isf(CHANCE) * errors.std() / np.sqrt(SEEDS)
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.02])
@@ -111,16 +104,14 @@ def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
     # At larger x than the sensor the film is squeezed towards smaller x: the voltage falls.
     assert profile.min() < 0 < np.abs(profile).max()
     assert profile.max() < 0.01 * largest
-    u = apparatus.predict_uncertainty(r, contact.base_shear(r))
-    assert 0 < u.max() < 0.1 * largest
+    assert 0 < apparatus.predict_uncertainty(r, contact.base_shear(r)).max() < 0.1 * largest
 
 
 def test_convolution_with_a_tangential_g_keeps_a_vector_field_s_zero_on_the_axis() -> None:
     apparatus = calibrated(shear_scan(seed=3)).apparatus
     r = np.linspace(0.0, 30e-3, 1501)
     spread = 1.2e-3
-    shear = -r / spread**2 * np.exp(-(r**2) / (2 * spread**2))
-    blurred = apparatus.convolve(r, shear)
+    blurred = apparatus.convolve(r, -r / spread**2 * np.exp(-(r**2) / (2 * spread**2)))
     # The gradient of a Gaussian stays one of a wider Gaussian, if G is nearly a Gaussian.
     wide = np.hypot(spread, apparatus.gaussian_sigma)
     expected = -r * spread**2 / wide**4 * np.exp(-(r**2) / (2 * wide**2))
@@ -138,8 +129,7 @@ def test_the_artifact_says_its_channel_and_comes_back_from_its_file(tmp_path: Pa
     apparatus.save(tmp_path / "xz.h5")
     again = memscal.load_apparatus(tmp_path / "xz.h5")
     r = np.linspace(0.0, 30e-3, 1501)
-    shear = apparatus.reference.sigma_rz
-    table = np.interp(r, apparatus.reference.r, shear)
+    table = np.interp(r, apparatus.reference.r, apparatus.reference.sigma_rz)
     assert_same_to_rounding(again.convolve(r, table), apparatus.convolve(r, table))
     assert again.order == 1
 
@@ -175,8 +165,7 @@ def test_outliers_and_missing_points_move_nothing() -> None:
     clean = calibrated(scan).apparatus
     u[12] += 0.8 * np.abs(u).max()
     u[40] = np.nan
-    spoiled = replace(scan, channels={**scan.channels, "u_xz": u})
-    found = calibrated(spoiled).apparatus
+    found = calibrated(replace(scan, channels={**scan.channels, "u_xz": u})).apparatus
     spread = clean.parameters.uncertainty("conversion_constant_gaussian")
     moved = (
         found.parameters["conversion_constant_gaussian"]

@@ -1,7 +1,5 @@
 """Uncertainties against brute force, the budget's own sums, and the functionals of G(r)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -43,8 +41,7 @@ def test_each_input_of_the_reference_counts_what_moving_it_changes(source, chang
 
 
 def test_the_load_scales_the_conversion_constant_and_nothing_else() -> None:
-    scan = replace(simulated(), load_uncertainty=0.02)
-    apparatus = memscal.calibrate(scan).apparatus
+    apparatus = memscal.calibrate(replace(simulated(), load_uncertainty=0.02)).apparatus
     assert apparatus.budget["conversion_constant"]["load"] == pytest.approx(
         0.02 * apparatus.conversion_constant
     )

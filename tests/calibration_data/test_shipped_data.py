@@ -1,7 +1,5 @@
 """The shipped data are what their README says: synthetic, in order, and made by its commands."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import os
@@ -18,9 +16,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import memscal
+from memscal import ElasticFilm, Indenter
 from memscal.formats.inspection import check
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
 
 DATA = Path(__file__).parents[2] / "calibration_data"
 README = (DATA / "README.md").read_text(encoding="utf-8")
@@ -76,8 +73,6 @@ def calibrations() -> dict[str, memscal.Calibration]:
 @pytest.fixture(scope="module")
 def generator() -> ModuleType:
     spec = importlib.util.spec_from_file_location("make_tables", DATA / "make_tables.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -121,13 +116,10 @@ def test_every_file_says_that_it_is_synthetic() -> None:
 
 
 @pytest.mark.parametrize("name", [*SCANS, EXPERIMENT[0]])
-def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(
-    name: str, calibrations: dict[str, memscal.Calibration]
-) -> None:
+def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calibrations) -> None:
     calibration = calibrations[name]
     assert calibration.passed
     truth = memscal.read_scan(DATA / name).synthetic
-    assert truth is not None
     assert truth["gaussian_sigma"] == 561e-6
     found = calibration.apparatus.parameters
     sought = {name: truth[name] for name in found.names if name in truth}
@@ -147,9 +139,7 @@ def own_uncertainty(apparatus: memscal.ApparatusFunction) -> float:
 @pytest.mark.parametrize(
     "name", ["rod_scan_33.h5", "rod_scan_three_loads.h5", "rod_scan_raster.h5"]
 )
-def test_lines_loads_and_raster_give_the_same_conversion_constant(
-    name: str, calibrations: dict[str, memscal.Calibration]
-) -> None:
+def test_lines_loads_and_raster_give_the_same_conversion_constant(name, calibrations) -> None:
     one, other = calibrations["rod_scan_65.h5"].apparatus, calibrations[name].apparatus
     expected = np.hypot(own_uncertainty(one), own_uncertainty(other))
     assert expected < 0.02 * one.conversion_constant
@@ -159,8 +149,7 @@ def test_lines_loads_and_raster_give_the_same_conversion_constant(
 @pytest.mark.parametrize("name", [*SCANS, *EXPERIMENT])
 def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -> None:
     shipped, made = memscal.read_scan(DATA / name), memscal.read_scan(rebuilt / name)
-    arrays = ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors")
-    for field in arrays:
+    for field in ("x", "y", "x_errors", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
         expected, found = getattr(shipped, field), getattr(made, field)
         assert (expected is None) == (found is None), field
         if expected is not None:
@@ -170,8 +159,6 @@ def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -
         assert getattr(made, field) == getattr(shipped, field), field
     for field in ("film", "indenter"):
         assert stated(getattr(made, field)) == pytest.approx(stated(getattr(shipped, field)))
-    assert made.synthetic is not None
-    assert shipped.synthetic is not None
     assert made.synthetic.keys() == shipped.synthetic.keys()
     for name, value in shipped.synthetic.items():
         expected = value if isinstance(value, str) else pytest.approx(value, rel=1e-9)
@@ -184,7 +171,6 @@ def test_the_contacts_of_the_experiment_are_what_its_readme_says() -> None:
         (dry, [0.34, 0.69, 1.37, 2.75], 0.2),
         (lubricated, [0.69, 2.75], 0),
     ):
-        assert scan.synthetic is not None
         assert scan.synthetic["friction"] == friction
         assert_allclose(np.diff(scan.x), 0.5e-3)
         assert_allclose(scan.normal_load, np.repeat(loads, 2)[:, None] * np.ones(33))
@@ -205,7 +191,6 @@ def test_the_shipped_artifact_is_what_calibrate_makes_now(rebuilt: Path) -> None
     assert made.gaussian_sigma == pytest.approx(shipped.gaussian_sigma, rel=1e-9)
     assert made.parameters.names == shipped.parameters.names
     source = shipped.process.input_scan
-    assert source is not None
     assert source.sha256 == hashlib.sha256((DATA / source.file_name).read_bytes()).hexdigest()
     assert [c.name for c in made.checks] == [c.name for c in shipped.checks]
     assert_allclose(made.radial_profile.g, shipped.radial_profile.g, atol=1e-6 * made.field.g.max())
@@ -227,9 +212,7 @@ def test_the_tables_are_what_their_generator_makes(generator: ModuleType, tmp_pa
         assert_allclose(numbers(tmp_path / name), numbers(DATA / name), rtol=0, atol=1.1e-5)
 
 
-def test_the_table_of_dry_contacts_becomes_a_scan_with_a_line_for_each_load_and_pass(
-    imported: Path,
-) -> None:
+def test_the_table_of_dry_contacts_becomes_a_scan_with_a_line_for_each_load_and_pass(imported):
     scan = memscal.read_scan(imported / "dry.h5")
     # One reading is empty, and one row is missing.
     assert (scan.kind, scan.u_zz.size, scan.lubrication) == ("points", 6 * 33 - 1, "dry")
@@ -268,7 +251,6 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
     table = memscal.read_reference(imported / "fem.h5")
     contact = memscal.indent(ours.film, ours.indenter, load=1.0)
     scan = memscal.read_scan(DATA / "rod_scan_65.h5")
-    assert scan.u_zz_errors is not None
     largest = np.max(np.abs(table.sigma_zz - contact.base_stress(table.r)))
     assert largest < 5e-4 * contact.base_stress(0.0)
 

@@ -1,7 +1,5 @@
 """Division problems whose answer is known in closed form."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass

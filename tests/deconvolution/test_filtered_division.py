@@ -1,7 +1,5 @@
 """Division by a spectral window: the quotient, the window, and the formulas of the windows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -34,8 +32,7 @@ def random_problem(seed: int, grid: FieldGrid) -> tuple[DivisionProblem, FloatAr
     if isinstance(grid, Lattice):
         reference = np.fft.ifftshift(reference)  # its axis at the lattice's first point
     kernel = rng.normal(size=shape)
-    problem = DivisionProblem(grid, grid.convolve(kernel, reference), reference, 1.0, 1.0)
-    return problem, kernel
+    return DivisionProblem(grid, grid.convolve(kernel, reference), reference, 1.0, 1.0), kernel
 
 
 @pytest.mark.parametrize("grid", [EvenGrid(9, 0.5), small_lattice()], ids=["quarter", "lattice"])
@@ -67,9 +64,7 @@ def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there
 
 
 @given(seed=SEEDS, amplitude=st.floats(0.1, 10), weakest=st.floats(0.1, 10))
-def test_tikhonov_is_the_solution_of_its_normal_equations(
-    seed: int, amplitude: float, weakest: float
-) -> None:
+def test_tikhonov_is_the_solution_of_its_normal_equations(seed, amplitude, weakest) -> None:
     rng = np.random.default_rng(seed)
     grid = small_lattice()
     voltage, reference = rng.normal(size=(2, 7, 9))
@@ -81,12 +76,10 @@ def test_tikhonov_is_the_solution_of_its_normal_equations(
     ]
     matrix = np.stack(columns, axis=1) * grid.cell_area
     # Parseval gives both terms of the functional the same factor: alpha is in no need of one.
-    alpha = (amplitude * 0.1 * weakest) ** 2
-    stacked = np.concatenate([matrix, np.sqrt(alpha) * np.eye(63)])
+    stacked = np.concatenate([matrix, np.sqrt((amplitude * 0.1 * weakest) ** 2) * np.eye(63)])
     target = np.concatenate([voltage.ravel(), np.zeros(63)])
     solution = np.linalg.lstsq(stacked, target, rcond=None)[0].reshape(7, 9)
-    scale = np.abs(solution).max()
-    np.testing.assert_allclose(found, solution, atol=1e-6 * scale)
+    np.testing.assert_allclose(found, solution, atol=1e-6 * np.abs(solution).max())
 
 
 @given(amplitude=st.floats(1e-2, 1e2), weakest=st.floats(1e-4, 0.5))

@@ -1,7 +1,5 @@
 """The paper's steps on arrays, against closed forms of Gaussians."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -60,9 +58,7 @@ def test_what_was_divided_convolves_back_to_the_voltage(method: str) -> None:
 
 def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_is() -> None:
     voltage, stress = voltage_and_stress()
-    modulus = stress.spectrum()[1]
-    place = int(np.argmax(modulus <= 1e-2))
-    pair = (1e-2, float(voltage.spectrum()[1][place]))
+    pair = (1e-2, float(voltage.spectrum()[1][int(np.argmax(stress.spectrum()[1] <= 1e-2))]))
     drawn = [
         memscal.divide(voltage, stress, weakest=weakest, method="white-noise-draw", seed=3)
         for weakest in (1e-2, pair)

@@ -1,7 +1,5 @@
 """Regularisers by name: ours, others', and the names that do not exist."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -99,8 +97,7 @@ def test_a_plug_in_is_listed_and_created_with_its_options_and_without_the_seed()
 
 @pytest.mark.usefixtures("plug_in")
 def test_a_plug_in_cannot_take_a_name_of_ours() -> None:
-    regulariser = create_regulariser("tikhonov")
-    assert type(regulariser).__module__ == "memscal.deconvolution.division"
+    assert type(create_regulariser("tikhonov")).__module__ == "memscal.deconvolution.division"
 
 
 @pytest.mark.usefixtures("plug_in")
@@ -110,8 +107,7 @@ def test_a_calibration_runs_with_a_plug_in() -> None:
     assert apparatus.process.configuration["method"] == "cutoff"
     assert apparatus.process.configuration["options"] == {"k_max": 2.5e3}
     transfer = apparatus.transfer
-    beyond = transfer.k > 2.6e3
-    np.testing.assert_array_equal(transfer.window[beyond], 0.0)
+    np.testing.assert_array_equal(transfer.window[transfer.k > 2.6e3], 0.0)
     np.testing.assert_array_equal(transfer.window[transfer.k < 2.4e3], 1.0)
 
 

@@ -1,7 +1,5 @@
 """The classical restorations: centre, units and scale, and what each of them promises."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -19,13 +17,10 @@ def named(regulariser: Regulariser) -> str:
 
 
 @pytest.mark.parametrize("regulariser", CLASSICAL, ids=named)
-def test_the_integral_is_the_conversion_constant(
-    regulariser: Regulariser, on_each_grid: Callable
-) -> None:
+def test_the_integral_is_the_conversion_constant(regulariser, on_each_grid) -> None:
     gaussians = on_each_grid()
     image = gaussians.problem.grid.to_image(regulariser.divide(gaussians.problem).field)
-    total = image.sum() * gaussians.problem.grid.cell_area
-    assert total == pytest.approx(3e-8, rel=1e-3)
+    assert image.sum() * gaussians.problem.grid.cell_area == pytest.approx(3e-8, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -33,9 +28,7 @@ def test_the_integral_is_the_conversion_constant(
     [(Wiener(), 1e-3), (UnsupervisedWiener(), 3e-2), (RichardsonLucy(), 1e-2)],
     ids=["wiener", "unsupervised", "rl"],
 )
-def test_strong_components_come_back(
-    regulariser: Regulariser, error: float, on_each_grid: Callable
-) -> None:
+def test_strong_components_come_back(regulariser, error, on_each_grid) -> None:
     gaussians = on_each_grid()
     strong = gaussians.stress_transform > 0.05
     found = gaussians.transform(regulariser.divide(gaussians.problem))[strong]
@@ -44,9 +37,7 @@ def test_strong_components_come_back(
 
 @pytest.mark.parametrize(("volts", "stress"), [(2.0**-20, 1.0), (2.0**20, 1.0), (1.0, 2.0**20)])
 @pytest.mark.parametrize("regulariser", [*CLASSICAL, Tikhonov()], ids=named)
-def test_the_units_of_voltage_and_stress_do_not_matter(
-    regulariser: Regulariser, volts: float, stress: float, gaussians: Callable
-) -> None:
+def test_the_units_of_voltage_and_stress_do_not_matter(regulariser, volts, stress, gaussians):
     # Powers of two: the unsupervised filter takes the rounding of noise-free data for noise.
     problem = gaussians("lattice").problem
     scaled = DivisionProblem(
@@ -80,13 +71,10 @@ def test_wiener_does_not_smooth_away_a_raster_too_coarse_to_show_the_band_edge()
     reference = np.exp(-((grid.radius / 0.9e-3) ** 2) / 2) / (2 * np.pi * 0.9e-3**2)
     kernel = np.exp(-((grid.radius / 0.6e-3) ** 2) / 2) / (2 * np.pi * 0.6e-3**2)
     problem = DivisionProblem(grid, grid.convolve(kernel, reference), reference, 1e-5, 1e-3)
-    division = Wiener().divide(problem)
-    np.testing.assert_allclose(division.field, kernel, atol=0.01 * kernel.max())
+    np.testing.assert_allclose(Wiener().divide(problem).field, kernel, atol=0.01 * kernel.max())
 
 
-def test_richardson_and_lucy_keep_the_kernel_positive_where_others_overshoot(
-    on_each_grid: Callable,
-) -> None:
+def test_richardson_and_lucy_keep_the_kernel_positive_where_others_overshoot(on_each_grid) -> None:
     problem = on_each_grid(weakest=1e-2).problem
     assert Tikhonov().divide(problem).field.min() < 0
     field = RichardsonLucy().divide(problem).field
@@ -112,9 +100,7 @@ def test_the_unsupervised_sampler_repeats_with_its_seed(gaussians: Callable, see
 
 
 @pytest.mark.parametrize("regulariser", CLASSICAL, ids=named)
-def test_windows_lie_between_nothing_and_all(
-    regulariser: Regulariser, on_each_grid: Callable
-) -> None:
+def test_windows_lie_between_nothing_and_all(regulariser, on_each_grid) -> None:
     problem = on_each_grid().problem
     window = regulariser.divide(problem).window
     assert window.shape == problem.grid.wavenumber.shape

@@ -1,7 +1,5 @@
 """The band: rings tile the plane, and the noise of a component is what simulation finds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from helpers.scans import RING, TAILS, estimated, simulated
@@ -28,24 +26,21 @@ def test_the_sum_over_rings_approximates_the_transform() -> None:
     estimate = estimated(simulated(noise=0.0, points=257, baseline=0.0, drift=0.0))
     points, k = estimate.points, estimate.model.k[estimate.model.k < 3e3]
     radius = np.abs(points.x - estimate.centre[0])
-    areas = _ring_areas(radius, tolerance=0.25 * points.step)
-    found = j0(np.outer(k, radius)) @ (areas * points.u)
+    found = j0(np.outer(k, radius)) @ (_ring_areas(radius, tolerance=0.25 * points.step) * points.u)
     wanted = estimate.spectrum.values[: k.size]
     # The rule is of second order in the step of 1/16 mm, and misses three percent of tail.
     assert np.abs(found - wanted).max() < 0.05 * wanted.max()
 
 
 def test_the_noise_of_a_component_is_what_many_scans_scatter() -> None:
-    scan = simulated(noise=0.01, centre=(0.0, 0.0))
-    estimate = estimated(scan)
+    estimate = estimated(simulated(noise=0.01, centre=(0.0, 0.0)))
     band = find_band(estimate)
     points = estimate.points
     radius = np.abs(points.x - estimate.centre[0])
     signal = estimate.predicted - estimate.background
     share = signal**2 / (signal**2 + estimate.noise**2) * estimate.outlier_weight
     areas = _ring_areas(radius, tolerance=0.25 * points.step)
-    rng = np.random.default_rng()
-    draws = rng.normal(0.0, estimate.noise, (4000, points.u.size))
+    draws = np.random.default_rng().normal(0.0, estimate.noise, (4000, points.u.size))
     scatter = (draws * areas * share) @ j0(np.outer(radius, band.k))
     # 4000 draws know a standard deviation to 1.1 percent; the largest of 200 to five of those.
     np.testing.assert_allclose(scatter.std(axis=0), band.noise, rtol=0.06)
@@ -63,9 +58,7 @@ def test_less_noise_resolves_more_and_the_relevant_band_lies_within_the_resolved
 
 @pytest.mark.parametrize("noise", [0.02, 0.005])
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), TAILS, RING])
-def test_within_the_band_the_data_speak_and_beyond_it_the_prior(
-    kernel: memscal.GaussianMixture, noise: float
-) -> None:
+def test_within_the_band_the_data_speak_and_beyond_it_the_prior(kernel, noise) -> None:
     places = np.array([0.8, 1.5])
     errors, kept = [], []
     for seed in range(16):

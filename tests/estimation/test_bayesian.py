@@ -1,7 +1,5 @@
 """Bayesian model averaging against the formulas of linear Gaussian models; shapes of departure."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from helpers.scans import CONVERSION, RING, SIGMA, TAILS, estimated, plane_error, simulated
@@ -38,8 +36,7 @@ def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods()
     voltages = model.signal(fit.geometry, basis.kernels(model.k)) * root[:, None]
     for i in (1, 5, len(HYPOTHESES) - 1):
         hypothesis = HYPOTHESES[i]
-        block = basis.blocks[SHAPES.index(hypothesis.shape)]
-        design = null.T @ voltages[:, block]
+        design = null.T @ voltages[:, basis.blocks[SHAPES.index(hypothesis.shape)]]
         noise = estimate.weighed.noise**2
         # At the same noise for both: the estimate's own maximises each, which is its profile.
         signal = hypothesis.strength**2 * design @ design.T
@@ -85,8 +82,7 @@ def test_more_noise_means_less_departure_from_the_gaussian() -> None:
 def test_the_width_reached_by_fewer_points_than_components_keeps_the_prior() -> None:
     """Few places cannot tell 79 coefficients; what they do not tell stays uncertain."""
     scan = simulated(points=15, half_range=5e-3, noise=0.003)
-    found = estimated(scan)
-    assert np.isfinite(found.covariance).all()
+    assert np.isfinite(estimated(scan).covariance).all()
     few = memscal.calibrate(scan, method="bayesian").apparatus
     many = memscal.calibrate(simulated(points=129, noise=0.003), method="bayesian").apparatus
     assert few.radial_uncertainty(0.0) > many.radial_uncertainty(0.0)
@@ -143,8 +139,9 @@ def test_a_shape_is_the_same_on_both_sides_of_the_transform(shape) -> None:
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: f"{s.name} {s.blur} {s.extent}")
 def test_a_strength_of_one_is_as_large_as_the_gaussian(shape) -> None:
-    transform = shape.rings(SIGMA, CONVERSION).transform(NODES.k)
-    expected = np.sqrt(np.sum(NODES.weights @ transform**2))
+    expected = np.sqrt(
+        np.sum(NODES.weights @ shape.rings(SIGMA, CONVERSION).transform(NODES.k) ** 2)
+    )
     gaussian = CONVERSION * np.exp(-0.5 * (SIGMA * NODES.k) ** 2)
     assert expected == pytest.approx(np.sqrt(NODES.weights @ gaussian**2), rel=1e-6)
 
@@ -158,8 +155,7 @@ def test_a_ring_carries_its_amplitude_whatever_its_radius_and_blur() -> None:
 
 
 def test_the_basis_moves_the_estimate_as_its_columns_say() -> None:
-    estimate = estimated(simulated(noise=0.002))
-    basis, r = estimate.basis, np.linspace(0.0, 3e-3, 31)
+    basis, r = estimated(simulated(noise=0.002)).basis, np.linspace(0.0, 3e-3, 31)
     columns = basis.kernels(NODES.k)
     np.testing.assert_allclose(
         np.stack([NODES.synthesise(c, r) for c in columns.T], axis=1),

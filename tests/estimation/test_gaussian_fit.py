@@ -1,7 +1,5 @@
 """The Gaussian fit: exact without noise, right in its derivatives, and robust at its start."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import memscal
+from memscal import Scan, fit_gaussian
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import fit_gaussian
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectrum
-from memscal.model.scan import Scan
 
 
 def forward(scan: Scan) -> ForwardModel:
@@ -77,8 +74,7 @@ def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
             a, s = found.conversion_constant + shift[0], found.sigma + shift[1]
             centre = found.centre.copy()
             centre[0, :plane] += shift[2 : 2 + plane]
-            kernel = a * gaussian_transfer(model.k, s)
-            signal = model.signal(model.geometry(centre), kernel)
+            signal = model.signal(model.geometry(centre), a * gaussian_transfer(model.k, s))
             return signal + model.drift_columns @ (found.drift + shift[2 + plane :])
 
         # The ellipse of a raster, whose slopes follow, is tested where it is at home.

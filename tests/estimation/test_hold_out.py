@@ -1,7 +1,5 @@
 """Predicting a repeat or a load from the others: the covariance is right, and faults are found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -25,11 +23,9 @@ def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covarian
     # The held-out part's own centre, baseline and drift, by generalised least squares.
     own, distance = x[out][:, 2:5], z[out] - x[out] @ beta
     weight = np.linalg.inv(covariance)
-    fitted = own @ np.linalg.solve(own.T @ weight @ own, own.T @ weight @ distance)
-    left = distance - fitted
+    left = distance - (own @ np.linalg.solve(own.T @ weight @ own, own.T @ weight @ distance))
     assert found.value == pytest.approx(left @ weight @ left / 30, rel=1e-5)
-    p_value = min(2 * chi2.sf(30 * found.value, 30), 1.0)
-    assert found.p_value == pytest.approx(p_value, rel=1e-4)
+    assert found.p_value == pytest.approx(min(2 * chi2.sf(30 * found.value, 30), 1.0), rel=1e-4)
     assert found.limit == pytest.approx(chi2.isf(5e-4, 30) / 30, rel=1e-6)
 
 
@@ -52,8 +48,7 @@ def test_groups_of_good_scans_are_rejected_no_more_often_than_is_said(options) -
         found = hold_out(estimate, group)
         assert (found.value > found.limit) == (found.p_value < 1e-3)
         p_values.append(found.p_value)
-    rejected = np.sum(np.array(p_values) < level)
-    assert rejected <= binom.ppf(1 - 1e-6, scans, level)
+    assert np.sum(np.array(p_values) < level) <= binom.ppf(1 - 1e-6, scans, level)
 
 
 @pytest.mark.parametrize("gain", [1.04, 0.92])
@@ -84,8 +79,7 @@ def test_a_repeat_may_have_its_own_baseline_and_centre() -> None:
 
 def test_a_signal_that_is_not_linear_in_load_is_found_by_the_load_held_out() -> None:
     scan = simulated(load=[0.5, 1.0, 1.5], noise=0.003, baseline=0.0, drift=0.0)
-    bent = replace(scan, u_zz=scan.u_zz * (1 + 0.06 * (scan.normal_load - 1.0)))
-    estimate = estimated(bent)
+    estimate = estimated(replace(scan, u_zz=scan.u_zz * (1 + 0.06 * (scan.normal_load - 1.0))))
     assert hold_out(estimate, load_groups(estimate.points.load)).p_value < 1e-3
 
 

@@ -1,7 +1,5 @@
 """The tests of symmetry, linearity and roundness: rare false alarms, and real departures found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +12,7 @@ from memscal.model.checks import chi_square_limit
 
 
 @pytest.mark.parametrize(
-    ("test", "options"),
-    [(symmetry_test, {}), (linearity_test, {"load": [0.5, 1.5], "points": 33})],
+    ("test", "options"), [(symmetry_test, {}), (linearity_test, {"load": [0.5, 1.5], "points": 33})]
 )
 def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options) -> None:
     scans = 80

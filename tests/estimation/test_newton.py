@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -30,15 +28,9 @@ def found_and_searched(
     assert found is not None
     robust = np.isfinite(knee)
     searched = least_squares(
-        lambda p: curve(p) - data,
-        start,
-        jac=slope,
-        loss="soft_l1" if robust else "linear",
-        f_scale=knee if robust else 1.0,
-        xtol=1e-14,
-        ftol=1e-14,
-        gtol=1e-14,
-    )
+        lambda p: curve(p) - data, start, jac=slope, loss="soft_l1" if robust else "linear",
+        f_scale=knee if robust else 1.0, xtol=1e-14, ftol=1e-14, gtol=1e-14,
+    )  # fmt: skip
     return found, searched.x
 
 
@@ -57,7 +49,6 @@ def test_a_step_that_goes_too_far_is_halved() -> None:
         return np.arctan(p), np.diag(1 / (1 + p**2))
 
     found = gauss_newton(linearise, np.array([1.6]), tolerance=1e-9)
-    assert found is not None
     assert found[0] == pytest.approx(0.0, abs=1e-9)
 
 

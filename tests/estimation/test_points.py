@@ -1,7 +1,5 @@
 """Points: what is left out is counted, and what cannot be calibrated is refused plainly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -45,11 +43,7 @@ def test_repeats_share_positions_and_know_their_row() -> None:
         (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, InputError, "Every voltage"),
         (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, InputError, "zero"),
         (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, InputError, "above zero"),
-        (
-            lambda s: {"x": s.x[:5], "u_zz": s.u_zz[:5], "u_zz_errors": None},
-            FitError,
-            "at least 6",
-        ),
+        (lambda s: {"x": s.x[:5], "u_zz": s.u_zz[:5], "u_zz_errors": None}, FitError, "at least 6"),
     ],
 )
 def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, error, words) -> None:

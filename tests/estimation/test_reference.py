@@ -1,7 +1,5 @@
 """The reference: where it comes from, what it must cover, and what its inputs change."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residuals that do not depend on G: exact size, no order, and real causes that break them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -54,8 +52,7 @@ def test_residuals_keep_the_misfit_s_size_and_lose_one_for_each_column(options) 
 
 def with_voltages(estimate: ProfileEstimate, u: np.ndarray) -> ProfileEstimate:
     """Change the voltages of an estimate and leave the model about its Gaussian as it is."""
-    points = replace(estimate.points, u=u)
-    model = replace(estimate.model, points=points)
+    model = replace(estimate.model, points=replace(estimate.points, u=u))
     return replace(estimate, model=model, outlier_weight=np.ones(u.size))
 
 
@@ -76,8 +73,7 @@ def test_residuals_of_many_noises_are_independent_and_of_unit_variance() -> None
 @pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), TAILS, RING])
 def test_what_is_left_does_not_depend_on_g(kernel: memscal.GaussianMixture) -> None:
     estimate = estimated(simulated(kernel=kernel, noise=0.005))
-    clean = simulated(kernel=kernel, noise=0.0).u_zz
-    residuals = residuals_of(with_voltages(estimate, clean))
+    residuals = residuals_of(with_voltages(estimate, simulated(kernel=kernel, noise=0.0).u_zz))
     # Without noise hardly anything is left over: of each direction a small share of the noise.
     assert residuals.values @ residuals.values < 0.1
 
@@ -92,19 +88,16 @@ def test_an_outlier_is_left_out_of_the_residuals() -> None:
 
 
 def test_each_row_and_each_repeat_is_a_pass_of_its_own_in_the_order_of_the_scan() -> None:
-    repeats = residuals_of(estimated(simulated(repeats=3, points=33)))
-    assert set(repeats.sequence) == {0, 1, 2}
+    assert set(residuals_of(estimated(simulated(repeats=3, points=33))).sequence) == {0, 1, 2}
     estimate = estimated(simulated(raster=True, points=17))
     raster = residuals_of(estimate)
     assert set(raster.sequence) == set(range(17))
     assert (np.diff(raster.sequence) >= 0).all()
-    same = np.diff(raster.sequence) == 0
-    assert (np.diff(estimate.points.x[raster.point])[same] > 0).all()
+    assert (np.diff(estimate.points.x[raster.point])[np.diff(raster.sequence) == 0] > 0).all()
 
 
 def test_the_chi_square_is_that_of_the_distribution() -> None:
-    values = np.array([1.0, -2.0, 0.5, 1.5])
-    found = chi_square_test(made(values))
+    found = chi_square_test(made(np.array([1.0, -2.0, 0.5, 1.5])))
     assert found.value == pytest.approx(7.5 / 4)
     assert found.p_value == pytest.approx(chi2.sf(7.5, 4))
     assert found.limit == pytest.approx(chi2.isf(1e-3, 4) / 4)
@@ -141,8 +134,7 @@ def test_the_traces_are_those_of_the_matrices() -> None:
 def test_the_moments_of_the_neighbours_correlation_give_its_tail() -> None:
     rng = np.random.default_rng()
     draws = 2500
-    estimate = estimated(simulated(points=49))
-    residuals = residuals_of(estimate)
+    residuals = residuals_of(estimated(simulated(points=49)))
     basis = residuals.basis
     p_values = np.empty(draws)
     for i, noise in enumerate(rng.normal(size=(draws, basis.shape[0]))):
@@ -202,12 +194,10 @@ def disturbed(cause: str, noise: float = 0.003) -> Scan:
     if cause == "a step of the baseline":
         return replace(scan, u_zz=scan.u_zz + 0.03 * largest * (place > 0.45))
     if cause == "correlated noise":
-        rng = np.random.default_rng(5)
-        white = rng.normal(size=scan.x.size + 50)
+        white = np.random.default_rng(5).normal(size=scan.x.size + 50)
         slow = np.convolve(white, 0.8 ** np.arange(50))[50 : 50 + scan.x.size]
         slow *= noise * largest * np.sqrt(1 - 0.8**2)
-        clean = simulated(noise=0.0, points=97)
-        return replace(scan, u_zz=clean.u_zz + slow)
+        return replace(scan, u_zz=simulated(noise=0.0, points=97).u_zz + slow)
     return replace(scan, film=replace(scan.film, thickness=2.6e-3))
 
 

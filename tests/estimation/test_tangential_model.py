@@ -1,7 +1,5 @@
 """The forward model of a tangential channel, against a 2-D convolution that knows no transform."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +7,12 @@ import pytest
 from helpers.scans import CENTRE, shear_scan
 
 import memscal
-from memscal.axisymmetry.kernels import GaussianMixture
+from memscal import GaussianMixture, StressProfile
 from memscal.errors import InputError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.reference import carried_force, reference_spectra
 from memscal.model.arrays import FloatArray
-from memscal.model.stress import StressProfile
 
 KERNEL = GaussianMixture((1.4, -0.4), (450e-6, 250e-6))
 
@@ -24,18 +21,10 @@ def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
     """Points anywhere on the plane, at a load of 2 N."""
     n = x.size
     return ScanPoints(
-        x=x,
-        y=y,
-        u=np.zeros(n),
-        load=np.full(n, 2.0),
-        u_errors=None,
-        x_errors=np.zeros(n),
-        repeat=np.zeros(n, dtype=np.intp),
-        scan=np.zeros(n, dtype=np.intp),
-        free=np.array([[True, True]]),
-        missing=0,
-        channel=channel,
-    )
+        x=x, y=y, u=np.zeros(n), load=np.full(n, 2.0), u_errors=None, x_errors=np.zeros(n),
+        repeat=np.zeros(n, dtype=np.intp), scan=np.zeros(n, dtype=np.intp),
+        free=np.array([[True, True]]), missing=0, channel=channel,
+    )  # fmt: skip
 
 
 def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
@@ -46,9 +35,7 @@ def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
 
 
 @pytest.mark.parametrize("channel", ["xz", "yz"])
-def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(
-    channel: str,
-) -> None:
+def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(channel) -> None:
     # The film's traction on every element of the base, weighed by G: in Cartesian coordinates,
     # with the indenter at (x, y) and the sensor at the centre.
     contact = memscal.indent(memscal.simulate().film, memscal.simulate().indenter, load=2.0)
@@ -74,8 +61,7 @@ def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sens
 
 
 def test_the_signal_is_odd_along_its_component_and_even_across() -> None:
-    rng = np.random.default_rng()
-    x, y = rng.uniform(-4e-3, 4e-3, (2, 8))
+    x, y = np.random.default_rng().uniform(-4e-3, 4e-3, (2, 8))
     signals = []
     for sx, sy in ((1, 1), (-1, 1), (1, -1)):
         model = model_at(sx * x, sy * y)
@@ -150,7 +136,6 @@ def test_the_points_of_a_channel_are_its_own_voltages_and_noise() -> None:
     scan = shear_scan(seed=2)
     points = measured_points(scan, "xz")
     np.testing.assert_array_equal(points.u, scan.channels["u_xz"])
-    assert points.u_errors is not None
     np.testing.assert_array_equal(points.u_errors, scan.channels["u_xz_errors"])
     assert (points.order, measured_points(scan).order) == (1, 0)
     without = replace(scan, channels={"u_xz": scan.channels["u_xz"]})

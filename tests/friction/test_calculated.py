@@ -1,7 +1,5 @@
 """Families of calculated profiles, against contacts that are solved one by one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart, profiles
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 
+from memscal import ElasticFilm, ExponentialCompliance, Interface, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError
 from memscal.friction.calculated import (
     FRICTIONS,
@@ -20,11 +19,7 @@ from memscal.friction.calculated import (
     normal_compliance_family,
 )
 from memscal.friction.family import ProfileFamily
-from memscal.mechanics.indent import indent
-from memscal.mechanics.interface import ExponentialCompliance, Interface
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
 
 LENGTHS = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0]) * 1.82e-6
 
@@ -60,9 +55,7 @@ def normal(law: str) -> Build:
     ],
     ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"],
 )
-def test_interpolated_profiles_are_those_of_contacts_solved_between(
-    build: Build, grid: list[float], between: list[float]
-) -> None:
+def test_interpolated_profiles_are_those_of_contacts_solved_between(build, grid, between) -> None:
     family = build(FILM, SPHERE, list(LOADS), list(grid))
     solved = build(FILM, SPHERE, list(LOADS), between)
     for index, value in enumerate(between):
@@ -77,8 +70,7 @@ def test_a_family_holds_the_contacts_that_indent_finds(friction: float, loading:
     contacts = indent(FILM, SPHERE, load=LOADS, friction=friction, loading=loading)
     truth = np.array([contact.base_spectrum(family.wavenumbers.k) for contact in contacts])
     assert apart(family, family.spectra[0], truth) < 3e-4
-    depths = [contact.depth for contact in contacts]
-    np.testing.assert_allclose(family.depths[0], depths, rtol=2e-4)
+    np.testing.assert_allclose(family.depths[0], [contact.depth for contact in contacts], rtol=2e-4)
     assert np.all(family.convergence < 1e-3)
 
 
@@ -233,7 +225,7 @@ def test_a_request_that_makes_no_sense_is_refused(changed: dict[str, object], sa
     request = {"indenter": SPHERE, "loads": [0.34], "friction": [0.1], "reach": REACH} | changed
     film_indenter_loads = FILM, request.pop("indenter"), request.pop("loads")
     with pytest.raises(InputError, match=said):
-        amontons_family(*film_indenter_loads, **request)  # type: ignore[arg-type]
+        amontons_family(*film_indenter_loads, **request)
 
 
 def test_laws_without_meaning_are_refused() -> None:

@@ -1,7 +1,5 @@
 """compare(): from scans and an artifact to friction, its checks, and what it refuses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +8,11 @@ import numpy as np
 import pytest
 
 import memscal
+from memscal import Experiment, Scan, StressSensor
 from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
 from memscal.friction.family import ProfileFamily
-from memscal.model.scan import Scan, StressSensor
-from memscal.simulation.experiment import Experiment
 
 FRICTION = (0.0, 0.1, 0.2, 0.3, math.inf)
 LOADINGS = ("incremental", "total")
@@ -55,18 +52,12 @@ def found(
 def families(made: Experiment, kept: Path) -> dict[str, ProfileFamily]:
     """The contacts of the comparison, from its folder."""
     family = amontons_family(
-        made.dry.film,
-        made.dry.indenter,
-        [0.69, 2.75],
-        friction=FRICTION,
-        reach=24e-3,
-        cache=kept,
+        made.dry.film, made.dry.indenter, [0.69, 2.75], friction=FRICTION, reach=24e-3, cache=kept
     )
     return {"incremental": family}
 
 
 def scaled(scan: Scan, factor: float, noise: float = 1.0) -> Scan:
-    assert scan.u_zz_errors is not None
     return replace(scan, u_zz=factor * scan.u_zz, u_zz_errors=noise * scan.u_zz_errors)
 
 
@@ -87,9 +78,7 @@ def test_every_load_meets_every_loading(found: memscal.FrictionComparison) -> No
     assert "dry, incremental: " in repr(found)
 
 
-def test_what_is_calculated_is_the_contact_blurred_by_g(
-    found: memscal.FrictionComparison, apparatus: memscal.ApparatusFunction, made: Experiment
-) -> None:
+def test_what_is_calculated_is_the_contact_blurred_by_g(found, apparatus, made) -> None:
     one = found.loads["incremental"][1]
     r = np.linspace(0.0, 30e-3, 1200)
     contact = memscal.indent(made.dry.film, made.dry.indenter, load=2.75, friction=0.3)
@@ -101,9 +90,7 @@ def test_what_is_calculated_is_the_contact_blurred_by_g(
     assert one.ratio == pytest.approx(one.s_max / one.p0_max)
 
 
-def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(
-    found: memscal.FrictionComparison,
-) -> None:
+def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(found) -> None:
     for one in found.loads["total"]:
         assert one.chi_square.shape == one.p_values.shape == (len(FRICTION),)
         assert one.chi_square.min() >= one.by_profile.least - 1e-6
@@ -112,9 +99,7 @@ def test_chi_square_of_the_calculated_profiles_is_that_of_the_likelihood(
         assert one.by_profile.chi_square[where] == pytest.approx(one.chi_square)
 
 
-def test_lubricated_contacts_are_found_frictionless_and_dry_ones_not(
-    found: memscal.FrictionComparison,
-) -> None:
+def test_lubricated_contacts_are_found_frictionless_and_dry_ones_not(found) -> None:
     for loading in LOADINGS:
         assert found.joint["lubricated"][loading].interval.low == 0
         assert found.joint["dry"][loading].interval.low > 0
@@ -142,10 +127,7 @@ def test_no_value_comes_without_interval_and_budget(found: memscal.FrictionCompa
             )
 
 
-def test_a_clean_experiment_passes_its_checks_of_friction(
-    found: memscal.FrictionComparison,
-) -> None:
-    names = {check.name for check in found.checks}
+def test_a_clean_experiment_passes_its_checks_of_friction(found) -> None:
     assert {
         "applied_force_1",
         "profile_chi_square_4",
@@ -153,23 +135,17 @@ def test_a_clean_experiment_passes_its_checks_of_friction(
         "joint_chi_square_dry",
         "joint_chi_square_lubricated",
         "lubricated_frictionless",
-    } <= names
+    } <= {check.name for check in found.checks}
     assert "lubricated_frictionless" not in failed(found)
 
 
-def test_the_messages_say_synthetic_and_hold_the_macroscopic_coefficient_against_it(
-    found: memscal.FrictionComparison,
-) -> None:
+def test_the_messages_say_synthetic_and_hold_the_macroscopic_coefficient_against_it(found) -> None:
     kinds = [message.kind for message in found.messages]
     assert kinds.count("synthetic") == 1
     assert kinds.count("macroscopic") == len(found.loadings)
 
 
-def test_a_stress_beyond_full_stick_fails_checks(
-    made: Experiment,
-    apparatus: memscal.ApparatusFunction,
-    families: dict[str, ProfileFamily],
-) -> None:
+def test_a_stress_beyond_full_stick_fails_checks(made, apparatus, families) -> None:
     """A gain of 30 % that the rod scan did not have."""
     wrong = [scaled(scan, 1.3) for scan in (made.dry, made.lubricated)]
     found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
@@ -177,20 +153,14 @@ def test_a_stress_beyond_full_stick_fails_checks(
     assert found.joint["dry"]["incremental"].value is None
 
 
-def test_noise_that_is_understated_fails_the_chi_square(
-    made: Experiment,
-    apparatus: memscal.ApparatusFunction,
-    families: dict[str, ProfileFamily],
-) -> None:
+def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, families) -> None:
     wrong = scaled(made.dry, 1.0, noise=0.25)
     found = compare_measured(memscal.measure_stress(wrong, apparatus), apparatus, families)
     assert "joint_chi_square_dry" in failed(found)
     assert found.joint["dry"]["incremental"].p_value < 1e-6
 
 
-def test_profiles_from_elsewhere_take_the_place_of_ours(
-    made: Experiment, apparatus: memscal.ApparatusFunction
-) -> None:
+def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus) -> None:
     tables = [
         contact.profile()
         for mu in (0.0, 0.3)
@@ -224,9 +194,7 @@ def test_an_artifact_of_another_channel_or_sensor_is_refused_unless_overridden(
     assert found.measured.overridden
 
 
-def test_scans_of_different_films_or_spheres_are_refused(
-    made: Experiment, apparatus: memscal.ApparatusFunction
-) -> None:
+def test_scans_of_different_films_or_spheres_are_refused(made, apparatus) -> None:
     film = replace(made.dry.film, young_modulus=2.3e6)
     with pytest.raises(InputError, match="another film or sphere"):
         memscal.compare([made.lubricated, replace(made.dry, film=film)], apparatus)
@@ -243,18 +211,13 @@ def test_scans_of_different_films_or_spheres_are_refused(
         ({"macroscopic": -0.1}, "macroscopic"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(
-    made: Experiment,
-    apparatus: memscal.ApparatusFunction,
-    options: dict[str, object],
-    words: str,
-) -> None:
+def test_options_that_make_no_sense_are_refused(made, apparatus, options, words) -> None:
     with pytest.raises(InputError, match=words):
         memscal.compare(made.lubricated, apparatus, **options)
 
 
 def test_what_is_no_scan_is_refused(apparatus: memscal.ApparatusFunction) -> None:
     with pytest.raises(InputError, match="where a Scan is needed"):
-        memscal.compare([1.0], apparatus)  # type: ignore[list-item]
+        memscal.compare([1.0], apparatus)
     with pytest.raises(InputError, match="no scan"):
         memscal.compare([], apparatus)

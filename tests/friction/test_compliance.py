@@ -1,7 +1,5 @@
 """Laws of the interface weighed by what was calculated: each is found where it is the truth."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 
@@ -83,7 +81,6 @@ def test_a_rigid_interface_at_full_stick_gives_an_upper_bound_of_the_slip_length
     assert not found.yielding_preferred
     assert found.length.value is None
     assert found.length.interval.low == 0
-    assert found.length.interval.high is not None
     assert 0 < found.length.interval.high < 5e-6
     assert "upper bound" in found.length.reason
 
@@ -97,7 +94,6 @@ def test_without_friction_a_slip_length_has_no_upper_bound() -> None:
 
 def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load() -> None:
     implied = weighed("slipping", 16e-6).implied
-    assert implied is not None
     assert np.all(np.diff(implied.friction, axis=0) > 0)
     # A longer slip length means less friction.
     assert np.all(np.diff(implied.friction, axis=1) < 0)
@@ -116,8 +112,6 @@ def test_the_effective_coefficient_that_a_slip_length_means_grows_with_the_load(
 def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() -> None:
     found = weighed("slipping", 16e-6)
     implied, length = found.implied, found.length.value
-    assert implied is not None
-    assert length is not None
     radii = [
         float(np.interp(slipping().coordinate(length), slipping().coordinates, r))
         for r in slipping().contact_radii.T
@@ -170,7 +164,6 @@ def test_an_uncertain_macroscopic_coefficient_makes_the_slip_length_as_uncertain
     ).length
     assert found.standard_uncertainty is not None
     alone = weighed("slipping", 16e-6).length.standard_uncertainty
-    assert alone is not None
     assert found.standard_uncertainty == pytest.approx(math.hypot(alone, 1.6e-6), rel=0.1)
 
 
@@ -184,8 +177,7 @@ def test_the_bayes_factor_depends_on_the_prior_as_its_density_does() -> None:
 
 
 def normal(truth: ProfileFamily, value: float) -> LawComparison:
-    points = read_without_error(truth, value, PRECISE)
-    return weigh_normal_compliance(measured(points, yielding()))
+    return weigh_normal_compliance(measured(read_without_error(truth, value, PRECISE), yielding()))
 
 
 def test_a_rigid_lubricated_interface_gives_an_upper_bound() -> None:
@@ -205,4 +197,4 @@ def test_a_normal_compliance_is_found_where_it_is_the_truth() -> None:
 
 def test_nothing_measured_is_refused() -> None:
     with pytest.raises(InputError, match="No measured profile"):
-        compare_interface([], None, macroscopic=1.6)  # type: ignore[arg-type]
+        compare_interface([], None, macroscopic=1.6)

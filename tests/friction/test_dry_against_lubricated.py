@@ -1,7 +1,5 @@
 """Dry against lubricated voltages: nothing where there is nothing, and what friction adds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -25,14 +23,10 @@ def profile(points: LoadPoints, lubrication: str, load: float = 2.0) -> Any:
     stress = points.u / CONVERSION
     noise = np.diag((points.noise / CONVERSION) ** 2)
     return SimpleNamespace(
-        lubrication=lubrication,
-        load=load,
-        x=points.offset,
-        s_zz=stress,
+        lubrication=lubrication, load=load, x=points.offset, s_zz=stress,
         covariances={"noise": noise, "conversion_constant": 1e-4 * np.outer(stress, stress)},
-        maximum=float(stress.max()),
-        maximum_budget={"noise": 100.0, "apparatus": 500.0},
-    )
+        maximum=float(stress.max()), maximum_budget={"noise": 100.0, "apparatus": 500.0},
+    )  # fmt: skip
 
 
 def compared(
@@ -81,7 +75,6 @@ def test_friction_shows() -> None:
 
 def test_an_error_of_the_conversion_constant_scales_the_difference_alone() -> None:
     one = compared(0.2, 1)
-    assert one is not None
     noise = np.sqrt(2) * bare_points().noise[0] / CONVERSION
     assert one.difference_errors == pytest.approx(np.hypot(noise, 0.01 * one.difference))
     assert one.maximum_uncertainty == pytest.approx(

@@ -1,15 +1,13 @@
 """The effective friction coefficient over many cheap experiments: coverage, bounds, budgets."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
 import pytest
-from helpers.linear_contacts import FRICTIONS, Laboratory
+from helpers.linear_contacts import Laboratory
 from scipy.stats import binom, kstest
 
-from memscal.friction.effective import fine_values, with_loading
+from memscal.friction.effective import with_loading
 from memscal.friction.results import BoundedEstimate
 
 SEEDS = 60
@@ -65,8 +63,7 @@ def test_values_scatter_as_their_uncertainties_say() -> None:
         if one.value is not None and one.standard_uncertainty is not None
     ]
     assert len(apart) > 0.9 * SEEDS
-    spread = np.sqrt(np.mean(np.square(apart)))
-    assert abs(spread - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
+    assert abs(np.sqrt(np.mean(np.square(apart))) - 1) < 4 / np.sqrt(2 * len(apart)) + 0.1
 
 
 def test_the_budget_is_the_uncertainty_where_the_likelihood_is_a_parabola() -> None:
@@ -79,28 +76,17 @@ def test_the_budget_is_the_uncertainty_where_the_likelihood_is_a_parabola() -> N
 def test_all_loads_together_tell_more_than_each() -> None:
     confronted = laboratory().drawn(0.1, seed=1)
     joint, single = confronted.effective([0, 1]), confronted.effective([0])
-    assert joint.interval.high is not None
     width = joint.interval.high - joint.interval.low
     assert single.interval.high is None or single.interval.high - single.interval.low > width
     assert joint.degrees == 2 * (33 - 3) - 1
 
 
 def test_lubricated_contacts_reach_no_friction() -> None:
-    reached = sum(one.interval.low == 0 for one in found(0.0))
-    assert reached >= binom.ppf(CHANCE, SEEDS, 0.95)
-
-
-def test_the_fine_values_hold_those_that_were_calculated() -> None:
-    values = fine_values(laboratory().family)
-    assert set(FRICTIONS) <= set(values.tolist())
-    assert np.all(np.diff(values) > 0)
-    assert 190 < values.size < 220
+    assert sum(one.interval.low == 0 for one in found(0.0)) >= binom.ppf(CHANCE, SEEDS, 0.95)
 
 
 def test_the_other_loading_adds_a_rectangle() -> None:
     first, second = found(0.1)[0], found(0.2)[0]
-    assert first.value is not None
-    assert second.value is not None
     expected = abs(first.value - second.value) / np.sqrt(12)
     assert with_loading(first, second).budget["loading"] == pytest.approx(expected)
     assert "loading" not in with_loading(first, None).budget

@@ -1,7 +1,5 @@
 """Evidence against closed forms: Gaussians are integrated exactly, whatever is free in them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -32,9 +30,7 @@ def tables(residual: np.ndarray, systematic: np.ndarray, noise: np.ndarray) -> T
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(
-    seed: int,
-) -> None:
+def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncertain(seed) -> None:
     rng = np.random.default_rng(seed)
     residual, systematic = rng.normal(size=12), rng.normal(size=(12, 3))
     noise = rng.uniform(0.3, 2.0, 12)
@@ -90,8 +86,7 @@ class Linear:
         information = design.T @ np.linalg.solve(covariance, design)
         best = np.linalg.solve(information, design.T @ np.linalg.solve(covariance, data))
         left = data - design @ best
-        square = left @ np.linalg.solve(covariance, left)
-        log = -(square + np.linalg.slogdet(covariance)[1]) / 2
+        log = -(left @ np.linalg.solve(covariance, left) + np.linalg.slogdet(covariance)[1]) / 2
         log += (len(self.shapes) * LOG_2PI - np.linalg.slogdet(information)[1]) / 2
         return log, best, np.sqrt(np.diag(np.linalg.inv(information)))
 
@@ -106,9 +101,7 @@ class Linear:
 
 @pytest.mark.parametrize("loads", [1, 2, 4])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(
-    seed: int, loads: int
-) -> None:
+def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, loads) -> None:
     # The systematic changes correlate the parameters: alone each is known ten times worse.
     model = Linear(seed, loads)
     exact, best, errors = model.exact()
@@ -124,8 +117,7 @@ def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(
 
 
 def test_one_parameter_is_integrated_over_its_prior() -> None:
-    nodes = np.linspace(-8, 8, 161)
-    found = evidence_of_one(-(nodes**2) / 2, np.full(161, 0.1 / 16))
+    found = evidence_of_one(-(np.linspace(-8, 8, 161) ** 2) / 2, np.full(161, 0.1 / 16))
     assert found.log == pytest.approx(LOG_2PI / 2 - np.log(16))
 
 
@@ -152,8 +144,7 @@ def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence() -
     ids=lambda prior: prior.words,
 )
 def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior) -> None:
-    edges = np.concatenate([[0.0], np.geomspace(1e-3, 50, 40), [np.inf]])
-    weights = prior.weights(edges)
+    weights = prior.weights(np.concatenate([[0.0], np.geomspace(1e-3, 50, 40), [np.inf]]))
     assert np.all(weights >= 0)
     assert weights.sum() == pytest.approx(1.0)
 

@@ -1,20 +1,17 @@
 """Families of tables that were calculated elsewhere."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 
+from memscal import StressProfile, indent
 from memscal.errors import InputError
 from memscal.friction.calculated import amontons_family
 from memscal.friction.external import external_family
-from memscal.mechanics.indent import indent
-from memscal.model.stress import StressProfile
 
 FRICTIONS = (0.0, 0.3, math.inf)
 
@@ -57,12 +54,6 @@ def test_a_table_serves_a_load_within_one_percent_in_proportion() -> None:
     family = external_family(tables(), asked, reach=REACH)
     np.testing.assert_allclose(family.spectra, 1.008 * exact.spectra, rtol=1e-12)
     assert family.loads.tolist() == asked
-
-
-def test_the_order_of_the_tables_does_not_matter() -> None:
-    one = external_family(tables(), LOADS, reach=REACH)
-    other = external_family(tables()[::-1], LOADS, reach=REACH)
-    assert_same_to_rounding(one.spectra, other.spectra)
 
 
 def test_tables_that_say_nothing_of_film_and_sphere_count_as_proportional() -> None:

@@ -1,14 +1,12 @@
 """Families that are kept in a folder: the same numbers, for the same request only."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.calculated_cases import FILM, REACH, SPHERE
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 
 from memscal.friction import family as assembly
 from memscal.friction.calculated import amontons_family, normal_compliance_family
@@ -18,7 +16,7 @@ from memscal.model.film import ElasticFilm
 
 def calculated(cache: Path | None, film: ElasticFilm = FILM, **changed: object) -> ProfileFamily:
     request = {"friction": [0.0, 0.3], "loading": "incremental", "reach": REACH} | changed
-    return amontons_family(film, SPHERE, [0.34], cache=cache, **request)  # type: ignore[arg-type]
+    return amontons_family(film, SPHERE, [0.34], cache=cache, **request)
 
 
 @pytest.fixture
@@ -29,15 +27,13 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def counted(paths: list[object], k: object, *, workers: int) -> object:
         counts.append(len(paths))
-        return solve(paths, k, workers=workers)  # type: ignore[arg-type]
+        return solve(paths, k, workers=workers)
 
     monkeypatch.setattr(assembly, "solve_paths", counted)
     return counts
 
 
-def test_a_kept_family_is_the_calculated_one_and_is_not_calculated_again(
-    tmp_path: Path, solved: list[int]
-) -> None:
+def test_a_kept_family_is_the_calculated_one_and_is_not_calculated_again(tmp_path, solved) -> None:
     film = replace(FILM, thickness_uncertainty=2e-5, poisson_ratio_uncertainty=0.01)
     first, second = (calculated(tmp_path, film) for _ in range(2))
     assert len(solved) == 1
@@ -65,11 +61,9 @@ def test_another_name_of_the_film_is_the_same_request(tmp_path: Path, solved: li
         {"reach": 50e-3},
     ],
 )
-def test_another_request_is_calculated(
-    tmp_path: Path, solved: list[int], changed: dict[str, object]
-) -> None:
+def test_another_request_is_calculated(tmp_path, solved, changed) -> None:
     calculated(tmp_path)
-    calculated(tmp_path, **changed)  # type: ignore[arg-type]
+    calculated(tmp_path, **changed)
     assert len(solved) == 2
 
 
@@ -90,9 +84,7 @@ def test_a_damaged_entry_is_calculated_anew(tmp_path: Path, solved: list[int]) -
     assert len(solved) == 2
 
 
-def test_without_a_folder_nothing_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

@@ -1,7 +1,5 @@
 """Chi-square with nuisances against the same computed by dense matrices, and its uncertainties."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -53,8 +51,7 @@ def joined(found: Predicted) -> np.ndarray:
 def generalised(residual: np.ndarray, covariance: np.ndarray, flat: np.ndarray) -> float:
     """Chi-square of generalised least squares: by its normal equations."""
     inverse = np.linalg.inv(covariance)
-    scale = np.abs(flat).max(axis=0)
-    columns = flat / scale
+    columns = flat / np.abs(flat).max(axis=0)
     best = np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ residual)
     left = residual - columns @ best
     return float(left @ inverse @ left)
@@ -95,8 +92,7 @@ def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
     ]
     at, step = laboratory.family.coordinate(0.15), 2e-3
     values = np.array([laboratory.family.value_at(at + shift) for shift in (-step, 0, step)])
-    members = laboratory.family.at(values)
-    found = likelihood(points, laboratory.sensor, members, [0, 1])
+    found = likelihood(points, laboratory.sensor, laboratory.family.at(values), [0, 1])
     curvature = (found.chi_square[0] + found.chi_square[2]) / (2 * step**2)
     assert found.chi_square[1] == pytest.approx(0.0, abs=1e-9)
     assert curvature == pytest.approx(found.information[1], rel=0.02)
@@ -113,8 +109,7 @@ def test_baseline_drift_and_a_shift_of_the_centre_change_nothing() -> None:
     before = found.whole.only([0]).chi_square
     held = [replace(points, u=u, free_centre=False)]
     fixed = likelihood(held, found.sensor, found.members, [0]).chi_square
-    moves = np.abs(moved.chi_square - before).max()
-    assert moves < 0.3 < np.abs(fixed - before).max()
+    assert np.abs(moved.chi_square - before).max() < 0.3 < np.abs(fixed - before).max()
 
 
 def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:

@@ -3,8 +3,6 @@
 Set MEMSCAL_FULL_STUDY for 80 experiments in place of 8.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator
@@ -16,15 +14,11 @@ import pytest
 from scipy.stats import binom
 
 import memscal
-from memscal.apparatus import ApparatusFunction
-from memscal.axisymmetry.kernels import GaussianMixture
+from memscal import ApparatusFunction, Experiment, GaussianMixture, MeasuredStress, compare_shear
 from memscal.errors import InputError
 from memscal.friction.calculated import FRICTIONS, amontons_family
-from memscal.friction.compare import compare_shear
 from memscal.friction.likelihood import LoadPoints, predict, sensor_of
 from memscal.model.arrays import FloatArray
-from memscal.model.measured_stress import MeasuredStress
-from memscal.simulation.experiment import Experiment
 
 EXPERIMENTS = 80 if os.environ.get("MEMSCAL_FULL_STUDY") else 8
 TRUTHS = (0.0, 0.1, 0.2, 1.0)
@@ -35,14 +29,9 @@ KERNEL = GaussianMixture(sigmas=(400e-6,))
 
 def experiment(friction: float, seed: int) -> Experiment:
     return memscal.simulate_experiment(
-        friction=friction,
-        loads=LOADS,
-        lubricated_loads=LOADS[:1],
-        channels=("zz", "xz"),
-        shear_kernel=KERNEL,
-        draw_inputs=True,
-        seed=seed,
-    )
+        friction=friction, loads=LOADS, lubricated_loads=LOADS[:1], channels=("zz", "xz"),
+        shear_kernel=KERNEL, draw_inputs=True, seed=seed,
+    )  # fmt: skip
 
 
 def measured_with(made: Experiment) -> tuple[MeasuredStress, ApparatusFunction]:
@@ -67,8 +56,7 @@ def test_a_family_of_shear_is_that_of_contacts_between_its_values(cache: Path) -
     r = np.linspace(0.0, 8e-3, 41)
     for friction in (0.07, 0.22, 0.5):
         member = family.at(friction)
-        contacts = memscal.indent(film, sphere, load=LOADS, friction=friction)
-        for i, contact in enumerate(contacts):
+        for i, contact in enumerate(memscal.indent(film, sphere, load=LOADS, friction=friction)):
             found = family.wavenumbers.synthesise(member.spectra[0, i], r, order=1)
             exact = contact.base_shear(r)
             np.testing.assert_allclose(found, exact, atol=1e-3 * np.abs(exact).max())
@@ -119,13 +107,10 @@ def test_what_is_predicted_has_a_side_and_slopes_of_its_own(cache: Path) -> None
     outward = [
         predict(at(offset + s * np.sign(offset)), sensor, members, 1).signal for s in (step, -step)
     ]
-    slope = (outward[0] - outward[1]) / (2 * step)
-    np.testing.assert_allclose(found.slope, slope, rtol=1e-5)
+    np.testing.assert_allclose(found.slope, (outward[0] - outward[1]) / (2 * step), rtol=1e-5)
 
 
-def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_end(
-    cache: Path,
-) -> None:
+def test_the_true_friction_lies_in_its_interval_and_large_friction_has_no_upper_end(cache) -> None:
     held, bounded = [], 0
     for seed in range(EXPERIMENTS):
         friction = TRUTHS[seed % len(TRUTHS)]
@@ -150,7 +135,6 @@ def test_the_shear_tells_friction_apart_at_all(cache: Path) -> None:
         for friction in (0.0, 1.0)
     )
     free, stuck = (found.joint["dry"]["incremental"].interval for found in (low, high))
-    assert free.high is not None
     assert free.high < stuck.low
     assert "by the shear" in str(low)
     assert low.to_dict()["joint"][0]["interval"]["high"] == free.high

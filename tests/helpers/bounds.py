@@ -1,7 +1,5 @@
 """The size of the studies, what no estimator can be better than, and what chance allows."""
 
-from __future__ import annotations
-
 import os
 from functools import lru_cache
 

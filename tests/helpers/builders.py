@@ -1,12 +1,11 @@
 """Small self-consistent objects that many tests need."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from memscal import ElasticFilm, Process, Rod, Scan, SourceFile, StressProfile, StressSensor
 from memscal.model.apparatus import (
     ApparatusData,
     ApparatusField,
@@ -16,11 +15,6 @@ from memscal.model.apparatus import (
     TransferFunction,
 )
 from memscal.model.checks import Message, QualityCheck
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
-from memscal.model.provenance import Process, SourceFile
-from memscal.model.scan import Scan, StressSensor
-from memscal.model.stress import StressProfile
 
 SIGMA = 561e-6
 CONVERSION = 3.0e-8
@@ -45,21 +39,11 @@ def make_profile(**changes: Any) -> StressProfile:
     width = 1.0e-3
     sigma = np.exp(-(r**2) / (2 * width**2)) / (2 * np.pi * width**2)
     profile = StressProfile(
-        r=r,
-        sigma_zz=sigma,
-        sigma_rz=sigma * r / width * 0.1,
-        load=1.0,
-        depth=0.587e-3,
-        contact_radius=0.25e-3,
-        stick_radius=0.0,
-        friction_coefficient=0.0,
-        loading="incremental",
-        film=make_film(),
-        indenter=Rod(radius=0.25e-3),
-        solver="closed form",
-        discretisation="none",
+        r=r, sigma_zz=sigma, sigma_rz=sigma * r / width * 0.1, load=1.0, depth=0.587e-3,
+        contact_radius=0.25e-3, stick_radius=0.0, friction_coefficient=0.0, loading="incremental",
+        film=make_film(), indenter=Rod(radius=0.25e-3), solver="closed form", discretisation="none",
         convergence=1e-9,
-    )
+    )  # fmt: skip
     return replace(profile, **changes)
 
 
@@ -78,25 +62,16 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
     u = u.copy()
     u[..., 5] = np.nan
     scan = Scan(
-        x=x,
-        y=y if kind in ("raster", "points") else None,
-        repeat=np.arange(33) % 3 + 1 if kind == "points" else None,
-        u_zz=u,
-        u_zz_errors=np.full(u.shape, 1e-5),
-        normal_load=np.full(u.shape, 1.01),
-        channels={"u_xz": 0.1 * u},
-        load=1.0,
-        load_uncertainty=0.01,
-        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6),
-        film=make_film(),
-        sensor=StressSensor(name="S1", model="MEMS", channel="zz"),
-        title="A scan",
-        start_time="2024-01-02T03:04:05+00:00",
-        end_time="2024-01-02T04:04:05+00:00",
-        notes="Two lines\nof notes, with an é.",
-        reference=make_profile(),
+        x=x, y=y if kind in ("raster", "points") else None,
+        repeat=np.arange(33) % 3 + 1 if kind == "points" else None, u_zz=u,
+        u_zz_errors=np.full(u.shape, 1e-5), normal_load=np.full(u.shape, 1.01),
+        channels={"u_xz": 0.1 * u}, load=1.0, load_uncertainty=0.01,
+        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6), film=make_film(),
+        sensor=StressSensor(name="S1", model="MEMS", channel="zz"), title="A scan",
+        start_time="2024-01-02T03:04:05+00:00", end_time="2024-01-02T04:04:05+00:00",
+        notes="Two lines\nof notes, with an é.", reference=make_profile(),
         synthetic={"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "shape": "gaussian"},
-    )
+    )  # fmt: skip
     return replace(scan, **changes)
 
 
@@ -117,11 +92,7 @@ def make_artifact(**changes: Any) -> ApparatusData:
     data = ApparatusData(
         field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g),
         radial_profile=ApparatusRadial(
-            r=r,
-            g=radial,
-            g_errors=errors,
-            g_gaussian=radial,
-            g_covariance=np.diag(errors**2),
+            r=r, g=radial, g_errors=errors, g_gaussian=radial, g_covariance=np.diag(errors**2)
         ),
         transfer=TransferFunction(
             k=k,

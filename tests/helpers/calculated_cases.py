@@ -1,13 +1,10 @@
 """Film, sphere and loads of the paper, and how far profiles are apart."""
 
-from __future__ import annotations
-
 import numpy as np
 
+from memscal import ElasticFilm, Sphere
 from memscal.friction.family import ProfileFamily
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = Sphere(radius=128.8e-3)

@@ -6,14 +6,13 @@ to the full circle here.  The stress at the base is not sampled inside the eleme
 from the reactions of its nodes, as the traction that is consistent with them.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from helpers.getfem_sphere import REACH, grid
@@ -38,7 +37,7 @@ class Mesh:
     z: FloatArray
 
     @classmethod
-    def of_corners(cls, r: FloatArray, z: FloatArray) -> Mesh:
+    def of_corners(cls, r: FloatArray, z: FloatArray) -> Self:
         return cls(_with_middles(r), _with_middles(z))
 
     @property
@@ -92,11 +91,9 @@ def press_rod(
     """Press a flat rod down by a tenth of a millimetre; the problem is linear."""
     depth = 0.1
     mesh = rod_mesh(radius, film.thickness, halvings)
-    top = mesh.nodes[:, -1]
-    under = top[mesh.r[:, -1] < radius * (1 + 1e-9)]
     deck = [
         *_film_deck(film, mesh),
-        *_node_set("ROD", under),
+        *_node_set("ROD", mesh.nodes[:, -1][mesh.r[:, -1] < radius * (1 + 1e-9)]),
         "*STEP",
         "*STATIC",
         "*BOUNDARY",

@@ -3,8 +3,6 @@
 Limits are on what the truth says: error of G and of A, and how often the stated bands hold it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,9 +15,8 @@ from scipy.optimize import brentq
 from scipy.stats import binom, t
 
 import memscal
-from memscal.axisymmetry.kernels import RadialKernel
+from memscal import RadialKernel, Scan
 from memscal.model.arrays import FloatArray
-from memscal.model.scan import Scan
 
 METHOD = "evidence"
 FULL_SEEDS, FEW_SEEDS = 200, 12
@@ -97,15 +94,10 @@ class Case:
     def scan(self, seed: int) -> Scan:
         """Return one scan; the seeds of different cases have nothing in common."""
         return simulated(
-            kernel=self.kernel,
-            noise=self.noise,
-            points=self.points,
-            repeats=self.repeats,
-            centre=(self.centre, 0.0),
-            baseline=0.01 if self.off else 0.0,
-            drift=0.005 if self.off else 0.0,
-            seed=crc32(self.name.encode()) + seed,
-        )
+            kernel=self.kernel, noise=self.noise, points=self.points, repeats=self.repeats,
+            centre=(self.centre, 0.0), baseline=0.01 if self.off else 0.0,
+            drift=0.005 if self.off else 0.0, seed=crc32(self.name.encode()) + seed,
+        )  # fmt: skip
 
 
 _GAUSSIAN = ((0.001, 0.02), (0.005, 0.06), (0.02, 0.15))
@@ -139,16 +131,12 @@ def _cases() -> Iterator[Case]:
     yield Case(*middle, 0.005, 0.5e-3, 1, False)
     yield Case(*wide, 0.02, 0.5e-3, 2, True)
     others = [
-        _disc(0.8, 0.3),
-        _sum("mixture", (0.75, 0.25), 0.5, 1.0),
-        _sum("ring", (1.3, -0.3), 0.6, 0.3),
-        _disc(0.6, 0.25),
-        _sum("mixture", (0.6, 0.4), 0.45, 0.9),
-        _sum("ring", (1.4, -0.4), 0.55, 0.3),
-        _disc(1.0, 0.3),
-        _sum("mixture", (0.85, 0.15), 0.55, 1.3),
+        _disc(0.8, 0.3), _sum("mixture", (0.75, 0.25), 0.5, 1.0),
+        _sum("ring", (1.3, -0.3), 0.6, 0.3), _disc(0.6, 0.25),
+        _sum("mixture", (0.6, 0.4), 0.45, 0.9), _sum("ring", (1.4, -0.4), 0.55, 0.3),
+        _disc(1.0, 0.3), _sum("mixture", (0.85, 0.15), 0.55, 1.3),
         _sum("ring", (1.25, -0.25), 0.7, 0.35),
-    ]
+    ]  # fmt: skip
     others_scans = [(0.001, 0.25e-3, 1), (0.005, 0.25e-3, 1), (0.02, 0.25e-3, 3)]
     others_scans += [(0.003, 0.5e-3, 3), (0.005, 0.5e-3, 2), (0.001, 0.5e-3, 1)]
     for i, kernel in enumerate(others):
@@ -221,8 +209,7 @@ class Outcome:
     @property
     def bias_error(self) -> float:
         """Standard error of :attr:`bias`: the estimate scatters by its own, not the stated size."""
-        scatter = self.a.std(ddof=1) / np.sqrt(self.a.size)
-        return float(scatter / np.sqrt(np.mean(self.u_a**2)))
+        return float(self.a.std(ddof=1) / np.sqrt(self.a.size) / np.sqrt(np.mean(self.u_a**2)))
 
     def coverage(self, band: str) -> tuple[float, float]:
         """How often a band held the truth, and its standard error over the seeds.
@@ -287,8 +274,7 @@ def study(name: str, seeds: int = SEEDS) -> Outcome:
 
 def mean_efficiency(outcomes: list[Outcome]) -> tuple[float, int]:
     """RMS error of A over its bound, of all cases with a bound; and how many seeds they had."""
-    ratios = [o.a / o.case.bound for o in outcomes if o.case.bound is not None]
-    together = np.concatenate(ratios)
+    together = np.concatenate([o.a / o.case.bound for o in outcomes if o.case.bound is not None])
     return float(np.sqrt(np.mean(together**2))), together.size
 
 
@@ -298,5 +284,4 @@ def mean_coverage(outcomes: list[Outcome], band: str) -> tuple[float, float]:
     share, error = np.array([o.coverage(band) for o in having]).T
     # A case without a miss says no more than that misses are rarer than its seeds.
     least = 1 / (1 + np.array([o.g.size for o in having]))
-    together = np.linalg.norm(np.maximum(error, least)) / len(having)
-    return float(share.mean()), float(together)
+    return float(share.mean()), float(np.linalg.norm(np.maximum(error, least)) / len(having))

@@ -1,7 +1,5 @@
 """Comparisons that never ran: contacts of closed form, so that every number is known."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -9,21 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from memscal.friction.results import (
-    BayesFactor,
-    BoundedEstimate,
-    DryAgainstLubricated,
-    FrictionComparison,
-    ImpliedFriction,
-    InterfaceComparison,
-    InterfaceLaw,
-    Interval,
-    LawComparison,
-    LoadComparison,
-    PriorChoice,
-)
-from memscal.model.checks import Message, QualityCheck
-from memscal.model.provenance import SourceFile
+import memscal
 
 FRICTION = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, math.inf])
 LOADS = (0.34, 0.69, 1.37, 2.75)
@@ -39,14 +23,13 @@ _COMMON = 0.008  # relative uncertainty of all stresses together
 def stress(r: Any, load: float, friction: float, loading: str) -> Any:
     """Return a Gaussian of the load's force, which narrows as friction grows; in Pa."""
     p0 = np.interp(load, LOADS, _MAXIMA)
-    full = np.interp(load, LOADS, _GAINS[loading])
-    top = p0 * (1 + full * (1.0 - math.exp(-friction / 0.12)))
+    top = p0 * (1 + np.interp(load, LOADS, _GAINS[loading]) * (1.0 - math.exp(-friction / 0.12)))
     return top * np.exp(-np.pi * top * np.asarray(r) ** 2 / load)
 
 
 def reading(
     values: np.ndarray, chi_square: np.ndarray, *, degrees: int = 29, **fields: Any
-) -> BoundedEstimate:
+) -> memscal.BoundedEstimate:
     """Return what a profile likelihood says, by the rule of the package."""
     least = float(chi_square.min())
     inside = values[chi_square - least <= _LIMIT]
@@ -54,55 +37,39 @@ def reading(
     high = None if math.isinf(inside[-1]) else float(inside[-1])
     value = None if high is None else float(values[np.argmin(chi_square)])
     spread = None if value is None else float(np.ptp(close)) / 2 or 0.01
-    return BoundedEstimate(
-        value=value,
-        standard_uncertainty=spread,
-        interval=Interval(float(inside[0]), high),
+    return memscal.BoundedEstimate(
+        value=value, standard_uncertainty=spread, interval=memscal.Interval(float(inside[0]), high),
         reason="" if value is not None else "A large coefficient is not excluded: a lower bound.",
         budget={} if spread is None else {"noise": 0.8 * spread, "thickness": 0.6 * spread},
-        values=values,
-        chi_square=chi_square,
-        degrees=degrees,
-        least=least,
-        p_value=0.31,
-        **fields,
-    )
+        values=values, chi_square=chi_square, degrees=degrees, least=least, p_value=0.31, **fields,
+    )  # fmt: skip
 
 
 def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -> Any:
     """Return a stand-in of a measured profile: what tables and figures read of one."""
     x = np.linspace(-8e-3, 8e-3, 33) - 0.14e-3
-    order = np.argsort(np.abs(x))
-    x = x[order]
+    x = x[np.argsort(np.abs(x))]
     r = np.abs(x)
     clean = stress(r, load, friction, "incremental")
     errors = np.hypot(0.004 * clean.max(), 0.01 * clean) * np.ones(r.size)
     errors = np.maximum(errors * np.exp(-r / 2e-3), 2e-4 * clean.max())
     top = float(clean.max())
     return SimpleNamespace(
-        scan=_scan(lubrication),
-        lubrication=lubrication,
-        x=x,
-        r=r,
-        s_zz=clean + rng.normal(0.0, errors),
-        s_zz_errors=errors,
-        load=load,
-        force=load * 1.003,
-        force_uncertainty=0.01 * load,
-        maximum=top,
-        maximum_uncertainty=0.01 * top,
-    )
+        scan=_scan(lubrication), lubrication=lubrication, x=x, r=r,
+        s_zz=clean + rng.normal(0.0, errors), s_zz_errors=errors, load=load, force=load * 1.003,
+        force_uncertainty=0.01 * load, maximum=top, maximum_uncertainty=0.01 * top,
+    )  # fmt: skip
 
 
 def _scan(lubrication: str) -> Any:
     return SimpleNamespace(
-        source=SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32),
+        source=memscal.SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32),
         lubrication=lubrication,
         indenter=SimpleNamespace(shape="sphere", radius=0.1288),
     )
 
 
-def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> LoadComparison:
+def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.LoadComparison:
     """Compare one profile with the closed form."""
     fine = np.concatenate([np.linspace(0.0, 0.6, 301), np.geomspace(0.62, 30, 40), [math.inf]])
     load, r = profile.load, profile.r
@@ -119,26 +86,17 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> LoadCompari
     p0 = float(stress(0.0, load, 0.0, loading))
     low, high = calculated[0], calculated[-1]
     between = np.clip(profile.s_zz, np.minimum(low, high), np.maximum(low, high))
-    inside = np.abs(profile.s_zz - between) <= 1.96 * profile.s_zz_errors
-    return LoadComparison(
-        profile=profile,
-        loading=loading,
-        s_max=profile.maximum,
-        s_max_uncertainty=profile.maximum_uncertainty,
-        p0_max=p0,
-        p0_max_uncertainty=_COMMON * p0,
-        ratio=profile.maximum / p0,
-        ratio_uncertainty=0.012,
-        calculated=calculated,
+    return memscal.LoadComparison(
+        profile=profile, loading=loading, s_max=profile.maximum,
+        s_max_uncertainty=profile.maximum_uncertainty, p0_max=p0, p0_max_uncertainty=_COMMON * p0,
+        ratio=profile.maximum / p0, ratio_uncertainty=0.012, calculated=calculated,
         calculated_errors=_COMMON * calculated,
         p_max=np.array([float(stress(0.0, load, mu, loading)) for mu in grid]),
-        chi_square=np.array([misfit(mu) for mu in grid]),
-        p_values=np.full(grid.size, 0.2),
+        chi_square=np.array([misfit(mu) for mu in grid]), p_values=np.full(grid.size, 0.2),
         degrees=29,
-        bracketed=float(inside.mean()),
-        by_maximum=reading(fine, datum, degrees=0),
-        by_profile=reading(fine, curve),
-    )
+        bracketed=float((np.abs(profile.s_zz - between) <= 1.96 * profile.s_zz_errors).mean()),
+        by_maximum=reading(fine, datum, degrees=0), by_profile=reading(fine, curve),
+    )  # fmt: skip
 
 
 def comparison(
@@ -152,7 +110,7 @@ def comparison(
     loads: Sequence[float] = LOADS,
     seed: int = 1,
     **fields: Any,
-) -> FrictionComparison:
+) -> memscal.FrictionComparison:
     """Return a comparison of every load, dry and lubricated."""
     rng = np.random.default_rng(seed)
     profiles = [
@@ -169,7 +127,7 @@ def comparison(
         for lubrication in lubrications
     }
     checks = tuple(
-        QualityCheck(name, 2.4 if bad else 0.7, 1.0, not bad, "The force is not the load.", 0.4)
+        memscal.QualityCheck(name, 2.4 if bad else 0.7, 1.0, not bad, "Not the load.", 0.4)
         for name, bad in (("restored_force", False), ("bracketing", failed))
     )
     measured = SimpleNamespace(
@@ -180,28 +138,23 @@ def comparison(
         overridden=(),
     )
     given: dict[str, Any] = {
-        "measured": measured,
-        "friction": friction_grid,
-        "loads": by_loading,
-        "joint": joint,
-        "dry_against_lubricated": _differences(profiles),
-        "macroscopic": macroscopic,
-        "checks": checks,
-        "messages": (),
-    }
-    return FrictionComparison(**(given | fields))
+        "measured": measured, "friction": friction_grid, "loads": by_loading, "joint": joint,
+        "dry_against_lubricated": _differences(profiles), "macroscopic": macroscopic,
+        "checks": checks, "messages": (),
+    }  # fmt: skip
+    return memscal.FrictionComparison(**(given | fields))
 
 
-def interface_comparison(slip_length: float = 1.8e-6) -> InterfaceComparison:
+def interface_comparison(slip_length: float = 1.8e-6) -> memscal.InterfaceComparison:
     """Return laws of a dry and of a lubricated interface, a slip length preferred."""
-    return InterfaceComparison(
+    return memscal.InterfaceComparison(
         macroscopic=(1.6, 0.2),
         tangential=_laws(
             "dry",
             ("effective Amontons", "effective Amontons, one for each load", "elasto-plastic"),
             (0.0, 2.1, 7.4),
             slip_length,
-            ImpliedFriction(
+            memscal.ImpliedFriction(
                 loads=np.array(LOADS),
                 friction=np.outer([0.11, 0.14, 0.17, 0.2], [1.3, 1.0, 0.8]),
                 pressures=np.array([27e3, 33e3, 50e3, 80e3]),
@@ -213,7 +166,7 @@ def interface_comparison(slip_length: float = 1.8e-6) -> InterfaceComparison:
         normal=_laws(
             "lubricated", ("rigid, frictionless", "normal compliance"), (0.0, -1.2), 0.3e-6, None
         ),
-        messages=(Message("prior", "The slip length is that of the prior."),),
+        messages=(memscal.Message("prior", "The slip length is that of the prior."),),
     )
 
 
@@ -222,43 +175,44 @@ def _laws(
     names: Sequence[str],
     evidence: Sequence[float],
     length: float,
-    implied: ImpliedFriction | None,
-) -> LawComparison:
+    implied: memscal.ImpliedFriction | None,
+) -> memscal.LawComparison:
     lengths = np.concatenate([[0.0], np.geomspace(0.05e-6, 50e-6, 120), [math.inf]])
     bounded = np.where(np.isinf(lengths), 20.0, np.log1p(lengths / 1e-6) / 0.1)
     chi_square = (bounded - math.log1p(length / 1e-6) / 0.1) ** 2 + 120.0
     inside = lengths[chi_square - 120.0 <= _LIMIT]
     laws = tuple(
-        InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120, 0.3)
+        memscal.InterfaceLaw(name, (0.21,), value, value + 2.0, 0.0, 130.0 - value, 120, 0.3)
         for name, value in zip(names, evidence, strict=True)
     )
     better, worse = sorted((-1, 0), key=lambda i: -evidence[i])
-    return LawComparison(
+    factor = memscal.BayesFactor(names[better], names[worse], abs(evidence[-1] - evidence[0]))
+    return memscal.LawComparison(
         lubrication=lubrication,
         loads=np.array(LOADS),
         laws=laws,
-        factors=(BayesFactor(names[better], names[worse], abs(evidence[-1] - evidence[0])),),
-        length=BoundedEstimate(
+        factors=(factor,),
+        length=memscal.BoundedEstimate(
             value=length,
             standard_uncertainty=0.1 * length,
-            interval=Interval(inside[0], inside[-1]),
+            interval=memscal.Interval(inside[0], inside[-1]),
             reason="",
             values=lengths,
             chi_square=chi_square,
             least=120.0,
             unit="m",
         ),
-        priors=(PriorChoice("lengths from 0.1 to 30 um", evidence[-1] - 0.4),),
+        priors=(memscal.PriorChoice("lengths from 0.1 to 30 um", evidence[-1] - 0.4),),
         implied=implied,
     )
 
 
-def _joint(of_each: Sequence[LoadComparison], lubrication: str) -> BoundedEstimate:
+def _joint(of_each: Sequence[memscal.LoadComparison], lubrication: str) -> memscal.BoundedEstimate:
     chosen = [one.by_profile for one in of_each if one.lubrication == lubrication]
     return reading(chosen[0].values, np.sum([one.chi_square for one in chosen], axis=0))
 
 
-def _differences(profiles: Sequence[Any]) -> tuple[DryAgainstLubricated, ...]:
+def _differences(profiles: Sequence[Any]) -> tuple[memscal.DryAgainstLubricated, ...]:
     found = []
     for dry in (p for p in profiles if p.lubrication == "dry"):
         for wet in (p for p in profiles if p.lubrication == "lubricated"):
@@ -269,7 +223,7 @@ def _differences(profiles: Sequence[Any]) -> tuple[DryAgainstLubricated, ...]:
             top = dry.maximum - wet.maximum
             spread = math.hypot(dry.maximum_uncertainty, wet.maximum_uncertainty)
             found.append(
-                DryAgainstLubricated(
+                memscal.DryAgainstLubricated(
                     load=dry.load,
                     r=dry.r,
                     difference=difference,

@@ -12,8 +12,6 @@ quadratic ones, the tractions of the base.  The load is prescribed and the depth
 Displacements are small: the gap is taken at the undeformed radius.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import sys
@@ -104,8 +102,7 @@ class Film:
             (AXIS, r < 1e-9),
             (TOP, (z > thickness - 1e-9) & (r < self.contact + 1e-9)),
         ):
-            faces = self.mesh.faces_from_pid(np.flatnonzero(inside))
-            self.mesh.set_region(region, faces)
+            self.mesh.set_region(region, self.mesh.faces_from_pid(np.flatnonzero(inside)))
 
     def space(self, degree, region=None, without_axis=False):
         """Lagrange elements on the mesh, or their traces on a boundary, with their radii."""
@@ -116,8 +113,7 @@ class Film:
             return elements, None
         degrees = elements.basic_dof_on_region(region)
         if without_axis:
-            axis = elements.basic_dof_on_region(AXIS)
-            degrees = np.setdiff1d(degrees, axis)
+            degrees = np.setdiff1d(degrees, elements.basic_dof_on_region(AXIS))
         radii = elements.basic_dof_nodes()[0][np.sort(degrees)]
         return self.getfem.MeshFem("partial", elements, degrees), radii
 
@@ -187,15 +183,11 @@ class Film:
             "load": self.integral("X(1)*pressure", TOP),
             "depth": float(self.model.variable("depth")[0]),
             "stick_radius": float(r[slides & (r > 0)].min(initial=self.contact)),
-            "iterations": iterations,
-            "r": r.tolist(),
-            "pressure": pressure.tolist(),
-            "shear": shear.tolist(),
-            "base_r": base_r.tolist(),
-            "base_normal": (-base_normal).tolist(),
-            "base_shear_r": shear_r.tolist(),
+            "iterations": iterations, "r": r.tolist(), "pressure": pressure.tolist(),
+            "shear": shear.tolist(), "base_r": base_r.tolist(),
+            "base_normal": (-base_normal).tolist(), "base_shear_r": shear_r.tolist(),
             "base_shear": (-base_shear).tolist(),
-        }
+        }  # fmt: skip
 
 
 def increments(loads, steps):

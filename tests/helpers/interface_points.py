@@ -1,7 +1,5 @@
 """Points as a sensor would read them without any error, whose errors are stated all the same."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from memscal import ElasticFilm, Sphere
 from memscal.friction.calculated import (
     amontons_family,
     elasto_plastic_family,
@@ -17,8 +16,6 @@ from memscal.friction.calculated import (
 from memscal.friction.family import ProfileFamily
 from memscal.friction.interface_laws import Measured
 from memscal.friction.likelihood import LoadPoints, Sensor
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Sphere
 
 LOADS = (0.34, 0.69, 1.37, 2.75)
 MACROSCOPIC = 1.6

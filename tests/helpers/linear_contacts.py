@@ -1,9 +1,8 @@
 """Contacts of closed form and voltages drawn from the likelihood's own model: cheap experiments."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -28,26 +27,18 @@ def gaussian_family(loads: Sequence[float] = LOADS) -> ProfileFamily:
     spectra = load[:, None] * np.exp(-0.5 * variance[..., None] * k2)
     table = variance.shape
     return ProfileFamily(
-        name="amontons",
-        loading="incremental",
-        wavenumbers=NODES,
-        loads=load,
-        values=FRICTIONS,
-        scale=0.3,
-        spectra=spectra,
-        by_load=spectra * (1 - variance[..., None] * k2 / 6),
+        name="amontons", loading="incremental", wavenumbers=NODES, loads=load, values=FRICTIONS,
+        scale=0.3, spectra=spectra, by_load=spectra * (1 - variance[..., None] * k2 / 6),
         changes={"thickness": -0.01 * variance[..., None] * k2 * spectra},
-        depths=np.full(table, np.nan),
-        contact_radii=np.full(table, np.nan),
+        depths=np.full(table, np.nan), contact_radii=np.full(table, np.nan),
         convergence=np.full(table, 1e-4),
-    )
+    )  # fmt: skip
 
 
 def gaussian_sensor() -> Sensor:
     """A Gaussian G of 0.56 mm; A uncertain by 1 %, the width by 2 %."""
     g = np.exp(-0.5 * (0.56e-3 * NODES.k) ** 2)
-    wider = -0.02 * (0.56e-3 * NODES.k) ** 2 * g
-    changes = CONVERSION * np.stack([0.01 * g, wider], axis=1)
+    changes = CONVERSION * np.stack([0.01 * g, -0.02 * (0.56e-3 * NODES.k) ** 2 * g], axis=1)
     return Sensor(NODES, CONVERSION * g, changes, CONVERSION)
 
 
@@ -62,16 +53,11 @@ def bare_points(
     x = np.tile(_POSITIONS, repeats)
     apart = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
     return LoadPoints(
-        u=np.zeros(x.size),
-        offset=x,
-        log_load=np.zeros(x.size),
-        noise=np.full(x.size, 3e-5),
-        load_errors=np.full(x.size, load_scatter),
-        x_errors=np.full(x.size, positions),
-        flat=np.stack([np.ones(x.size), x / x.max()], axis=1),
-        load_share=0.01,
+        u=np.zeros(x.size), offset=x, log_load=np.zeros(x.size), noise=np.full(x.size, 3e-5),
+        load_errors=np.full(x.size, load_scatter), x_errors=np.full(x.size, positions),
+        flat=np.stack([np.ones(x.size), x / x.max()], axis=1), load_share=0.01,
         correlation=correlation**apart if correlation else None,
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,14 +69,13 @@ class Laboratory:
     points: tuple[LoadPoints, ...]
 
     @classmethod
-    def of(cls, *, points: LoadPoints | None = None) -> Laboratory:
+    def of(cls, *, points: LoadPoints | None = None) -> Self:
         family = gaussian_family()
         every = bare_points() if points is None else points
         return cls(family, gaussian_sensor(), (every,) * family.loads.size)
 
     def predicted(self, friction: float, load: int, points: LoadPoints | None = None) -> Predicted:
-        members = self.family.at(friction)
-        return predict(points or self.points[load], self.sensor, members, load)
+        return predict(points or self.points[load], self.sensor, self.family.at(friction), load)
 
     def drawn(self, friction: float, seed: int) -> Confrontation:
         """Draw everything that the likelihood counts, and hold it against the family."""

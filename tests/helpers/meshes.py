@@ -1,7 +1,5 @@
 """Meshes as finite-element programs leave them, with a stress in closed form."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import meshio

@@ -6,8 +6,6 @@ estimator has to find; those that leave their regularisation to the user are als
 is looked for, and return the best that any of their settings finds.  Repeats are averaged.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -129,14 +127,9 @@ def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
     response /= response.sum(axis=1).max()
     with others_warnings():
         fit = dl.snlls(
-            voltage / voltage.max(),
-            response,
-            lbl=np.zeros(ring.size),
-            reg=True,
-            regparam="aic",
-            regop=dl.regoperator(ring / RING_STEP, 2),
-            uq=False,
-        )
+            voltage / voltage.max(), response, lbl=np.zeros(ring.size), reg=True, regparam="aic",
+            regop=dl.regoperator(ring / RING_STEP, 2), uq=False,
+        )  # fmt: skip
     return np.interp(RADII, ring, fit.lin) / (area @ fit.lin)
 
 

@@ -1,7 +1,5 @@
 """Scans of known truth: with a rod, with a sphere, with a tangential channel; and their steps."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
@@ -10,15 +8,12 @@ import numpy as np
 from helpers.builders import make_artifact
 
 import memscal
+from memscal import MeasuredStress, Process, RadialKernel, Scan, StressSensor
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
-from memscal.axisymmetry.kernels import RadialKernel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectrum
 from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
-from memscal.model.measured_stress import MeasuredStress
-from memscal.model.provenance import Process
-from memscal.model.scan import Scan, StressSensor
 from memscal.simulation.contact_scan import simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
@@ -108,14 +103,9 @@ def sphere_scan(
     u = signal + top * (0.01 + 0.0025 * x / half_range + rng.normal(0.0, noise, x.size))
     assert isinstance(contact.indenter, memscal.Sphere | memscal.Rod)
     return Scan(
-        x=x,
-        u_zz=u,
-        u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
-        load=contact.load,
-        indenter=contact.indenter,
-        film=contact.film,
-        sensor=SENSOR,
-    )
+        x=x, u_zz=u, u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
+        load=contact.load, indenter=contact.indenter, film=contact.film, sensor=SENSOR,
+    )  # fmt: skip
 
 
 def known_apparatus(

@@ -1,7 +1,5 @@
 """Loads taken apart, and the force check: what it sees, what it does not, how often it is wrong."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +8,10 @@ from helpers.builders import make_scan
 from helpers.scans import EXACT_FILM, LOADS, SIGMA, contact_scan, known_apparatus, measured
 
 import memscal
+from memscal import MeasuredStress, SourceFile
 from memscal.errors import InputError
 from memscal.measurement.measure_stress import pooled_force
 from memscal.measurement.measured_profile import single_loads
-from memscal.model.measured_stress import MeasuredStress
-from memscal.model.provenance import SourceFile
 
 SENSOR = known_apparatus()
 QUIET = {"noise": 0.001, "load_scatter": 0.002, "position_error": 0.0}
@@ -35,9 +32,7 @@ def test_there_is_a_check_for_each_load_and_one_for_all() -> None:
     assert len(values) == len(measured(0).checks)
     assert values["applied_force_3"].meaning.startswith("1.37 N, dry: ")
     for name in names:
-        p = values[name].p_value
-        assert p is not None
-        assert (p > 0.05) == (values[name].value < 1.96)
+        assert (values[name].p_value > 0.05) == (values[name].value < 1.96)
 
 
 def test_one_profile_has_no_check_of_all() -> None:
@@ -67,7 +62,6 @@ def test_the_force_does_not_depend_on_the_thickness_of_the_film() -> None:
 @pytest.mark.parametrize("gain", [1 / 1.05, 1.05])
 def test_a_gain_that_is_wrong_by_five_percent_is_seen(gain: float) -> None:
     scan = contact_scan(2, **QUIET)
-    assert scan.u_zz_errors is not None
     wrong = replace(scan, u_zz=gain * scan.u_zz, u_zz_errors=gain * scan.u_zz_errors)
     found = memscal.measure_stress(wrong, SENSOR)
     assert "applied_force_all" in failed(found)
@@ -103,7 +97,6 @@ def test_every_line_goes_to_the_part_of_its_load() -> None:
     assert np.sort(together, axis=None).tolist() == np.sort(scan.u_zz, axis=None).tolist()
     for part in parts:
         assert part.scan.u_zz.shape == (2, scan.x.size)
-        assert part.scan.normal_load is not None
         assert np.all(np.abs(part.scan.normal_load / part.load - 1) < 0.15)
 
 
@@ -129,7 +122,6 @@ def test_a_line_or_a_raster_has_one_load(kind: str) -> None:
 
 def test_a_line_at_several_loads_is_refused_by_its_number() -> None:
     scan = contact_scan()
-    assert scan.normal_load is not None
     loads = scan.normal_load.copy()
     loads[2, :5] = 0.5
     mixed = replace(scan, normal_load=loads, source=SourceFile("mixed.h5", ""))
@@ -139,7 +131,6 @@ def test_a_line_at_several_loads_is_refused_by_its_number() -> None:
 
 def test_a_line_without_any_load_is_refused_by_its_number() -> None:
     scan = contact_scan()
-    assert scan.normal_load is not None
     loads = scan.normal_load.copy()
     loads[1] = np.nan
     with pytest.raises(InputError, match="line 2: every load is missing"):

@@ -1,7 +1,5 @@
 """Measured stress is the pressed contact's, blurred, as far as its uncertainty says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,14 +20,12 @@ from helpers.scans import (
 )
 
 import memscal
+from memscal import MeasuredProfile, Scan, SourceFile, StressSensor
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import DomainError, FitError, InputError
 from memscal.measurement.measure_stress import joined_stress
 from memscal.measurement.measured_profile import contact_signal, prepared_scan, single_loads
 from memscal.measurement.restore import restore_known
-from memscal.model.measured_stress import MeasuredProfile
-from memscal.model.provenance import SourceFile
-from memscal.model.scan import Scan, StressSensor
 
 QUIET = {"noise": 0.0, "load_scatter": 0.0, "position_error": 0.0}
 SEEDS = 5
@@ -127,8 +123,7 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
 def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> None:
     """A contact that sticks follows its load by up to 40 % more than one that slides."""
     options = {**QUIET, "load_scatter": 0.03, "record_loads": True, "load_reading": 0.0}
-    found = measured(4, **options, state_noise=False, friction=friction)
-    for profile in found.profiles:
+    for profile in measured(4, **options, state_noise=False, friction=friction).profiles:
         truth = blurred(profile.load, profile.r, friction)
         np.testing.assert_allclose(profile.s_zz, truth, atol=2e-3 * truth.max())
 
@@ -144,7 +139,6 @@ def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
     ratios = []
     for seed in range(SEEDS):
         scan = contact_scan(seed)
-        assert scan.u_zz_errors is not None
         found = memscal.measure_stress(replace(scan, u_zz_errors=None), SENSOR)
         truth = float(scan.u_zz_errors[0, 0])
         ratios += [float(p.points["zz"].noise.min()) / truth for p in found.profiles]
@@ -173,8 +167,7 @@ def test_repeats_at_one_position_are_averaged() -> None:
 
 
 def test_a_rod_is_measured_like_a_sphere() -> None:
-    scan = memscal.simulate(seed=2, points=33)
-    [profile] = memscal.measure_stress(scan, SENSOR).profiles
+    [profile] = memscal.measure_stress(memscal.simulate(seed=2, points=33), SENSOR).profiles
     assert abs(profile.force - 1.0) < 4 * profile.force_uncertainty
 
 
@@ -196,10 +189,8 @@ def test_profiles_of_several_scans_know_theirs() -> None:
         ({"film": replace(EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
     ],
 )
-def test_what_does_not_belong_together_is_refused_by_both_names(
-    changes: dict[str, object], words: str
-) -> None:
-    scan = replace(contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)  # type: ignore[arg-type]
+def test_what_does_not_belong_together_is_refused_by_both_names(changes, words) -> None:
+    scan = replace(contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)
     with pytest.raises(InputError, match=rf"s\.h5 does not belong to the artifact: .*{words}"):
         memscal.measure_stress(scan, SENSOR)
 
@@ -259,7 +250,6 @@ def test_a_scan_that_ends_on_one_side_of_the_contact_is_refused() -> None:
 
 def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
     scan = contact_scan(load=(1.37,))
-    assert scan.normal_load is not None
     heavy = replace(scan, normal_load=scan.normal_load * 1e6, source=SourceFile("heavy.h5", ""))
     with pytest.raises(DomainError, match=r"heavy\.h5, 1\.37e\+06 N, dry"):
         memscal.measure_stress(heavy, SENSOR)
@@ -299,6 +289,6 @@ def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
 
 def test_what_is_no_scan_is_refused() -> None:
     with pytest.raises(InputError, match="a float where a Scan is needed"):
-        memscal.measure_stress([1.0], SENSOR)  # type: ignore[list-item]
+        memscal.measure_stress([1.0], SENSOR)
     with pytest.raises(InputError, match="no scan"):
         memscal.measure_stress([], SENSOR)

@@ -1,7 +1,5 @@
 """Shapes of pressure: closed forms against quadrature, and what the film makes of a shear."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -23,9 +21,7 @@ def hankel(order: int, profile: np.ndarray, r: np.ndarray, weights: np.ndarray) 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 3.5])
 @pytest.mark.parametrize("shear", [0.0, -0.4])
-def test_the_transform_is_that_of_pressure_and_shear_through_the_film(
-    exponent: float, shear: float
-) -> None:
+def test_the_transform_is_that_of_pressure_and_shear_through_the_film(exponent, shear) -> None:
     radius = WIDTH * math.sqrt(2 * (exponent + 2))
     r, weights = gauss_between(np.linspace(0.0, radius, 40), 16)
     pressure = (1 - (r / radius) ** 2) ** exponent
@@ -43,8 +39,7 @@ def test_the_transform_is_that_of_pressure_and_shear_through_the_film(
 def test_widening_is_the_derivative_by_the_width(shape: PressureShape) -> None:
     step = 1e-4 * WIDTH
     difference = shape.transform(K, WIDTH + step) - shape.transform(K, WIDTH - step)
-    slope = shape.widening(K, WIDTH) * WIDTH
-    np.testing.assert_allclose(slope, difference / 2e-4, atol=1e-6)
+    np.testing.assert_allclose(shape.widening(K, WIDTH) * WIDTH, difference / 2e-4, atol=1e-6)
 
 
 @pytest.mark.parametrize("shape", pressure_shapes(EXACT_FILM), ids=str)

@@ -1,17 +1,12 @@
 """Two methods that share nothing but the contact: Hankel transforms and finite elements."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 
+from memscal import Contact, ElasticFilm, Indenter, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError
-from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter, Rod, Sphere
 
 SPHERE = Sphere(radius=128.8e-3)
 R = np.linspace(0.0, 8e-3, 60)

@@ -1,16 +1,12 @@
 """The base shear's transform of order one, against closed forms and the shear itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from scipy.integrate import simpson
 from scipy.special import j1
 
-from memscal.mechanics.indent import indent
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
+from memscal import ElasticFilm, Rod, Sphere, indent
 
 
 def film(nu: float) -> ElasticFilm:

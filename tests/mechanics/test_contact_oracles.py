@@ -1,21 +1,16 @@
 """Contacts against closed forms, limits, tables, and the rod's independent solution."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from scipy.integrate import simpson
 
+from memscal import Cone, Contact, ElasticFilm, Profile, Rod, Sphere, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
-from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
 from memscal.mechanics.rod import solve_rod
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Cone, Profile, Rod, Sphere
 
 SPHERE = Sphere(radius=128.8e-3)
 LOADS = (0.34, 0.69, 1.37, 2.75)
@@ -50,9 +45,7 @@ def test_a_cone_on_a_thick_film_is_sneddon_s() -> None:
 
 @pytest.mark.parametrize("friction", [0.1, 1.0, math.inf])
 @pytest.mark.parametrize("loading", ["incremental", "total"])
-def test_friction_changes_nothing_on_an_incompressible_half_space(
-    friction: float, loading: str
-) -> None:
+def test_friction_changes_nothing_on_an_incompressible_half_space(friction, loading) -> None:
     thick = film(0.5, thickness=2.0)
     smooth = indent(thick, SPHERE, load=1e-2)
     rough = indent(thick, SPHERE, load=1e-2, friction=friction, loading=loading)
@@ -75,9 +68,7 @@ def test_a_thin_compressible_film_is_a_row_of_springs() -> None:
 
 
 @pytest.mark.parametrize(("friction", "grip"), [(0.0, 1), (math.inf, 4)])
-def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(
-    friction: float, grip: float
-) -> None:
+def test_a_thin_incompressible_film_is_squeezed_as_a_lubricant(friction, grip) -> None:
     # w = -h^3 / 3G div grad p with a free surface, four times stiffer where both faces stick:
     # P = grip pi G a^6 / (32 R h^3), delta = a^2 / 4R.  The error falls as h/a.
     excess = []
@@ -100,14 +91,12 @@ def test_every_load_increment_is_a_flat_punch_s(nu: float, friction: float) -> N
     # What is in contact goes down together, and sticks, if it does, where it touched: between two
     # loads a contact is stiff as a rod of its radius (Mossakovskii's argument, on any film).
     path = indent(film(nu), SPHERE, load=list(np.linspace(1.0, 1.6, 7)), friction=friction)
-    radii = np.array([contact.contact_radius for contact in path])
     stiffness = [
         2 * film(nu).contact_modulus * a
         * solve_rod(a / 2e-3, nu, sticking=friction > 0).stiffness_factor
-        for a in radii
+        for a in np.array([contact.contact_radius for contact in path])
     ]  # fmt: skip
-    loads = np.array([contact.load for contact in path])
-    depth = simpson(1 / np.array(stiffness), x=loads)
+    depth = simpson(1 / np.array(stiffness), x=np.array([contact.load for contact in path]))
     # Where a film of nu = 0 sticks, its tractions oscillate towards the edge, which blurs it.
     assert path[-1].depth - path[0].depth == pytest.approx(depth, rel=4e-4 if nu > 0 else 1.5e-3)
 
@@ -147,14 +136,13 @@ def test_the_base_carries_the_load(friction: float, loading: str) -> None:
 def test_signorini_s_and_amontons_conditions_hold(nu: float, friction: float, loading: str) -> None:
     for contact in indent(film(nu), SPHERE, load=LOADS[1::2], friction=friction, loading=loading):
         a, peak = contact.contact_radius, contact.max_interface_stress
-        r = contact.traction.rings  # type: ignore[attr-defined]
+        r = contact.traction.rings
         p, q = contact.interface_pressure(r), contact.interface_shear(r)
         # What sticks may pull a little at the very edge of its contact: the last rings.
         assert p[r < 0.98 * a].min() >= 0
         assert p.min() > -1e-2 * peak
         if math.isfinite(friction):
-            clear = r < 0.98 * a
-            assert np.max((np.abs(q) - friction * p)[clear]) < 1e-9 * peak
+            assert np.max((np.abs(q) - friction * p)[r < 0.98 * a]) < 1e-9 * peak
         inside, outside = r[r < 0.97 * a], np.linspace(1.01, 3.0, 40) * a
         gap = SPHERE.height(inside) - contact.depth + contact.surface_depression(inside)
         assert np.max(np.abs(gap)) < 1e-9 * contact.depth
@@ -231,9 +219,7 @@ def test_a_load_that_outgrows_the_film_the_model_or_the_tip_is_refused() -> None
         indent(film(), short, load=1.0)
 
 
-def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_contact_that_does_not_settle_is_an_error_that_carries_the_last_one(monkeypatch) -> None:
     monkeypatch.setattr("memscal.mechanics.solver.step._MOST_ITERATIONS", 4)
     with pytest.raises(ConvergenceError, match="did not settle") as caught:
         indent(film(0.3), SPHERE, load=[0.011, 1.111], friction=0.123, rings=64)

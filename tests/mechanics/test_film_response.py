@@ -1,7 +1,5 @@
 """The transfer functions against the equations of elasticity, solved by another route."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.linalg import expm

@@ -1,18 +1,12 @@
 """Finite strain behind the same door as all other contacts."""
 
-from __future__ import annotations
-
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
+from memscal import Cone, ElasticFilm, Interface, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError
-from memscal.mechanics.indent import indent
-from memscal.mechanics.interface import Interface
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Cone, Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD, SPHERE = Rod(radius=0.25e-3), Sphere(radius=128.8e-3)
@@ -45,8 +39,6 @@ def test_a_light_rod_stresses_the_base_as_in_the_linear_film() -> None:
         (SPHERE, {"load": 500.0}, DomainError, "contact would be"),
     ],
 )
-def test_what_is_not_modelled_at_finite_strain_is_refused(
-    indenter: Any, asked: dict[str, Any], error: type[Exception], message: str
-) -> None:
+def test_what_is_not_modelled_at_finite_strain_is_refused(indenter, asked, error, message) -> None:
     with pytest.raises(error, match=message):
         indent(FILM, indenter, **{"load": 0.1, "strain": "finite", **asked})

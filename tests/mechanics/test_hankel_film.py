@@ -1,17 +1,13 @@
 """The film's surface by Hankel transforms: reciprocity, limits, and the rod's own condition."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 
+from memscal import ElasticFilm, Rod, indent
 from memscal.axisymmetry.hankel import gauss_between, gauss_panels
 from memscal.mechanics.hankel_film import HankelField, HankelFilm
-from memscal.mechanics.indent import indent
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod
 
 
 def film(nu: float, thickness: float = 2e-3) -> ElasticFilm:

@@ -1,22 +1,17 @@
 """Pressing a rod on a film: loads, depths, base stress, and requests that are refused."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
+from memscal import Contact, ElasticFilm, Rod, Sphere, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import DomainError, InputError
-from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD = Rod(radius=0.25e-3)
@@ -51,15 +46,6 @@ def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction: floa
     assert_same_to_rounding(contact.base_spectrum(-k), spectrum)
 
 
-def test_a_large_array_of_wavenumbers_is_treated_in_parts() -> None:
-    contact = indent(FILM, ROD, load=0.5)
-    k = np.linspace(0.0, 2e4, 20001)
-    np.testing.assert_allclose(
-        contact.base_spectrum(k)[::4000], contact.base_spectrum(k[::4000]), atol=1e-15
-    )
-    assert contact.base_spectrum([]).shape == (0,)
-
-
 def test_the_rod_of_the_paper_sinks_as_deep_as_the_linear_model_says() -> None:
     contact = indent(FILM, ROD, load=1.0)
     assert contact.depth == pytest.approx(0.587e-3, rel=1e-3)
@@ -70,8 +56,7 @@ def test_friction_changes_the_stress_under_the_paper_s_rod_by_a_thousandth() -> 
     r = np.linspace(0.0, 8e-3, 400)
     sliding = indent(FILM, ROD, load=1.0).base_stress(r)
     sticking = indent(FILM, ROD, load=1.0, friction=math.inf).base_stress(r)
-    difference = np.max(np.abs(sticking - sliding)) / np.max(sliding)
-    assert 0.5e-3 < difference < 2e-3
+    assert 0.5e-3 < np.max(np.abs(sticking - sliding)) / np.max(sliding) < 2e-3
 
 
 @pytest.mark.parametrize(("nu", "friction"), CASES)
@@ -86,13 +71,6 @@ def test_a_list_of_loads_gives_proportional_contacts() -> None:
     assert three.depth == pytest.approx(3 * one.depth, rel=1e-14)
     assert [c.load for c in indent(FILM, ROD, load=np.array([0.25, 0.75]))] == [0.25, 0.75]
     assert [c.depth for c in indent(FILM, ROD, depth=(1e-5, 2e-5))] == [1e-5, 2e-5]
-
-
-def test_a_contact_says_how_it_was_solved() -> None:
-    sliding, sticking = indent(FILM, ROD, load=1.0), indent(FILM, ROD, load=1.0, friction=math.inf)
-    assert (sliding.stick_radius, sticking.stick_radius) == (0.0, ROD.radius)
-    assert sliding.contact_radius == ROD.radius
-    assert "spherical Bessel functions" in sliding.discretisation
 
 
 @pytest.mark.parametrize("friction", [0.0, math.inf])
@@ -127,9 +105,7 @@ def test_base_stress_does_not_depend_on_the_other_radii_asked_for() -> None:
 
 @pytest.mark.parametrize("radius", [0.1e-3, 0.25e-3, 4e-3])
 @pytest.mark.parametrize(("nu", "friction"), CASES)
-def test_a_spline_through_the_profile_is_the_stress(
-    nu: float, friction: float, radius: float
-) -> None:
+def test_a_spline_through_the_profile_is_the_stress(nu, friction, radius) -> None:
     contact = press(nu, friction, radius)
     profile = contact.profile()
     between = (profile.r[1:] + profile.r[:-1]) / 2
@@ -146,7 +122,6 @@ def test_the_profile_of_a_sticking_rod_carries_its_conditions() -> None:
     assert math.isinf(profile.friction_coefficient or 0)
     assert profile.loading == ""
     assert profile.film == FILM
-    assert profile.sigma_rz is not None
     assert profile.sigma_rz[1] < 0
 
 

@@ -1,7 +1,5 @@
 """The rod problem against closed forms, tables and an independent integral equation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.special import j0, j1, spherical_jn
@@ -63,14 +61,8 @@ def test_a_thin_compressible_film_is_compressed_uniaxially() -> None:
     # P -> pi a^2 M delta/h with M = 2G (1-nu)/(1-2nu), again with an edge of the order h.
     nu, ratios = 0.3, np.array([10.0, 20.0])
     kappa = np.array([solve_rod(ratio, nu, sticking=False).stiffness_factor for ratio in ratios])
-    limit = np.pi * (1 - nu) ** 2 / (2 * (1 - 2 * nu)) * ratios
-    root = np.sqrt(kappa / limit)
+    root = np.sqrt(kappa / (np.pi * (1 - nu) ** 2 / (2 * (1 - 2 * nu)) * ratios))
     assert 2 * root[1] - root[0] == pytest.approx(1, abs=3e-3)
-
-
-@pytest.mark.parametrize("sticking", [False, True])
-def test_an_incompressible_film_converges_exponentially(sticking: bool) -> None:
-    assert solve_rod(0.125, 0.5, sticking=sticking).convergence < 1e-11
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
@@ -97,22 +89,11 @@ def test_transforms_belong_to_the_tractions(nu: float, sticking: bool) -> None:
 
 def test_sticking_stiffens_the_film_and_sliding_needs_no_shear() -> None:
     sliding = solve_rod(0.5, 0.5, sticking=False)
-    sticking = solve_rod(0.5, 0.5, sticking=True)
-    assert sticking.stiffness_factor > sliding.stiffness_factor
+    assert solve_rod(0.5, 0.5, sticking=True).stiffness_factor > sliding.stiffness_factor
     assert sliding.shear_terms.size == 0
 
 
-def test_shear_holds_back_what_the_pressure_would_move() -> None:
-    r = np.array([0.2, 0.5, 0.8])
-    # A thin incompressible film is squeezed outward, so that the rod drags it inward ...
-    assert np.all(solve_rod(1.0, 0.5, sticking=True).traction(1.0, 1.0).shear(r) < 0)
-    # ... a thick compressible one moves inward under a pressure, and is dragged outward.
-    assert np.all(solve_rod(0.01, 0.0, sticking=True).traction(1.0, 1.0).shear(r) > 0)
-
-
-def test_a_solution_that_has_not_settled_is_not_given_away(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_solution_that_has_not_settled_is_not_given_away(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rod, "_MOST_TERMS", 16)
     with pytest.raises(ConvergenceError, match="in the last refinement"):
         solve_rod(37.5, 0.5, sticking=False)

@@ -1,7 +1,5 @@
 """Parameters, checks and the short cuts to them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -32,8 +30,6 @@ def test_an_uncertainty_is_the_root_of_its_variance(deviations: list[float]) -> 
         (np.zeros(2), np.zeros((2, 2)), ("m",)),
     ],
 )
-def test_parameters_that_do_not_fit_together_are_refused(
-    values: np.ndarray, covariance: np.ndarray, units: tuple[str, ...]
-) -> None:
+def test_parameters_that_do_not_fit_together_are_refused(values, covariance, units) -> None:
     with pytest.raises(InputError, match="2 parameter names"):
         ParameterSet(("a", "b"), values, covariance, units)

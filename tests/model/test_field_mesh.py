@@ -1,7 +1,5 @@
 """A mesh with a field holds what it says, or says what it lacks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Films and indenters: their ranges, their moduli, and that they stay as they were made."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -11,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from memscal import Cone, ElasticFilm, Profile, Rod, Sphere
 from memscal.errors import InputError
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Cone, Profile, Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 
@@ -49,9 +46,7 @@ def test_a_film_that_cannot_be_is_refused_by_name(changes: dict[str, Any], named
 
 @pytest.mark.parametrize("radius", [0.0, -1e-3, float("nan"), float("inf")])
 @pytest.mark.parametrize("kind", [Rod, Sphere])
-def test_an_indenter_without_a_radius_is_refused_by_its_shape(
-    kind: type[Rod | Sphere], radius: float
-) -> None:
+def test_an_indenter_without_a_radius_is_refused_by_its_shape(kind, radius) -> None:
     with pytest.raises(InputError, match=f"{kind.__name__.lower()} radius"):
         kind(radius=radius)
 
@@ -71,8 +66,7 @@ def test_a_rod_is_flat_to_its_edge_and_ends_there() -> None:
 
 def test_a_sphere_is_round() -> None:
     sphere = Sphere(radius=5e-3)
-    height = sphere.height(R)
-    np.testing.assert_allclose(R**2 + (5e-3 - height) ** 2, 25e-6, rtol=1e-14)
+    np.testing.assert_allclose(R**2 + (5e-3 - sphere.height(R)) ** 2, 25e-6, rtol=1e-14)
     assert sphere.height(5.1e-3) == np.inf
     # Far from its radius a sphere is a parabola, to the last digit.
     assert Sphere(radius=1e6).height(1e-3) == pytest.approx(0.5e-12, rel=1e-12)
@@ -99,14 +93,6 @@ def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
     assert repr(profile) == "<Profile: 4 radii to 3 mm, heights to 9 um>"
 
 
-def test_profiles_of_equal_tables_are_equal() -> None:
-    one, same = (Profile.from_function(lambda r: r**2, extent=1e-3) for _ in range(2))
-    other = Profile.from_function(lambda r: 2 * r**2, extent=1e-3)
-    assert one == same
-    assert hash(one) == hash(same)
-    assert one != other
-
-
 @pytest.mark.parametrize(
     ("r", "z", "message"),
     [
@@ -120,8 +106,6 @@ def test_profiles_of_equal_tables_are_equal() -> None:
         ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0], "3 heights"),
     ],
 )
-def test_a_profile_that_cannot_touch_is_refused(
-    r: list[float], z: list[float], message: str
-) -> None:
+def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
     with pytest.raises(InputError, match=f"(?i){message}"):
         Profile(r=r, z=z)

@@ -1,7 +1,5 @@
 """Measured values in words: rounding, exponents, and what is said when nothing is known."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -52,16 +50,12 @@ def test_a_negative_uncertainty_is_refused():
         format_measured(1.0, -0.1, "mm")
 
 
-@given(
-    value=st.floats(-1e30, 1e30),
-    uncertainty=st.floats(1e-30, 1e30),
-)
+@given(value=st.floats(-1e30, 1e30), uncertainty=st.floats(1e-30, 1e30))
 def test_what_is_read_back_differs_by_no_more_than_the_rounding(value, uncertainty):
     assume(uncertainty > 1e-11 * abs(value))
     text = format_measured(value, uncertainty, "m")
     match = re.fullmatch(r"\((-?[\d.]+) ± ([\d.]+)\)(?:×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))? m", text)
     assert match is not None, text
-    ordinary = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-    factor = 10.0 ** int((match[3] or "0").translate(ordinary))
+    factor = 10.0 ** int((match[3] or "0").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
     assert float(match[2]) * factor == pytest.approx(uncertainty, rel=0.0501)
     assert abs(float(match[1]) * factor - value) <= 0.0501 * uncertainty + 1e-14 * abs(value)

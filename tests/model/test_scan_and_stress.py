@@ -1,9 +1,6 @@
 """Scans and stress profiles: shapes, values, and what is kept from later changes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -68,9 +65,7 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
         ("line", {"lubricant": "glycerol"}, "'glycerol'.*is not stated"),
     ],
 )
-def test_a_scan_that_contradicts_itself_is_refused(
-    kind: str, changes: dict[str, Any], problem: str
-) -> None:
+def test_a_scan_that_contradicts_itself_is_refused(kind, changes, problem) -> None:
     with pytest.raises(InputError, match=problem):
         make_scan(kind, **changes)
 
@@ -101,9 +96,7 @@ def test_a_scan_keeps_its_own_copy_of_its_data() -> None:
         ({"sigma_zz": np.zeros((101, 1))}, "sigma_zz of the stress profile has shape"),
     ],
 )
-def test_a_profile_that_contradicts_itself_is_refused(
-    changes: dict[str, Any], problem: str
-) -> None:
+def test_a_profile_that_contradicts_itself_is_refused(changes, problem) -> None:
     with pytest.raises(InputError, match=problem):
         make_profile(**changes)
 
@@ -123,17 +116,13 @@ def test_the_force_of_a_profile_is_its_integral(width: float, force: float) -> N
     axis=st.booleans(),
     curvature=st.floats(-0.9, 2.0),
 )
-def test_the_force_of_uneven_radii_is_exact_where_a_spline_is(
-    seed: int, count: int, axis: bool, curvature: float
-) -> None:
+def test_the_force_of_uneven_radii_is_exact_where_a_spline_is(seed, count, axis, curvature) -> None:
     """A stress a + b r^2 makes sigma r an odd cubic, which the mirrored spline is."""
     steps = np.random.default_rng(seed).uniform(0.05, 1.0, count)
     r = np.cumsum(steps) - (steps[0] if axis else 0.0)
     reach = r[-1]
-    sigma = 1.0 + curvature * (r / reach) ** 2
-    profile = make_profile(r=r, sigma_zz=sigma, sigma_rz=None)
-    exact = np.pi * reach**2 * (1.0 + curvature / 2)
-    assert profile.force == pytest.approx(exact, rel=1e-9)
+    profile = make_profile(r=r, sigma_zz=1.0 + curvature * (r / reach) ** 2, sigma_rz=None)
+    assert profile.force == pytest.approx(np.pi * reach**2 * (1.0 + curvature / 2), rel=1e-9)
 
 
 def test_a_single_radius_carries_the_force_of_an_even_pressure_or_none() -> None:

@@ -1,7 +1,5 @@
 """The checks that the data classes share: what passes, what does not, and what is said."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -41,9 +39,7 @@ def test_not_negative_means_finite_and_zero_or_above(value: float) -> None:
 
 
 @given(NUMBERS, NUMBERS, NUMBERS)
-def test_a_range_holds_both_of_its_ends_and_nothing_infinite(
-    value: float, low: float, high: float
-) -> None:
+def test_a_range_holds_both_of_its_ends_and_nothing_infinite(value, low, high) -> None:
     inside = low <= value <= high and math.isfinite(value)
     assert refused(require_range, "ratio", value, low, high) == (not inside)
 

@@ -1,14 +1,12 @@
 """Synthetic contact scans and whole experiments: mechanics, force, statistics, stated truth."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 from scipy.integrate import simpson
 from scipy.stats import chi2
 
@@ -38,7 +36,6 @@ def seed() -> int:
 
 
 def truth(scan: Scan) -> dict[str, Any]:
-    assert scan.synthetic is not None
     return dict(scan.synthetic)
 
 
@@ -58,7 +55,6 @@ def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int) ->
     options: dict[str, Any] = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
     options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
     scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)
-    assert scan.normal_load is not None
     contacts = memscal.indent(
         PAPER_FILM, PAPER_SPHERE, load=np.sort(scan.normal_load, axis=None), friction=0.15
     )
@@ -93,7 +89,6 @@ def test_the_noise_is_the_same_voltage_at_every_load(seed: int) -> None:
     options: dict[str, Any] = {"repeats": 40, "load": [0.34, 2.75], "load_scatter": 0.0}
     noisy, clean = (simulate_contacts(noise=s, seed=seed, **options) for s in (0.01, 0.0))
     stated = noisy.u_zz_errors
-    assert stated is not None
     assert np.ptp(stated) == 0
     largest = simulate_contacts(load=[2.75], **EXACT).u_zz.max()
     assert stated.flat[0] == pytest.approx(0.01 * largest, rel=1e-4)
@@ -109,8 +104,6 @@ def test_loads_and_places_scatter_as_stated_and_are_seen_in_the_voltage(seed: in
     options: dict[str, Any] = {"load": [0.69], "repeats": 80, **STILL, "seed": seed}
     exact = simulate_contacts(load_scatter=0.0, position_error=0.0, **options)
     loads = simulate_contacts(load_scatter=0.02, position_error=0.0, record_loads=True, **options)
-    assert loads.normal_load is not None
-    assert loads.normal_load_errors is not None
     np.testing.assert_allclose(loads.normal_load_errors, 0.002 * loads.normal_load)
     ratio = loads.normal_load / 0.69 - 1
     low, high = chi2.ppf([RARE, 1 - RARE], ratio.size) * (0.02**2 + 0.002**2)
@@ -145,8 +138,7 @@ def test_each_source_of_error_has_numbers_of_its_own(seed: int) -> None:
 
 def test_a_common_error_of_the_loads_is_in_the_voltages_but_not_in_the_loads() -> None:
     heavy = simulate_contacts(load=[1.0], load_scale=1.1, **EXACT)
-    true = simulate_contacts(load=[1.1], **EXACT)
-    np.testing.assert_allclose(heavy.u_zz, true.u_zz, rtol=1e-12)
+    np.testing.assert_allclose(heavy.u_zz, simulate_contacts(load=[1.1], **EXACT).u_zz, rtol=1e-12)
     assert (heavy.load, truth(heavy)["load_1"]) == pytest.approx((1.0, 1.1))
     np.testing.assert_array_equal(heavy.normal_load, np.ones(33))
 
@@ -195,9 +187,7 @@ def test_the_defaults_are_the_papers_scan() -> None:
         ({"kernel": 561e-6}, InputError, "transform"),
     ],
 )
-def test_what_cannot_be_scanned_is_refused(
-    options: dict[str, Any], error: type[Exception], problem: str
-) -> None:
+def test_what_cannot_be_scanned_is_refused(options, error, problem) -> None:
     with pytest.raises(error, match=problem):
         simulate_contacts(**{"load": [0.34], **options})
 
@@ -260,8 +250,7 @@ def test_what_is_drawn_scatters_as_it_is_stated() -> None:
     assert max(sampled["ratio"]) <= 0
     own = np.array([values for name, values in sampled.items() if name != "ratio"])
     assert np.all(np.abs(own.mean(axis=1)) < 6 / np.sqrt(len(draws)))
-    between = np.corrcoef(own) - np.eye(len(own))
-    assert np.abs(between).max() < 6 / np.sqrt(len(draws))
+    assert np.abs(np.corrcoef(own) - np.eye(len(own))).max() < 6 / np.sqrt(len(draws))
 
 
 def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_ones() -> None:
@@ -301,8 +290,7 @@ def test_a_gain_is_on_the_contacts_only() -> None:
 
 def test_a_thicker_film_than_is_stated_is_under_all_indenters() -> None:
     wrong = memscal.simulate_experiment(**FEW, **EXACT, thickness_factor=1.05)
-    thick = replace(PAPER_FILM, thickness=2.1e-3)
-    right = memscal.simulate_experiment(**FEW, **EXACT, film=thick)
+    right = memscal.simulate_experiment(**FEW, **EXACT, film=replace(PAPER_FILM, thickness=2.1e-3))
     for one, other in zip(wrong.scans.values(), right.scans.values(), strict=True):
         np.testing.assert_allclose(one.u_zz, other.u_zz, rtol=1e-12)
         assert (one.film.thickness, truth(one)["thickness"]) == (2e-3, pytest.approx(2.1e-3))
@@ -332,8 +320,6 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> No
         ({"repeats": 0}, "one row"),
     ],
 )
-def test_an_experiment_that_cannot_be_made_is_refused(
-    options: dict[str, Any], problem: str
-) -> None:
+def test_an_experiment_that_cannot_be_made_is_refused(options, problem) -> None:
     with pytest.raises(InputError, match=problem):
         memscal.simulate_experiment(**{**FEW, **options})

@@ -1,18 +1,15 @@
 """The simulated tangential channel: its parity, its size, and nothing moved in the other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.rounding import assert_same_to_rounding
+from helpers.machine import assert_same_to_rounding
 
 import memscal
-from memscal.axisymmetry.kernels import GaussianMixture
+from memscal import GaussianMixture, simulate_experiment
 from memscal.errors import InputError
 from memscal.simulation.contact_scan import simulate_contacts
-from memscal.simulation.experiment import simulate_experiment
 
 KERNEL = GaussianMixture(sigmas=(400e-6,))
 QUIET = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
@@ -62,14 +59,12 @@ def test_a_sphere_s_shear_is_that_of_its_contact_at_its_friction() -> None:
 
 def test_the_truth_of_the_channel_is_stored_and_comes_back_from_a_file(tmp_path: Path) -> None:
     scan = memscal.simulate(seed=5, **BOTH)
-    assert scan.synthetic is not None
     assert scan.synthetic["conversion_constant_xz"] == 4e-8
     assert scan.synthetic["gaussian_sigma_xz"] == 400e-6
     memscal.write_scan(scan, tmp_path / "scan.h5")
     again = memscal.read_scan(tmp_path / "scan.h5")
     np.testing.assert_allclose(again.channels["u_xz"], scan.channels["u_xz"], rtol=1e-12)
     np.testing.assert_allclose(again.channels["u_xz_errors"], scan.channels["u_xz_errors"])
-    assert again.synthetic is not None
     assert again.synthetic["noise_xz"] == pytest.approx(scan.synthetic["noise_xz"])
 
 
@@ -78,18 +73,15 @@ def test_the_laboratory_s_channel_is_calibrated_to_its_truth() -> None:
     for seed in range(10):
         scan = memscal.simulate(seed=seed, **BOTH)
         found = memscal.calibrate(scan, channel="xz", method="evidence").apparatus
-        u = found.parameters.uncertainty("gaussian_sigma")
-        off.append((found.gaussian_sigma - 400e-6) / u)
+        off.append((found.gaussian_sigma - 400e-6) / found.parameters.uncertainty("gaussian_sigma"))
     # Ten standard normal deviates, at a chance of one in ten thousand for each bound.
     assert abs(np.mean(off)) < 1.24
     assert np.sum(np.square(off)) < 35.6
 
 
 def test_a_whole_experiment_has_the_channel_in_all_of_its_scans() -> None:
-    found = simulate_experiment(loads=[0.69], lubricated_loads=[0.69], **BOTH)
-    for scan in found.scans.values():
+    for scan in simulate_experiment(loads=[0.69], lubricated_loads=[0.69], **BOTH).scans.values():
         assert "u_xz" in scan.channels
-        assert scan.synthetic is not None
         assert scan.synthetic["conversion_constant_xz"] == 4e-8
 
 

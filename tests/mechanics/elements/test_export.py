@@ -1,15 +1,12 @@
 """The mesh that leaves the house holds the same field as the film model."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
 import pytest
 
+from memscal import ElasticFilm, FieldMesh
 from memscal.mechanics.elements.element_film import ElementField, ElementFilm
-from memscal.model.field_mesh import FieldMesh
-from memscal.model.film import ElasticFilm
 
 H = 2e-3
 

@@ -1,20 +1,15 @@
 """The film at finite strain: closed forms, balances, and the linear model where strain is small."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import skfem
 
+from memscal import Contact, ElasticFilm, Rod, Sphere, indent
 from memscal.errors import ConvergenceError
-from memscal.mechanics.contact import Contact
 from memscal.mechanics.finite_strain.film_elements import FilmElements, NeoHookean
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
-from memscal.mechanics.indent import indent
 from memscal.mechanics.solver.problem import Depth, Load
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD = Rod(radius=0.25e-3)
@@ -76,9 +71,7 @@ def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film()
 
 
 @pytest.mark.parametrize("face", [RodFace(0.25, 0.05), SphereFace(0.3)])
-def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(
-    face: RodFace | SphereFace,
-) -> None:
+def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(face: RodFace | SphereFace) -> None:
     s = np.linspace(0.0, 0.4, 8001)
     points, tangents, _ = face.contour(s)
     assert np.hypot(*tangents) == pytest.approx(1.0)
@@ -111,10 +104,7 @@ def test_a_hardly_pressed_rod_is_that_of_the_linear_model(sticking: bool) -> Non
     # Only the flat part of its end touches then: a rod of that radius.
     (state,) = solve_finite_strain(FILM, ROD, (Depth(1e-10),), sticking=sticking, edge=EDGE)
     linear = indent(
-        FILM,
-        Rod(radius=ROD.radius - EDGE),
-        depth=1e-10,
-        friction=np.inf if sticking else 0.0,
+        FILM, Rod(radius=ROD.radius - EDGE), depth=1e-10, friction=np.inf if sticking else 0.0
     )
     # The stress at the edge of the flat is singular, and the mesh no finer than the rounding's.
     assert state.load == pytest.approx(linear.load, rel=5e-3)
@@ -131,9 +121,7 @@ def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]) -> None:
         assert state.inside.base_spectrum(np.zeros(1))[0] == pytest.approx(state.load, rel=1e-5)
 
 
-def test_the_work_of_the_rod_is_the_energy_of_the_film(
-    pressed_rods: tuple[Contact, ...],
-) -> None:
+def test_the_work_of_the_rod_is_the_energy_of_the_film(pressed_rods: tuple[Contact, ...]) -> None:
     last = pressed_rods[-1]
     assert last.work == pytest.approx(last.elastic_energy, rel=1e-3)
 
@@ -148,9 +136,7 @@ def test_the_film_drapes_itself_around_the_rod(pressed_rods: tuple[Contact, ...]
     assert np.all(deepest.traction.pressures >= 0)
 
 
-def test_a_mesh_of_the_state_carries_stress_and_displacement(
-    pressed_rods: tuple[Contact, ...],
-) -> None:
+def test_a_mesh_of_the_state_carries_stress_and_displacement(pressed_rods) -> None:
     state = pressed_rods[-1]
     mesh = state.mesh()
     a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
@@ -159,8 +145,7 @@ def test_a_mesh_of_the_state_carries_stress_and_displacement(
     for side, (start, end) in enumerate([(0, 1), (1, 2), (2, 0)]):
         middle = mesh.points[mesh.triangles[:, [start, end]]].mean(axis=1)
         assert mesh.points[mesh.triangles[:, 3 + side]] == pytest.approx(middle)
-    base = mesh.points[:, 1] < 1e-12
-    near = base & (mesh.points[:, 0] < 2e-3)
+    near = (mesh.points[:, 1] < 1e-12) & (mesh.points[:, 0] < 2e-3)
     expected = -state.inside.base_normal(mesh.points[near, 0])
     assert mesh.stress[near, 1] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
     assert mesh.displacement[:, 1].min() == pytest.approx(-state.depth, rel=1e-6)

@@ -1,11 +1,17 @@
-"""Time as a ratio: two computations that take turns on the same machine."""
-
-from __future__ import annotations
+"""Comparisons of what depends on the machine: times, and floats that differ by rounding."""
 
 import sys
 from collections.abc import Callable
 from time import perf_counter
 from typing import Any
+
+import numpy as np
+
+
+def assert_same_to_rounding(found: Any, expected: Any) -> None:
+    """Compare arrays to 1e-12 of the largest value."""
+    close = 1e-12 * float(np.max(np.abs(expected)))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=close)
 
 
 def once(work: Callable[[], Any]) -> float:
