@@ -5,11 +5,6 @@ The command line exits with the ``exit_code`` of an error; a user catches :class
 
 from __future__ import annotations
 
-__all__ = [
-    "ConvergenceError", "DomainError", "FitError", "FormatError", "InputError", "MemscalError",
-    "OutputError", "SchemaVersionError", "UnitError", "UnsafeFileError",
-]  # fmt: skip
-
 
 class MemscalError(Exception):
     """Base of every error that memscal raises on purpose.

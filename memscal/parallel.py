@@ -17,11 +17,6 @@ if TYPE_CHECKING:
 
     from threadpoolctl import ThreadpoolController
 
-__all__ = [
-    "THREAD_VARIABLES", "one_thread_per_process", "require_workers", "single_threaded",
-    "worker_pool",
-]  # fmt: skip
-
 #: What OpenBLAS, OpenMP, MKL and Accelerate read when they are loaded.
 THREAD_VARIABLES = (
     "OPENBLAS_NUM_THREADS",

@@ -8,8 +8,6 @@ from memscal.cli.commands import memscal
 from memscal.cli.failures import Session, guarded
 from memscal.parallel import one_thread_per_process
 
-__all__ = ["main"]
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command ``memscal`` and return its exit code, as ``memscal --help`` lists them."""

@@ -20,8 +20,6 @@ from memscal.cli.output import (
     write_files,
 )
 
-__all__ = ["command"]
-
 EXAMPLES = """\b
 Examples:
   memscal apply sensor.apparatus.h5 sphere.h5

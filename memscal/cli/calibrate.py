@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
 
-__all__ = ["command"]
-
 #: Processes that share the draws, where there are as many cores.
 _MOST_WORKERS = 8
 

@@ -10,8 +10,6 @@ from memscal.cli.failures import DONE, REFUSED, debug_option
 from memscal.cli.options import FILE, json_option
 from memscal.cli.output import emit_json, error
 
-__all__ = ["command"]
-
 EXAMPLES = """\b
 Examples:
   memscal check scan.apparatus.h5

@@ -10,8 +10,6 @@ import click
 from memscal.cli.failures import debug_option
 from memscal.version import __version__
 
-__all__ = ["COMMANDS", "SETTINGS", "memscal"]
-
 COMMANDS = {
     "calibrate": ("calibrate", "Find a sensor's apparatus function from a rod scan."),
     "reference": ("reference", "Solve the stress at the base of a film under an indenter."),

@@ -28,15 +28,6 @@ if TYPE_CHECKING:
     from memscal.friction.results import FrictionComparison
     from memscal.model.stress import StressProfile
 
-__all__ = [
-    "FigureFiles",
-    "cache_from",
-    "cache_options",
-    "command",
-    "figure_stems",
-    "user_cache_folder",
-]
-
 
 def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> list[str]:
     """Return the stems of all figures' names, without matplotlib; a test compares both."""

@@ -7,8 +7,6 @@ import click
 from memscal.cli.failures import DONE, debug_option
 from memscal.cli.output import emit
 
-__all__ = ["command"]
-
 EXAMPLES = """\b
 Examples:
   memscal completion bash > ~/.local/share/bash-completion/completions/memscal

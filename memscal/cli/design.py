@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 else:  # generic since click 8.2 only
     _WishType = click.ParamType
 
-__all__ = ["command"]
-
 _VARIED = ("step", "half-range", "repeats")
 
 _HIDDEN = (

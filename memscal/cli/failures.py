@@ -14,19 +14,6 @@ from memscal.cli.output import error, message, warn
 from memscal.errors import MemscalError
 from memscal.model.checks import QualityCheck
 
-__all__ = [
-    "CHECK_FAILED",
-    "DONE",
-    "INTERNAL",
-    "INTERRUPTED",
-    "REFUSED",
-    "USAGE",
-    "Session",
-    "debug_option",
-    "exit_code_of",
-    "guarded",
-]
-
 DONE, CHECK_FAILED, USAGE, REFUSED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from memscal.formats.tables.reference import ImportedProfile
     from memscal.formats.tables.scan import ImportedScan
 
-__all__ = ["command"]
-
 _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "solver")
 _OF_TABLES = ("r",)
 _OF_MESHES = ("vertical", "base", "centre")

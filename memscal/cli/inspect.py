@@ -15,8 +15,6 @@ from memscal.cli.output import emit_json
 if TYPE_CHECKING:
     from memscal.summaries.table import Table
 
-__all__ = ["command"]
-
 EXAMPLES = """\b
 Examples:
   memscal inspect scan.apparatus.h5

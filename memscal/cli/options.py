@@ -20,25 +20,6 @@ if TYPE_CHECKING:
 else:  # generic since click 8.2 only
     _Number = click.ParamType
 
-__all__ = [
-    "FILE",
-    "FILM",
-    "Quantity",
-    "film_from",
-    "film_options",
-    "force_option",
-    "indenter_from",
-    "json_option",
-    "kernel_from",
-    "kernel_options",
-    "option",
-    "options_of",
-    "output_options",
-    "radius_options",
-    "require_one_kernel",
-    "si",
-]
-
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 FILE = click.Path(path_type=Path)

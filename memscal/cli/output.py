@@ -19,24 +19,6 @@ from memscal.summaries.table import Table, readable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "FIGURE_SUFFIXES",
-    "FigurePath",
-    "beside",
-    "emit",
-    "emit_json",
-    "emit_tables",
-    "error",
-    "message",
-    "note",
-    "prove_writable",
-    "rendered",
-    "show_messages",
-    "warn",
-    "working",
-    "write_files",
-]
-
 
 def emit(text: str) -> None:
     """Print results; a reader that goes away (``| head``) is no failure."""

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from memscal.mechanics.interface import Interface
     from memscal.model.indenter import Indenter
 
-__all__ = ["SHAPES", "command", "interface_of", "interface_options"]
-
 #: The paper's rod and sphere, in mm.
 _RADIUS = {"rod": 0.25, "sphere": 128.8}
 SHAPES = ("rod", "sphere", "cone", "profile")

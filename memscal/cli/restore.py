@@ -25,8 +25,6 @@ from memscal.cli.output import (
 if TYPE_CHECKING:
     from memscal.measurement.restoration import Restoration
 
-__all__ = ["command"]
-
 EXAMPLES = """\b
 Examples:
   memscal restore sensor.apparatus.h5 sphere.h5

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from memscal.model.scan import Scan
     from memscal.simulation.experiment import Experiment
 
-__all__ = ["FILES", "NAMES", "command"]
-
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with what the laboratory names."""
 

@@ -24,15 +24,6 @@ from memscal.model.checks import QualityCheck
 from memscal.model.quantities import KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
-__all__ = [
-    "calibration_figure",
-    "draw_radial",
-    "draw_radial_log",
-    "draw_transfer",
-    "failed_checks_text",
-    "values_text",
-]
-
 _EXPANDED = 2.0
 _LOG_DECADES = 4.0
 

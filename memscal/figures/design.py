@@ -14,8 +14,6 @@ from memscal.model.quantities import MM, PER_MM, PER_MM2
 from memscal.planning.design import varied_designs
 from memscal.planning.expected import Design
 
-__all__ = ["design_figure"]
-
 #: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
 _WIDTHS, _BANDS = 4.0, 2.0
 #: Factors on the planned number at which the third panel is evaluated.

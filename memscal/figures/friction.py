@@ -44,15 +44,6 @@ from memscal.friction.results import (
 )
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "comparison_figure",
-    "comparison_figures",
-    "draw_maxima",
-    "interface_figure",
-    "length_position",
-    "maxima_figure",
-]
-
 _UM = 1e-6
 #: The length in the middle of the axis, in m.
 _MIDDLE = 3e-6

@@ -26,8 +26,6 @@ from memscal.figures.style import COLOURS, house_style, legend_above, new_figure
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.quantities import KPA, MM
 
-__all__ = ["draw_profiles", "draw_residuals", "friction_set_figure", "profile_figure"]
-
 _FINE = 241
 _DECADES = 3.3
 _SHOWN = (0.0, 0.05, 0.1, 0.2, 0.3, np.inf)

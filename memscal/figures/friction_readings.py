@@ -22,14 +22,6 @@ from memscal.figures.friction_scale import (
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
 from memscal.friction.results import BoundedEstimate, FrictionComparison
 
-__all__ = [
-    "draw_effective",
-    "draw_levels",
-    "draw_likelihood",
-    "effective_friction_figure",
-    "likelihood_figure",
-]
-
 _READINGS = {
     "by_maximum": ("by the maximum", "gaussian", -1),
     "by_profile": ("by the profile", "deconvolved", 1),

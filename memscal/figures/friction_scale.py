@@ -16,23 +16,6 @@ from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
 
-__all__ = [
-    "EXPANDED",
-    "LUBRICATIONS",
-    "chosen",
-    "draw_errorbar",
-    "draw_points",
-    "friction_axis",
-    "friction_colours",
-    "friction_name",
-    "friction_position",
-    "load_looks",
-    "lubricated_words",
-    "main_loading",
-    "on_axis",
-    "share_limits",
-]
-
 #: Loads up to this multiple of another one look alike.
 _ALIKE = 1.05
 #: Radii closer than this, in m, count as one.

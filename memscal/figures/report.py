@@ -19,8 +19,6 @@ from memscal.model.quantities import PER_MM, Record, estimated_quantity
 from memscal.summaries.calibration import sensor_title, tables
 from memscal.summaries.table import Table, checks_table
 
-__all__ = ["html_report"]
-
 _STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff;

@@ -18,8 +18,6 @@ from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM, MV
 
-__all__ = ["draw_residuals", "draw_scan", "draw_scan_log", "limit_to_scan"]
-
 _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a limit
 
 

@@ -26,8 +26,6 @@ from memscal.mechanics.contact import Contact
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
 
-__all__ = ["contact_figure", "measured_stress_figure", "restoration_figure"]
-
 _MEASURED_STRESS_EXPANDED = 1.96
 _DECADES = 1e-3
 #: Okabe and Ito's colours once more, one for each load, from the smallest up.

@@ -21,23 +21,6 @@ from memscal.estimation.points import TANGENTIAL
 from memscal.formats.files import atomic_write_bytes
 from memscal.model.apparatus import ApparatusData
 
-__all__ = [
-    "COLOURS",
-    "FIGURE_SUFFIXES",
-    "FIGURE_WIDTH",
-    "SCATTER_THRESHOLD",
-    "channel_indices",
-    "drawable",
-    "figure_format",
-    "house_style",
-    "legend_above",
-    "marker_size",
-    "new_figure",
-    "panel_letter",
-    "render_figure",
-    "save_figure",
-]
-
 
 def channel_indices(data: ApparatusData) -> str:
     """Return the indices of the stress that a sensor's channel measures: zz, xz or yz."""

@@ -12,8 +12,6 @@ from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM, MV
 
-__all__ = ["sweep_figure"]
-
 _INNER = (0.16, 0.84)  # of the draws: what one standard deviation holds of a normal law
 _SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge
 

@@ -22,8 +22,6 @@ from memscal.model.apparatus import (
     TransferFunction,
 )
 
-__all__ = ["artifact_tree", "read_artifact", "write_artifact"]
-
 
 def read_artifact(path: str | os.PathLike[str]) -> ApparatusData:
     """Read an apparatus function, in SI units; refuse a file that was changed."""

@@ -24,15 +24,6 @@ from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, tree_to_
 from memscal.formats.values import altered, require_schema
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "CONTACT_TABLE_SCHEMA",
-    "CacheFolder",
-    "clear_contact_tables",
-    "find_contact_table",
-    "keep_contact_table",
-    "table_key",
-]
-
 CONTACT_TABLE_SCHEMA = "memscal-contact-table"
 
 CacheFolder = str | os.PathLike[str] | None

@@ -18,17 +18,6 @@ from memscal.model.checks import messages_from_json, messages_to_json
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Quantity, Record
 
-__all__ = [
-    "KINDS",
-    "Kind",
-    "listed",
-    "origins",
-    "read_record",
-    "read_source",
-    "write_record",
-    "write_source",
-]
-
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 

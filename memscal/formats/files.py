@@ -13,8 +13,6 @@ from pathlib import Path
 from memscal.errors import InputError, OutputError, UnsafeFileError
 from memscal.formats.schema import MAX_FILE_BYTES
 
-__all__ = ["atomic_write_bytes", "ensure_writable", "read_bytes"]
-
 _UNTOUCHED = "Nothing was written; what was there before is untouched."
 _CURES = {
     errno.ENOSPC: "Free some space on this disk, or choose another folder.",

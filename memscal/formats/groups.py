@@ -24,29 +24,6 @@ from memscal.model.quantities import TRUTH, Record, declared_quantity, estimated
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "budget_group",
-    "estimated_record",
-    "indenter_group",
-    "instrument_group",
-    "parameter_dimension",
-    "parameter_group",
-    "process_group",
-    "profile_groups",
-    "quality_group",
-    "read_budget",
-    "read_film",
-    "read_indenter",
-    "read_parameters",
-    "read_process",
-    "read_profile",
-    "read_quality",
-    "read_round_indenter",
-    "read_sensor",
-    "reference_groups",
-    "sample_group",
-]
-
 # One name for each axis of the covariance: netCDF tools want each dimension once.
 _AXES = ("parameter", "parameter_prime")
 _COVARIANCE = (

@@ -30,8 +30,6 @@ from memscal.formats.values import altered, require_schema, units_of
 from memscal.model import records
 from memscal.model.quantities import Record, record
 
-__all__ = ["Finding", "check", "describe"]
-
 _READERS: dict[str, Callable[[SafeFile], Any]] = {
     SCAN_SCHEMA: scan_from,
     REFERENCE_SCHEMA: profile_from,

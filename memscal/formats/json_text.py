@@ -11,8 +11,6 @@ import numpy as np
 
 from memscal.errors import InputError
 
-__all__ = ["from_json", "to_json"]
-
 
 def to_json(subject: str, value: Any) -> str:
     """Write plain values as JSON; numbers that are not finite become strings."""

@@ -14,8 +14,6 @@ from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 
-__all__ = ["Contacts", "Scans", "opened_contacts", "opened_scan", "opened_scans", "opened_stress"]
-
 Path: TypeAlias = str | PathLike[str]
 Scans: TypeAlias = Scan | Path | Sequence[Scan | Path]
 """One scan or several, each itself or as the path of its file."""

@@ -11,8 +11,6 @@ from memscal.formats.schema import REFERENCE_SCHEMA
 from memscal.formats.values import require_schema
 from memscal.model.stress import StressProfile
 
-__all__ = ["read_reference", "write_reference"]
-
 
 def read_reference(path: str | os.PathLike[str]) -> StressProfile:
     """Read a stress profile from a memscal-reference file.

@@ -31,8 +31,6 @@ from memscal.model.arrays import FloatArray
 from memscal.model.quantities import by_name
 from memscal.model.scan import Scan
 
-__all__ = ["ensure_folder_writable", "read_scan", "write_scan", "write_scans"]
-
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
 _SAMPLE = "/entry/sample"

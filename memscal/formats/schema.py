@@ -2,19 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "ARTIFACT_SCHEMA",
-    "CONTENTS_PATH",
-    "DIGEST_ATTRIBUTE",
-    "MAX_FILE_BYTES",
-    "REFERENCE_SCHEMA",
-    "SCAN_SCHEMA",
-    "SCHEMA_ATTRIBUTE",
-    "SCHEMA_VERSION",
-    "STRESS_SCHEMA",
-    "VERSION_ATTRIBUTE",
-]
-
 SCAN_SCHEMA = "memscal-scan"
 REFERENCE_SCHEMA = "memscal-reference"
 ARTIFACT_SCHEMA = "memscal-artifact"

@@ -35,8 +35,6 @@ from memscal.model.measured_stress import (
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import Quantity, record
 
-__all__ = ["profile_paths", "read_stress", "stress_from", "write_stress"]
-
 _CHANNELS = ("zz", "xz", "yz")
 _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 

@@ -16,8 +16,6 @@ from memscal.errors import UnitError
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import DIMENSIONS
 
-__all__ = ["FILE_UNITS", "SI_UNITS", "dimension_of", "from_si", "to_si"]
-
 SI_UNITS = {name: dimension.si for name, dimension in DIMENSIONS.items()}
 """The unit of each dimension inside Python."""
 FILE_UNITS = {name: dimension.stored for name, dimension in DIMENSIONS.items()}

@@ -20,20 +20,6 @@ from memscal.formats.schema import (
 from memscal.formats.units import SI_UNITS, dimension_of, to_si
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "altered",
-    "any_scalar",
-    "json_value",
-    "optional_scalar",
-    "optional_text",
-    "require_array",
-    "require_scalar",
-    "require_schema",
-    "require_text",
-    "stored_items",
-    "units_of",
-]
-
 _MAX_ITEMS = 10_000
 
 

@@ -27,15 +27,6 @@ from memscal.model.indenter import Indenter
 if TYPE_CHECKING:
     from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = [
-    "FRICTIONS",
-    "SLIP_LENGTHS",
-    "LawFamilies",
-    "amontons_family",
-    "elasto_plastic_family",
-    "normal_compliance_family",
-]
-
 FRICTIONS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, math.inf)
 """Friction coefficients between which profiles are interpolated to 1e-3 of their maximum."""
 

@@ -20,8 +20,6 @@ from memscal.model.checks import (
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
 
-__all__ = ["comparison_checks", "comparison_messages", "in_words", "synthetic_messages"]
-
 #: Share of points that may lie outside of what friction can explain, beyond those of chance.
 _OUTSIDE = 0.15
 

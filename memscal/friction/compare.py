@@ -44,17 +44,6 @@ from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 
-__all__ = [
-    "ShearComparison",
-    "compare",
-    "compare_measured",
-    "compare_shear",
-    "require_contacts",
-    "require_macroscopic",
-    "same_apparatus",
-    "scans_of",
-]
-
 
 def scans_of(contacts: Sequence[Scan | MeasuredStress]) -> list[Scan | MeasuredScan]:
     """Return the scans, and those of which a stress was measured."""

@@ -28,19 +28,6 @@ from memscal.model.notation import format_bound
 if TYPE_CHECKING:
     from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = [
-    "Confrontation",
-    "bracketed_share",
-    "confront",
-    "dry_against_lubricated",
-    "fine_values",
-    "friction_reason",
-    "load_comparison",
-    "lubricated_pairs",
-    "profile_estimate",
-    "with_loading",
-]
-
 #: Coverage factor of 95 %.
 _EXPANDED = 1.96
 

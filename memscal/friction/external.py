@@ -18,8 +18,6 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.model.stress import StressProfile
 
-__all__ = ["external_family"]
-
 #: Loads that differ by no more, relatively, are one; the stress is scaled in proportion.
 _SAME_LOAD = 0.01
 #: A table must have decayed to this share of its maximum where it ends.

@@ -36,17 +36,6 @@ from memscal.model.indenter import Indenter, Sphere
 from memscal.parallel import require_workers, worker_pool
 from memscal.version import __version__
 
-__all__ = [
-    "FRICTION_SCALE",
-    "STRONGER",
-    "FamilySetup",
-    "ProfileFamily",
-    "base_wavenumbers",
-    "bounded",
-    "parameter_values",
-    "require_loads",
-]
-
 FRICTION_SCALE = 0.3
 """Friction at the middle of the bounded coordinate: there a contact begins to stick wholly."""
 

@@ -21,17 +21,6 @@ from memscal.friction.marginal_likelihood import (
 from memscal.friction.results import BoundedEstimate, ImpliedFriction, InterfaceLaw, Interval
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "LawCurve",
-    "Measured",
-    "curve",
-    "implied_friction",
-    "interface_length",
-    "of_one_value",
-    "one_of_all",
-    "one_of_each",
-]
-
 #: Nodes over all values, and over those that the data do not exclude.
 _COARSE, _FINE = 81, 161
 #: Of one load: with others its parameter is known better than alone.

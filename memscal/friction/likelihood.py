@@ -41,20 +41,6 @@ from memscal.measurement.posterior import apparatus_changes, sensor_transfer
 from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = [
-    "Likelihood",
-    "LoadPoints",
-    "Predicted",
-    "Sensor",
-    "Standardised",
-    "likelihood",
-    "load_points",
-    "points_at",
-    "predict",
-    "sensor_of",
-    "standardise",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class LoadPoints:

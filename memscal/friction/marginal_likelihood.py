@@ -33,18 +33,6 @@ import numpy as np
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray
 
-__all__ = [
-    "Evidence",
-    "Prior",
-    "Tables",
-    "bounded_prior",
-    "evidence_of_each",
-    "evidence_of_one",
-    "log_likelihood",
-    "log_uniform_prior",
-    "uniform_prior",
-]
-
 #: Paths through the loads along which a parameter of each load is drawn: a power of two.
 _PATHS = 256
 #: A systematic direction that moves the data by less than this, in standard deviations, is none.

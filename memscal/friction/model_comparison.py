@@ -57,8 +57,6 @@ from memscal.model.checks import Message
 if TYPE_CHECKING:
     from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = ["compare_interface", "weigh_normal_compliance", "weigh_slip_length"]
-
 #: Slip lengths that are thought possible: of the order of the roughness of surfaces that touch.
 _SLIP_LENGTHS = (1e-7, 1e-4)
 #: Other ranges of them, whose Bayes factors are stated beside.

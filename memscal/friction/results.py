@@ -18,22 +18,6 @@ if TYPE_CHECKING:
     from memscal.apparatus import ApparatusFunction
     from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
-__all__ = [
-    "BayesFactor",
-    "BoundedEstimate",
-    "DryAgainstLubricated",
-    "FrictionComparison",
-    "ImpliedFriction",
-    "InterfaceComparison",
-    "InterfaceLaw",
-    "Interval",
-    "LawComparison",
-    "LoadComparison",
-    "PriorChoice",
-    "ShearComparison",
-    "percent",
-]
-
 _UM = 1e-6
 
 

@@ -394,7 +394,7 @@ def _points(
     weight = restored.posterior.estimate.outlier_weight
     noise = _noise_in_shape(prepared, restored)[measured_mask(scan)]
     points = {"zz": _of_channel(scan, normal, noise, weight)}
-    for channel in TANGENTIAL:
+    for channel in (name for name in TANGENTIAL if f"u_{name}" in scan.channels):
         try:
             shear = measured_points(scan, channel)
         except (InputError, FitError):

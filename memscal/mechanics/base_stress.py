@@ -19,7 +19,12 @@ import numpy as np
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import gauss_panels
-from memscal.mechanics import film_response as film
+from memscal.mechanics.film_response import (
+    base_normal_from_pressure,
+    base_normal_from_shear,
+    base_shear_from_pressure,
+    base_shear_from_shear,
+)
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
@@ -76,8 +81,8 @@ def base_normal_spectrum(
 ) -> FloatArray:
     r"""Return :math:`\int\sigma_{zz}\,J_0(kr)\,r\,dr` of the base at ``k`` (rad/m), in N."""
     x, nu = k * elastic_film.thickness, elastic_film.poisson_ratio
-    pressed = film.base_normal_from_pressure(x, nu) * traction.pressure_transform(k)
-    return pressed - film.base_normal_from_shear(x, nu) * traction.shear_transform(k)
+    pressed = base_normal_from_pressure(x, nu) * traction.pressure_transform(k)
+    return pressed - base_normal_from_shear(x, nu) * traction.shear_transform(k)
 
 
 def base_shear_stress(
@@ -94,8 +99,8 @@ def base_shear_spectrum(
 ) -> FloatArray:
     r"""Return :math:`\int\tau\,J_1(kr)\,r\,dr` of the base's traction on the film, in N."""
     x, nu = k * elastic_film.thickness, elastic_film.poisson_ratio
-    pressed = film.base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
-    return -(pressed + film.base_shear_from_shear(x, nu) * traction.shear_transform(k))
+    pressed = base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
+    return -(pressed + base_shear_from_shear(x, nu) * traction.shear_transform(k))
 
 
 def _hankel_synthesis(

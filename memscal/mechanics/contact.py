@@ -21,8 +21,6 @@ from memscal.model.indenter import Indenter, Rod
 from memscal.model.result import Result
 from memscal.model.stress import StressProfile
 
-__all__ = ["Contact", "too_deep"]
-
 # Default radii of a profile, in film thicknesses: near the contact and far from it, a cubic spline
 # with these steps is good to 1e-6 of the maximum.
 _NEAR_STEP = 0.02

@@ -21,8 +21,6 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.parallel import single_threaded
 
-__all__ = ["indent"]
-
 _Several = Sequence[float] | FloatArray
 
 # Fewer rings than this resolve no contact.

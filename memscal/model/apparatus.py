@@ -17,11 +17,6 @@ from memscal.model.provenance import Process
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "ApparatusData", "ApparatusField", "ApparatusRadial", "ParameterSet", "Reconvolution",
-    "TransferFunction",
-]  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class ApparatusField:

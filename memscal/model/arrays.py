@@ -12,12 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
 
-__all__ = [
-    "FloatArray", "finite_vector", "freeze_arrays", "frozen_array", "require_increasing",
-    "require_non_negative", "require_positive", "require_range", "same_content",
-    "whole_numbers",
-]  # fmt: skip
-
 FloatArray = NDArray[np.float64]
 
 

@@ -6,13 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-__all__ = [
-    "FAILED_CALIBRATION", "FAILED_CHECK", "FALSE_ALARM", "NOISE_LIMIT", "NOISE_UNSTATED",
-    "OUTLIER_LIMIT", "OUTLIER_WEIGHT", "Message", "QualityCheck", "check", "chi_square_limit",
-    "failed_check_messages", "import_notes", "marked_texts", "messages_from_json",
-    "messages_to_json", "state_of_checks",
-]  # fmt: skip
-
 #: Chance that a check fails although its assumption holds.
 FALSE_ALARM = 1e-3
 #: Scatter over stated noise up to which a scan counts as being as noisy as stated.

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, freeze_arrays
 
-__all__ = ["FieldMesh"]
-
 _CORNERS_ONLY, _WITH_MIDSIDES = 3, 6
 
 

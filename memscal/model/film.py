@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from memscal.model.arrays import require_non_negative, require_positive, require_range
 
-__all__ = ["ElasticFilm"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ElasticFilm:

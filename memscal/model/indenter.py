@@ -19,8 +19,6 @@ from memscal.model.arrays import (
     require_positive,
 )
 
-__all__ = ["Cone", "Indenter", "Profile", "Rod", "RoundIndenter", "Sphere"]
-
 
 class Indenter:
     """A rigid axisymmetric indenter; its face is a height over the radius."""

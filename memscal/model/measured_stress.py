@@ -30,8 +30,6 @@ from memscal.model.provenance import Process, SourceFile
 from memscal.model.result import Result
 from memscal.model.scan import StressSensor
 
-__all__ = ["MeasuredPoints", "MeasuredProfile", "MeasuredScan", "MeasuredStress"]
-
 #: Millimetres in a metre, millivolts in a volt.
 _FILE_SCALE = 1e3
 

@@ -7,8 +7,6 @@ from decimal import Decimal, localcontext
 
 from memscal.errors import InputError
 
-__all__ = ["format_bound", "format_measured", "printable"]
-
 # Outside these powers of ten a factor reads better than a row of zeros.
 _PLAIN_EXPONENTS = range(-3, 5)
 _NEGLIGIBLE = 1e-12

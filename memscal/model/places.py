@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from memscal.model.arrays import FloatArray
 
-__all__ = ["EvenAxis", "Places", "even_lattice", "places_of"]
-
 IntArray = NDArray[np.intp]
 
 #: Readings share a place where they are closer than this share of the distance that nine tenths

@@ -11,8 +11,6 @@ from typing import Any
 from memscal.errors import InputError
 from memscal.model.checks import Message
 
-__all__ = ["Process", "SourceFile", "timestamp"]
-
 
 @dataclass(frozen=True)
 class SourceFile:

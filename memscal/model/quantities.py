@@ -12,12 +12,6 @@ from typing import NamedTuple
 from memscal.model.apparatus import ParameterSet
 from memscal.model.notation import format_measured
 
-__all__ = [
-    "DIMENSIONS", "ESTIMATED", "KPA", "MM", "MV", "PER_MM", "PER_MM2", "TRUTH", "Dimension",
-    "Quantity", "Record", "by_name", "declared_quantity", "estimated_quantity", "measured",
-    "measured_text", "parameter_quantity", "record",
-]  # fmt: skip
-
 # SI units in the unit that is shown: m in a mm, V in a mV, ...; dividing by MM shows mm.
 MM, MV, KPA, PER_MM, PER_MM2 = 1e-3, 1e-3, 1e3, 1e3, 1e6
 

@@ -4,14 +4,6 @@ from __future__ import annotations
 
 from memscal.model.quantities import Quantity, Record, measured, record
 
-__all__ = [
-    "CHECK", "CONE", "CONTACT", "CONVERSION", "EXPERIMENT", "FIELD", "FILM", "INDENTER",
-    "INDENTER_FACE", "LOAD", "MEASURED_SCAN", "NUMERICS", "PROCESS", "PROFILE", "PROFILE_NOTES",
-    "RADIAL", "RADIAL_COVARIANCE", "RADIAL_VERSION_1_0", "RECONVOLUTION", "ROUND_INDENTER",
-    "SAMPLE", "SCAN_DATA", "SENSOR", "SOLVER", "STRESS_CURVE", "STRESS_NUMBERS",
-    "STRESS_PROFILE", "SYNTHETIC", "TRANSFER", "points_record",
-]  # fmt: skip
-
 _L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
 _PER_AREA = "per area"
 _R, _X, _YX, _K = ("r",), ("x",), ("y", "x"), ("k",)

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["Result"]
-
 _FORMS = {"dataset": "arrays", "frame": "data frame", "correlated": "covariance of parameters"}
 
 

@@ -23,11 +23,6 @@ from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "LUBRICATIONS", "Scan", "StressSensor", "checked_correlation", "require_contacts",
-    "require_plane",
-]  # fmt: skip
-
 LUBRICATIONS = ("", "dry", "lubricated")
 """What can be between indenter and film; empty where a scan does not say."""
 

@@ -12,8 +12,6 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
 
-__all__ = ["StressProfile"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StressProfile:

@@ -19,8 +19,6 @@ from memscal.planning.expected import Design, evaluate
 from memscal.planning.plan import Plan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
-__all__ = ["VARIED", "WISHES", "design", "least_design", "require_wishes", "varied_designs"]
-
 WISHES = {
     "A": "conversion_constant",
     "sigma": "gaussian_sigma",

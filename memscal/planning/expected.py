@@ -34,8 +34,6 @@ from memscal.model.arrays import FloatArray, freeze_arrays
 from memscal.model.result import Result
 from memscal.planning.plan import Plan
 
-__all__ = ["Design", "Expected", "evaluate", "expected_calibration"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Expected:

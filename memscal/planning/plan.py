@@ -17,8 +17,6 @@ from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 
-__all__ = ["MOST_POSITIONS", "Plan"]
-
 #: As many as a simulated scan may have.
 MOST_POSITIONS = 4096
 #: A range that is a whole number of steps but for rounding is one.

@@ -25,11 +25,6 @@ from memscal.simulation.sensor import (
     shear_channel,
 )
 
-__all__ = [
-    "PAPER_LOADS", "PAPER_SPHERE", "LoadPath", "described_film", "pressed_path",
-    "simulate_contacts",
-]  # fmt: skip
-
 # Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
 # its smallest value: closer ones would show the solver's own error.
 _SPREAD = 2.0

@@ -23,8 +23,6 @@ from memscal.simulation.contact_scan import (
 )
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 
-__all__ = ["Experiment", "Reality", "drawn", "simulate_experiment"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Reality:

@@ -22,8 +22,6 @@ from memscal.simulation.sensor import (
     shear_channel,
 )
 
-__all__ = ["simulate"]
-
 #: The paper's film, with its uncertainties where it gives them and modest ones elsewhere.
 PAPER_FILM = ElasticFilm(
     young_modulus=2.2e6,

@@ -13,11 +13,6 @@ from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray, require_positive
 
-__all__ = [
-    "Disturbances", "ShearChannel", "apparatus_function", "blurred_stress", "disturbance",
-    "shear_channel",
-]  # fmt: skip
-
 # The film passes exp(-kh): beyond this in kh nothing is left in double precision.
 _REACH = 40.0
 

@@ -27,21 +27,6 @@ from memscal.summaries.table import (
 if TYPE_CHECKING:
     import xarray
 
-__all__ = [
-    "Calibrated",
-    "apparatus_of",
-    "correlated",
-    "correlated_parameters",
-    "dataset",
-    "estimate_rows",
-    "mapping",
-    "parameter_json",
-    "rehearsal_json",
-    "rehearsal_table",
-    "sensor_title",
-    "tables",
-]
-
 Calibrated: TypeAlias = Calibration | ApparatusData
 
 _IN_JSON = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "centre",

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
     from memscal.model.measured_stress import MeasuredProfile
 
-__all__ = ["failures", "file_json", "frame", "mapping", "notes", "tables"]
-
 
 def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
     """Return what ``compare --json`` prints but for the files that it was given and wrote."""

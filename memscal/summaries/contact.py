@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-__all__ = ["contacts_table", "dataset", "depth_messages", "frame", "mapping", "tables"]
-
 #: Share of the film's thickness up to which linear elasticity is taken as valid.
 _SHALLOW = 0.1
 _SINGULAR = (

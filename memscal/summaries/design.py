@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-__all__ = ["correlated", "dataset", "frame", "mapping", "tables"]
-
 #: Words and symbol of the parameters that are shown.
 _SHOWN = {
     "conversion_constant": ("conversion constant A", "A"),

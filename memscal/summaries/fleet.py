@@ -13,8 +13,6 @@ from memscal.summaries.table import Table, checks_json, checks_table, finite, te
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["correlated", "frame", "mapping", "tables"]
-
 
 def tables(result: FleetCalibration) -> list[Table]:
     """Return the estimates and the quality checks, or the error."""

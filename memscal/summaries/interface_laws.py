@@ -15,8 +15,6 @@ from memscal.friction.results import (
 )
 from memscal.summaries.table import Table, finite, texts_of
 
-__all__ = ["friction_name", "mapping", "tables"]
-
 
 def friction_name(friction: float) -> str:
     """Return a friction coefficient as it is typed: ``0.15`` or ``inf``."""

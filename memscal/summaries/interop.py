@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-__all__ = ["column", "correlated_numbers", "data_frame", "labelled_dataset", "quantity_json"]
-
 
 def labelled_dataset(
     quantities: Iterable[Quantity],

@@ -11,8 +11,6 @@ from memscal.summaries.table import Table, finite, texts_of
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["frame", "mapping", "tables"]
-
 
 def tables(result: MonteCarlo) -> list[Table]:
     """Return each parameter's standard uncertainty by the budget and by draws."""

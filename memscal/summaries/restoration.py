@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-__all__ = ["correlated", "dataset", "frame", "mapping", "tables"]
-
 _SHOWN_RADII = 9
 #: The table of the stress ends where it has fallen to this share of its maximum.
 _TAIL = 0.01

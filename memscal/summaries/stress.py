@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-__all__ = ["correlated", "dataset", "frame", "mapping", "tables"]
-
 _PER_PASCAL = 1e-3
 """Volts per pascal in mV/Pa."""
 _QUANTITIES = by_name(STRESS_PROFILE.quantities)

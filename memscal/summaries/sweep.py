@@ -14,8 +14,6 @@ from memscal.summaries.table import Table, finite
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["dataset", "mapping", "tables"]
-
 # Results of a sweep, the attribute of their draws, and the units of Python and of JSON.
 _RESULTS = (
     ("conversion_constant", "seed_conversion_constant", "V/Pa", "mV/Pa", MV),

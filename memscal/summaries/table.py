@@ -16,16 +16,6 @@ from memscal.model.notation import printable
 if TYPE_CHECKING:
     from memscal.model.quantities import Record
 
-__all__ = [
-    "Table",
-    "checks_json",
-    "checks_table",
-    "finite",
-    "readable",
-    "record_arrays",
-    "texts_of",
-]
-
 _LONGEST = 100_000
 
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")

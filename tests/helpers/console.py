@@ -1,5 +1,7 @@
 """What tests of the command line need: the outcome of a run, and a look at a folder."""
 
+from __future__ import annotations
+
 import json
 import os
 from collections.abc import Callable

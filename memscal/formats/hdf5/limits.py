@@ -11,16 +11,6 @@ import h5py
 
 from memscal.errors import UnsafeFileError
 
-__all__ = [
-    "MAX_DATASET_BYTES",
-    "MAX_TEXT_BYTES",
-    "attribute_text_lengths",
-    "check_layout",
-    "check_type",
-    "claimed_bytes",
-    "text_length",
-]
-
 _DESCRIPTOR = 16
 _OBJECT = 16  # header of an object in a global heap
 _CONTINUATION, _ATTRIBUTE = 0x10, 0x0C

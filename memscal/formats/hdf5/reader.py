@@ -30,8 +30,6 @@ from memscal.formats.hdf5.limits import (
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 
-__all__ = ["SafeFile", "damage_named", "open_hdf5"]
-
 
 @contextlib.contextmanager
 def damage_named(

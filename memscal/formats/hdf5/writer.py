@@ -27,24 +27,6 @@ from memscal.formats.schema import (
 from memscal.formats.units import from_si
 from memscal.model.notation import printable
 
-__all__ = [
-    "DigestItem",
-    "Group",
-    "Node",
-    "Number",
-    "content_digest",
-    "contents_of",
-    "count",
-    "file_tree",
-    "index_axis",
-    "note",
-    "si",
-    "tree_items",
-    "tree_to_bytes",
-    "walk",
-    "write_tree",
-]
-
 Attribute = str | int | tuple[str, ...]
 
 

@@ -27,8 +27,6 @@ from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 
-__all__ = ["heavy_arrays", "run_meshio"]
-
 _WORKER = Path(__file__).with_name("worker.py")
 _MAX_ANSWER_BYTES = 512 * 2**20
 # Of the child: for the libraries and a small mesh, and more for each byte of the file.

@@ -12,8 +12,6 @@ from memscal.formats.meshes.mesh_files import Cells, Mesh
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes
 
-__all__ = ["AXES", "Base", "Frame", "average_over_circles", "find_base", "find_frame"]
-
 AXES = "xyz"
 # Of the largest coordinate: meshes are often stored in single precision.
 _TOLERANCE = 1e-6

@@ -23,8 +23,6 @@ from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 from memscal.version import __version__
 
-__all__ = ["Cells", "Mesh", "is_mesh", "read_mesh", "write_mesh"]
-
 _KINDS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".xmf": "xdmf"}
 # Known as meshes of other kinds, so that none is taken for a table.
 _OTHERS = {

@@ -30,8 +30,6 @@ from memscal.model.checks import Message, import_notes
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 
-__all__ = ["read_reference_mesh"]
-
 _FEWEST_RADII = 3
 
 

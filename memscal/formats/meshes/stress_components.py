@@ -11,8 +11,6 @@ from memscal.formats.meshes.film_base import AXES, Frame
 from memscal.formats.meshes.mesh_files import Mesh
 from memscal.model.notation import printable
 
-__all__ = ["Component", "find_normal", "find_shear"]
-
 # VTK's order of a symmetric tensor, and that of axisymmetric elements in FEM programs.
 _SYMMETRIC = ("xx", "yy", "zz", "xy", "yz", "xz")
 _SCALAR, _AXISYMMETRIC, _SIX, _NINE = 1, 4, 6, 9

@@ -18,15 +18,6 @@ from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
-__all__ = [
-    "ImportedProfile",
-    "Samples",
-    "profile_of",
-    "read_reference_table",
-    "require_numbers",
-    "require_sign",
-]
-
 # A larger difference between force and load is warned of, one beyond a factor is refused.
 _WARNED = 0.03
 _REFUSED = 2.0

@@ -18,8 +18,6 @@ from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.places import places_of
 from memscal.model.scan import Scan, StressSensor
 
-__all__ = ["ImportedScan", "read_scan_table"]
-
 Column = str | int
 
 #: Positions closer than this share of the typical spacing are probably one place, and a table with

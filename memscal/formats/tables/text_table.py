@@ -20,8 +20,6 @@ from memscal.model.indenter import Profile
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 
-__all__ = ["Table", "read_indenter_table", "read_table"]
-
 _MAX_COLUMNS = 1000
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eEdD][+-]?\d+)?")

@@ -21,8 +21,6 @@ from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load,
 from memscal.mechanics.solver.step import take_step
 from memscal.model.arrays import FloatArray
 
-__all__ = ["PathPoint", "follow"]
-
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
 _PULL = 1e-2
 _OVERLAP = 1e-3

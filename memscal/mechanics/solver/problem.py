@@ -28,8 +28,6 @@ from memscal.mechanics.surface import SurfaceCompliance
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
-__all__ = ["ContactProblem", "ContactState", "Depth", "Goal", "Load", "Target", "Touch"]
-
 
 @dataclass(frozen=True, eq=False)
 class ContactProblem:

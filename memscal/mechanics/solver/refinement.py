@@ -24,8 +24,6 @@ from memscal.model.indenter import Indenter, Rod
 if TYPE_CHECKING:
     from memscal.mechanics.elements.element_film import ElementFilm
 
-__all__ = ["RingRequest", "relative_change", "solve_on_rings"]
-
 # Rings beyond the largest contact, so that it can end where it will.
 _MARGIN = 4
 # Shrinkage of the spacing at a contact's edge, and its growth with the distance from there.

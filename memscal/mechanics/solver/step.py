@@ -18,8 +18,6 @@ from memscal.mechanics.interface import NormalLaw
 from memscal.mechanics.solver.problem import ContactProblem, ContactState, Depth, Goal, Load, Touch
 from memscal.model.arrays import FloatArray
 
-__all__ = ["take_step"]
-
 _Indices = NDArray[np.intp]
 
 
