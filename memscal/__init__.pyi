@@ -48,8 +48,8 @@ from .friction.results import ShearComparison as ShearComparison
 from .measurement.measure_stress import measure_stress as measure_stress
 from .measurement.restoration import Restoration as Restoration
 from .measurement.restore import restore as restore
-from .mechanics.base_stress import InterfaceTraction as InterfaceTraction
 from .mechanics.contact import Contact as Contact
+from .mechanics.film_response import InterfaceTraction as InterfaceTraction
 from .mechanics.indent import indent as indent
 from .mechanics.interface import ExponentialCompliance as ExponentialCompliance
 from .mechanics.interface import GreenwoodTripp as GreenwoodTripp
@@ -75,9 +75,9 @@ from .model.measured_stress import MeasuredPoints as MeasuredPoints
 from .model.measured_stress import MeasuredProfile as MeasuredProfile
 from .model.measured_stress import MeasuredScan as MeasuredScan
 from .model.measured_stress import MeasuredStress as MeasuredStress
-from .model.places import Places as Places
 from .model.provenance import Process as Process
 from .model.provenance import SourceFile as SourceFile
+from .model.scan import Places as Places
 from .model.scan import Scan as Scan
 from .model.scan import StressSensor as StressSensor
 from .model.stress import StressProfile as StressProfile

@@ -19,7 +19,7 @@ from memscal.estimation.forward import elliptic_departure
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.profile import ProfileEstimate, constrained_profile
 from memscal.model.arrays import FloatArray
-from memscal.model.places import EvenAxis, even_lattice
+from memscal.model.scan import EvenAxis, even_lattice
 
 _POINTS_PER_WIDTH = 6.0
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.model.arrays import FloatArray
-from memscal.model.places import Places, places_of
-from memscal.model.scan import Scan
+from memscal.model.scan import Places, Scan, places_of
 
 #: Channels that measure the shear along x and along y.
 TANGENTIAL = ("xz", "yz")

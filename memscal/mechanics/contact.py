@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import DomainError, InputError
-from memscal.mechanics.base_stress import InterfaceTraction
+from memscal.mechanics.film_response import InterfaceTraction
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.surface import FilmField, MeshedField
 from memscal.model.arrays import FloatArray

@@ -15,16 +15,17 @@ from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.mechanics import film_response
-from memscal.mechanics.base_stress import (
+from memscal.mechanics.film_response import (
     HalfSpaceIntegrals,
     InterfaceTraction,
+    RingTraction,
     base_normal_spectrum,
     base_normal_stress,
     base_shear_spectrum,
     base_shear_stress,
+    hat_transforms,
 )
 from memscal.mechanics.half_space import coupling_integrals, singular_integrals
-from memscal.mechanics.rings import RingTraction, hat_transforms
 from memscal.mechanics.surface import SurfaceCompliance
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response
-from memscal.mechanics.base_stress import HalfSpaceIntegrals, base_normal_stress
+from memscal.mechanics.film_response import HalfSpaceIntegrals, base_normal_stress
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 

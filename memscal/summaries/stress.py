@@ -10,7 +10,7 @@ from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, MV, Quantity, by_name
-from memscal.model.records import STRESS_PROFILE
+from memscal.model.records import STRESS_NUMBERS, STRESS_PROFILE
 from memscal.summaries.interop import (
     correlated_numbers,
     data_frame,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _PER_PASCAL = 1e-3
 """Volts per pascal in mV/Pa."""
-_QUANTITIES = by_name(STRESS_PROFILE.quantities)
+_QUANTITIES = by_name([*STRESS_PROFILE.quantities, *STRESS_NUMBERS.quantities])
 _POINTS = ("r", "x", "y", "s_zz", "s_zz_errors")
 _SCALARS = ("load", "force", "force_uncertainty", "maximum", "maximum_uncertainty", "baseline",
             "baseline_uncertainty", "contact_radius", "lubrication")  # fmt: skip

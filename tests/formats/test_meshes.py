@@ -18,7 +18,7 @@ from memscal.formats.meshes.mesh_files import read_mesh, write_mesh
 from memscal.formats.meshes.reference_mesh import read_reference_mesh
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.tables.reference import ImportedProfile
-from memscal.mechanics.base_stress import base_normal_stress, base_shear_stress
+from memscal.mechanics.film_response import base_normal_stress, base_shear_stress
 from memscal.model.checks import marked_texts
 from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm

@@ -15,8 +15,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
-from memscal.model.places import places_of
-from memscal.model.scan import Scan, StressSensor
+from memscal.model.scan import Scan, StressSensor, places_of
 
 Column = str | int
 

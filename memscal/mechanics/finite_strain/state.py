@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.axisymmetry.hankel import gauss_between, hankel_transform
+from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.finite_strain.pressing import Pressed, Pressing
-from memscal.mechanics.rings import RingTraction
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact, too_deep
+from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.hankel_film import HankelFilm
 from memscal.mechanics.interface import Interface
-from memscal.mechanics.rings import RingTraction
 from memscal.mechanics.solver.path import PathPoint, follow
 from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target
 from memscal.model.arrays import FloatArray
