@@ -91,14 +91,11 @@ class FigureFiles:
 
 
 def user_cache_folder() -> Path | None:
-    """Return the user's folder of contacts; a relative XDG_CACHE_HOME counts as none."""
-    named = os.environ.get("XDG_CACHE_HOME", "")
-    if named and Path(named).is_absolute():
-        return Path(named, "memscal", "contacts")
-    try:
-        return Path.home() / ".cache" / "memscal" / "contacts"
-    except RuntimeError:
-        return None
+    """Return the user's folder of contacts, by the rules of the system; none without a home."""
+    from platformdirs import user_cache_path
+
+    folder = user_cache_path("memscal", appauthor=False) / "contacts"
+    return folder if folder.is_absolute() else None
 
 
 cache_options = options_of(
