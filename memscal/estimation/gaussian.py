@@ -233,7 +233,7 @@ class GaussianFit:
         return np.asarray(self.covariance(weights, 1.0) @ twice.T @ back)
 
 
-def fit_gaussian(
+def fit_gaussian_to_points(
     model: ForwardModel, weights: FloatArray, start: GaussianFit | None = None
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""

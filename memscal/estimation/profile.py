@@ -17,7 +17,7 @@ from memscal.estimation.bayesian import (
     weigh_departures,
 )
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, fit_gaussian
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
@@ -169,7 +169,7 @@ class ProfileEstimate:
 def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> ProfileEstimate:
     """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
     model = ForwardModel(points, references)
-    fit = fit_gaussian(model, _stated_weights(points))
+    fit = fit_gaussian_to_points(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
     residual = points.u - fit.predicted
     outlier = _outlier_weight(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
@@ -177,7 +177,7 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     least = least if points.u_errors is None else 1.0
     for _ in range(_WEIGHING_ROUNDS):
         weights = stated * outlier
-        fit = fit_gaussian(model, weights, start=fit)
+        fit = fit_gaussian_to_points(model, weights, start=fit)
         basis = departure_basis(model, fit)
         weighed = weigh_departures(
             model, fit, basis, weights, float(outlier.sum()), least_noise=least

@@ -21,7 +21,7 @@ from memscal.errors import FitError
 from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import fit_gaussian
+from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
 from memscal.estimation.reference import (
@@ -74,7 +74,7 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
     errors = model.points.u_errors
     assert errors is not None
     weights = np.asarray(1 / errors**2)
-    fit = fit_gaussian(model, weights, start=fit_gaussian(model, weights))
+    fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
     basis = departure_basis(model, fit)
     count = float(repeats * weights.size)
     weighed = weigh_departures(model, fit, basis, weights, count, expected_noise=1.0)

@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import memscal
-from memscal import Scan, fit_gaussian
+from memscal import Scan
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectrum
 
@@ -25,7 +26,7 @@ def forward(scan: Scan) -> ForwardModel:
 
 def fit(scan: Scan):
     model = forward(scan)
-    return fit_gaussian(model, np.ones_like(model.points.u))
+    return fit_gaussian_to_points(model, np.ones_like(model.points.u))
 
 
 @settings(max_examples=25)
@@ -67,7 +68,7 @@ def test_a_raster_s_centre_is_found_in_both_directions() -> None:
 def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
     for raster in (False, True):
         model = forward(simulated(raster=raster, points=13, noise=0.0))
-        found = fit_gaussian(model, np.ones_like(model.points.u))
+        found = fit_gaussian_to_points(model, np.ones_like(model.points.u))
         plane = 2 if raster else 1
 
         def predict(shift, found=found, model=model, plane=plane):

@@ -9,12 +9,13 @@ from helpers.machine import assert_same_to_rounding
 from helpers.scans import EXACT_FILM, EXACT_ROD, estimated, simulated
 
 import memscal
-from memscal import Plan, fit_gaussian
+from memscal import Plan
 from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
 from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectrum
 from memscal.planning.design import varied_designs
@@ -114,7 +115,7 @@ def test_the_mean_of_repeats_is_worth_all_of_them() -> None:
         contact = memscal.indent(clean.film, clean.indenter, load=clean.load)
         reference = reference_spectrum(contact, points, clean.film.thickness)
         model, weights = ForwardModel(points, (reference,)), 1 / errors.ravel() ** 2
-        fit = fit_gaussian(model, weights, start=fit_gaussian(model, weights))
+        fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
         basis = departure_basis(model, fit)
         count = float(share * weights.size)
         found.append(weigh_departures(model, fit, basis, weights, count, expected_noise=1.0))
