@@ -119,7 +119,7 @@ class LineFields:
         """Return the values of a field at the measured points."""
         return cut(field, self.grid, self.radius)
 
-    def on_support(self, kernel: FloatArray, profile: KernelProfile | None) -> Field:  # noqa: ARG002
+    def on_support(self, kernel: FloatArray, _: KernelProfile | None) -> Field:
         """Return a kernel on its support."""
         # The lifted profile's grid is fine enough to be read as it is.
         inside = slice(0, self.support + 1)

@@ -129,6 +129,7 @@ class ExponentialCompliance:
         """The decay length, in m."""
         return self.decay_length
 
+    # Both take the film as every law does; this one does not depend on it.
     def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:  # noqa: ARG002
         """Return the pressure in Pa at a ``separation`` in m."""
         return np.asarray(self.reference_pressure * np.exp(-separation / self.decay_length))

@@ -137,3 +137,23 @@ def test_synthesis_of_order_one_takes_a_transform_back_and_has_a_potential() -> 
     np.testing.assert_allclose(spectrum.at(r), r * gaussian(r), atol=1e-12)
     np.testing.assert_allclose(spectrum.scalar.at(r), gaussian(r), atol=1e-12)
     assert spectrum.integral == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("r_max", [0.5, 3.0, 200.0])
+def test_the_integral_is_the_transform_at_zero(r_max: float) -> None:
+    # A ring: one Gaussian taken off another; its integral over the plane is 4 pi - pi.
+    k = Wavenumbers.covering(12.0, r_max)
+    ring = RadialSpectrum(k, 4 * np.pi * np.exp(-(k.k**2)) - np.pi * np.exp(-(k.k**2) / 4))
+    assert ring.integral == pytest.approx(3 * np.pi, rel=1e-10)
+
+
+def test_the_product_of_transforms_is_the_transform_of_the_convolution() -> None:
+    # Convolving 1/(a^2 + r^2)^(3/2) fields adds their depths: exp(-ak) exp(-bk).
+    wavenumbers = Wavenumbers.covering(40.0, 20.0)
+
+    def depth(a: float, r: FloatArray) -> FloatArray:
+        return a / (2 * np.pi * (a**2 + r**2) ** 1.5)
+
+    r = np.linspace(0.0, 20.0, 31)
+    product = np.exp(-0.7 * wavenumbers.k) * np.exp(-0.8 * wavenumbers.k)
+    np.testing.assert_allclose(wavenumbers.synthesise(product, r), depth(1.5, r), atol=1e-12)

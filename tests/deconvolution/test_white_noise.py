@@ -134,3 +134,13 @@ def test_a_draw_on_a_quarter_plane_convolves_back_as_its_quotient_says(seed: int
     problem = DivisionProblem(grid, unit(wide), unit(narrow), least, weakest)
     back = grid.convolve(WhiteNoiseDraw(seed=seed).divide(problem).field, problem.reference)
     assert np.abs(back - problem.voltage).max() < 5e-4 * problem.voltage.max()
+
+
+def test_a_seed_gives_the_same_draw_and_another_seed_another(
+    gaussians: Callable, seed: int
+) -> None:
+    problem = gaussians().problem
+    first = WhiteNoiseDraw(seed=seed).divide(problem).field
+    np.random.default_rng(seed).normal(size=100)
+    np.testing.assert_array_equal(first, WhiteNoiseDraw(seed=seed).divide(problem).field)
+    assert not np.array_equal(first, WhiteNoiseDraw(seed=seed + 1).divide(problem).field)

@@ -159,6 +159,7 @@ class MixedSystem:
         def dilatation(u: Any, r: Any) -> Any:
             return div(u) + u[0] / r
 
+        # scikit-fem carries no types.
         @skfem.BilinearForm  # type: ignore[untyped-decorator]
         def distortion(u: Any, v: Any, w: Any) -> Any:
             r = w.x[0]
