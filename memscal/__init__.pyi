@@ -12,6 +12,7 @@ from .calibration.calibrate import Calibration as Calibration
 from .calibration.calibrate import calibrate as calibrate
 from .calibration.many import FleetCalibration as FleetCalibration
 from .calibration.many import calibrate_many as calibrate_many
+from .calibration.monte_carlo import BudgetComparison as BudgetComparison
 from .calibration.monte_carlo import MonteCarlo as MonteCarlo
 from .calibration.monte_carlo import monte_carlo as monte_carlo
 from .calibration.sweep import Sweep as Sweep
@@ -47,6 +48,7 @@ from .friction.results import PriorChoice as PriorChoice
 from .friction.results import ShearComparison as ShearComparison
 from .measurement.measure_stress import measure_stress as measure_stress
 from .measurement.restoration import Restoration as Restoration
+from .measurement.restoration import StressComparison as StressComparison
 from .measurement.restore import restore as restore
 from .mechanics.contact import Contact as Contact
 from .mechanics.film_response import InterfaceTraction as InterfaceTraction

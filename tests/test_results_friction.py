@@ -91,6 +91,24 @@ def test_rows_hold_every_load_by_every_loading(found: FrictionComparison) -> Non
     np.testing.assert_allclose(rows["friction by profile"], values)
 
 
+def test_coefficients_share_what_scans_share(found: FrictionComparison) -> None:
+    joint = {
+        f"friction_{lubrication}_{loading}": estimate
+        for lubrication, by_loading in found.joint.items()
+        for loading, estimate in by_loading.items()
+        if estimate.standard_uncertainty is not None
+    }
+    numbers = found.ufloats()
+    assert set(numbers) == set(joint)
+    for name, number in numbers.items():
+        assert number.nominal_value == pytest.approx(joint[name].value)
+        assert number.std_dev == pytest.approx(joint[name].standard_uncertainty)
+    first, *others = numbers.values()
+    for other in others:
+        apart = math.hypot(first.std_dev, other.std_dev)
+        assert abs(first.std_dev - other.std_dev) <= (first - other).std_dev <= apart * (1 + 1e-9)
+
+
 def test_a_comparison_draws_itself_and_its_laws(found: FrictionComparison) -> None:
     assert len(found.plot().axes) == 4
     assert len(found.interface.plot().axes) == 3

@@ -222,7 +222,7 @@ _CUT, _COUNTS = 0.05, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class BudgetComparison:
     """One parameter by draws and by the first-order budget, in its SI unit."""
 
     name: str
@@ -264,7 +264,7 @@ class MonteCarlo(Result):
     samples : ndarray, shape (m, 5)
         A (V/Pa), both widths (m), full width at half maximum (m) and noise-equivalent area (m^2)
         of the m draws that could be calibrated: all of them, unless a message says otherwise.
-    comparisons : tuple of Comparison
+    comparisons : tuple of BudgetComparison
         The same, summed up, beside the budget.
     r : ndarray, shape (n,)
         Radii of G, in m.
@@ -284,7 +284,7 @@ class MonteCarlo(Result):
     seed: int
     sources: tuple[str, ...]
     samples: FloatArray
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[BudgetComparison, ...]
     r: FloatArray
     g_mean: FloatArray
     g_uncertainty: FloatArray
@@ -305,7 +305,7 @@ class MonteCarlo(Result):
         """Whether every parameter agrees with its budget."""
         return all(comparison.agrees for comparison in self.comparisons)
 
-    def __getitem__(self, name: str) -> Comparison:
+    def __getitem__(self, name: str) -> BudgetComparison:
         """Return the comparison of one parameter."""
         for comparison in self.comparisons:
             if comparison.name == name:
@@ -404,7 +404,7 @@ def monte_carlo(
 
 def _compared(
     calibration: Calibration, name: str, column: FloatArray, solved: Sequence[SolvedInput]
-) -> Comparison:
+) -> BudgetComparison:
     """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
     value, mean, spread = parameters[name], float(column.mean()), float(column.std(ddof=1))
@@ -415,7 +415,7 @@ def _compared(
     first, last = shortest_interval(column)
     agrees = same_spread and same_mean
     reason = "" if agrees else _reason(spread, mean - value, u, budget, solved)
-    return Comparison(
+    return BudgetComparison(
         name=name,
         value=value,
         mean=mean,
@@ -473,7 +473,10 @@ def _sampling_error(draws: FloatArray) -> float:
 
 
 def _messages(
-    calibration: Calibration, comparisons: Sequence[Comparison], failures: Sequence[str], draws: int
+    calibration: Calibration,
+    comparisons: Sequence[BudgetComparison],
+    failures: Sequence[str],
+    draws: int,
 ) -> Iterator[Message]:
     """Return messages on what was drawn, and on uncertainty that no draw shows."""
     if not calibration.effects:

@@ -21,7 +21,7 @@ from memscal.figures.style import (
     new_figure,
     panel_letter,
 )
-from memscal.measurement.restoration import Comparison, Restoration
+from memscal.measurement.restoration import Restoration, StressComparison
 from memscal.mechanics.contact import Contact
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import KPA, MM
@@ -112,7 +112,7 @@ _RESTORATION_EXPANDED = 2.0
 _LEAST_LIMIT = 3.5
 
 
-def restoration_figure(restored: Restoration, compared: Comparison | None = None) -> Figure:
+def restoration_figure(restored: Restoration, compared: StressComparison | None = None) -> Figure:
     """Draw the stress at the base as restored, as blurred by the sensor, and as calculated.
 
     Panel a, stress against the distance from the centre; b, residuals against position.
@@ -128,7 +128,7 @@ def restoration_figure(restored: Restoration, compared: Comparison | None = None
     return figure
 
 
-def _draw_stress(axes: Axes, restored: Restoration, compared: Comparison | None) -> None:
+def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison | None) -> None:
     r = restored.r / MM
     stress = restored.sigma_zz / KPA
     band = _RESTORATION_EXPANDED * np.sqrt(np.maximum(np.diag(restored.covariance), 0.0)) / KPA

@@ -39,7 +39,7 @@ _NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class StressComparison:
     """How a calculated stress agrees with a scan and with the stress restored from it."""
 
     stress: StressProfile | Contact
@@ -54,7 +54,7 @@ class Comparison:
 
 def compare_stress(
     posterior: Posterior, scan: Scan, stress: StressProfile | Contact, r: FloatArray
-) -> Comparison:
+) -> StressComparison:
     """Compare a calculated stress, scaled to a rod's load, with scan and restoration."""
     if not isinstance(scan.indenter, Rod) and abs(stress.load / scan.load - 1) > SAME_LOAD:
         raise InputError(
@@ -73,7 +73,7 @@ def compare_stress(
     allowed = np.hypot(_EXPANDED * np.sqrt(np.maximum(np.diag(covariance), 0)), _NEGLIGIBLE * peak)
     apart = np.abs(synthesis @ posterior.state[:nodes] - calculated)
     chi_square, degrees = _direct(posterior, scan, spectrum)
-    return Comparison(
+    return StressComparison(
         stress=stress,
         sigma_zz=calculated,
         chi_square=chi_square / degrees,
@@ -146,7 +146,7 @@ class Restoration(Result):
         Stress at the base there, in Pa, positive in compression.
     covariance : ndarray, shape (n, n)
         Its covariance, in Pa^2: noise, what regularisation hides, and uncertain inputs.
-    comparison : Comparison, optional
+    comparison : StressComparison, optional
         With an expected stress, where one was given.
     checks : tuple of QualityCheck
         Quality checks.
@@ -160,7 +160,7 @@ class Restoration(Result):
     r: FloatArray
     sigma_zz: FloatArray
     covariance: FloatArray
-    comparison: Comparison | None = None
+    comparison: StressComparison | None = None
     checks: tuple[QualityCheck, ...] = ()
     messages: tuple[Message, ...] = ()
 
@@ -302,7 +302,7 @@ class Restoration(Result):
             self._synthesis(r) @ (sensor_transfer(self.apparatus, k) * self.posterior.state[:nodes])
         )
 
-    def compare(self, expected: Expected) -> Comparison:
+    def compare(self, expected: Expected) -> StressComparison:
         """Compare a calculated stress with the scan, blurred by G, and with the restored one.
 
         Raises

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import overload
+from dataclasses import replace
+from typing import Any, overload
 
 import numpy as np
 
@@ -25,6 +26,8 @@ _Several = Sequence[float] | FloatArray
 
 # Fewer rings than this resolve no contact.
 _FEWEST_RINGS = 16
+#: Contacts whose depths differ by less than this share are one.
+_SAME = 1e-6
 
 
 @overload
@@ -179,6 +182,48 @@ def indent(
         )
         contacts = solve_on_rings(request)
     return list(contacts) if several else contacts[0]
+
+
+def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
+    """Return contacts with each stated property of film and indenter varied, at the same load.
+
+    Each: the contacts with more and with less of it, and the standard uncertainty over the
+    difference of the two.  A contact that was not reached by loading alone is refused.
+    """
+    film, indenter = contact.film, contact.indenter
+
+    def again(film: ElasticFilm, indenter: Indenter) -> Contact:
+        return indent(
+            film,
+            indenter,
+            load=contact.load,
+            friction=contact.friction,
+            loading=contact.loading or "incremental",
+            backend=contact.backend,
+            interface=contact.interface,
+            strain=contact.strain,
+        )
+
+    if abs(again(film, indenter).depth / contact.depth - 1) > max(_SAME, 2 * contact.convergence):
+        raise InputError(
+            "The contact was not reached by loading alone, or in a film of its own radius.",
+            why="Its depth is not that of one loading to its load, which is what can be repeated "
+            "with other properties.",
+            cure="Ask a contact of a single load for its uncertainties.",
+        )
+    varied = []
+    for name in ("young_modulus", "poisson_ratio", "thickness", "radius"):
+        holder: Any = indenter if name == "radius" else film
+        if not (u := getattr(holder, f"{name}_uncertainty", None)):
+            continue
+        value = getattr(holder, name)
+        # One-sided at nu = 1/2.
+        ends = (value + u if name != "poisson_ratio" else min(value + u, 0.5), max(value - u, 0.0))
+        records = [replace(holder, **{name: end}) for end in ends]
+        pairs = [(film, new) if name == "radius" else (new, indenter) for new in records]
+        more, less = (again(*pair) for pair in pairs)
+        varied.append((more, less, u / (ends[0] - ends[1])))
+    return varied
 
 
 def _targets(

@@ -39,6 +39,8 @@ DIMENSIONS = {
     "voltage per length": Dimension("V/m", "mV/mm", "mV/mm", MV / MM),
     "dimensionless": Dimension("1", "1", "", 1.0),
     "angle": Dimension("rad", "rad", "rad", 1.0),
+    "energy": Dimension("J", "J", "J", 1.0),
+    "stress per length": Dimension("Pa/m", "MPa/mm", "MPa/mm", 1e9),
 }
 
 # Units other than a dimension's own in which some quantities are shown, in SI units.
@@ -58,6 +60,7 @@ class Quantity:
     stored: str = ""  # the name in files where it is another
     shown: str = ""  # the unit where it is not its dimension's
     origin: str = ""  # the name among the origins of a file where it says where data come from
+    label: str = ""  # the name in JSON and in data frames where it is another
 
     @property
     def key(self) -> str:
@@ -72,13 +75,31 @@ class Quantity:
         return DIMENSIONS[self.dimension].shown
 
     @property
+    def unit_text(self) -> str:
+        """The unit in ASCII, as JSON states it: ``1`` of a number without a unit."""
+        return self.unit.replace("²", "^2").replace("⁴", "^4") or "1"
+
+    @property
+    def column(self) -> str:
+        """The name of its column in a data frame: ``r (mm)``."""
+        shown = self.unit if self.dimension in DIMENSIONS else ""
+        name = self.label or self.name
+        return f"{name} ({shown})" if shown else name
+
+    @property
+    def heading(self) -> str:
+        """Its words and unit over a column of a table."""
+        shown = self.unit if self.dimension in DIMENSIONS else ""
+        return f"{self.words} ({shown})" if shown else self.words
+
+    @property
     def si_unit(self) -> str:
         """The SI unit of its values in Python."""
         return DIMENSIONS[self.dimension].si if self.dimension in DIMENSIONS else self.dimension
 
     @property
     def scale(self) -> float:
-        """How many SI units :attr:`unit` is."""
+        """How many SI units :attr:`unit` is; 1 of a count."""
         if self.shown or self.dimension not in DIMENSIONS:
             return _OTHER_UNITS.get(self.shown, 1.0)
         return DIMENSIONS[self.dimension].scale
@@ -112,6 +133,7 @@ def measured(quantity: Quantity, *, required: bool = False) -> tuple[Quantity, Q
         words=f"standard uncertainty of the {quantity.words}",
         symbol="",
         required=required,
+        label=f"u({quantity.label or quantity.name})",
     )
     return quantity, spread
 

@@ -101,7 +101,7 @@ PROFILE = record(
 CONTACT = record(
     "NXcollection",
     _LOAD[0],
-    Quantity("depth", _L, "indentation depth", "d", shown="um"),
+    Quantity("depth", _L, "depth", "d", shown="um"),
     Quantity("contact_radius", _L, "contact radius", "a"),
     Quantity("stick_radius", _L, "stick radius", "c"),
     Quantity("friction_coefficient", _ONE, "friction coefficient", "μ"),
@@ -211,10 +211,10 @@ STRESS_PROFILE = record(
 )
 STRESS_NUMBERS = record(
     "NXdata",
-    *measured(Quantity("load", "force", "stated load", "P", required=True)),
+    *measured(Quantity("load", "force", "load", "P", required=True)),
     Quantity("lubrication", "text", "dry or lubricated"),
-    *measured(Quantity("force", "force", "force of the measured stress", "F", required=True)),
-    *measured(Quantity("maximum", _P, "largest measured stress", "S", required=True)),
+    *measured(Quantity("force", "force", "total force", "F", required=True)),
+    *measured(Quantity("maximum", _P, "maximum of S_zz", "S", required=True)),
     *measured(Quantity("centre", _L, "centre along x", "x₀", required=True), required=True),
     *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
     *measured(Quantity("baseline", _U, "baseline", "U₀", required=True), required=True),
@@ -255,3 +255,156 @@ def points_record(channel: str) -> Record:
         Quantity("correlation", _ONE, axes=("point", "point_prime"), stored=f"{u}_correlation"),
         signal=u,
     )
+
+
+# What results show beyond what files hold: the members of JSON, the cells of tables.
+_COUNT = "number"
+
+FIT = (
+    Quantity("chi_square", _COUNT, "chi-square", "χ²", label="chi2"),
+    Quantity("degrees", _COUNT, "degrees of freedom", "ν"),
+    Quantity("p_value", _COUNT, "chance of such a chi-square, or a larger one", "p"),
+)
+"""How data agree with what was calculated."""
+
+SOLUTION = (
+    *CONTACT.quantities[:4],
+    Quantity("max_interface_stress", _P, "interface peak", shown="Pa"),
+    Quantity("max_base_stress", _P, "base peak", shown="Pa"),
+    Quantity("friction", _ONE, "friction coefficient", "μ", label="friction_coefficient"),
+    Quantity("sticking", "truth", "whether nothing slips"),
+    CONTACT.quantities[5],
+    Quantity("backend", "text", "method of solution"),
+    Quantity("strain", "text", "linear or finite strain"),
+    Quantity("convergence", _ONE, "change"),
+    Quantity("steps", _COUNT, "steps"),
+    Quantity("elastic_energy", "energy", "elastic energy of the film"),
+    Quantity("work", "energy", "work of the indenter"),
+    Quantity("dissipated_energy", "energy", "energy that friction has taken"),
+    Quantity("discretisation", "text", "mesh or quadrature"),
+)
+"""A contact that was solved."""
+
+PLAN = (
+    Quantity("positions", _COUNT, "positions"),
+    Quantity("step", _L, "step"),
+    Quantity("half_range", _L, "half range"),
+    Quantity("repeats", _COUNT, "repeats"),
+    Quantity("load", "force", "load", "P"),
+    Quantity("signal", _U, "largest signal", label="largest_signal"),
+    Quantity("point_noise", _U, "noise of a voltage", label="noise"),
+)
+"""A planned scan."""
+
+EXPECTED = (
+    *measured(Quantity("g_at_axis", _PER_AREA, "G at the axis")),
+    TRANSFER.quantities[-1],
+)
+"""What a planned scan is expected to give beside its parameters."""
+
+FORCE_BUDGET = Quantity("force_budget", _COUNT, "uncertainty of the force by source, in N")
+MAXIMUM_BUDGET = Quantity("maximum_budget", _P, "that of the maximum", axes=("source",))
+APPLIED = (
+    *measured(Quantity("conversion_constant", "voltage per stress", "conversion constant A")),
+    *measured(Quantity("force_over_load", _ONE, "total force over applied load")),
+)
+"""What holds for all measured profiles."""
+
+RESTORED = (
+    LOAD.quantities[0],
+    *measured(Quantity("force", "force", "total force", "F")),
+    *measured(Quantity("stress_on_axis", _P, "stress on the axis")),
+    *measured(Quantity("centre", _L, "centre of the scan", "x₀")),
+    *measured(Quantity("centre_y", _L, "centre of the scan along y", "y₀")),
+    *measured(Quantity("baseline", _U, "baseline", "U₀")),
+    FORCE_BUDGET,
+    TRANSFER.quantities[-1],
+)
+"""Numbers of a restoration; a centre is left out where it does not apply."""
+
+RESTORED_AGAINST = (
+    Quantity("origin", "text", "what was calculated"),
+    Quantity("chi_square", _COUNT, "reduced chi-square", "χ²/ν", label="chi2_reduced"),
+    *FIT[1:],
+    Quantity("difference", _COUNT, "largest difference", label="largest_difference"),
+    Quantity("within", _COUNT, "share of the radii", label="share_within_95_percent"),
+)
+"""A restored stress beside a calculated one."""
+
+FRICTION = Quantity("friction", _ONE, "friction coefficient", "μ")
+SLIP_LENGTH = Quantity("length", _L, "slip length", shown="um")
+
+ESTIMATE_FIT = (
+    Quantity("budget", _ONE, "standard uncertainty by source", axes=("source",)),
+    Quantity("least", _COUNT, "least chi-square", "χ²", label="chi2"),
+    *FIT[1:],
+)
+"""How an estimate by profile likelihood fits."""
+
+COMPARED_LOAD = (
+    Quantity("lubrication", "text", "dry or lubricated"),
+    STRESS_NUMBERS.quantities[0],
+    *measured(Quantity("force", "force", "force", "F")),
+)
+COMPARED_MAXIMA = (
+    *measured(Quantity("s_max", _P, "S_max", label="S_max")),
+    *measured(Quantity("p0_max", _P, "p0_max", label="p0_max")),
+    *measured(Quantity("ratio", _ONE, "S_max/p0_max")),
+)
+"""What was measured at one load: the profile's force, maxima beside the frictionless ones."""
+
+CALCULATED = (
+    Quantity("friction", _COUNT, "friction coefficient", "μ", label="friction_coefficient"),
+    Quantity("sticking", "truth", "whether nothing slips"),
+    Quantity("p_max", _P, "largest calculated stress"),
+    FIT[0],
+    FIT[2],
+)
+"""One load against the profile calculated with one friction coefficient."""
+
+DRY_AGAINST_LUBRICATED = (
+    STRESS_NUMBERS.quantities[0],
+    *measured(Quantity("maximum", _P, "on the axis", label="on_axis")),
+    *measured(Quantity("relative", _ONE, "of the lubricated")),
+    *FIT,
+)
+
+LAW = (
+    Quantity("name", "text", "law"),
+    Quantity("best", _COUNT, "best parameters"),
+    Quantity("log_evidence", _COUNT, "ln of evidence"),
+    Quantity("log_likelihood", _COUNT, "ln of the largest likelihood"),
+    Quantity("numerical_error", _COUNT, "standard uncertainty of the integral"),
+    *ESTIMATE_FIT[1:],
+)
+BAYES_FACTOR = (
+    Quantity("favoured", "text", "law that is favoured"),
+    Quantity("against", "text", "law"),
+    Quantity("log_factor", _COUNT, "ln of the Bayes factor"),
+    Quantity("words", "text", "evidence"),
+)
+PRIOR = (Quantity("prior", "text", "prior"), BAYES_FACTOR[2])
+COMPARED_LAWS = (
+    Quantity("lubrication", "text", "dry or lubricated"),
+    Quantity("loads", "force", "loads", axes=("load",)),
+)
+IMPLIED = (
+    Quantity("load", "force", "load", axes=("load",)),
+    Quantity("friction", _ONE, "effective coefficient", axes=("load",),
+             label="effective_friction_coefficient"),
+    Quantity("pressure", _P, "mean pressure", axes=("load",), label="mean_pressure"),
+    Quantity("stiffness", "stress per length", "stiffness", axes=("load",)),
+)  # fmt: skip
+"""What a slip length means at one load; coefficient and stiffness with the ends of intervals."""
+
+DRAWN = (
+    Quantity("value", _COUNT, "value of the calibration"),
+    Quantity("mean", _COUNT, "mean of the draws"),
+    Quantity("uncertainty", _COUNT, "u of the draws", label="standard_uncertainty"),
+    Quantity("sampling_error", _COUNT, "standard uncertainty of that"),
+    Quantity("symmetric", _COUNT, "95 % interval", label="interval_95"),
+    Quantity("shortest", _COUNT, "shortest 95 % interval", label="shortest_interval_95"),
+    Quantity("first_order", _COUNT, "u by the budget"),
+    Quantity("stated", _COUNT, "u with what regularisation hides"),
+)
+"""A parameter by draws and by its budget, all in the unit of the parameter."""

@@ -15,14 +15,8 @@ from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.quantities import MM, PER_MM, measured_text, parameter_quantity
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-from memscal.summaries.table import (
-    Table,
-    checks_json,
-    checks_table,
-    finite,
-    record_arrays,
-    texts_of,
-)
+from memscal.summaries.declared import correlated_numbers, members, parameter_json, record_arrays
+from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
 
 if TYPE_CHECKING:
     import xarray
@@ -51,12 +45,11 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     """Return the object of ``calibrate --json``; its form is part of the contract."""
     apparatus = apparatus_of(result)
     parameters = apparatus.parameters
-    resolved = finite(apparatus.resolved_wavenumber / PER_MM)
     values: dict[str, Any] = {
         "schema_version": "1",
         "method": apparatus.process.configuration.get("method"),
         **{name: parameter_json(parameters, name) for name in _IN_JSON if name in parameters},
-        "resolved_wavenumber": {"value": resolved, "unit": "rad/mm"},
+        **members(records.TRANSFER.quantities[-1:], apparatus),
     }
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
@@ -95,10 +88,7 @@ def correlated(result: Calibrated) -> dict[str, Any]:
 
 def correlated_parameters(parameters: ParameterSet) -> dict[str, Any]:
     """Return parameters as numbers of the package uncertainties, with their covariance."""
-    from uncertainties import correlated_values
-
-    numbers = correlated_values(parameters.values, parameters.covariance)
-    return dict(zip(parameters.names, numbers, strict=True))
+    return correlated_numbers(parameters.names, parameters.values, parameters.covariance)
 
 
 def estimate_rows(parameters: ParameterSet, resolved: float) -> list[tuple[str, str, str]]:
@@ -106,16 +96,6 @@ def estimate_rows(parameters: ParameterSet, resolved: float) -> list[tuple[str, 
     quantities = {name: parameter_quantity(parameters, name) for name in parameters.names}
     rows = [(q.words, q.symbol, measured_text(parameters, name)) for name, q in quantities.items()]
     return [*rows, ("resolved up to the wavenumber", "k", f"{resolved / PER_MM:.3g} rad/mm")]
-
-
-def parameter_json(parameters: ParameterSet, name: str) -> dict[str, Any]:
-    """Return a parameter's value and standard uncertainty in the unit in which it is shown."""
-    quantity = parameter_quantity(parameters, name)
-    return {
-        "value": finite(parameters[name] / quantity.scale),
-        "standard_uncertainty": finite(parameters.uncertainty(name) / quantity.scale),
-        "unit": quantity.unit,
-    }
 
 
 def sensor_title(apparatus: ApparatusData) -> str:

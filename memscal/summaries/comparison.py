@@ -8,10 +8,12 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from memscal.errors import InputError
 from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import (
     BoundedEstimate,
-    DryAgainstLubricated,
     FrictionComparison,
     LoadComparison,
     ShearComparison,
@@ -21,8 +23,18 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import FAILED_CHECK, Message, QualityCheck, failed_check_messages
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
-from memscal.model.quantities import KPA, MM
+from memscal.model.quantities import MM, measured
+from memscal.model.records import (
+    CALCULATED,
+    COMPARED_LOAD,
+    COMPARED_MAXIMA,
+    DRY_AGAINST_LUBRICATED,
+    ESTIMATE_FIT,
+    FRICTION,
+    STRESS_NUMBERS,
+)
 from memscal.summaries import interface_laws
+from memscal.summaries.declared import cell, columns, correlated_numbers, members
 from memscal.summaries.interface_laws import friction_name
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
 
@@ -46,7 +58,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
         loads = [
             {
                 "lubrication": profile.lubrication,
-                "load": {"value": finite(profile.load), "unit": "N"},
+                **members(STRESS_NUMBERS.quantities[:1], profile),
                 "by_loading": {
                     loading or "given": _estimate(estimates[i])
                     for loading, estimates in comparison.loads.items()
@@ -68,9 +80,11 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
         "scans": scans,
         "loads": [_load(i, comparison, load) for i, load in enumerate(first)],
         "joint": joint,
-        "dry_against_lubricated": [_difference(pair) for pair in comparison.dry_against_lubricated],
+        "dry_against_lubricated": [
+            members(DRY_AGAINST_LUBRICATED, pair) for pair in comparison.dry_against_lubricated
+        ],
         "interface": None if laws is None else interface_laws.mapping(laws),
-        "macroscopic": None if sliding is None else _quantity(*sliding, "1"),
+        "macroscopic": None if sliding is None else _sliding(*sliding),
         "checks": checks_json(comparison.checks),
         "overridden": list(comparison.measured.overridden),
         "warnings": texts_of(comparison.messages),
@@ -85,25 +99,11 @@ def frame(comparison: FrictionComparison | ShearComparison) -> pd.DataFrame:
     for loading in comparison.loadings:
         loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
         for profile, load in zip(comparison.measured.profiles, loads, strict=True):
-            row: dict[str, Any] = {
-                "loading": loading,
-                "lubrication": profile.lubrication,
-                "load (N)": profile.load,
-                "force (N)": profile.force,
-                "u(force) (N)": profile.force_uncertainty,
-            }
+            row: dict[str, Any] = {"loading": loading, **columns(COMPARED_LOAD, profile)}
             if isinstance(load, BoundedEstimate):
                 row |= _columns("friction", load)
             else:
-                row |= {
-                    "S_max (kPa)": load.s_max / KPA,
-                    "u(S_max) (kPa)": load.s_max_uncertainty / KPA,
-                    "p0_max (kPa)": load.p0_max / KPA,
-                    "u(p0_max) (kPa)": load.p0_max_uncertainty / KPA,
-                    "S_max/p0_max": load.ratio,
-                    "u(S_max/p0_max)": load.ratio_uncertainty,
-                    "bracketed": load.bracketed,
-                }
+                row |= columns(COMPARED_MAXIMA, load) | {"bracketed": load.bracketed}
                 row |= _columns("friction by maximum", load.by_maximum)
                 row |= _columns("friction by profile", load.by_profile)
             rows.append(row)
@@ -123,6 +123,42 @@ def _columns(name: str, estimate: BoundedEstimate) -> dict[str, float]:
     }
 
 
+#: Sources of uncertainty that scans of one sensor on one film do not share.
+_OF_ONE_SCAN = {"noise", "load_scatter", "position"}
+
+
+def correlated(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
+    """Return the coefficients of all loads that have a standard uncertainty, by what they are of.
+
+    Two of one scan share all sources of uncertainty, those of dry and lubricated scans only what
+    is common to them; each source moves all coefficients to the same side.
+    """
+    joint = [entry for entry in _joint(comparison) if entry[2].standard_uncertainty is not None]
+    if not joint:
+        raise InputError(
+            "No friction coefficient of all loads has a standard uncertainty.",
+            why="; ".join(estimate.reason for *_, estimate in _joint(comparison)),
+            cure="Use summary() or to_dict(), which give its bounds.",
+        )
+    budgets = [
+        {(name, lubrication if name in _OF_ONE_SCAN else ""): u for name, u in of.budget.items()}
+        for lubrication, _, of in joint
+    ]
+    sources = {source for budget in budgets for source in budget}
+    shares = np.array([[budget.get(source, 0.0) for source in sources] for budget in budgets])
+    # The budget is linear; the standard uncertainty is that of the likelihood.
+    shares /= np.maximum(np.linalg.norm(shares, axis=1, keepdims=True), np.finfo(float).tiny)
+    spread = np.array([estimate.standard_uncertainty for *_, estimate in joint], dtype=np.float64)
+    names = [
+        "_".join(("friction", lubrication or "unstated", loading or "given"))
+        for lubrication, loading, _ in joint
+    ]
+    values = [estimate.best for *_, estimate in joint]
+    correlation = shares @ shares.T
+    np.fill_diagonal(correlation, 1.0)
+    return correlated_numbers(names, values, correlation * np.outer(spread, spread))
+
+
 def _joint(
     comparison: FrictionComparison | ShearComparison,
 ) -> Iterator[tuple[str, str, BoundedEstimate]]:
@@ -137,21 +173,18 @@ def file_json(source: SourceFile | None) -> dict[str, Any]:
     return {name: getattr(source, name, None) for name in ("file_name", "sha256")}
 
 
-def _quantity(value: float, uncertainty: float | None, unit: str) -> dict[str, Any]:
-    return {"value": finite(value), "standard_uncertainty": finite(uncertainty), "unit": unit}
+def _sliding(value: float, uncertainty: float | None) -> dict[str, Any]:
+    values = {"friction": value, "friction_uncertainty": uncertainty}
+    [member] = members(measured(FRICTION), None, **values).values()
+    return dict(member)
 
 
 def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
     """Return what was measured at one load, and what each loading makes of it."""
-    profile = load.profile
     return {
-        "scan": getattr(profile.scan.source, "file_name", None),
-        "lubrication": load.lubrication,
-        "load": {"value": finite(load.load), "unit": "N"},
-        "force": _quantity(profile.force, profile.force_uncertainty, "N"),
-        "S_max": _quantity(load.s_max / KPA, load.s_max_uncertainty / KPA, "kPa"),
-        "p0_max": _quantity(load.p0_max / KPA, load.p0_max_uncertainty / KPA, "kPa"),
-        "ratio": _quantity(load.ratio, load.ratio_uncertainty, "1"),
+        "scan": getattr(load.profile.scan.source, "file_name", None),
+        **members(COMPARED_LOAD, load.profile),
+        **members(COMPARED_MAXIMA, load),
         "by_loading": {
             loading or "given": _by_loading(comparison, loads[index])
             for loading, loads in comparison.loads.items()
@@ -160,6 +193,7 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
 
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
+    calculated = zip(comparison.friction, load.p_max, load.chi_square, load.p_values, strict=True)
     return {
         "effective_friction_coefficient": {
             "by_maximum": _estimate(load.by_maximum),
@@ -168,33 +202,25 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
         "profiles": [
-            {
-                "friction_coefficient": finite(mu),
-                "sticking": math.isinf(mu),
-                "p_max": {"value": finite(load.p_max[i] / KPA), "unit": "kPa"},
-                "chi2": finite(float(load.chi_square[i])),
-                "p_value": finite(float(load.p_values[i])),
-            }
-            for i, mu in enumerate(comparison.friction)
+            members(
+                CALCULATED,
+                None,
+                friction=mu,
+                sticking=math.isinf(mu),
+                p_max=p_max,
+                chi_square=chi_square,
+                p_value=p_value,
+            )
+            for mu, p_max, chi_square, p_value in calculated
         ],
     }
 
 
 def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
-    """Return a coefficient with its interval; without a value there is a reason."""
+    """Return a coefficient with its interval, how it fits, and its likelihood."""
     return {
-        "value": finite(estimate.value),
-        "standard_uncertainty": finite(estimate.standard_uncertainty),
-        "interval": {
-            "low": finite(estimate.interval.low),
-            "high": finite(estimate.interval.high),
-            "level": estimate.interval.level,
-        },
-        "reason": estimate.reason or None,
-        "budget": {name: finite(u) for name, u in estimate.budget.items()},
-        "chi2": finite(estimate.least),
-        "degrees": estimate.degrees,
-        "p_value": finite(estimate.p_value),
+        **interface_laws.bounded_json(FRICTION, estimate),
+        **members(ESTIMATE_FIT, estimate),
         "profile_likelihood": {
             "friction_coefficient": _shortened(estimate.values),
             "chi2": _shortened(estimate.chi_square),
@@ -204,17 +230,6 @@ def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
 
 def _shortened(values: FloatArray) -> list[float | None]:
     return [finite(float(f"{value:.6g}")) for value in values]
-
-
-def _difference(pair: DryAgainstLubricated) -> dict[str, Any]:
-    return {
-        "load": {"value": finite(pair.load), "unit": "N"},
-        "on_axis": _quantity(pair.maximum / KPA, pair.maximum_uncertainty / KPA, "kPa"),
-        "relative": _quantity(pair.relative, pair.relative_uncertainty, "1"),
-        "chi2": finite(pair.chi_square),
-        "degrees": pair.degrees,
-        "p_value": finite(pair.p_value),
-    }
 
 
 #: Coefficients farther apart than this, in the bounded coordinate, leave much to interpolation.
@@ -315,14 +330,13 @@ def _maxima_table(comparison: FrictionComparison) -> Table:
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"
     )
-    head = [*_LABELS, "force (N)", "S_max (kPa)", "p0_max (kPa)", "S_max/p0_max"]
+    force, maxima = COMPARED_LOAD[2], COMPARED_MAXIMA[::2]
+    head = [*_LABELS, *(quantity.heading for quantity in (force, *maxima))]
     rows = [
         [
             *_labels(i, load.profile),
-            format_measured(load.profile.force, load.profile.force_uncertainty),
-            format_measured(load.s_max / KPA, load.s_max_uncertainty / KPA),
-            format_measured(load.p0_max / KPA, load.p0_max_uncertainty / KPA),
-            format_measured(load.ratio, load.ratio_uncertainty),
+            cell(force, load.profile, unit=""),
+            *(cell(quantity, load, unit="") for quantity in maxima),
         ]
         for i, load in enumerate(comparison.loads[comparison.loadings[0]], start=1)
     ]
@@ -468,15 +482,17 @@ def _checks_table(checks: Sequence[QualityCheck]) -> Table:
 
 def _lubrication_table(comparison: FrictionComparison) -> Table:
     """Return how far dry and lubricated stress differ at each load."""
+    load, maximum, _, relative, *_ = DRY_AGAINST_LUBRICATED
     rows = [
         [
             f"{pair.load:.4g}",
-            format_measured(pair.maximum / KPA, pair.maximum_uncertainty / KPA),
+            cell(maximum, pair, unit=""),
             format_measured(100 * pair.relative, 100 * pair.relative_uncertainty, "%"),
             f"{pair.chi_square / pair.degrees:.2f}",
             f"{pair.p_value:.2g}",
         ]
         for pair in comparison.dry_against_lubricated
     ]
-    head = ["load (N)", "on the axis (kPa)", "of the lubricated", "χ²/ν of no difference", "p"]
+    words = (load.heading, maximum.heading, relative.words)
+    head = [*words, "χ²/ν of no difference", "p"]
     return Table("Dry less lubricated stress (± standard uncertainty)", head, rows)

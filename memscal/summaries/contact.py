@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from memscal.mechanics.contact import Contact
+from memscal.mechanics.indent import changes_by_inputs
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message
 from memscal.model.indenter import Cone, RoundIndenter
-from memscal.model.quantities import KPA, MM, Quantity, by_name
-from memscal.model.records import CONTACT, PROFILE
-from memscal.summaries.interop import column, data_frame, labelled_dataset, quantity_json
+from memscal.model.quantities import MM, Quantity, by_name
+from memscal.model.records import PROFILE, SOLUTION
+from memscal.summaries.declared import (
+    correlated_numbers,
+    data_frame,
+    labelled_dataset,
+    members,
+)
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
@@ -25,7 +34,7 @@ _SINGULAR = (
     "The pressure under a flat rod grows without bound towards its edge: "
     "there is no largest interface stress."
 )
-_QUANTITIES = by_name(CONTACT.quantities)
+_QUANTITIES = by_name(SOLUTION)
 _PROFILE = (
     *PROFILE.quantities,
     Quantity("interface_pressure", "stress", "pressure at the interface", axes=("r",)),
@@ -35,23 +44,7 @@ _PROFILE = (
 
 def mapping(contact: Contact) -> dict[str, Any]:
     """Return one solution of ``reference --json``; the contract fixes its form."""
-    shown = [_QUANTITIES[name] for name in ("load", "depth", "contact_radius", "stick_radius")]
-    return {
-        **{q.name: quantity_json(getattr(contact, q.name) / q.scale, q.unit) for q in shown},
-        "max_interface_stress": quantity_json(contact.max_interface_stress, "Pa"),
-        "max_base_stress": quantity_json(contact.max_base_stress, "Pa"),
-        "friction_coefficient": quantity_json(contact.friction, "1"),
-        "sticking": math.isinf(contact.friction),
-        "loading": contact.loading,
-        "backend": contact.backend,
-        "strain": contact.strain,
-        "convergence": quantity_json(contact.convergence, "1"),
-        "steps": contact.steps,
-        "elastic_energy": quantity_json(contact.elastic_energy, "J"),
-        "work": quantity_json(contact.work, "J"),
-        "dissipated_energy": quantity_json(contact.dissipated_energy, "J"),
-        "discretisation": contact.discretisation,
-    }
+    return members(SOLUTION, contact, sticking=math.isinf(contact.friction))
 
 
 def depth_messages(contacts: Sequence[Contact]) -> tuple[list[Message], list[str]]:
@@ -81,26 +74,28 @@ def tables(contact: Contact) -> list[Table]:
 def contacts_table(contacts: Sequence[Contact]) -> Table:
     """Return one row for each contact of a path; columns that do not apply are left out."""
     rod = contacts[0].indenter.shape == "rod"
-    columns = {"load (N)": [f"{c.load:.4g}" for c in contacts], **_lengths("depth", contacts)}
+    columns = _numbers("load", contacts) | _numbers("depth", contacts)
     if rod:
         columns["load/depth (N/mm)"] = [f"{c.load / c.depth * MM:.4g}" for c in contacts]
     else:
-        columns |= _lengths("contact_radius", contacts)
+        columns |= _numbers("contact_radius", contacts)
     if contacts[0].friction > 0:
-        columns |= _lengths("stick_radius", contacts)
+        columns |= _numbers("stick_radius", contacts)
     if not rod:
-        columns["interface peak (kPa)"] = [f"{c.max_interface_stress / KPA:.5g}" for c in contacts]
-    columns["base peak (kPa)"] = [f"{c.max_base_stress / KPA:.5g}" for c in contacts]
-    columns["steps"] = [f"{c.steps}" for c in contacts]
-    columns["change"] = [f"{c.convergence:.1g}" for c in contacts]
+        columns |= _numbers("max_interface_stress", contacts, ".5g")
+    columns |= _numbers("max_base_stress", contacts, ".5g")
+    columns |= _numbers("steps", contacts, "g") | _numbers("convergence", contacts, ".1g")
     rows = [list(row) for row in zip(*columns.values(), strict=True)]
     return Table(_title(contacts[0]), list(columns), rows)
 
 
-def _lengths(name: str, contacts: Sequence[Contact]) -> dict[str, list[str]]:
+def _numbers(name: str, contacts: Sequence[Contact], form: str = ".4g") -> dict[str, list[str]]:
+    """Return a column of one quantity; stress is shown in kPa here, in Pa in JSON."""
     quantity = _QUANTITIES[name]
-    cells = [f"{getattr(contact, name) / quantity.scale:.4g}" for contact in contacts]
-    return {column(quantity).replace("_", " "): cells}
+    if quantity.dimension == "stress":
+        quantity = replace(quantity, shown="")
+    values = (getattr(contact, name) / quantity.scale for contact in contacts)
+    return {quantity.heading: [format(value, form) for value in values]}
 
 
 def _title(contact: Contact) -> str:
@@ -147,3 +142,22 @@ def dataset(contact: Contact) -> xarray.Dataset:
 def frame(contact: Contact) -> pd.DataFrame:
     """Return one row for each radius of the default profile."""
     return data_frame(_PROFILE, _arrays(contact))
+
+
+def correlated(contact: Contact) -> dict[str, Any]:
+    """Return depth, radii and largest base stress at the exact load, as correlated numbers.
+
+    They vary with the stated uncertainties of film and indenter; the change under refinement is
+    taken as a further standard uncertainty of each.
+    """
+    names = ["depth", "contact_radius", "stick_radius", "max_base_stress"]
+
+    def numbers(contact: Contact) -> FloatArray:
+        return np.array([getattr(contact, name) for name in names], dtype=np.float64)
+
+    values = numbers(contact)
+    covariance = np.diag((contact.convergence * values) ** 2)
+    for more, less, share in changes_by_inputs(contact):
+        change = (numbers(more) - numbers(less)) * share
+        covariance += np.outer(change, change)
+    return correlated_numbers(names, values, covariance)

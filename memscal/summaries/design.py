@@ -6,13 +6,15 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity
-from memscal.model.records import RADIAL, TRANSFER
+from memscal.model.records import EXPECTED, PLAN, RADIAL, TRANSFER
 from memscal.planning.expected import Design
-from memscal.summaries.interop import (
+from memscal.summaries.declared import (
     correlated_numbers,
     data_frame,
     labelled_dataset,
-    quantity_json,
+    members,
+    parameter_json,
+    plain,
 )
 from memscal.summaries.table import Table
 
@@ -46,14 +48,15 @@ _QUANTITIES = (
 def tables(planned: Design) -> list[Table]:
     """Return the plan, the expected parameters, and the sources of their uncertainties."""
     plan = planned.plan
+    words = {quantity.name: quantity.words for quantity in PLAN}
     noise = f"{plan.point_noise / MV:.3g} mV ({plan.point_noise / plan.signal * 100:.3g} %)"
     rows = [
-        ("positions", f"{plan.positions}, every {plan.step / MM:.4g} mm"),
-        ("half range", f"{plan.half_range / MM:.4g} mm"),
-        ("repeats", f"{plan.repeats}"),
-        ("load", f"{plan.load:.4g} N"),
-        ("largest signal", f"{plan.signal / MV:.4g} mV"),
-        ("noise of a voltage", noise),
+        (words["positions"], f"{plan.positions}, every {plan.step / MM:.4g} mm"),
+        (words["half_range"], f"{plan.half_range / MM:.4g} mm"),
+        (words["repeats"], f"{plan.repeats}"),
+        (words["load"], f"{plan.load:.4g} N"),
+        (words["signal"], f"{plan.signal / MV:.4g} mV"),
+        (words["point_noise"], noise),
     ]
     title = f"A planned scan (nothing was measured), for method {planned.method}"
     head = ("", "value", "uncertainty", "relative")
@@ -103,36 +106,22 @@ def _contributions_table(planned: Design) -> Table:
 
 def mapping(planned: Design) -> dict[str, Any]:
     """Return the object of ``design --json``; the contract fixes its form."""
-    plan = planned.plan
+    axis = {"g_at_axis": planned.g[0], "g_at_axis_uncertainty": planned.g_errors[0]}
     return {
         "planned": True,
         "method": planned.method,
-        "plan": {
-            "positions": plan.positions,
-            "step": quantity_json(plan.step / MM, "mm"),
-            "half_range": quantity_json(plan.half_range / MM, "mm"),
-            "repeats": plan.repeats,
-            "load": quantity_json(plan.load, "N"),
-            "largest_signal": quantity_json(plan.signal / MV, "mV"),
-            "noise": quantity_json(plan.point_noise / MV, "mV"),
-        },
+        "plan": members(PLAN, planned.plan),
         "wanted_si": dict(planned.want),
         "expected": {name: _expected_json(planned, name) for name in _SHOWN},
-        "g_at_axis": {
-            **quantity_json(planned.g[0] / PER_MM2, "1/mm^2"),
-            "uncertainty": float(planned.g_errors[0] / PER_MM2),
-        },
-        "resolved_wavenumber": quantity_json(planned.resolved_wavenumber / PER_MM, "rad/mm"),
+        **members(EXPECTED, planned, **axis),
     }
 
 
 def _expected_json(planned: Design, name: str) -> dict[str, Any]:
-    shown = ESTIMATED[name]
     return {
-        **quantity_json(planned.parameters[name] / shown.scale, shown.unit),
-        "uncertainty": planned.parameters.uncertainty(name) / shown.scale,
+        **parameter_json(planned.parameters, name),
         "relative_uncertainty": planned.relative_uncertainty(name),
-        "budget": {source: u / shown.scale for source, u in planned.budget[name].items()},
+        "budget": plain(planned.budget[name], ESTIMATED[name].scale),
     }
 
 

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from memscal.calibration.many import FleetCalibration
 from memscal.errors import InputError
-from memscal.model.quantities import PER_MM, parameter_quantity
-from memscal.summaries.calibration import correlated_parameters, estimate_rows, parameter_json
-from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
+from memscal.model.quantities import parameter_quantity
+from memscal.model.records import TRANSFER
+from memscal.summaries.calibration import correlated_parameters, estimate_rows
+from memscal.summaries.declared import members, parameter_json
+from memscal.summaries.table import Table, checks_json, checks_table, texts_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,11 +30,10 @@ def mapping(result: FleetCalibration) -> dict[str, Any]:
     values: dict[str, Any] = {"index": result.index, "passed": result.passed}
     if result.parameters is None or result.resolved_wavenumber is None:
         return values | {"error": str(result.error)}
-    resolved = {"value": finite(result.resolved_wavenumber / PER_MM), "unit": "rad/mm"}
     estimates = {name: parameter_json(result.parameters, name) for name in result.parameters.names}
     checks, warnings = checks_json(result.checks), texts_of(result.messages)
-    of_all = {"resolved_wavenumber": resolved, "checks": checks, "warnings": warnings}
-    return values | estimates | of_all
+    resolved = members(TRANSFER.quantities[-1:], result)
+    return values | estimates | resolved | {"checks": checks, "warnings": warnings}
 
 
 def frame(result: FleetCalibration) -> pd.DataFrame:

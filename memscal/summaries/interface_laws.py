@@ -13,7 +13,10 @@ from memscal.friction.results import (
     LawComparison,
     percent,
 )
-from memscal.summaries.table import Table, finite, texts_of
+from memscal.model.quantities import KPA, Quantity
+from memscal.model.records import BAYES_FACTOR, COMPARED_LAWS, IMPLIED, LAW, PRIOR, SLIP_LENGTH
+from memscal.summaries.declared import members, plain
+from memscal.summaries.table import Table, texts_of
 
 
 def friction_name(friction: float) -> str:
@@ -21,8 +24,7 @@ def friction_name(friction: float) -> str:
     return "inf" if math.isinf(friction) else f"{friction:.4g}"
 
 
-_UM = 1e-6
-_MPA_PER_MM = 1e9
+_STIFFNESS = IMPLIED[-1]
 
 
 def tables(comparison: InterfaceComparison) -> list[Table]:
@@ -60,7 +62,7 @@ def _law_table(direction: str, compared: LawComparison) -> Table:
 def _best(compared: LawComparison, law: InterfaceLaw) -> str:
     """Return the free parameters where the likelihood is largest; the last law's is a length."""
     if law is compared.laws[-1]:
-        return ", ".join(f"{value / _UM:.3g} um" for value in law.best)
+        return ", ".join(f"{value / SLIP_LENGTH.scale:.3g} um" for value in law.best)
     return ", ".join(friction_name(float(f"{value:.3g}")) for value in law.best)
 
 
@@ -89,10 +91,10 @@ def _implied_table(implied: ImpliedFriction) -> Table:
         rows.append([
             f"{load:.4g}",
             _between(friction[1], low, high),
-            f"{pressure / 1e3:.4g}",
-            _between(*(value / _MPA_PER_MM for value in (stiffness[1], soft, stiff))),
+            f"{pressure / KPA:.4g}",
+            _between(*(value / _STIFFNESS.scale for value in (stiffness[1], soft, stiff))),
         ])  # fmt: skip
-    head = ["load (N)", "effective coefficient", "mean pressure (kPa)", "stiffness (MPa/mm)"]
+    head = [quantity.heading for quantity in IMPLIED]
     return Table("What the slip length means at each load [its 95 % interval]", head, rows)
 
 
@@ -105,7 +107,7 @@ def _short(value: float) -> str:
 
 
 def mapping(comparison: InterfaceComparison) -> dict[str, Any]:
-    """Return laws, evidence and lengths as JSON says them."""
+    """Return laws, evidence and lengths as JSON holds them."""
     directions = {name: _laws_json(compared) for name, compared in comparison.by_direction.items()}
     return directions | {"warnings": texts_of(comparison.messages)}
 
@@ -113,64 +115,32 @@ def mapping(comparison: InterfaceComparison) -> dict[str, Any]:
 def _laws_json(compared: LawComparison) -> dict[str, Any]:
     implied = compared.implied
     return {
-        "lubrication": compared.lubrication,
-        "loads_n": [finite(load) for load in compared.loads],
-        "laws": [_law_json(law) for law in compared.laws],
-        "bayes_factors": [
-            {
-                "favoured": factor.favoured,
-                "against": factor.against,
-                "log_factor": finite(factor.log_factor),
-                "words": factor.words,
-            }
-            for factor in compared.factors
-        ],
-        "length": _length_json(compared.length),
-        "other_priors": [
-            {"prior": prior.prior, "log_factor": finite(prior.log_factor)}
-            for prior in compared.priors
-        ],
-        "implied": None
-        if implied is None
-        else [
-            {
-                "load_n": finite(load),
-                "effective_friction_coefficient": [finite(mu) for mu in friction],
-                "mean_pressure_kpa": finite(pressure / 1e3),
-                "stiffness_mpa_per_mm": [finite(k / _MPA_PER_MM) for k in stiffness],
-            }
-            for load, friction, pressure, stiffness in zip(
-                implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True
-            )
-        ],
+        **members(COMPARED_LAWS, compared),
+        "laws": [members(LAW, law) for law in compared.laws],
+        "bayes_factors": [members(BAYES_FACTOR, factor) for factor in compared.factors],
+        "length": bounded_json(SLIP_LENGTH, compared.length),
+        "other_priors": [members(PRIOR, prior) for prior in compared.priors],
+        "implied": None if implied is None else _implied_json(implied),
     }
 
 
-def _law_json(law: InterfaceLaw) -> dict[str, Any]:
+def _implied_json(implied: ImpliedFriction) -> list[dict[str, Any]]:
+    names = [quantity.name for quantity in IMPLIED]
+    rows = zip(implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True)
+    return [members(IMPLIED, implied, **dict(zip(names, row, strict=True))) for row in rows]
+
+
+def bounded_json(quantity: Quantity, estimate: BoundedEstimate) -> dict[str, Any]:
+    """Return an estimate with its interval; without a value there is a reason."""
+    interval, scale = estimate.interval, quantity.scale
     return {
-        "name": law.name,
-        "best": [finite(value) for value in law.best],
-        "log_evidence": finite(law.log_evidence),
-        "log_likelihood": finite(law.log_likelihood),
-        "numerical_error": finite(law.numerical_error),
-        "chi2": finite(law.least),
-        "degrees": law.degrees,
-        "p_value": finite(law.p_value),
-    }
-
-
-def _length_json(length: BoundedEstimate) -> dict[str, Any]:
-    def um(value: float | None) -> float | None:
-        return None if value is None else finite(value / _UM)
-
-    return {
-        "value": um(length.value),
-        "standard_uncertainty": um(length.standard_uncertainty),
-        "unit": "um",
+        "value": plain(estimate.value, scale),
+        "standard_uncertainty": plain(estimate.standard_uncertainty, scale),
+        "unit": quantity.unit_text,
         "interval": {
-            "low": um(length.interval.low),
-            "high": um(length.interval.high),
-            "level": length.interval.level,
+            "low": plain(interval.low, scale),
+            "high": plain(interval.high, scale),
+            "level": interval.level,
         },
-        "reason": length.reason or None,
+        "reason": estimate.reason or None,
     }

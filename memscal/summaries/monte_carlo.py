@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from memscal.calibration.monte_carlo import Comparison, MonteCarlo
+from memscal.calibration.monte_carlo import BudgetComparison, MonteCarlo
 from memscal.model.quantities import estimated_quantity
-from memscal.summaries.table import Table, finite, texts_of
+from memscal.model.records import DRAWN
+from memscal.summaries.declared import plain
+from memscal.summaries.table import Table, texts_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,19 +45,11 @@ def mapping(result: MonteCarlo) -> dict[str, Any]:
     }
 
 
-def _comparison_json(comparison: Comparison) -> dict[str, Any]:
+def _comparison_json(comparison: BudgetComparison) -> dict[str, Any]:
     quantity = estimated_quantity(comparison.name)
-    scale = quantity.scale
     return {
-        "value": finite(comparison.value / scale),
-        "mean": finite(comparison.mean / scale),
-        "standard_uncertainty": finite(comparison.uncertainty / scale),
-        "sampling_error": finite(comparison.sampling_error / scale),
-        "interval_95": [finite(end / scale) for end in comparison.symmetric],
-        "shortest_interval_95": [finite(end / scale) for end in comparison.shortest],
-        "first_order": finite(comparison.first_order / scale),
-        "stated": finite(comparison.stated / scale),
-        "unit": quantity.unit.replace("²", "^2"),
+        **{q.label or q.name: plain(getattr(comparison, q.name), quantity.scale) for q in DRAWN},
+        "unit": quantity.unit_text,
         "agrees": comparison.agrees,
         "reason": comparison.reason,
     }

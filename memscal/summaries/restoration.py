@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from memscal.measurement.restoration import Comparison, Restoration
+from memscal.measurement.restoration import Restoration, StressComparison
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_measured
-from memscal.model.quantities import KPA, MM, MV, PER_MM, Quantity
-from memscal.model.records import PROFILE
-from memscal.summaries.interop import (
+from memscal.model.quantities import KPA, MM, PER_MM, Quantity, by_name
+from memscal.model.records import PROFILE, RESTORED, RESTORED_AGAINST
+from memscal.summaries.declared import (
+    cell,
     correlated_numbers,
     data_frame,
     labelled_dataset,
-    quantity_json,
+    members,
 )
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
 
@@ -34,27 +35,29 @@ _QUANTITIES = (
     ),
     Quantity("sigma_zz_calculated", "stress", "calculated normal stress", axes=("r",)),
 )
+_PROFILE = by_name(PROFILE.quantities)
+_NUMBERS = ("force", "stress_on_axis", "centre", "centre_y", "baseline")
 
 
-def _numbers(restored: Restoration) -> list[tuple[str, str, float, float, str]]:
-    """Name in JSON, words, value, standard uncertainty and unit of each number."""
-    axis, error = float(restored.stress(0.0)), float(restored.stress_uncertainty(0.0))
-    rows = [
-        ("force", "total force", restored.force, restored.force_uncertainty, "N"),
-        ("stress_on_axis", "stress on the axis", axis / KPA, error / KPA, "kPa"),
-    ]
-    for i, name in _free_centres(restored):
-        words = "centre of the scan" + (" along y" if i else "")
-        value, spread = restored.centre[i] / MM, restored.centre_uncertainty[i] / MM
-        rows.append((name, words, float(value), float(spread), "mm"))
-    baseline, spread = restored.baseline / MV, restored.baseline_uncertainty / MV
-    return [*rows, ("baseline", "baseline", baseline, spread, "mV")]
+def _values(restored: Restoration) -> dict[str, Any]:
+    """Return what the numbers of a restoration are, where they are no attributes of it."""
+    values = {
+        "load": restored.scan.load,
+        "stress_on_axis": float(restored.stress(0.0)),
+        "stress_on_axis_uncertainty": float(restored.stress_uncertainty(0.0)),
+    }
+    for i, name in enumerate(("centre", "centre_y")):
+        values[name] = float(restored.centre[i])
+        values[f"{name}_uncertainty"] = float(restored.centre_uncertainty[i])
+    return values
 
 
-def _free_centres(restored: Restoration) -> list[tuple[int, str]]:
-    """Return the coordinates of the centre that the scan determines."""
+def _determined(restored: Restoration) -> list[Quantity]:
+    """Return the quantities of a restoration without centres that the scan does not determine."""
     free = restored.points.free[0]
-    return [(i, name) for i, name in enumerate(("centre", "centre_y")) if free[i]]
+    fixed = [name for i, name in enumerate(("centre", "centre_y")) if not free[i]]
+    hidden = {name + end for name in fixed for end in ("", "_uncertainty")}
+    return [quantity for quantity in RESTORED if quantity.name not in hidden]
 
 
 def _errors(restored: Restoration) -> FloatArray:
@@ -63,44 +66,31 @@ def _errors(restored: Restoration) -> FloatArray:
 
 def mapping(restored: Restoration) -> dict[str, Any]:
     """Return the object of ``restore --json`` without its file; the contract fixes its form."""
-    resolved = restored.resolved_wavenumber / PER_MM
     comparison = restored.comparison
+    names = ("r", "sigma_zz", "sigma_zz_errors")
+    errors = {"sigma_zz_errors": _errors(restored)}
     return {
-        "load": quantity_json(restored.scan.load, "N"),
-        **{name: quantity_json(value, unit, u) for name, _, value, u, unit in _numbers(restored)},
-        "force_budget": {source: finite(u) for source, u in restored.force_budget.items()},
-        "resolved_wavenumber": quantity_json(resolved, "rad/mm"),
+        **members(_determined(restored), restored, **_values(restored)),
         "reconvolution": {
             "chi2_reduced": finite(restored.chi_square / restored.degrees),
             "degrees": finite(restored.degrees),
         },
-        "stress": {
-            "r_mm": [finite(r / MM) for r in restored.r],
-            "sigma_zz_kpa": [finite(s / KPA) for s in restored.sigma_zz],
-            "sigma_zz_errors_kpa": [finite(u / KPA) for u in _errors(restored)],
-        },
-        "calculated": None if comparison is None else _comparison_json(comparison),
+        "stress": members([_PROFILE[name] for name in names], restored, **errors),
+        "calculated": None
+        if comparison is None
+        else members(RESTORED_AGAINST, comparison, origin=_origin(comparison)),
         "checks": checks_json(restored.checks),
         "warnings": texts_of(restored.messages),
     }
 
 
-def _comparison_json(comparison: Comparison) -> dict[str, Any]:
-    return {
-        "origin": _origin(comparison),
-        "chi2_reduced": finite(comparison.chi_square),
-        "degrees": comparison.degrees,
-        "p_value": finite(comparison.p_value),
-        "largest_difference": finite(comparison.difference),
-        "share_within_95_percent": finite(comparison.within),
-    }
-
-
 def tables(restored: Restoration) -> list[Table]:
     """Return the numbers, the stress at a few radii, and the quality checks."""
-    rows = [(words, format_measured(v, u, unit)) for _, words, v, u, unit in _numbers(restored)]
-    rows[:0] = [("load", f"{restored.scan.load:.4g} N")]
-    rows += [
+    values = _values(restored)
+    shown = [quantity for quantity in _determined(restored) if quantity.name in _NUMBERS]
+    rows = [
+        ("load", f"{restored.scan.load:.4g} N"),
+        *((quantity.words, cell(quantity, restored, **values)) for quantity in shown),
         ("resolved up to the wavenumber", f"{restored.resolved_wavenumber / PER_MM:.3g} rad/mm"),
         ("restored stress blurred again", f"χ²/ν = {restored.chi_square / restored.degrees:.3g}"),
     ]
@@ -136,7 +126,7 @@ def _stress_table(restored: Restoration) -> Table:
     return Table("Normal stress at the base, positive in compression", head, rows)
 
 
-def _origin(comparison: Comparison) -> str:
+def _origin(comparison: StressComparison) -> str:
     if isinstance(comparison.stress, Contact):
         friction = comparison.stress.friction
         return f"calculated with{f' friction {friction:.4g}' if friction else 'out friction'}"
@@ -169,7 +159,6 @@ def frame(restored: Restoration) -> pd.DataFrame:
 
 def correlated(restored: Restoration) -> dict[str, Any]:
     """Return force, stress on the axis, centre and baseline with their joint covariance."""
-    centres = {name: float(restored.centre[i]) for i, name in _free_centres(restored)}
-    values = {"force": restored.force, "stress_on_axis": float(restored.stress(0.0)), **centres}
-    values["baseline"] = restored.baseline
-    return correlated_numbers(list(values), list(values.values()), restored.scalar_covariance)
+    held = _values(restored) | {"force": restored.force, "baseline": restored.baseline}
+    shown = [quantity.name for quantity in _determined(restored) if quantity.name in _NUMBERS]
+    return correlated_numbers(shown, [held[name] for name in shown], restored.scalar_covariance)

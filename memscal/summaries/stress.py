@@ -8,36 +8,39 @@ import numpy as np
 
 from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
-from memscal.model.notation import format_measured
-from memscal.model.quantities import KPA, MM, MV, Quantity, by_name
-from memscal.model.records import STRESS_NUMBERS, STRESS_PROFILE
-from memscal.summaries.interop import (
+from memscal.model.quantities import MM, Quantity, by_name
+from memscal.model.records import (
+    APPLIED,
+    FORCE_BUDGET,
+    MAXIMUM_BUDGET,
+    STRESS_NUMBERS,
+    STRESS_PROFILE,
+)
+from memscal.summaries.declared import (
+    cell,
     correlated_numbers,
     data_frame,
     labelled_dataset,
-    quantity_json,
+    members,
 )
-from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
+from memscal.summaries.table import Table, checks_json, checks_table, texts_of
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-_PER_PASCAL = 1e-3
-"""Volts per pascal in mV/Pa."""
-_QUANTITIES = by_name([*STRESS_PROFILE.quantities, *STRESS_NUMBERS.quantities])
+_NUMBERS = by_name(STRESS_NUMBERS.quantities)
+_QUANTITIES = by_name(STRESS_PROFILE.quantities) | _NUMBERS
 _POINTS = ("r", "x", "y", "s_zz", "s_zz_errors")
-_SCALARS = ("load", "force", "force_uncertainty", "maximum", "maximum_uncertainty", "baseline",
-            "baseline_uncertainty", "contact_radius", "lubrication")  # fmt: skip
+_SCALARS = tuple(name for name in _NUMBERS if not name.startswith("centre"))
+_IN_JSON = [q for name, q in _NUMBERS.items() if not name.startswith("centre_y")]
+_POINTS_IN_JSON = [_QUANTITIES[name] for name in ("r", "x", "s_zz", "s_zz_errors")]
 
 
 def mapping(stress: MeasuredStress) -> dict[str, Any]:
     """Return the object of ``apply --json`` without its files; the contract fixes its form."""
-    ratio, spread = pooled_force(stress.profiles)
-    a, u = stress.conversion_constant, stress.conversion_constant_uncertainty
     return {
-        "conversion_constant": quantity_json(a / _PER_PASCAL, "mV/Pa", u / _PER_PASCAL),
-        "force_over_load": {"value": finite(ratio), "standard_uncertainty": finite(spread)},
+        **members(APPLIED, stress, **_force_over_load(stress)),
         "profiles": [_profile_json(profile) for profile in stress.profiles],
         "overridden": list(stress.overridden),
         "checks": checks_json(stress.checks),
@@ -45,31 +48,30 @@ def mapping(stress: MeasuredStress) -> dict[str, Any]:
     }
 
 
+def _force_over_load(stress: MeasuredStress) -> dict[str, Any]:
+    ratio, u = pooled_force(stress.profiles)
+    return {"force_over_load": ratio, "force_over_load_uncertainty": u}
+
+
 def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
-    baseline, baseline_error = profile.baseline / MV, profile.baseline_uncertainty / MV
-    centre, centre_error = _centre(profile)
     return {
         "scan": getattr(profile.scan.source, "file_name", None),
-        "load": quantity_json(profile.load, "N"),
-        "lubrication": profile.lubrication,
-        "force": quantity_json(profile.force, "N", profile.force_uncertainty),
-        "maximum": quantity_json(profile.maximum / KPA, "kPa", profile.maximum_uncertainty / KPA),
-        "centre": quantity_json(centre, "mm", centre_error),
-        "baseline": quantity_json(baseline, "mV", baseline_error),
-        "force_budget": {source: finite(u) for source, u in profile.force_budget.items()},
-        "maximum_budget_kpa": {name: finite(u / KPA) for name, u in profile.maximum_budget.items()},
-        "stress": {
-            "r_mm": [finite(r / MM) for r in profile.r],
-            "x_mm": [finite(x / MM) for x in profile.x],
-            "s_zz_kpa": [finite(s / KPA) for s in profile.s_zz],
-            "s_zz_errors_kpa": [finite(u / KPA) for u in profile.s_zz_errors],
-        },
+        **members([*_IN_JSON, FORCE_BUDGET, MAXIMUM_BUDGET], profile, **_centre(profile)),
+        "stress": members(_POINTS_IN_JSON, profile),
     }
+
+
+def _centre(profile: MeasuredProfile) -> dict[str, Any]:
+    """Return the centre along the scan, in m."""
+    axis = profile.axis
+    u = profile.centre_uncertainty[axis]
+    return {"centre": profile.centre[axis], "centre_uncertainty": u}
 
 
 def tables(stress: MeasuredStress) -> list[Table]:
     """Return the profiles, what holds for all of them, and the quality checks that matter."""
-    head = ("", "load", "state", "total force", "maximum of S_zz", "centre", "checks")
+    shown = [_NUMBERS[name] for name in ("force", "maximum", "centre")]
+    head = ("", _NUMBERS["load"].words, "state", *(q.words for q in shown), "checks")
     rows, marked = [], set()
     for i, profile in enumerate(stress.profiles):
         number = str(i + 1)
@@ -77,17 +79,10 @@ def tables(stress: MeasuredStress) -> list[Table]:
         if failed:
             marked.add(i)
         names = ", ".join(name.replace("_", " ") for name in failed)
-        rows.append(
-            (
-                number,
-                f"{profile.load:.4g} N",
-                profile.lubrication or "not stated",
-                format_measured(profile.force, profile.force_uncertainty, "N"),
-                format_measured(profile.maximum / KPA, profile.maximum_uncertainty / KPA, "kPa"),
-                format_measured(*_centre(profile), "mm"),
-                f"FAILED: {names}" if failed else "passed",
-            )
-        )
+        cells = [cell(quantity, profile, **_centre(profile)) for quantity in shown]
+        state = profile.lubrication or "not stated"
+        checks = f"FAILED: {names}" if failed else "passed"
+        rows.append((number, f"{profile.load:.4g} N", state, *cells, checks))
     film, indenter = stress.scans[0].film, stress.scans[0].indenter
     title = (
         f"Stress measured at the base of a {film.thickness / MM:.4g} mm film under a "
@@ -95,26 +90,17 @@ def tables(stress: MeasuredStress) -> list[Table]:
     )
     # What checks all profiles, the force of each, and what failed.
     kinds = ("applied_force", "applied_force_all")
-    checks = [check for check in stress.checks if check.kind in kinds or not check.passed]
+    checks_shown = [check for check in stress.checks if check.kind in kinds or not check.passed]
     common = Table("All profiles", ("", ""), _common_rows(stress))
-    return [Table(title, head, rows, frozenset(marked)), common, checks_table(checks)]
+    return [Table(title, head, rows, frozenset(marked)), common, checks_table(checks_shown)]
 
 
 def _common_rows(stress: MeasuredStress) -> list[tuple[str, str]]:
-    a, u = stress.conversion_constant, stress.conversion_constant_uncertainty
+    ratio = _force_over_load(stress)
+    numbers = [(q.words, cell(q, stress, **ratio)) for q in APPLIED[::2]]
     points = sum(profile.r.size for profile in stress.profiles)
     farthest = max(float(profile.r[-1]) for profile in stress.profiles)
-    return [
-        ("conversion constant A", format_measured(a / _PER_PASCAL, u / _PER_PASCAL, "mV/Pa")),
-        ("total force over applied load", format_measured(*pooled_force(stress.profiles))),
-        ("points", f"{points}, from the axis to {farthest / MM:.3g} mm"),
-    ]
-
-
-def _centre(profile: MeasuredProfile) -> tuple[float, float]:
-    """Centre along the scan and its standard uncertainty, in mm."""
-    axis = profile.axis
-    return profile.centre[axis] / MM, profile.centre_uncertainty[axis] / MM
+    return [*numbers, ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")]
 
 
 def dataset(stress: MeasuredStress) -> xarray.Dataset:

@@ -8,17 +8,18 @@ import numpy as np
 
 from memscal.calibration.sweep import Sweep
 from memscal.model.arrays import FloatArray
-from memscal.model.quantities import MM, MV
-from memscal.summaries.table import Table, finite
+from memscal.model.quantities import ESTIMATED, MM, MV, Quantity
+from memscal.summaries.declared import plain
+from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
     import xarray
 
-# Results of a sweep, the attribute of their draws, and the units of Python and of JSON.
+#: Results of a sweep, with the attribute of their draws.
 _RESULTS = (
-    ("conversion_constant", "seed_conversion_constant", "V/Pa", "mV/Pa", MV),
-    ("gaussian_sigma_deconvolved", "seed_gaussian_sigma", "m", "mm", MM),
-    ("relative_rms", "seed_relative_rms", "1", "1", 1.0),
+    (ESTIMATED["conversion_constant"], "seed_conversion_constant"),
+    (ESTIMATED["gaussian_sigma_deconvolved"], "seed_gaussian_sigma"),
+    (Quantity("relative_rms", "dimensionless", "rms over the largest signal"), "seed_relative_rms"),
 )
 
 
@@ -30,9 +31,10 @@ def tables(result: Sweep) -> list[Table]:
     power = int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
     scales, forms = (MV * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
-    for (name, *_), scale, form in zip(_RESULTS, scales, forms, strict=True):
-        columns.append([_number(value / scale, form) for value in getattr(result, name)])
-    for (_, name, *_), scale, form in zip(_RESULTS, scales, forms, strict=True):
+    for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
+        values = getattr(result, quantity.name) / scale
+        columns.append([_number(value, form) for value in values])
+    for (_, name), scale, form in zip(_RESULTS, scales, forms, strict=True):
         columns.append([_median(draws / scale, form) for draws in getattr(result, name)])
     title = (
         "Dependence on the noise amplitude (1 is the rule's choice): the expectation, and the "
@@ -45,13 +47,13 @@ def tables(result: Sweep) -> list[Table]:
 
 def mapping(result: Sweep) -> dict[str, Any]:
     """Return the whole sweep: lists over amplitudes, and lists of draws within them."""
-    return {"amplitude": _scaled(result.amplitude, 1.0)} | {
-        name: {
-            "values": _scaled(getattr(result, name), scale),
-            "draws": [_scaled(row, scale) for row in getattr(result, draws)],
-            "unit": unit,
+    return {"amplitude": plain(result.amplitude)} | {
+        quantity.name: {
+            "values": plain(getattr(result, quantity.name), quantity.scale),
+            "draws": plain(getattr(result, draws), quantity.scale),
+            "unit": quantity.unit_text,
         }
-        for name, draws, _, unit, scale in _RESULTS
+        for quantity, draws in _RESULTS
     }
 
 
@@ -61,14 +63,11 @@ def dataset(result: Sweep) -> xarray.Dataset:
 
     axes = ("amplitude", "draw")
     variables: dict[str, Any] = {"amplitude": (axes[:1], result.amplitude, {"units": "1"})}
-    for name, draws, unit, *_ in _RESULTS:
-        variables[name] = (axes[:1], getattr(result, name), {"units": unit})
-        variables[draws] = (axes, getattr(result, draws), {"units": unit})
+    for quantity, draws in _RESULTS:
+        attributes = {"units": quantity.si_unit}
+        variables[quantity.name] = (axes[:1], getattr(result, quantity.name), attributes)
+        variables[draws] = (axes, getattr(result, draws), attributes)
     return xarray.Dataset(variables)
-
-
-def _scaled(values: FloatArray, scale: float) -> list[float | None]:
-    return [finite(float(value) / scale) for value in values]
 
 
 def _median(values: FloatArray, form: str) -> str:

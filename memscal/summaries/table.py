@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.notation import printable
-
-if TYPE_CHECKING:
-    from memscal.model.quantities import Record
 
 _LONGEST = 100_000
 
@@ -82,23 +79,6 @@ def checks_json(checks: Sequence[QualityCheck]) -> list[dict[str, Any]]:
         }
         for check in checks
     ]
-
-
-def record_arrays(
-    record: Record, holder: object, names: Mapping[str, str] | None = None
-) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
-    """Return what an object holds of a record as variables of an xarray Dataset, in SI units.
-
-    ``names`` replaces names of quantities and axes that another record of the Dataset has, too.
-    """
-    names, variables = names or {}, {}
-    for quantity in record.quantities:
-        value = getattr(holder, quantity.name, None)
-        if value is not None:
-            axes = tuple(names.get(axis, axis) for axis in quantity.axes)
-            attributes = {"units": quantity.si_unit, "long_name": quantity.words}
-            variables[names.get(quantity.key, quantity.key)] = (axes, value, attributes)
-    return variables
 
 
 _GAP = "  "

@@ -124,9 +124,33 @@ def test_a_design_says_what_it_was_varied_to_reach(planned: memscal.Design):
     )
 
 
-def test_a_contact_has_no_uncertainty(contact: memscal.Contact):
-    with pytest.raises(InputError, match="no covariance of parameters"):
-        contact.ufloats()
+def test_a_contact_varies_with_its_film_and_indenter():
+    film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3,
+                               young_modulus_uncertainty=0.1e6)  # fmt: skip
+    rod = memscal.Rod(radius=0.25e-3, radius_uncertainty=5e-6)
+    numbers = memscal.indent(film, rod, load=0.2).ufloats()
+    # A flat punch: depth is as 1/E at a given load; the stress at the base does not depend on E.
+    numbers_of_modulus = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=0.2).ufloats()
+    depth, stress = (numbers_of_modulus[name] for name in ("depth", "max_base_stress"))
+    assert depth.std_dev / depth.nominal_value == pytest.approx(0.1 / 2.2, rel=0.01)
+    assert stress.std_dev < 1e-6 * stress.nominal_value
+    assert numbers["contact_radius"].std_dev == pytest.approx(5e-6)
+    assert numbers["depth"].std_dev > depth.std_dev
+    # Only P/E matters under a sphere: what E changes, the load changes the other way.
+    sphere = memscal.Sphere(radius=0.1288)
+    pressed_in = memscal.indent(film, sphere, load=0.3).ufloats()["depth"]
+    less, more = (memscal.indent(film, sphere, load=0.3 / (1 + s * 0.1 / 2.2)) for s in (1, -1))
+    assert pressed_in.std_dev == pytest.approx((more.depth - less.depth) / 2, rel=1e-3)
+
+
+def test_a_contact_that_was_unloaded_is_not_varied(contact: memscal.Contact):
+    sphere = memscal.Sphere(radius=0.1288)
+    released = memscal.indent(contact.film, sphere, load=[1.0, 0.4], friction=0.3)[1]
+    with pytest.raises(InputError, match="not reached by loading alone"):
+        released.ufloats()
+
+
+def test_a_contact_tabulates_its_stress(contact: memscal.Contact):
     table = contact.to_dataframe()
     assert table["sigma_zz (kPa)"].max() == pytest.approx(contact.max_base_stress / 1e3)
     assert contact.to_dict()["depth"] == {"value": pytest.approx(contact.depth * 1e6), "unit": "um"}

@@ -1,0 +1,150 @@
+"""Results by their declared quantities: JSON, cells of tables, datasets, and data frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from memscal.model.apparatus import ParameterSet
+from memscal.model.arrays import FloatArray
+from memscal.model.notation import format_measured
+from memscal.model.quantities import DIMENSIONS, Quantity, Record, by_name, parameter_quantity
+from memscal.summaries.table import finite
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray
+
+_UNCERTAINTY = "_uncertainty"
+
+
+def members(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
+    """Return the quantities of an object as JSON holds them, in the units in which they are shown.
+
+    A number stands with its unit and, where that is declared, its standard uncertainty; an array
+    or a budget by source names its unit in its key.  ``values`` stand in for attributes.
+    """
+    declared, held = by_name(quantities), {}
+    for name, quantity in declared.items():
+        key = quantity.label or name
+        if quantity.dimension not in DIMENSIONS:
+            held[key] = plain(_value(name, holder, values))
+        elif quantity.axes:
+            unit = quantity.unit.lower().replace("/", "_per_")
+            key = f"{key}_{unit}" if unit else key
+            held[key] = plain(_value(name, holder, values), quantity.scale)
+        elif not name.endswith(_UNCERTAINTY):
+            held[key] = {"value": plain(_value(name, holder, values), quantity.scale)}
+            if (spread := name + _UNCERTAINTY) in declared:
+                u = plain(_value(spread, holder, values), quantity.scale)
+                held[key]["standard_uncertainty"] = u
+            held[key]["unit"] = quantity.unit_text
+    return held
+
+
+def _value(name: str, holder: object, values: Mapping[str, Any]) -> Any:
+    return values[name] if name in values else getattr(holder, name)
+
+
+def plain(value: Any, scale: float = 1.0) -> Any:
+    """Return text, truth, a count, or numbers over ``scale`` as JSON can hold them."""
+    if isinstance(value, Mapping):
+        return {key: plain(number, scale) for key, number in value.items()}
+    if isinstance(value, np.ndarray | list | tuple):
+        return [plain(number, scale) for number in value]
+    if value is None or isinstance(value, str | bool):
+        return value
+    return value if isinstance(value, int) and scale == 1 else finite(float(value) / scale)
+
+
+def parameter_json(parameters: ParameterSet, name: str) -> dict[str, Any]:
+    """Return a parameter's value and standard uncertainty in the unit in which it is shown."""
+    quantity = parameter_quantity(parameters, name)
+    numbers = (parameters[name], parameters.uncertainty(name))
+    value, u = (plain(number, quantity.scale) for number in numbers)
+    return {"value": value, "standard_uncertainty": u, "unit": quantity.unit_text}
+
+
+def cell(quantity: Quantity, holder: object, /, *, unit: str | None = None, **values: Any) -> str:
+    """Return a number with its standard uncertainty as a cell of a table, in its unit or none."""
+    names = (quantity.name, quantity.name + _UNCERTAINTY)
+    value, u = (_value(name, holder, values) for name in names)
+    spread = None if u is None else u / quantity.scale
+    shown = quantity.unit if unit is None else unit
+    return format_measured(value / quantity.scale, spread, shown)
+
+
+def columns(quantities: Iterable[Quantity], holder: object, /) -> dict[str, Any]:
+    """Return the quantities of an object as one row of a data frame, by column."""
+    return {
+        quantity.column: getattr(holder, quantity.name) / quantity.scale
+        if quantity.dimension in DIMENSIONS
+        else getattr(holder, quantity.name)
+        for quantity in quantities
+    }
+
+
+def data_frame(quantities: Iterable[Quantity], values: Mapping[str, ArrayLike]) -> pd.DataFrame:
+    """Return columns of the values (SI) in the units in which they are shown."""
+    import pandas as pd
+
+    return pd.DataFrame(
+        {
+            quantity.column: np.asarray(values[quantity.name]) / quantity.scale
+            if quantity.dimension in DIMENSIONS
+            else values[quantity.name]
+            for quantity in quantities
+            if quantity.name in values
+        }
+    )
+
+
+def labelled_dataset(
+    quantities: Iterable[Quantity],
+    values: Mapping[str, ArrayLike],
+    axes: Mapping[str, tuple[str, ...]] | None = None,
+) -> xarray.Dataset:
+    """Return values in SI units by the names of their quantities, which give axes and words.
+
+    ``axes``: those of quantities that here run along others than declared.
+    """
+    import xarray
+
+    variables = {}
+    for quantity in quantities:
+        if quantity.name in values:
+            attributes = {"long_name": quantity.words}
+            if quantity.dimension in DIMENSIONS:
+                attributes["units"] = quantity.si_unit
+            names = (axes or {}).get(quantity.name, quantity.axes)
+            variables[quantity.name] = (names, np.asarray(values[quantity.name]), attributes)
+    return xarray.Dataset(variables)
+
+
+def record_arrays(
+    record: Record, holder: object, names: Mapping[str, str] | None = None
+) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
+    """Return what an object holds of a record as variables of an xarray Dataset, in SI units.
+
+    ``names`` replaces names of quantities and axes that another record of the Dataset has, too.
+    """
+    names, variables = names or {}, {}
+    for quantity in record.quantities:
+        value = getattr(holder, quantity.name, None)
+        if value is not None:
+            axes = tuple(names.get(axis, axis) for axis in quantity.axes)
+            attributes = {"units": quantity.si_unit, "long_name": quantity.words}
+            variables[names.get(quantity.key, quantity.key)] = (axes, value, attributes)
+    return variables
+
+
+def correlated_numbers(
+    names: Sequence[str], values: Sequence[float] | FloatArray, covariance: FloatArray
+) -> dict[str, Any]:
+    """Return numbers of the package uncertainties by name."""
+    from uncertainties import correlated_values
+
+    return dict(zip(names, correlated_values(list(values), covariance), strict=True))
