@@ -1,7 +1,5 @@
 """The package keeps to its own plan: who may import what, and how long a module may be."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Outputs that cannot be written: known before anything is computed, and nothing is lost."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Callable

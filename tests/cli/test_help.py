@@ -1,7 +1,5 @@
 """Help, hints and completion."""
 
-from __future__ import annotations
-
 import re
 
 import click

@@ -1,7 +1,5 @@
 """``memscal inspect`` and ``memscal check``."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Measured and restored stress, contacts and designs show themselves as the commands print them."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The calibration figure: what its panels hold, and what they may not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import matplotlib as mpl

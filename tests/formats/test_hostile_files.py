@@ -1,7 +1,5 @@
 """Files built to read, run, hang or exhaust something: each is refused, and says why."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Meshes built to read, hang or exhaust something, or merely broken: refused in plain words."""
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import os

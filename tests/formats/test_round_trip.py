@@ -1,7 +1,5 @@
 """What is written is what is read: values, units and text."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The file of measured stress: what was measured comes back, and nothing else is read."""
 
-from __future__ import annotations
-
 import gzip
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tables as they leave an experiment or a FEM program, with everything that can be messy."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
