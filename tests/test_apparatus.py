@@ -16,7 +16,7 @@ from scipy.signal import fftconvolve
 
 import memscal
 from memscal import ApparatusFunction, load_apparatus
-from memscal.errors import InputError
+from memscal.errors import InputError, OutputError
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, TransferFunction
 from memscal.model.arrays import FloatArray
 
@@ -184,6 +184,8 @@ def test_steps_may_be_coarse_where_there_is_no_stress(apparatus: ApparatusFuncti
 def test_saving_and_loading_changes_no_prediction(apparatus, tmp_path) -> None:
     path = tmp_path / "apparatus.h5"
     apparatus.save(path)
+    with pytest.raises(OutputError, match="exists already"):
+        apparatus.save(path)
     loaded = load_apparatus(path)
     assert isinstance(loaded, ApparatusFunction)
     stress = 2e5 * np.exp(-((RADII / 1e-3) ** 2))

@@ -37,6 +37,7 @@ def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: 
         ((1.0,), (0.0,), "above zero"),
         ((1.0,), (-1e-3,), "above zero"),
         ((1.0,), (np.inf,), "above zero"),
+        ((1.0,), (np.nan,), "above zero"),
         ((float("nan"),), (1e-3,), "add up to nan"),
     ],
 )
@@ -82,6 +83,7 @@ def test_a_disc_of_no_size_is_its_gaussian_and_one_far_away_is_zero() -> None:
     np.testing.assert_allclose(point.radial(r), gaussian.radial(r), atol=1e-10 / 0.5e-3**2)
     far = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3).radial(np.array([[50e-3], [0.5]]))
     np.testing.assert_allclose(far, 0.0, atol=1e-12 / 0.8e-3**2)
+    assert point.radial(np.empty((0, 3))).shape == (0, 3)
 
 
 @pytest.mark.parametrize(

@@ -158,6 +158,8 @@ def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
         paper, draws=34, seed=8, workers=2, progress=lambda *numbers: told.append(numbers)
     )
     np.testing.assert_allclose(two.samples, hundred.samples[:34], rtol=1e-9)
+    other = memscal.monte_carlo(paper, draws=2, seed=9).samples
+    assert not np.any(other == hundred.samples[:2])
     done = [number for number, _ in told]
     assert done == sorted(done)
     assert len(done) > 2

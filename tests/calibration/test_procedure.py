@@ -40,6 +40,13 @@ def test_with_hardly_any_noise_the_truth_returns(kernel: memscal.GaussianMixture
     assert plane_error(R, apparatus.radial(R), kernel.radial(R)) < limit
 
 
+def test_a_scan_without_noise_is_known_to_the_error_of_the_model() -> None:
+    calibration = memscal.calibrate(simulated(noise=0.0))
+    assert calibration.passed
+    for name in ("gaussian_sigma", "gaussian_sigma_deconvolved"):
+        assert calibration.apparatus.parameters[name] == pytest.approx(SIGMA, rel=1e-3)
+
+
 def test_g_integrates_to_one_on_its_support_and_a_times_g_predicts_the_scan() -> None:
     calibration = memscal.calibrate(simulated())
     stored = calibration.apparatus.field

@@ -25,6 +25,8 @@ def options(command: click.Command) -> list[click.Option]:
 def test_the_list_of_commands_names_and_describes_each(run: Run):
     shown = run("--help").exits(0)
     assert list(commands()) == list(COMMANDS)
+    bare = run()
+    assert shown.out in bare.out + bare.err
     for name, (_, about) in COMMANDS.items():
         assert re.search(rf"^  {name} +{re.escape(about)}$", shown.out, re.MULTILINE)
 

@@ -65,6 +65,7 @@ def test_a_seed_reaches_only_those_that_draw(name: str) -> None:
     regulariser = create_regulariser(name, seed=41)
     draws = name in {"white-noise-draw", "unsupervised-wiener"}
     assert getattr(regulariser, "seed", None) == (41 if draws else None)
+    assert create_regulariser(name, seed=np.int64(41)) == regulariser
 
 
 def test_the_former_name_of_the_bayesian_method_is_an_alias() -> None:

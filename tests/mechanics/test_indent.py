@@ -44,6 +44,10 @@ def test_the_spectrum_is_the_fourier_transform_of_the_base_stress(friction: floa
     assert spectrum[0, 0] == pytest.approx(0.5, rel=1e-14)
     assert abs(spectrum[1, 2]) < 1e-100
     assert_same_to_rounding(contact.base_spectrum(-k), spectrum)
+    many = np.linspace(0.0, 2e4, 20001)  # more than are computed at a time
+    np.testing.assert_allclose(
+        contact.base_spectrum(many)[::4000], contact.base_spectrum(many[::4000]), atol=1e-15
+    )
 
 
 def test_the_rod_of_the_paper_sinks_as_deep_as_the_linear_model_says() -> None:

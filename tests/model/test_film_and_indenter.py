@@ -91,6 +91,9 @@ def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
     assert np.all(profile.height(np.linspace(0.0, 1e-3, 20)) == 0)
     assert profile.height(3.01e-3) == np.inf
     assert repr(profile) == "<Profile: 4 radii to 3 mm, heights to 9 um>"
+    same = Profile(r=profile.r, z=profile.z)
+    assert (profile == same, hash(profile) == hash(same)) == (True, True)
+    assert profile != Profile(r=profile.r, z=2 * profile.z)
 
 
 @pytest.mark.parametrize(

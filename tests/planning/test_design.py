@@ -157,6 +157,8 @@ def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design
     assert other.method == "white-noise"
     assert other.budget["fwhm"]["window"] > 0
     assert paper.budget["fwhm"]["window"] == 0
+    with pytest.raises(InputError, match="no parameter colour"):
+        paper.relative_uncertainty("colour")
 
 
 def test_less_noise_resolves_more(paper: Design) -> None:
