@@ -89,10 +89,7 @@ def test_a_shell_gets_its_completion_script(run: Run, shell):
     (["memscal", "reference", ""], {"rod", "sphere", "cone", "profile"}),
 ])  # fmt: skip
 def test_words_are_completed(
-    words,
-    expected,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words, expected, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.setenv("_MEMSCAL_COMPLETE", "bash_complete")
     monkeypatch.setenv("COMP_WORDS", " ".join(words))

@@ -1,6 +1,7 @@
 """A family between its values: bounded coordinate, interpolation, and what it refuses."""
 
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -74,6 +75,15 @@ def test_a_family_is_not_extrapolated() -> None:
     for beyond in (0.01, 0.5, math.inf):
         with pytest.raises(InputError, match="does not reach"):
             short.at(beyond)
+
+
+def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
+    one = family()
+    with pytest.raises(ValueError, match="read-only"):
+        one.spectra[0, 0, 0] = 0.0
+    again = pickle.loads(pickle.dumps(one))
+    assert_same_to_rounding(again.at(0.2).spectra, one.at(0.2).spectra)
+    assert_same_to_rounding(again.changes["thickness"], one.changes["thickness"])
 
 
 @pytest.mark.parametrize("wrong", [-0.1, math.nan])

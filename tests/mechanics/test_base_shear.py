@@ -26,8 +26,7 @@ def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu: fl
 
 
 @pytest.mark.parametrize(
-    ("indenter", "nu", "friction"),
-    [(SPHERE, 0.5, 0.2), (ROD, 0.3, 0.0), (ROD, 0.5, np.inf)],
+    ("indenter", "nu", "friction"), [(SPHERE, 0.5, 0.2), (ROD, 0.3, 0.0), (ROD, 0.5, np.inf)]
 )
 def test_the_spectrum_is_an_integral_of_the_shear_and_odd_in_k(indenter, nu, friction) -> None:
     contact = indent(film(nu), indenter, load=1.37, friction=friction)
