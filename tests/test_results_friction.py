@@ -34,18 +34,15 @@ def reading(
     return replace(made, **fields)
 
 
-@pytest.mark.parametrize(
-    ("found", "text"),
-    [
-        (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
-        (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
-        (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
-        (reading(None, 12.51, None), "above 12 (95 %)"),
-        (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
-        (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
-        (reading(None, 0.0, None), "not identifiable"),
-    ],
-)
+@pytest.mark.parametrize(("found", "text"), [
+    (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
+    (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
+    (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
+    (reading(None, 12.51, None), "above 12 (95 %)"),
+    (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
+    (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
+    (reading(None, 0.0, None), "not identifiable"),
+])  # fmt: skip
 def test_an_estimate_prints_its_interval_or_a_bound(found: BoundedEstimate, text: str) -> None:
     assert str(found) == text
     assert text in repr(found)

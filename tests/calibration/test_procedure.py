@@ -241,20 +241,17 @@ def test_the_result_is_the_same_however_often_and_whatever_the_global_random_sta
     assert set(one.parameters.names) >= MAIN_PARAMETERS
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"reference": {1: 2}}, "The reference is a dict"),
-        ({"reference": [None, None]}, "2 references were given, but there is one scan"),
-        ({"method": 3}, "cannot divide"),
-        ({"method": Tikhonov}, "that is set up"),
-        ({"amplitude": "abc"}, "must be a positive number"),
-        ({"amplitude": -1.0}, "must be a positive number"),
-        ({"amplitude": float("nan")}, "must be a positive number"),
-        ({"method": "richardson-lucy", "iterations": 2.5}, "whole number"),
-        ({"method": "white-noise-draw", "seed": -1}, "whole number"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    ({"reference": {1: 2}}, "The reference is a dict"),
+    ({"reference": [None, None]}, "2 references were given, but there is one scan"),
+    ({"method": 3}, "cannot divide"),
+    ({"method": Tikhonov}, "that is set up"),
+    ({"amplitude": "abc"}, "must be a positive number"),
+    ({"amplitude": -1.0}, "must be a positive number"),
+    ({"amplitude": float("nan")}, "must be a positive number"),
+    ({"method": "richardson-lucy", "iterations": 2.5}, "whole number"),
+    ({"method": "white-noise-draw", "seed": -1}, "whole number"),
+])  # fmt: skip
 def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
     with pytest.raises(InputError, match=words):
         memscal.calibrate(simulated(), **arguments)
