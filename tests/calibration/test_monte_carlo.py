@@ -171,6 +171,11 @@ def test_intervals_hold_their_share_of_the_draws(hundred: memscal.MonteCarlo) ->
         for low, high in (comparison.symmetric, comparison.shortest):
             held = np.mean((hundred.samples[:, i] >= low) & (hundred.samples[:, i] <= high))
             assert held == pytest.approx(0.95, abs=0.011)
+    # Of normal draws 1 / sqrt(2 M), known itself to 12 %.
+    errors = [
+        comparison.sampling_error / comparison.uncertainty for comparison in hundred.comparisons
+    ]
+    assert np.median(errors) == pytest.approx(1 / np.sqrt(200), rel=0.36)
     low, high = hundred.g_symmetric
     assert ((hundred.g_mean >= low) & (hundred.g_mean <= high))[hundred.r < 3e-3].all()
 
