@@ -16,7 +16,7 @@ from scipy.signal import fftconvolve
 
 import memscal
 from memscal import ApparatusFunction, load_apparatus
-from memscal.errors import InputError
+from memscal.errors import InputError, OutputError
 from memscal.model.apparatus import ApparatusData, ApparatusRadial, TransferFunction
 from memscal.model.arrays import FloatArray
 
@@ -150,23 +150,20 @@ def test_beyond_the_support_there_is_nothing() -> None:
     np.testing.assert_array_equal(apparatus.radial_uncertainty([outside, 1.0]), 0.0)
 
 
-@pytest.mark.parametrize(
-    ("r", "sigma", "problem"),
-    [
-        (RADII * 1e3, gaussian(RADII, 1e-3), "r reaches 12 m"),
-        (RADII[::40], gaussian(RADII[::40], 1e-3), "every 0.8 mm, coarser"),
-        (RADII[:101], gaussian(RADII[:101], 1e-3), "13.5% of the largest stress is left"),
-        (RADII[:-1], gaussian(RADII, 1e-3), "601 stresses for 600 radii"),
-        (RADII[::-1], gaussian(RADII, 1e-3), "r must increase"),
-        (RADII - 1e-4, gaussian(RADII, 1e-3), "r begins at -0.0001 m"),
-        (RADII[100:], gaussian(RADII[100:], 1e-3), "r begins at 0.002 m"),
-        (np.outer([1, 1], RADII), np.outer([1, 1], RADII), "r has shape"),
-        ([], [], "r has shape"),
-        (RADII, np.full(601, np.nan), "sigma_zz holds a value that is not finite"),
-        (RADII[:3], [1.0, 0.5, 0.0], "3 radii cannot be interpolated"),
-        ([0.0], [1.0], "cannot be interpolated"),
-    ],
-)
+@pytest.mark.parametrize(("r", "sigma", "problem"), [
+    (RADII * 1e3, gaussian(RADII, 1e-3), "r reaches 12 m"),
+    (RADII[::40], gaussian(RADII[::40], 1e-3), "every 0.8 mm, coarser"),
+    (RADII[:101], gaussian(RADII[:101], 1e-3), "13.5% of the largest stress is left"),
+    (RADII[:-1], gaussian(RADII, 1e-3), "601 stresses for 600 radii"),
+    (RADII[::-1], gaussian(RADII, 1e-3), "r must increase"),
+    (RADII - 1e-4, gaussian(RADII, 1e-3), "r begins at -0.0001 m"),
+    (RADII[100:], gaussian(RADII[100:], 1e-3), "r begins at 0.002 m"),
+    (np.outer([1, 1], RADII), np.outer([1, 1], RADII), "r has shape"),
+    ([], [], "r has shape"),
+    (RADII, np.full(601, np.nan), "sigma_zz holds a value that is not finite"),
+    (RADII[:3], [1.0, 0.5, 0.0], "3 radii cannot be interpolated"),
+    ([0.0], [1.0], "cannot be interpolated"),
+])  # fmt: skip
 def test_a_table_that_cannot_be_convolved_is_refused(apparatus, r, sigma, problem) -> None:
     for method in (apparatus.convolve, apparatus.predict):
         with pytest.raises(InputError, match=problem) as caught:
@@ -184,6 +181,8 @@ def test_steps_may_be_coarse_where_there_is_no_stress(apparatus: ApparatusFuncti
 def test_saving_and_loading_changes_no_prediction(apparatus, tmp_path) -> None:
     path = tmp_path / "apparatus.h5"
     apparatus.save(path)
+    with pytest.raises(OutputError, match="exists already"):
+        apparatus.save(path)
     loaded = load_apparatus(path)
     assert isinstance(loaded, ApparatusFunction)
     stress = 2e5 * np.exp(-((RADII / 1e-3) ** 2))

@@ -1,7 +1,5 @@
 """The package keeps to its own plan: who may import what, and how long a module may be."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator
@@ -44,7 +42,7 @@ SLOW = {
 LONGEST, SHORT = 600, 120
 MOST_MODULES, MOST_LINES, MOST_LINES_OF_TESTS = 185, 34_000, 22_000
 SHORT_WITH_ONE_IMPORTER = {
-    "memscal.cli.commands": "asking for help imports it and nothing that a command needs",
+    "memscal.cli.commands": "asking for help imports it and nothing that a command needs"
 }
 """Modules that are short and have a single importer, each with the reason why it stands alone."""
 

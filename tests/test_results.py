@@ -45,6 +45,8 @@ def test_print_shows_the_tables_of_the_command(calibration, drawn, scan, capsys)
     shown = printed(capsys, scan, "--sweep", "--monte-carlo", "6")
     sweep = calibration.sweep()
     assert shown == f"{calibration}\n\n{sweep}\n\n{drawn}\n"
+    columns = ("6 draws of noise", "u by the budget", "u of the draws", "95 % interval", "agrees")
+    assert [words for words in columns if words not in str(drawn)] == []
     values = json.loads(printed(capsys, scan, "--sweep", "--monte-carlo", "6", "--json"))
     assert Path(values.pop("artifact")).name == "out.h5"
     expected = {"sweep": sweep.to_dict(), "monte_carlo": drawn.to_dict()}

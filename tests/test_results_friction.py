@@ -34,18 +34,15 @@ def reading(
     return replace(made, **fields)
 
 
-@pytest.mark.parametrize(
-    ("found", "text"),
-    [
-        (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
-        (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
-        (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
-        (reading(None, 12.51, None), "above 12 (95 %)"),
-        (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
-        (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
-        (reading(None, 0.0, None), "not identifiable"),
-    ],
-)
+@pytest.mark.parametrize(("found", "text"), [
+    (reading(0.2134, 0.171, 0.262), "0.21 [0.17, 0.26]"),
+    (reading(0.1544, 0.1361, 0.1749), "0.154 [0.136, 0.175]"),
+    (reading(0.03, 0.0, 0.084), "0.03 [0, 0.08]"),
+    (reading(None, 12.51, None), "above 12 (95 %)"),
+    (reading(0.2, 0.091, 1.61), "0.20 [0.09, 1.61]"),
+    (reading(0.0, 0.0, 0.05), "below 0.050 (95 %)"),
+    (reading(None, 0.0, None), "not identifiable"),
+])  # fmt: skip
 def test_an_estimate_prints_its_interval_or_a_bound(found: BoundedEstimate, text: str) -> None:
     assert str(found) == text
     assert text in repr(found)
@@ -67,7 +64,8 @@ def test_a_comparison_prints_tables_within_a_hundred_columns(found: FrictionComp
     assert len(heads) > 1
     assert sum(map(len, heads)) == 30
     assert "1.8 [1.4, 2.3] um" in str(found)
-    assert str(found.interface) in str(found)
+    for words in ("for it, very strong", "against it, positive", str(found.interface)):
+        assert words in str(found)
     assert "0.1" in repr(found)
     assert len(repr(found)) < 400
 
@@ -81,6 +79,24 @@ def test_json_is_standard_and_says_null_and_why_where_there_is_no_value() -> Non
             assert "lower bound" in estimate["reason"]
     assert "Contributions" not in str(bound)
     assert "no_value" in {message.kind for message in notes(bound)}
+
+
+def test_every_load_has_both_readings_and_those_of_all_loads_the_macroscopic_one(found) -> None:
+    shown = {table.title.partition(" [")[0]: table.rows for table in tables(found)}
+    for loading, loads in found.loads.items():
+        rows = shown[f"Effective friction coefficient, {loading} loading"]
+        readings = [row[3:5] for row in rows if row[2] != "all"]
+        assert readings == [[str(load.by_maximum), str(load.by_profile)] for load in loads]
+    rows = shown["Beside the macroscopic friction coefficient, 1.60 ± 0.20"]
+    assert [row[2] for row in rows] == 4 * ["above the 95 % interval"]
+    assert "macroscopic" not in str(comparison(macroscopic=None))
+
+
+def test_what_is_not_stated_is_named() -> None:
+    unstated = comparison(lubrications=("",), loadings=("",))
+    for words in ("not stated", "profiles as given"):
+        assert words in str(unstated)
+    assert set(unstated.to_dict()["loads"][0]["by_loading"]) == {"given"}
 
 
 def test_rows_hold_every_load_by_every_loading(found: FrictionComparison) -> None:
@@ -170,6 +186,8 @@ def test_definitions_of_the_loading_that_disagree_are_told() -> None:
     assert "gives at least 0.20, total loading 0.29" in messages(bound, far)
     assert "disagree" not in messages(bound, bound)
     assert in_words(reading(0.01, 0.0, 0.05)) == "at most 0.050"
+    assert in_words(reading(0.12, 0.08, 0.17)) == "0.12 (0.080 to 0.17)"
+    assert in_words(reading(None, 0.0, None)) == "no bound"
 
 
 def test_the_macroscopic_coefficient_is_held_against_the_interval() -> None:

@@ -17,7 +17,7 @@ import memscal
 pytestmark = pytest.mark.accuracy
 
 SEEDS = 200 if FULL else 24
-CHANCE = 1e-5
+CHANCE = 1e-5 if FULL else 1e-3  # of fewer seeds, so that what is wrong by much is still found
 NOISES = (0.001, 0.005, 0.02)
 R = np.linspace(0, 3e-3, 121)
 

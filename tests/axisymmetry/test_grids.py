@@ -172,6 +172,9 @@ def test_lifting_then_cutting_gives_the_profile_back(seed: int) -> None:
     r = rng.uniform(0.0, 6.4, size=200)
     back = cut(on_grid(profile, grid, 0.02), grid, r)
     np.testing.assert_allclose(back, profile(r), atol=3e-5 * np.abs(weights).sum())
+    whole = Lattice(centred_axis(129, 0.1), centred_axis(129, 0.1))
+    lifted = grid.to_image(on_grid(profile, grid, 0.02))
+    np.testing.assert_allclose(on_grid(profile, whole, 0.02), lifted, atol=1e-12)
 
 
 def test_the_error_of_lifting_falls_with_the_fourth_power_of_the_step() -> None:

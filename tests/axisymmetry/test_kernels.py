@@ -28,18 +28,16 @@ def test_a_mixture_and_its_transform_belong_together(shares: list[float], data: 
     assert mixture.transform(np.zeros(1))[0] == pytest.approx(1.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("weights", "sigmas", "problem"),
-    [
-        ((0.5, 0.4), (1e-3, 1e-3), "add up to 0.9, not to 1"),
-        ((0.5, 0.5), (1e-3,), "2 weights do not fit 1 widths"),
-        ((), (), "0 weights"),
-        ((1.0,), (0.0,), "above zero"),
-        ((1.0,), (-1e-3,), "above zero"),
-        ((1.0,), (np.inf,), "above zero"),
-        ((float("nan"),), (1e-3,), "add up to nan"),
-    ],
-)
+@pytest.mark.parametrize(("weights", "sigmas", "problem"), [
+    ((0.5, 0.4), (1e-3, 1e-3), "add up to 0.9, not to 1"),
+    ((0.5, 0.5), (1e-3,), "2 weights do not fit 1 widths"),
+    ((), (), "0 weights"),
+    ((1.0,), (0.0,), "above zero"),
+    ((1.0,), (-1e-3,), "above zero"),
+    ((1.0,), (np.inf,), "above zero"),
+    ((1.0,), (np.nan,), "above zero"),
+    ((float("nan"),), (1e-3,), "add up to nan"),
+])  # fmt: skip
 def test_a_mixture_that_is_no_apparatus_function_is_refused(weights, sigmas, problem) -> None:
     with pytest.raises(InputError, match=problem):
         GaussianMixture(weights, sigmas)
@@ -82,17 +80,15 @@ def test_a_disc_of_no_size_is_its_gaussian_and_one_far_away_is_zero() -> None:
     np.testing.assert_allclose(point.radial(r), gaussian.radial(r), atol=1e-10 / 0.5e-3**2)
     far = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3).radial(np.array([[50e-3], [0.5]]))
     np.testing.assert_allclose(far, 0.0, atol=1e-12 / 0.8e-3**2)
+    assert point.radial(np.empty((0, 3))).shape == (0, 3)
 
 
-@pytest.mark.parametrize(
-    ("radius", "sigma", "problem"),
-    [
-        (0.0, 0.3e-3, "radius of the disc"),
-        (float("nan"), 0.3e-3, "radius of the disc"),
-        (0.8e-3, -0.3e-3, "width of the Gaussian that blurs the disc"),
-        (0.8e-3, np.inf, "width of the Gaussian that blurs the disc"),
-    ],
-)
+@pytest.mark.parametrize(("radius", "sigma", "problem"), [
+    (0.0, 0.3e-3, "radius of the disc"),
+    (float("nan"), 0.3e-3, "radius of the disc"),
+    (0.8e-3, -0.3e-3, "width of the Gaussian that blurs the disc"),
+    (0.8e-3, np.inf, "width of the Gaussian that blurs the disc"),
+])  # fmt: skip
 def test_a_disc_without_a_size_is_refused(radius: float, sigma: float, problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         SmoothedDisc(radius=radius, sigma=sigma)

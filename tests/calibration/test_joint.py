@@ -115,15 +115,12 @@ def test_noise_that_is_correlated_is_weighed_as_such() -> None:
     assert np.std(stated[:, 1]) < np.std(naive[:, 1])
 
 
-@pytest.mark.parametrize(
-    ("correlation", "words"),
-    [
-        (np.ones((65, 65)), "not positive definite"),
-        (np.eye(65) * 2, "not one on its diagonal"),
-        (np.eye(60), r"should be \(65, 65\)"),
-        (np.full((65, 65), np.nan), "finite"),
-    ],
-)
+@pytest.mark.parametrize(("correlation", "words"), [
+    (np.ones((65, 65)), "not positive definite"),
+    (np.eye(65) * 2, "not one on its diagonal"),
+    (np.eye(60), r"should be \(65, 65\)"),
+    (np.full((65, 65), np.nan), "finite"),
+])  # fmt: skip
 def test_a_correlation_that_no_noise_can_have_is_refused(correlation, words) -> None:
     with pytest.raises(InputError, match=words):
         replace(simulated(), u_zz_correlation=correlation)
@@ -167,21 +164,18 @@ def test_correlated_inputs_combine_as_their_correlation_says() -> None:
         assert np.sum(np.copysign(squares**2, squares)) == pytest.approx(u[r] ** 2)
 
 
-@pytest.mark.parametrize(
-    ("correlations", "words"),
-    [
-        ({("thickness", "weather"): 0.5}, "'thickness' and 'weather'"),
-        ({("thickness", "poisson_ratio"): 1.5}, "outside -1 to 1"),
-        (
-            {
-                ("thickness", "poisson_ratio"): 0.9,
-                ("thickness", "load"): 0.9,
-                ("poisson_ratio", "load"): -0.9,
-            },
-            "contradict each other",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("correlations", "words"), [
+    ({("thickness", "weather"): 0.5}, "'thickness' and 'weather'"),
+    ({("thickness", "poisson_ratio"): 1.5}, "outside -1 to 1"),
+    (
+        {
+            ("thickness", "poisson_ratio"): 0.9,
+            ("thickness", "load"): 0.9,
+            ("poisson_ratio", "load"): -0.9,
+        },
+        "contradict each other",
+    ),
+])  # fmt: skip
 def test_correlations_that_cannot_be_are_refused(correlations, words) -> None:
     with pytest.raises(InputError, match=words):
         memscal.calibrate(memscal.simulate(), correlations=correlations)

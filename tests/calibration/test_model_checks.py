@@ -33,16 +33,13 @@ def test_the_table_of_checks_lists_those_that_there_are_and_which_have_p_values(
     assert {check.name: check.p_value is not None for check in found} == listed
 
 
-@pytest.mark.parametrize(
-    ("options", "there", "absent"),
-    [
-        ({}, {"chi_square"}, {"held_out_repeat", "held_out_load", "held_out_scan"}),
-        ({"state_noise": False}, {"residual_runs"}, {"chi_square", "noise_as_stated"}),
-        ({"state_noise": False, "repeats": 3}, {"chi_square", "held_out_repeat"}, set()),
-        ({"load": [0.5, 1.0, 1.5]}, {"held_out_load"}, {"held_out_repeat"}),
-        ({"load": [0.5, 1.0], "repeats": 2}, {"held_out_load", "held_out_repeat"}, set()),
-    ],
-)
+@pytest.mark.parametrize(("options", "there", "absent"), [
+    ({}, {"chi_square"}, {"held_out_repeat", "held_out_load", "held_out_scan"}),
+    ({"state_noise": False}, {"residual_runs"}, {"chi_square", "noise_as_stated"}),
+    ({"state_noise": False, "repeats": 3}, {"chi_square", "held_out_repeat"}, set()),
+    ({"load": [0.5, 1.0, 1.5]}, {"held_out_load"}, {"held_out_repeat"}),
+    ({"load": [0.5, 1.0], "repeats": 2}, {"held_out_load", "held_out_repeat"}, set()),
+])  # fmt: skip
 def test_a_check_is_run_where_the_scan_has_something_to_check(options, there, absent) -> None:
     found = set(checks(simulated(points=33, **options)))
     assert there <= found

@@ -158,6 +158,8 @@ def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
         paper, draws=34, seed=8, workers=2, progress=lambda *numbers: told.append(numbers)
     )
     np.testing.assert_allclose(two.samples, hundred.samples[:34], rtol=1e-9)
+    other = memscal.monte_carlo(paper, draws=2, seed=9).samples
+    assert not np.any(other == hundred.samples[:2])
     done = [number for number, _ in told]
     assert done == sorted(done)
     assert len(done) > 2
@@ -169,6 +171,11 @@ def test_intervals_hold_their_share_of_the_draws(hundred: memscal.MonteCarlo) ->
         for low, high in (comparison.symmetric, comparison.shortest):
             held = np.mean((hundred.samples[:, i] >= low) & (hundred.samples[:, i] <= high))
             assert held == pytest.approx(0.95, abs=0.011)
+    # Of normal draws 1 / sqrt(2 M), known itself to 12 %.
+    errors = [
+        comparison.sampling_error / comparison.uncertainty for comparison in hundred.comparisons
+    ]
+    assert np.median(errors) == pytest.approx(1 / np.sqrt(200), rel=0.36)
     low, high = hundred.g_symmetric
     assert ((hundred.g_mean >= low) & (hundred.g_mean <= high))[hundred.r < 3e-3].all()
 
@@ -239,15 +246,12 @@ def test_draws_that_fail_are_left_out_and_told() -> None:
         memscal.monte_carlo(calibration, draws=4)
 
 
-@pytest.mark.parametrize(
-    ("options", "named"),
-    [
-        ({"draws": 1}, "draws is 1"),
-        ({"draws": 2.5}, "draws is 2.5"),
-        ({"seed": -1}, "seed is -1"),
-        ({"workers": 0}, "workers is 0"),
-    ],
-)
+@pytest.mark.parametrize(("options", "named"), [
+    ({"draws": 1}, "draws is 1"),
+    ({"draws": 2.5}, "draws is 2.5"),
+    ({"seed": -1}, "seed is -1"),
+    ({"workers": 0}, "workers is 0"),
+])  # fmt: skip
 def test_numbers_that_make_no_sense_are_refused(paper, options, named) -> None:
     with pytest.raises(memscal.MemscalError, match=named):
         memscal.monte_carlo(paper, **options)

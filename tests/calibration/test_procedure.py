@@ -40,6 +40,13 @@ def test_with_hardly_any_noise_the_truth_returns(kernel: memscal.GaussianMixture
     assert plane_error(R, apparatus.radial(R), kernel.radial(R)) < limit
 
 
+def test_a_scan_without_noise_is_known_to_the_error_of_the_model() -> None:
+    calibration = memscal.calibrate(simulated(noise=0.0))
+    assert calibration.passed
+    for name in ("gaussian_sigma", "gaussian_sigma_deconvolved"):
+        assert calibration.apparatus.parameters[name] == pytest.approx(SIGMA, rel=1e-3)
+
+
 def test_g_integrates_to_one_on_its_support_and_a_times_g_predicts_the_scan() -> None:
     calibration = memscal.calibrate(simulated())
     stored = calibration.apparatus.field
@@ -234,20 +241,17 @@ def test_the_result_is_the_same_however_often_and_whatever_the_global_random_sta
     assert set(one.parameters.names) >= MAIN_PARAMETERS
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"reference": {1: 2}}, "The reference is a dict"),
-        ({"reference": [None, None]}, "2 references were given, but there is one scan"),
-        ({"method": 3}, "cannot divide"),
-        ({"method": Tikhonov}, "that is set up"),
-        ({"amplitude": "abc"}, "must be a positive number"),
-        ({"amplitude": -1.0}, "must be a positive number"),
-        ({"amplitude": float("nan")}, "must be a positive number"),
-        ({"method": "richardson-lucy", "iterations": 2.5}, "whole number"),
-        ({"method": "white-noise-draw", "seed": -1}, "whole number"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    ({"reference": {1: 2}}, "The reference is a dict"),
+    ({"reference": [None, None]}, "2 references were given, but there is one scan"),
+    ({"method": 3}, "cannot divide"),
+    ({"method": Tikhonov}, "that is set up"),
+    ({"amplitude": "abc"}, "must be a positive number"),
+    ({"amplitude": -1.0}, "must be a positive number"),
+    ({"amplitude": float("nan")}, "must be a positive number"),
+    ({"method": "richardson-lucy", "iterations": 2.5}, "whole number"),
+    ({"method": "white-noise-draw", "seed": -1}, "whole number"),
+])  # fmt: skip
 def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
     with pytest.raises(InputError, match=words):
         memscal.calibrate(simulated(), **arguments)

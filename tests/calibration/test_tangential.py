@@ -159,6 +159,16 @@ def test_a_line_along_y_calibrates_the_other_channel() -> None:
     assert abs(apparatus.parameters["centre_y"] - CENTRE) < 20e-6
 
 
+def test_two_scans_together_know_more_than_either() -> None:
+    scans = [shear_scan(seed=seed, noise=0.02) for seed in (8, 9)]
+    together = memscal.calibrate(scans, channel="xz", method="bayesian")
+    alone, both = (
+        found.apparatus.budget["gaussian_sigma"]["noise"]
+        for found in (calibrated(scans[0]), together)
+    )
+    assert both == pytest.approx(alone / np.sqrt(2), rel=0.25)
+
+
 def test_outliers_and_missing_points_move_nothing() -> None:
     scan = shear_scan(seed=10)
     u = scan.channels["u_xz"].copy()

@@ -19,14 +19,11 @@ def calibrated(scan, film=PAPER_FILM, rod=PAPER_ROD):
     return memscal.calibrate(scan, reference=memscal.indent(film, rod, load=1.0)).apparatus
 
 
-@pytest.mark.parametrize(
-    ("source", "change"),
-    [
-        ("thickness", lambda: {"film": replace(PAPER_FILM, thickness=2.02e-3)}),
-        ("poisson_ratio", lambda: {"film": replace(PAPER_FILM, poisson_ratio=0.495)}),
-        ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
-    ],
-)
+@pytest.mark.parametrize(("source", "change"), [
+    ("thickness", lambda: {"film": replace(PAPER_FILM, thickness=2.02e-3)}),
+    ("poisson_ratio", lambda: {"film": replace(PAPER_FILM, poisson_ratio=0.495)}),
+    ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
+])  # fmt: skip
 def test_each_input_of_the_reference_counts_what_moving_it_changes(source, change) -> None:
     scan = simulated(film=PAPER_FILM, rod=PAPER_ROD, noise=0.002)
     usual, moved = calibrated(scan), calibrated(scan, **change())

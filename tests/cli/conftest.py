@@ -1,7 +1,5 @@
 """Running the program in this process, on scans of its own making."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

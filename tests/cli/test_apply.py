@@ -1,7 +1,5 @@
 """``memscal apply``: what it prints, what it writes, and its exit codes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What cannot be calibrated: plain words, the right exit code, and the old output still there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,9 +1,8 @@
 """Outputs that cannot be written: known before anything is computed, and nothing is lost."""
 
-from __future__ import annotations
-
 import errno
 import os
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -128,17 +127,34 @@ def test_running_out_of_memory_is_said_so(run: Run, scan: Path, monkeypatch: Pat
     run("calibrate", scan).exits(70, "out of memory")
 
 
-def test_a_python_warning_becomes_one_line(run: Run, scan: Path, monkeypatch: Patch):
-    import warnings
-
+@pytest.fixture
+def meanwhile(monkeypatch: Patch) -> Callable[[Callable[[], object]], None]:
+    """Let something happen while the calibration is computed."""
     from memscal.calibration.calibrate import calibrate
 
-    def warning(*given: object, **options: object) -> object:
+    def happens(action: Callable[[], object]) -> None:
+        monkeypatch.setattr(
+            CALIBRATE, lambda *a, **options: (action(), calibrate(*a, **options))[1]
+        )
+
+    return happens
+
+
+def test_a_python_warning_becomes_one_line(run: Run, scan: Path, meanwhile):
+    def warn() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("always")
             warnings.warn("the film is old", UserWarning, stacklevel=1)
-        return calibrate(*given, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(CALIBRATE, warning)
+    meanwhile(warn)
     done = run("calibrate", scan).exits(0)
     assert "Warning: UserWarning: the film is old" in done.err.splitlines()
+
+
+@pytest.mark.parametrize("name", ["out.h5", "out.png"])
+def test_a_file_that_appears_during_the_computing_is_not_replaced(
+    run: Run, scan: Path, folder: Path, meanwhile, name
+):
+    meanwhile(lambda: (folder / name).write_bytes(OLD))
+    run("calibrate", scan, "-o", "out.h5", "--figure", "out.png").exits(4)
+    assert (folder / name).read_bytes() == OLD

@@ -1,7 +1,5 @@
 """``memscal calibrate``: what it writes, prints and returns."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``memscal compare``: from files to friction; exit codes, refusals, and what it writes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``memscal design``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

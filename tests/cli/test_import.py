@@ -1,7 +1,5 @@
 """``memscal import``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``memscal import`` of the meshes of finite-element programs."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from pathlib import Path

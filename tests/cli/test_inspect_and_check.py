@@ -1,7 +1,5 @@
 """``memscal inspect`` and ``memscal check``."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -58,8 +56,10 @@ def test_inspect_speaks_the_units_of_the_command_line(run: Run, folder: Path):
 
 def test_inspect_refuses_what_is_not_ours(run: Run, folder: Path):
     Path("notes.txt").write_text("hello")
-    refused = run("inspect", "notes.txt").exits(3)
-    assert refused.out == ""
+    with h5py.File("foreign.h5", "w"):
+        pass
+    for name in ("notes.txt", "foreign.h5"):
+        assert run("inspect", name).exits(3, f"{name} is not").out == ""
 
 
 def test_check_passes_a_file_as_it_was_written(run: Run, artifact: Path):

@@ -1,7 +1,5 @@
 """Words and tables for people."""
 
-from __future__ import annotations
-
 import io
 import sys
 import time

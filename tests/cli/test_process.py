@@ -1,7 +1,5 @@
 """The program as a process of its own: streams and exit codes."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

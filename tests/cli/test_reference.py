@@ -1,7 +1,5 @@
 """``memscal reference``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -137,6 +135,7 @@ def test_options_that_make_no_sense_are_a_matter_of_usage(run: Run, folder: Path
 def test_a_figure_of_the_contacts_is_written(run: Run, folder: Path):
     done = run("reference", "sphere", "--load", 0.5, "--load", 1, "--figure", "contacts.svg")
     done.exits(0, "Written: contacts.svg")
+    assert [line.split()[0] for line in done.out.splitlines()[3:]] == ["0.5", "1"]
     assert Path("contacts.svg").read_bytes().startswith(b"<?xml")
 
 

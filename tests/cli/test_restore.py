@@ -1,7 +1,5 @@
 """``memscal restore``: what it prints, what it writes, and its exit codes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,6 +53,7 @@ def test_another_film_is_exit_code_1(run: Run, artifact: Path, folder: Path):
     thicker = replace(scan, film=replace(scan.film, thickness=2.5e-3))
     memscal.write_scan(thicker, folder / "other.h5")
     run("restore", artifact, "other.h5").exits(CHECKED, "film agreement")
+    assert names(folder) == ["other.h5", "sensor.apparatus.h5"]
 
 
 def test_files_in_the_wrong_order_are_refused(run: Run, artifact: Path, sphere: Path):

@@ -1,7 +1,5 @@
 """Measured and restored stress, contacts and designs show themselves as the commands print them."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -42,9 +40,15 @@ def planned() -> memscal.Design:
     return memscal.design(noise=0.01, want={"sigma": 0.028}, vary="repeats")
 
 
-@pytest.mark.parametrize("name", ["stress", "restored", "contact", "planned"])
-def test_text_mapping_notebook_figure_and_arrays(name, request: pytest.FixtureRequest):
+@pytest.mark.parametrize(("name", "words"), [
+    ("stress", ["2.75 N  dry", "total force", "maximum", "kPa", "applied force all"]),
+    ("restored", ["total force", "stress on the axis", "calculated", "restored force", "kPa"]),
+    ("contact", ["friction 0.3, incremental loading (hankel)", "stick radius (mm)"]),
+    ("planned", ["nothing was measured", "film thickness", "Gaussian width sigma", "resolved"]),
+])  # fmt: skip
+def test_text_mapping_notebook_figure_and_arrays(name, words, request: pytest.FixtureRequest):
     result = request.getfixturevalue(name)
+    assert [word for word in words if word not in str(result)] == []
     assert str(result) == result.summary()
     assert "\n" not in repr(result)
     assert len(repr(result)) < 200

@@ -1,7 +1,5 @@
 """``memscal simulate --experiment sphere``."""
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """``memscal calibrate --channel``: the tangential channel on the command line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -27,26 +27,25 @@ def test_the_prior_weights_add_up_and_the_uncertainty_allows_no_gaussian() -> No
 
 def test_posterior_odds_are_prior_odds_times_the_ratio_of_marginal_likelihoods() -> None:
     """Densities of the data with the flat parameters projected out, covariance by covariance."""
-    estimate = estimated(simulated(noise=0.003, kernel=TAILS, repeats=2))
+    estimate = estimated(simulated(noise=0.01, kernel=TAILS, repeats=2))
     fit, basis, model = estimate.gaussian, estimate.basis, estimate.model
     root = np.sqrt(estimate.weights)
     q, _ = np.linalg.qr(fit.jacobian * root[:, None], mode="complete")
     null = q[:, basis.flat :]
     rest = null.T @ (root * (estimate.points.u - fit.predicted))
     voltages = model.signal(fit.geometry, basis.kernels(model.k)) * root[:, None]
-    for i in (1, 5, len(HYPOTHESES) - 1):
-        hypothesis = HYPOTHESES[i]
-        design = null.T @ voltages[:, basis.blocks[SHAPES.index(hypothesis.shape)]]
-        noise = estimate.weighed.noise**2
-        # At the same noise for both: the estimate's own maximises each, which is its profile.
-        signal = hypothesis.strength**2 * design @ design.T
-        eye = noise * np.eye(rest.size)
-        ratio = multivariate_normal.logpdf(rest, cov=eye + signal)
-        ratio -= multivariate_normal.logpdf(rest, cov=eye)
-        weight = hypothesis.estimate / HYPOTHESES[0].estimate
-        found = estimate.weighed.probability
-        if weight and found[0] > 0 and found[i] > 0:
-            assert np.log(found[i] / found[0] / weight) == pytest.approx(ratio, abs=1.5)
+    likely = np.flatnonzero(estimate.weighed.probability > 1e-3)
+    assert likely.size > 5
+    logs = []
+    for hypothesis in (HYPOTHESES[i] for i in likely):
+        covariance = estimate.weighed.noise**2 * np.eye(rest.size)
+        if hypothesis.shape is not None:
+            design = null.T @ voltages[:, basis.blocks[SHAPES.index(hypothesis.shape)]]
+            covariance += hypothesis.strength**2 * design @ design.T
+        logs.append(multivariate_normal.logpdf(rest, cov=covariance) + np.log(hypothesis.estimate))
+    found = np.log(estimate.weighed.probability[likely])
+    # At one noise for all: each hypothesis has a best noise of its own, a few percent away.
+    np.testing.assert_allclose(found - found.max(), logs - np.max(logs), atol=0.4)
 
 
 @pytest.mark.parametrize(

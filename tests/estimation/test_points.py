@@ -35,17 +35,14 @@ def test_repeats_share_positions_and_know_their_row() -> None:
     assert np.array_equal(np.unique(points.repeat), [0, 1, 2])
 
 
-@pytest.mark.parametrize(
-    ("change", "error", "words"),
-    [
-        (lambda s: {"u_zz": np.full_like(s.u_zz, np.nan)}, InputError, "missing"),
-        (lambda s: {"u_zz": -s.u_zz}, InputError, "positive in compression"),
-        (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, InputError, "Every voltage"),
-        (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, InputError, "zero"),
-        (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, InputError, "above zero"),
-        (lambda s: {"x": s.x[:5], "u_zz": s.u_zz[:5], "u_zz_errors": None}, FitError, "at least 6"),
-    ],
-)
+@pytest.mark.parametrize(("change", "error", "words"), [
+    (lambda s: {"u_zz": np.full_like(s.u_zz, np.nan)}, InputError, "missing"),
+    (lambda s: {"u_zz": -s.u_zz}, InputError, "positive in compression"),
+    (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, InputError, "Every voltage"),
+    (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, InputError, "zero"),
+    (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, InputError, "above zero"),
+    (lambda s: {"x": s.x[:5], "u_zz": s.u_zz[:5], "u_zz_errors": None}, FitError, "at least 6"),
+])  # fmt: skip
 def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, error, words) -> None:
     scan = simulated()
     with pytest.raises(error, match=words):

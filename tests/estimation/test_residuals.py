@@ -176,13 +176,13 @@ def test_the_pure_error_is_the_scatter_of_repeats() -> None:
     scan = simulated(repeats=3, points=33, state_noise=False)
     estimate = estimated(scan)
     found, model = pure_error_test(estimate), free_model(estimate)
-    if model.kept.size == scan.u_zz.size:
-        pure = scan.u_zz.var(axis=0, ddof=1).mean()
-        degrees = 33 - model.design.shape[1]
-        misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]
-        value = (misfit @ misfit - 66 * pure) / degrees / pure
-        assert found.value == pytest.approx(value, rel=1e-6)
-        assert found.p_value == pytest.approx(f.sf(value, degrees, 66), rel=1e-6)
+    assert model.kept.size == scan.u_zz.size
+    pure = scan.u_zz.var(axis=0, ddof=1).mean()
+    degrees = 33 - model.design.shape[1]
+    misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]
+    value = (misfit @ misfit - 66 * pure) / degrees / pure
+    assert found.value == pytest.approx(value, rel=1e-6)
+    assert found.p_value == pytest.approx(f.sf(value, degrees, 66), rel=1e-6)
 
 
 def disturbed(cause: str, noise: float = 0.003) -> Scan:

@@ -1,7 +1,5 @@
 """Calibrations made of Gaussians, whose convolutions and transforms have closed forms."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import replace

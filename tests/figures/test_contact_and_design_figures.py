@@ -1,7 +1,5 @@
 """The figures of contacts and of designs: what is drawn is what was calculated."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

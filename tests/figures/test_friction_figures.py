@@ -1,7 +1,5 @@
 """Figures of a comparison: what is drawn are the comparison's numbers, and nothing is lost."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The HTML report: parsed by another program, self-contained, and safe with hostile names."""
 
-from __future__ import annotations
-
 import base64
 from html.parser import HTMLParser
 

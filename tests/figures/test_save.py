@@ -1,7 +1,5 @@
 """Figures in files: whole, and of the right kind."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The figures of measured and of restored stress: what is drawn is what was found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

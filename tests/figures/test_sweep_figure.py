@@ -1,7 +1,5 @@
 """The sweep figure: every draw is accounted for, and heavy tails do not rule the axes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

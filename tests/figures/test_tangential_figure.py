@@ -1,7 +1,5 @@
 """The figure of a tangential channel: its shear, its names, and both sides on one logarithm."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from helpers.scans import shear_scan

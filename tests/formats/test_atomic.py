@@ -1,7 +1,5 @@
 """A file is written whole or not at all, never over an input, and never by surprise."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

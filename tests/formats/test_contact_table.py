@@ -1,7 +1,5 @@
 """Contact tables that are kept in a folder: found whole, or not at all."""
 
-from __future__ import annotations
-
 import os
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

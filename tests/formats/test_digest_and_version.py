@@ -1,7 +1,5 @@
 """An altered artifact is refused; a newer major version is refused; a newer minor one is not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

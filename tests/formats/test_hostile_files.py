@@ -1,7 +1,5 @@
 """Files built to read, run, hang or exhaust something: each is refused, and says why."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -371,8 +369,9 @@ def test_every_truncation_is_an_error_of_ours(tmp_path: Path):
     data = whole.read_bytes()
     for length in [*range(0, 2048, 64), *range(2048, len(data), 1999), len(data) - 1]:
         cut.write_bytes(data[:length])
-        with pytest.raises(FormatError, match=r"cut\.h5"):
+        with pytest.raises(FormatError, match=r"cut\.h5") as caught:
             read_scan(cut)
+    assert "Get the file again" in caught.value.cure
 
 
 @pytest.fixture(scope="module")

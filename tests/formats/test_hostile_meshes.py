@@ -1,7 +1,5 @@
 """Meshes built to read, hang or exhaust something, or merely broken: refused in plain words."""
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import os
@@ -135,7 +133,7 @@ def test_cells_that_state_their_own_size_are_read(tmp_path: Path, kind):
         np.testing.assert_array_equal(cells.nodes, SMALL.cells[0].data[:, :3])
 
 
-@pytest.mark.parametrize("offsets", ["3000000000 4", "4 9", "4.0 8.0"])
+@pytest.mark.parametrize("offsets", ["3000000000 4", "-4 4", "0 4", "4 9", "4.0 8.0"])
 def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets):
     path = tmp_path / "film.vtu"
     mesh = meshio.Mesh(SMALL.points, [("polygon", SMALL.cells[0].data[:2])])
@@ -143,7 +141,7 @@ def test_a_cell_with_billions_of_nodes_is_refused(tmp_path: Path, offsets):
     edited(path, numbers_of(path, "offsets"), offsets)
     if "." in offsets:
         edited(path, 'type="Int64" Name="offsets"', 'type="Float64" Name="offsets"')
-    refused(path)
+    refused(path, "cannot be read|a cell without nodes")
 
 
 @pytest.mark.parametrize("address", [
@@ -186,6 +184,8 @@ def test_the_hdf5_file_of_an_xdmf_file_is_a_source_and_read_safely(tmp_path: Pat
     ('Dimensions="10 9"', 'Dimensions="10 9" Reference="/Xdmf/Domain/Grid"', "points to them"),
     ('Dimensions="10 9"', 'Dimensions="10 9" ItemType="Function"', "calculated from others"),
     ("<Domain>", "<Domain><Grid><Topology/></Grid>", "holds 2 grids"),
+    ('Dimensions="10 9"', 'Dimensions="10 ten"', "cannot be read"),
+    ('Dimensions="10 9"', 'Dimensions="9 10"', "cannot be read"),
 ])  # fmt: skip
 def test_xdmf_that_is_more_than_a_mesh_with_numbers_is_refused(tmp_path: Path, old, new, words):
     refused(edited(small(tmp_path / "film.xdmf", data_format="XML"), old, new), words)
@@ -270,9 +270,10 @@ def test_what_is_no_file_with_something_in_it_is_refused(tmp_path: Path, ending)
     refused(path, "is empty")
     path.write_bytes(b"\0\1\2 not a mesh at all")
     refused(path)
-    path.unlink()
-    os.mkfifo(path)
-    refused(path, "not a regular file", UnsafeFileError)
+    for make in (os.mkfifo, Path.mkdir):
+        path.unlink()
+        make(path)
+        refused(path, "not a regular file", UnsafeFileError)
 
 
 def test_meshio_does_not_print_to_the_terminal(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
@@ -372,7 +373,8 @@ def test_damage_is_refused_or_harmless_wherever_it_is(tmp_path: Path, name, opti
         small(path, **options)
     good = path.read_bytes()
     for i in np.linspace(20, len(good) - 20, 3).astype(int):
-        for damaged in (good[:i], good[:i] + bytes([good[i] ^ 0x15]) + good[i + 1 :]):
-            path.write_bytes(damaged)
-            with contextlib.suppress(FormatError):
-                assert isinstance(read_mesh(path), Mesh)
+        path.write_bytes(good[:i])
+        refused(path)
+        path.write_bytes(good[:i] + bytes([good[i] ^ 0x15]) + good[i + 1 :])
+        with contextlib.suppress(FormatError):
+            assert isinstance(read_mesh(path), Mesh)

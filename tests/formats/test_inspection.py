@@ -1,7 +1,5 @@
 """What inspect says about a file, and what check finds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Meshes of finite-element programs: the stress at the base of the film, found and turned."""
 
-from __future__ import annotations
-
 import base64
 import re
 from pathlib import Path

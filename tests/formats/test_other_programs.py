@@ -1,7 +1,5 @@
 """The files as other programs of the field see them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

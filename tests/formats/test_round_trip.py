@@ -1,7 +1,5 @@
 """What is written is what is read: values, units and text."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Mapping
@@ -16,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from memscal.errors import FormatError, InputError, UnitError
+from memscal.errors import FormatError, InputError, OutputError, UnitError
 from memscal.formats.artifact import read_artifact, write_artifact
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
@@ -193,6 +191,19 @@ def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp
     write_artifact(make_artifact(process=process), tmp_path / "a.h5")
     found = read_artifact(tmp_path / "a.h5").process.configuration
     assert found == {"seed": 3, "mu": "inf", "loads": [1.0, 2.0]}
+
+
+@pytest.mark.parametrize(("write", "thing"), [
+    (write_scan, make_scan()), (write_reference, make_profile()), (write_artifact, make_artifact()),
+])  # fmt: skip
+def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path: Path, write, thing):
+    path = tmp_path / "a.h5"
+    path.write_bytes(b"years of work")
+    with pytest.raises(OutputError, match="exists already"):
+        write(thing, path)
+    assert path.read_bytes() == b"years of work"
+    write(thing, path, overwrite=True)
+    assert h5py.is_hdf5(path)
 
 
 def test_a_large_field_is_compressed_and_comes_back(tmp_path: Path):

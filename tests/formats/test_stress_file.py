@@ -1,7 +1,5 @@
 """The file of measured stress: what was measured comes back, and nothing else is read."""
 
-from __future__ import annotations
-
 import gzip
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import memscal
-from memscal.errors import FormatError, InputError, MemscalError, UnitError
+from memscal.errors import FormatError, InputError, MemscalError, OutputError, UnitError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
 from memscal.formats.stress import read_stress, write_stress
@@ -110,6 +108,13 @@ def test_what_was_saved_and_read_again_is_equal_to_the_last_bit(path: Path):
     assert found == make_stress()
     assert np.isnan(found.checks[1].value)
     assert len(repr(found)) < 200
+
+
+def test_an_existing_file_is_left_alone(path: Path):
+    before = path.read_bytes()
+    with pytest.raises(OutputError, match="exists already"):
+        make_stress().save(path)
+    assert path.read_bytes() == before
 
 
 @given(st.lists(st.floats(-1.0, 1.0, allow_subnormal=False), min_size=7, max_size=7))

@@ -1,7 +1,5 @@
 """Tables as they leave an experiment or a FEM program, with everything that can be messy."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -290,6 +288,7 @@ def test_a_force_that_differs_from_the_load_is_warned_of(tmp_path: Path, factor)
     found = reference_table(tmp_path, gaussian_table(8.0, factor))
     (note,) = [note for note in found.notes if note.kind == "force_differs"]
     assert f"{abs(factor - 1):.1%}" in note.text
+    assert "Check the load" in note.text
 
 
 def test_a_table_that_ends_early_is_warned_of_and_not_refused(tmp_path: Path):

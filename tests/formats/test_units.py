@@ -1,7 +1,5 @@
 """Units at the door: the table, pint behind it, and what is refused."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -207,20 +207,17 @@ def test_a_load_beyond_the_model_is_named() -> None:
         amontons_family(FILM, Sphere(radius=2e-3), [1.0, 300.0], friction=[0.1], reach=REACH)
 
 
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"indenter": Rod(radius=1e-3)}, "sphere is needed"),
-        ({"loads": [0.34, -1.0]}, "load is -1 N"),
-        ({"loads": []}, "loads"),
-        ({"friction": [0.3, 0.1]}, "do not increase"),
-        ({"friction": [-0.1, 0.1]}, "none of them negative"),
-        ({"friction": []}, "none of them negative"),
-        ({"loading": "sudden"}, "loading is 'sudden'"),
-        ({"reach": 0.0}, "reach"),
-        ({"workers": 0}, "workers"),
-    ],
-)
+@pytest.mark.parametrize(("changed", "said"), [
+    ({"indenter": Rod(radius=1e-3)}, "sphere is needed"),
+    ({"loads": [0.34, -1.0]}, "load is -1 N"),
+    ({"loads": []}, "loads"),
+    ({"friction": [0.3, 0.1]}, "do not increase"),
+    ({"friction": [-0.1, 0.1]}, "none of them negative"),
+    ({"friction": []}, "none of them negative"),
+    ({"loading": "sudden"}, "loading is 'sudden'"),
+    ({"reach": 0.0}, "reach"),
+    ({"workers": 0}, "workers"),
+])  # fmt: skip
 def test_a_request_that_makes_no_sense_is_refused(changed: dict[str, object], said: str) -> None:
     request = {"indenter": SPHERE, "loads": [0.34], "friction": [0.1], "reach": REACH} | changed
     film_indenter_loads = FILM, request.pop("indenter"), request.pop("loads")

@@ -200,17 +200,14 @@ def test_scans_of_different_films_or_spheres_are_refused(made, apparatus) -> Non
         memscal.compare([made.lubricated, replace(made.dry, film=film)], apparatus)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"friction": [0.2]}, "nothing to choose from"),
-        ({"loading": ()}, "No loading"),
-        ({"loading": "sideways"}, "sideways"),
-        ({"interface": True}, "macroscopic friction coefficient is not given"),
-        ({"macroscopic_uncertainty": 0.1}, "macroscopic friction coefficient is not given"),
-        ({"macroscopic": -0.1}, "macroscopic"),
-    ],
-)
+@pytest.mark.parametrize(("options", "words"), [
+    ({"friction": [0.2]}, "nothing to choose from"),
+    ({"loading": ()}, "No loading"),
+    ({"loading": "sideways"}, "sideways"),
+    ({"interface": True}, "macroscopic friction coefficient is not given"),
+    ({"macroscopic_uncertainty": 0.1}, "macroscopic friction coefficient is not given"),
+    ({"macroscopic": -0.1}, "macroscopic"),
+])  # fmt: skip
 def test_options_that_make_no_sense_are_refused(made, apparatus, options, words) -> None:
     with pytest.raises(InputError, match=words):
         memscal.compare(made.lubricated, apparatus, **options)

@@ -54,6 +54,8 @@ def test_a_table_serves_a_load_within_one_percent_in_proportion() -> None:
     family = external_family(tables(), asked, reach=REACH)
     np.testing.assert_allclose(family.spectra, 1.008 * exact.spectra, rtol=1e-12)
     assert family.loads.tolist() == asked
+    turned = external_family(tables()[::-1], asked, reach=REACH)
+    assert_same_to_rounding(turned.spectra, family.spectra)
 
 
 def test_tables_that_say_nothing_of_film_and_sphere_count_as_proportional() -> None:

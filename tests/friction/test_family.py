@@ -1,6 +1,7 @@
 """A family between its values: bounded coordinate, interpolation, and what it refuses."""
 
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -76,6 +77,15 @@ def test_a_family_is_not_extrapolated() -> None:
             short.at(beyond)
 
 
+def test_a_family_cannot_be_changed_and_survives_another_process() -> None:
+    one = family()
+    with pytest.raises(ValueError, match="read-only"):
+        one.spectra[0, 0, 0] = 0.0
+    again = pickle.loads(pickle.dumps(one))
+    assert_same_to_rounding(again.at(0.2).spectra, one.at(0.2).spectra)
+    assert_same_to_rounding(again.changes["thickness"], one.changes["thickness"])
+
+
 @pytest.mark.parametrize("wrong", [-0.1, math.nan])
 def test_a_value_that_is_none_is_refused(wrong: float) -> None:
     with pytest.raises(InputError, match="not negative"):
@@ -91,17 +101,14 @@ def test_some_of_the_loads_are_picked_in_the_order_given() -> None:
     assert_same_to_rounding(turned.changes["thickness"], one.changes["thickness"][:, ::-1])
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("values", np.array([0.0, 0.3, 0.1, 1.0, 2.0])),
-        ("values", np.array([-0.1, 0.0, 0.1, 1.0, 2.0])),
-        ("spectra", np.ones((5, 2, 3))),
-        ("changes", {"thickness": np.ones((5, 1, 3))}),
-        ("depths", np.ones((2, 5))),
-        ("scale", 0.0),
-    ],
-)
+@pytest.mark.parametrize(("name", "value"), [
+    ("values", np.array([0.0, 0.3, 0.1, 1.0, 2.0])),
+    ("values", np.array([-0.1, 0.0, 0.1, 1.0, 2.0])),
+    ("spectra", np.ones((5, 2, 3))),
+    ("changes", {"thickness": np.ones((5, 1, 3))}),
+    ("depths", np.ones((2, 5))),
+    ("scale", 0.0),
+])  # fmt: skip
 def test_what_does_not_fit_together_is_refused(name: str, value: object) -> None:
     with pytest.raises(InputError):
         replace(family(), **{name: value})

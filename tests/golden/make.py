@@ -14,8 +14,6 @@ A long list of numbers is kept as its length, a few values, mean and root mean s
 cannot repeat is masked: dates, digests, and versions of programs.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import gzip

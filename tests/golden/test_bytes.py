@@ -1,7 +1,5 @@
 """Two runs of the commands of ``commands_of_files.txt`` write the same bytes at the same time."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Printed results, public names and the contents of old files stay what they were."""
 
-from __future__ import annotations
-
 from operator import attrgetter
 from pathlib import Path
 from typing import Any

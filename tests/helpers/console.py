@@ -1,13 +1,11 @@
 """What tests of the command line need: the outcome of a run, and a look at a folder."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class Outcome:
         assert isinstance(value, dict)
         return value
 
-    def exits(self, code: int, *words: str) -> Outcome:
+    def exits(self, code: int, *words: str) -> Self:
         """Assert the exit code, and that words stand in the messages."""
         assert self.code == code, self.err
         for word in words:

@@ -179,16 +179,13 @@ def test_profiles_of_several_scans_know_theirs() -> None:
     assert [p.lubrication for p in found.profiles] == ["dry"] * 4 + ["lubricated"]
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"sensor": StressSensor(name="another", channel="zz")}, 'sensor "another".*"a simulated'),
-        ({"sensor": StressSensor(name="a simulated sensor", channel="xz")}, "channel xz.*zz"),
-        ({"film": replace(EXACT_FILM, thickness=2.2e-3)}, r"thickness 2\.2 mm.*2 mm"),
-        ({"film": replace(EXACT_FILM, young_modulus=3e6)}, "young modulus 3 MPa.*2.2 MPa"),
-        ({"film": replace(EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"sensor": StressSensor(name="another", channel="zz")}, 'sensor "another".*"a simulated'),
+    ({"sensor": StressSensor(name="a simulated sensor", channel="xz")}, "channel xz.*zz"),
+    ({"film": replace(EXACT_FILM, thickness=2.2e-3)}, r"thickness 2\.2 mm.*2 mm"),
+    ({"film": replace(EXACT_FILM, young_modulus=3e6)}, "young modulus 3 MPa.*2.2 MPa"),
+    ({"film": replace(EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
+])  # fmt: skip
 def test_what_does_not_belong_together_is_refused_by_both_names(changes, words) -> None:
     scan = replace(contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)
     with pytest.raises(InputError, match=rf"s\.h5 does not belong to the artifact: .*{words}"):

@@ -8,6 +8,8 @@ from scipy.special import j1
 
 from memscal import ElasticFilm, Rod, Sphere, indent
 
+ROD, SPHERE = Rod(radius=0.25e-3), Sphere(radius=128.8e-3)
+
 
 def film(nu: float) -> ElasticFilm:
     return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
@@ -17,14 +19,17 @@ def film(nu: float) -> ElasticFilm:
 def test_the_first_moment_of_the_shear_is_that_of_a_column_under_the_load(nu: float) -> None:
     # Equilibrium of the whole film: at small k every film is an oedometer under the mean
     # pressure, whose radial stress nu/(1 - nu) p on its thickness h is what the base holds.
-    contact = indent(film(nu), Rod(radius=0.25e-3), load=2.0)
+    contact = indent(film(nu), ROD, load=2.0)
     k = 1e-3 / film(nu).thickness
     moment = contact.base_shear_spectrum(k) / k
     assert moment == pytest.approx(-2.0 * nu / (1 - nu) * film(nu).thickness, rel=1e-5)
 
 
-def test_the_spectrum_is_an_integral_of_the_shear_and_odd_in_k() -> None:
-    contact = indent(film(0.5), Sphere(radius=128.8e-3), load=1.37, friction=0.2)
+@pytest.mark.parametrize(
+    ("indenter", "nu", "friction"), [(SPHERE, 0.5, 0.2), (ROD, 0.3, 0.0), (ROD, 0.5, np.inf)]
+)
+def test_the_spectrum_is_an_integral_of_the_shear_and_odd_in_k(indenter, nu, friction) -> None:
+    contact = indent(film(nu), indenter, load=1.37, friction=friction)
     k = np.array([150.0, 700.0, 2000.0])
     # Even radii, a hundred to the film's thickness, over which the shear is smooth.
     r = np.linspace(0.0, 80e-3, 4001)

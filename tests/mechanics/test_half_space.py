@@ -49,6 +49,7 @@ def test_the_coupling_is_elementary() -> None:
     np.testing.assert_allclose(beyond @ EVEN, (1 - inside**2) / 2, atol=1e-15)
     over_x = np.divide(inside**3 / 3, x, out=np.zeros_like(x), where=x > 0)
     np.testing.assert_allclose(within @ EVEN, over_x, atol=1e-15)
+    assert np.all(singular_integrals(np.zeros(1), EVEN)[1] == 0)  # on the axis nothing moves aside
 
 
 def test_the_transforms_of_the_hats_sum_to_those_of_simple_tractions() -> None:

@@ -22,13 +22,10 @@ def press(interface: Interface | None = None, load: float = 1.37, mu: float = 0.
     return indent(FILM, SPHERE, load=load, friction=mu, interface=interface, rings=64)
 
 
-@pytest.mark.parametrize(
-    ("parameter", "separation", "pressure"),
-    [
-        *[(4, d, p) for d, p in ((2, 0.0266), (1, 0.3027), (0, 1.7202), (-1, 5.6185))],
-        *[(17, d, p) for d, p in ((1, 1.2865), (0, 7.3107), (-1, 23.8785))],
-    ],
-)
+@pytest.mark.parametrize(("parameter", "separation", "pressure"), [
+    *[(4, d, p) for d, p in ((2, 0.0266), (1, 0.3027), (0, 1.7202), (-1, 5.6185))],
+    *[(17, d, p) for d, p in ((1, 1.2865), (0, 7.3107), (-1, 23.8785))],
+])  # fmt: skip
 def test_greenwood_and_tripp_s_own_values(parameter, separation, pressure) -> None:
     # p in E* sqrt(sigma / 8B), mu = (8/3) eta sigma sqrt(2 B beta); here sigma = B = beta = 1.
     density = parameter * 3 / (8 * math.sqrt(2))
@@ -150,19 +147,16 @@ def test_a_path_through_a_compliant_interface_loses_work_in_every_cycle() -> Non
     assert contacts[2].depth == pytest.approx(contacts[0].depth, rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Interface(slip_length=-1e-6), "slip length"),
-        (lambda: Interface(slip_length=math.nan), "slip length"),
-        (lambda: ExponentialCompliance(decay_length=-1.0, reference_pressure=1.0), "decay length"),
-        (lambda: ExponentialCompliance(decay_length=1.0, reference_pressure=0.0), "reference"),
-        (
-            lambda: GreenwoodTripp(roughness=1e-6, asperity_density=0.0, asperity_radius=1e-6),
-            "density",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: Interface(slip_length=-1e-6), "slip length"),
+    (lambda: Interface(slip_length=math.nan), "slip length"),
+    (lambda: ExponentialCompliance(decay_length=-1.0, reference_pressure=1.0), "decay length"),
+    (lambda: ExponentialCompliance(decay_length=1.0, reference_pressure=0.0), "reference"),
+    (
+        lambda: GreenwoodTripp(roughness=1e-6, asperity_density=0.0, asperity_radius=1e-6),
+        "density",
+    ),
+])  # fmt: skip
 def test_laws_that_make_no_sense_are_refused(make: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         make()

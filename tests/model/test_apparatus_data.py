@@ -21,15 +21,12 @@ def test_an_uncertainty_is_the_root_of_its_variance(deviations: list[float]) -> 
     assert "another" not in parameters
 
 
-@pytest.mark.parametrize(
-    ("values", "covariance", "units"),
-    [
-        (np.zeros(3), np.zeros((2, 2)), ()),
-        (np.zeros(2), np.zeros((3, 3)), ()),
-        (np.zeros(2), np.zeros(2), ()),
-        (np.zeros(2), np.zeros((2, 2)), ("m",)),
-    ],
-)
+@pytest.mark.parametrize(("values", "covariance", "units"), [
+    (np.zeros(3), np.zeros((2, 2)), ()),
+    (np.zeros(2), np.zeros((3, 3)), ()),
+    (np.zeros(2), np.zeros(2), ()),
+    (np.zeros(2), np.zeros((2, 2)), ("m",)),
+])  # fmt: skip
 def test_parameters_that_do_not_fit_together_are_refused(values, covariance, units) -> None:
     with pytest.raises(InputError, match="2 parameter names"):
         ParameterSet(("a", "b"), values, covariance, units)

@@ -23,22 +23,19 @@ def test_the_moduli_are_those_of_isotropic_elasticity(nu: float, modulus: float)
     assert film.contact_modulus == pytest.approx(2 * film.shear_modulus / (1 - nu))
 
 
-@pytest.mark.parametrize(
-    ("changes", "named"),
-    [
-        ({"young_modulus": 0.0}, "young_modulus is 0 Pa"),
-        ({"young_modulus": float("inf")}, "young_modulus is inf Pa"),
-        ({"poisson_ratio": 0.5000001}, "poisson_ratio"),
-        ({"poisson_ratio": -0.1}, "poisson_ratio is -0.1"),
-        ({"poisson_ratio": float("nan")}, "poisson_ratio is nan"),
-        ({"thickness": -2e-3}, "thickness is -0.002 m"),
-        ({"roughness_rms": -1e-6}, "roughness_rms"),
-        ({"young_modulus_uncertainty": -1.0}, "uncertainty of film young_modulus"),
-        ({"poisson_ratio_uncertainty": float("nan")}, "uncertainty of film poisson_ratio"),
-        ({"thickness_uncertainty": float("inf")}, "uncertainty of film thickness"),
-        ({"roughness_rms_uncertainty": -1e-9}, "uncertainty of film roughness_rms"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "named"), [
+    ({"young_modulus": 0.0}, "young_modulus is 0 Pa"),
+    ({"young_modulus": float("inf")}, "young_modulus is inf Pa"),
+    ({"poisson_ratio": 0.5000001}, "poisson_ratio"),
+    ({"poisson_ratio": -0.1}, "poisson_ratio is -0.1"),
+    ({"poisson_ratio": float("nan")}, "poisson_ratio is nan"),
+    ({"thickness": -2e-3}, "thickness is -0.002 m"),
+    ({"roughness_rms": -1e-6}, "roughness_rms"),
+    ({"young_modulus_uncertainty": -1.0}, "uncertainty of film young_modulus"),
+    ({"poisson_ratio_uncertainty": float("nan")}, "uncertainty of film poisson_ratio"),
+    ({"thickness_uncertainty": float("inf")}, "uncertainty of film thickness"),
+    ({"roughness_rms_uncertainty": -1e-9}, "uncertainty of film roughness_rms"),
+])  # fmt: skip
 def test_a_film_that_cannot_be_is_refused_by_name(changes: dict[str, Any], named: str) -> None:
     with pytest.raises(InputError, match=named):
         replace(FILM, **changes)
@@ -91,21 +88,21 @@ def test_a_profile_goes_through_its_table_and_nowhere_else() -> None:
     assert np.all(profile.height(np.linspace(0.0, 1e-3, 20)) == 0)
     assert profile.height(3.01e-3) == np.inf
     assert repr(profile) == "<Profile: 4 radii to 3 mm, heights to 9 um>"
+    same = Profile(r=profile.r, z=profile.z)
+    assert (profile == same, hash(profile) == hash(same)) == (True, True)
+    assert profile != Profile(r=profile.r, z=2 * profile.z)
 
 
-@pytest.mark.parametrize(
-    ("r", "z", "message"),
-    [
-        ([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, 3.0, 4.0], "touches first"),
-        ([0.0, 1.0, 2.0, 3.0], [0.0, -1.0, 3.0, 4.0], "lowest height"),
-        ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0], "press a Rod"),
-        ([0.0, 1.0, 2.0, 3.0], [0.0, math.nan, 3.0, 4.0], "height .* not finite"),
-        ([0.0, 2.0, 1.0, 3.0], [0.0, 1.0, 2.0, 3.0], "increase"),
-        ([0.5, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, 3.0], "first at the axis"),
-        ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], "four or more"),
-        ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0], "3 heights"),
-    ],
-)
+@pytest.mark.parametrize(("r", "z", "message"), [
+    ([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, 3.0, 4.0], "touches first"),
+    ([0.0, 1.0, 2.0, 3.0], [0.0, -1.0, 3.0, 4.0], "lowest height"),
+    ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0], "press a Rod"),
+    ([0.0, 1.0, 2.0, 3.0], [0.0, math.nan, 3.0, 4.0], "height .* not finite"),
+    ([0.0, 2.0, 1.0, 3.0], [0.0, 1.0, 2.0, 3.0], "increase"),
+    ([0.5, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, 3.0], "first at the axis"),
+    ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], "four or more"),
+    ([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0], "3 heights"),
+])  # fmt: skip
 def test_a_profile_that_cannot_touch_is_refused(r, z, message) -> None:
     with pytest.raises(InputError, match=f"(?i){message}"):
         Profile(r=r, z=z)

@@ -164,29 +164,26 @@ def test_the_defaults_are_the_papers_scan() -> None:
     np.testing.assert_allclose(np.diff(scan.x), 0.5e-3)
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "problem"),
-    [
-        ({"load": []}, InputError, "list of loads is empty"),
-        ({"load": [0.3, 0.3]}, InputError, "given twice"),
-        ({"load": [-1.0]}, InputError, "load is -1 N"),
-        ({"load": 1e7}, DomainError, "load|film"),
-        ({"points": 1}, InputError, "two contacts"),
-        ({"repeats": 0}, InputError, "one row"),
-        ({"seed": -1}, InputError, "seed"),
-        ({"spacing": 0.0}, InputError, "spacing"),
-        ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
-        ({"load_reading": -0.1}, InputError, "load_reading"),
-        ({"load_scale": 0.0}, InputError, "load_scale"),
-        ({"position_error": -1e-6}, InputError, "position_error"),
-        ({"noise": float("nan")}, InputError, "noise"),
-        ({"centre": (float("inf"), 0.0)}, InputError, "centre"),
-        ({"friction": -0.1}, InputError, "friction"),
-        ({"lubrication": "wet"}, InputError, "lubrication"),
-        ({"lubrication": "dry", "lubricant": "oil"}, InputError, "lubricant"),
-        ({"kernel": 561e-6}, InputError, "transform"),
-    ],
-)
+@pytest.mark.parametrize(("options", "error", "problem"), [
+    ({"load": []}, InputError, "list of loads is empty"),
+    ({"load": [0.3, 0.3]}, InputError, "given twice"),
+    ({"load": [-1.0]}, InputError, "load is -1 N"),
+    ({"load": 1e7}, DomainError, "load|film"),
+    ({"points": 1}, InputError, "two contacts"),
+    ({"repeats": 0}, InputError, "one row"),
+    ({"seed": -1}, InputError, "seed"),
+    ({"spacing": 0.0}, InputError, "spacing"),
+    ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
+    ({"load_reading": -0.1}, InputError, "load_reading"),
+    ({"load_scale": 0.0}, InputError, "load_scale"),
+    ({"position_error": -1e-6}, InputError, "position_error"),
+    ({"noise": float("nan")}, InputError, "noise"),
+    ({"centre": (float("inf"), 0.0)}, InputError, "centre"),
+    ({"friction": -0.1}, InputError, "friction"),
+    ({"lubrication": "wet"}, InputError, "lubrication"),
+    ({"lubrication": "dry", "lubricant": "oil"}, InputError, "lubricant"),
+    ({"kernel": 561e-6}, InputError, "transform"),
+])  # fmt: skip
 def test_what_cannot_be_scanned_is_refused(options, error, problem) -> None:
     with pytest.raises(error, match=problem):
         simulate_contacts(**{"load": [0.34], **options})
@@ -308,18 +305,15 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> No
     assert lubricated["decay_length"] == 1e-6
 
 
-@pytest.mark.parametrize(
-    ("options", "problem"),
-    [
-        ({"gain": 0.0}, "gain is 0"),
-        ({"thickness_factor": -1.0}, "thickness_factor"),
-        ({"load_uncertainty": -0.1}, "uncertainty of the load"),
-        ({"seed": -1}, "seed is -1"),
-        ({"loads": []}, "list of loads is empty"),
-        ({"rod_load": 0.0}, "load"),
-        ({"repeats": 0}, "one row"),
-    ],
-)
+@pytest.mark.parametrize(("options", "problem"), [
+    ({"gain": 0.0}, "gain is 0"),
+    ({"thickness_factor": -1.0}, "thickness_factor"),
+    ({"load_uncertainty": -0.1}, "uncertainty of the load"),
+    ({"seed": -1}, "seed is -1"),
+    ({"loads": []}, "list of loads is empty"),
+    ({"rod_load": 0.0}, "load"),
+    ({"repeats": 0}, "one row"),
+])  # fmt: skip
 def test_an_experiment_that_cannot_be_made_is_refused(options, problem) -> None:
     with pytest.raises(InputError, match=problem):
         memscal.simulate_experiment(**{**FEW, **options})

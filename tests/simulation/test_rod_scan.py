@@ -163,25 +163,22 @@ def test_another_film_and_rod_are_simulated_as_they_are() -> None:
     assert scan.u_zz.max() > simulate(centre=(0.0, 0.0), points=9, **STILL).u_zz.max()
 
 
-@pytest.mark.parametrize(
-    ("options", "problem"),
-    [
-        ({"points": 1}, "two positions"),
-        ({"repeats": 0}, "one repeat"),
-        ({"raster": True, "repeats": 2}, "A raster has one repeat at one load"),
-        ({"raster": True, "load": [1.0, 2.0]}, "A raster has one repeat at one load"),
-        ({"load": 0.0}, "load"),
-        ({"load": float("nan")}, "load"),
-        ({"load_uncertainty": -0.1}, "uncertainty of the load"),
-        ({"conversion_constant": -1e-7}, "conversion_constant"),
-        ({"noise": float("nan")}, "noise"),
-        ({"half_range": 8.0}, "8"),
-        ({"load": []}, "load"),
-        ({"load": [-1.0, 3.0]}, "load"),
-        ({"seed": -1}, "seed"),
-        ({"centre": (float("nan"), 0.0)}, "centre"),
-    ],
-)
+@pytest.mark.parametrize(("options", "problem"), [
+    ({"points": 1}, "two positions"),
+    ({"repeats": 0}, "one repeat"),
+    ({"raster": True, "repeats": 2}, "A raster has one repeat at one load"),
+    ({"raster": True, "load": [1.0, 2.0]}, "A raster has one repeat at one load"),
+    ({"load": 0.0}, "load"),
+    ({"load": float("nan")}, "load"),
+    ({"load_uncertainty": -0.1}, "uncertainty of the load"),
+    ({"conversion_constant": -1e-7}, "conversion_constant"),
+    ({"noise": float("nan")}, "noise"),
+    ({"half_range": 8.0}, "8"),
+    ({"load": []}, "load"),
+    ({"load": [-1.0, 3.0]}, "load"),
+    ({"seed": -1}, "seed"),
+    ({"centre": (float("nan"), 0.0)}, "centre"),
+])  # fmt: skip
 def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         simulate(**options)
@@ -222,14 +219,11 @@ def test_any_object_with_the_three_methods_is_a_kernel() -> None:
     assert own.synthetic["centre_of_mass"] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("kernel", "problem"),
-    [
-        (Own(size=2.0), "transform is 2 at k = 0, not 1"),
-        (Own(size=float("nan")), "transform is nan at k = 0"),
-        (561e-6, r"a float, which has no transform\(\)"),
-    ],
-)
+@pytest.mark.parametrize(("kernel", "problem"), [
+    (Own(size=2.0), "transform is 2 at k = 0, not 1"),
+    (Own(size=float("nan")), "transform is nan at k = 0"),
+    (561e-6, r"a float, which has no transform\(\)"),
+])  # fmt: skip
 def test_what_is_no_apparatus_function_is_refused(kernel: Any, problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         simulate(kernel=kernel, points=9)

@@ -136,8 +136,10 @@ def _checked(
     blocks = []
     for block in header["cells"]:
         numbers = arrays[block["nodes"]]
-        if not numbers.size:
+        if not len(numbers):
             continue
+        if not numbers.size:
+            raise _unusable(sources[0], "a cell without nodes")
         with np.errstate(invalid="ignore"):
             nodes = numbers.astype(np.int64)
         if nodes.ndim != 2 or not (

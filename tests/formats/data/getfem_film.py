@@ -6,8 +6,6 @@ nu = 1/2, bonded at y = 0, under 1 N spread as a Gaussian with a standard deviat
 Axisymmetric: x is the radius, y the height.  Taylor-Hood elements on rectangles.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

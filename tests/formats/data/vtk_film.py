@@ -4,8 +4,6 @@ Needs the package vtk; nothing of memscal is in it.  In mm and MPa: a section wi
 tensor whose component yy carries 1 N at the base, texts beside it, and the stress in the cells.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -121,6 +121,19 @@ def test_the_base_carries_the_load(pressed_rods: tuple[Contact, ...]) -> None:
         assert state.inside.base_spectrum(np.zeros(1))[0] == pytest.approx(state.load, rel=1e-5)
 
 
+def test_the_departure_of_the_base_stress_grows_linearly_at_first(pressed_rods) -> None:
+    once, twice, _ = pressed_rods
+    (hardly,) = solve_finite_strain(
+        FILM, ROD, (Depth(1e-8),), sticking=bool(np.isinf(once.friction)), edge=EDGE, refinement=0.6
+    )
+    k = np.array([1500.0])
+    light, medium, heavy = (
+        state.inside.base_spectrum(k)[0] / state.load for state in (hardly, once, twice)
+    )
+    assert abs(medium / light - 1) > 1e-4
+    assert (heavy / light - 1) / (medium / light - 1) == pytest.approx(2.0, rel=0.25)
+
+
 def test_the_work_of_the_rod_is_the_energy_of_the_film(pressed_rods: tuple[Contact, ...]) -> None:
     last = pressed_rods[-1]
     assert last.work == pytest.approx(last.elastic_energy, rel=1e-3)
