@@ -46,6 +46,8 @@ def load_groups(load: FloatArray) -> NDArray[np.intp]:
 
 def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | None:
     """Predict each group of points from the others; ``None`` with fewer than two such groups."""
+    # The distance of the group's data from the prediction, in the covariance of noise and
+    # parameters, is S(all) - S(others) of residual sums of squares (Chow, Econometrica 28, 1960).
     if np.unique(group).size < 2:
         return None
     # Clipped: many outliers in one group count together, and a single one counts little.
@@ -53,7 +55,7 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     # Centre, baseline and drift are fitted to a held-out group by itself.
     nuisances = int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
     columns = model.design[:, 2 : 2 + nuisances]
-    fold = _folds(group)[model.kept]
+    fold = _folds(group)[model.point]
     outcomes = {
         int(i): outcome
         for i in np.unique(fold)
