@@ -279,8 +279,10 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     )
     # At a width of zero every slope by the width is zero: steps do not leave it.
     if solution is None or solution[1] < _NARROWEST:
-        accuracy = {"xtol": 1e-10, "ftol": 1e-12, "gtol": 1e-10, "max_nfev": 100}
-        result = least_squares(residual, begin, jac=slope, loss=loss, f_scale=_KNEE, **accuracy)
+        result = least_squares(
+            residual, begin, slope, loss=loss, f_scale=_KNEE,
+            xtol=1e-10, ftol=1e-12, gtol=1e-10, max_nfev=100,
+        )  # fmt: skip
         if not result.success:
             raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
         solution = np.asarray(result.x)

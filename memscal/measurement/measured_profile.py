@@ -249,10 +249,12 @@ def prepared_scan(
     prepared = PreparedScan(_at_nominal(single, np.zeros_like(scan.u_zz)), _stated(scan), False)
     if scan.normal_load is None:
         return prepared
+    errors = scan.normal_load_errors
+    load_share = 0.0 if errors is None else np.nan_to_num(errors) / single.load
     for _ in range(_ROUNDS):
         estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
         slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
-        of_load = _load_noise(single, slope)
+        of_load = np.abs(slope) * load_share
         electronic, estimated = _stated(scan), False
         if scan.u_zz_errors is None and of_load.any():
             noise = _noise_of_load(estimate, of_load[np.isfinite(prepared.scan.u_zz)])
@@ -280,11 +282,6 @@ def _at_nominal(single: SingleLoad, slope: FloatArray) -> Scan:
         return scan
     shift = slope * np.log(scan.normal_load / single.load)
     return replace(scan, u_zz=scan.u_zz - shift, normal_load=None, normal_load_errors=None)
-
-
-def _load_noise(single: SingleLoad, slope: FloatArray) -> FloatArray:
-    errors = single.scan.normal_load_errors
-    return np.abs(slope) * (0.0 if errors is None else np.nan_to_num(errors) / single.load)
 
 
 def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan:

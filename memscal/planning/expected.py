@@ -94,8 +94,8 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
 def _propagated(solution: Solution) -> Results:
     estimate, deconvolution = solution.estimate, solution.deconvolution
     effects = input_effects(solution.scans, solution.stresses, estimate)
-    window = solution.fields.along_axis(deconvolution.quotient.window)[0]
-    return propagate(estimate, deconvolution, solution.window_at_nodes, window, effects, {})
+    wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
+    return propagate(estimate, deconvolution, solution.window_at_nodes, wavenumbers, effects, {})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
