@@ -352,6 +352,11 @@ class Calibration(Result):
         -------
         Sweep
             A, both widths and the reconvolution for each.
+
+        Raises
+        ------
+        InputError
+            If a number is out of range, or the scan's fields cannot be divided.
         """
         return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
 

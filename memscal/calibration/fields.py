@@ -67,7 +67,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
 def constrained_kernel(
     estimate: ProfileEstimate, fields: Fields
 ) -> Callable[[bool, bool], tuple[KernelProfile, FloatArray]]:
-    """Return what gives A G of the estimate and its values on the grid, as constrained."""
+    """Return a function for A G of the estimate under constraints, with values on the grid."""
 
     def posterior(nonnegative: bool, monotone: bool) -> tuple[KernelProfile, FloatArray]:
         profile = constrained_profile(estimate, nonnegative=nonnegative, monotone=monotone)

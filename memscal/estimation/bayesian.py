@@ -380,7 +380,7 @@ def _average(
         if p > 0:
             _add_gain(gain, linear, conditional, p)
     mean = gain @ linear.data
-    # The data move the probabilities, too: d(p m) = (m - mean) p d(log marginal likelihood).
+    # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
     moving, covariance = np.zeros_like(gain), np.zeros((count, count))
     for p, q, conditional in zip(estimate, uncertainty, conditionals, strict=True):
         if p == 0 and q == 0:

@@ -198,7 +198,7 @@ def _undetermined(model: ForwardModel, conversion_constant: float | None = None)
 
 _Loss = Literal["linear", "soft_l1"]
 
-#: A step in the ellipticity that the solver takes for one.
+#: Scale of the ellipticity in the solver.
 _TYPICAL_ELLIPTICITY = 0.2
 #: Standardised residual from which on the robust fit's loss grows linearly.
 _KNEE = 3.0
@@ -271,7 +271,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     def slope(scaled: FloatArray) -> FloatArray:
         return standardised(evaluate(scaled).jacobian, weights) * scale / noise
 
-    # A robust fit is only where the next one starts.
+    # A robust fit is the start of the next one: a low accuracy is enough.
     knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
     begin = start / scale
     solution = gauss_newton(

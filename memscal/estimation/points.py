@@ -310,7 +310,7 @@ def _require_positive_peak(points: ScanPoints) -> None:
     u = points.u / points.load
     distance = np.hypot(points.x - np.median(points.x), points.y - np.median(points.y))
     baseline = np.median(u[distance >= np.quantile(distance, 0.75)])
-    # Three points of a peak outvote single outliers of either sign.
+    # The median of three points does not follow a single outlier.
     ordered = np.sort(u - baseline)
     rise, fall = np.median(ordered[-3:]), -np.median(ordered[:3])
     if fall > 1.5 * rise:

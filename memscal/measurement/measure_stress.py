@@ -330,7 +330,7 @@ def _prepared(single: SingleLoad, sensor: ApparatusFunction, signal: ContactSign
 
 
 def _placed(failure: FitError | InputError, single: SingleLoad) -> FitError | InputError:
-    """Say in which file and at which load something failed."""
+    """Return the error with its file and load in front."""
     return type(failure)(
         f"{place_of(single.scan, single)}: {failure.problem}", why=failure.why, cure=failure.cure
     )

@@ -302,9 +302,9 @@ def _with_noise(scan: Scan, electronic: FloatArray, of_load: FloatArray) -> Scan
 def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
     """Noise beside that of the loads, by maximum likelihood of the residuals."""
     residual, weight = estimate.weighed.residual, estimate.outlier_weight
-    # What was fitted took its share of the scatter with it.
-    taken = 3 + estimate.model.drift_columns.shape[1]
-    square = weight * residual**2 * residual.size / max(residual.size - taken, 1)
+    # The fitted parameters lower the scatter of the residuals.
+    fitted = 3 + estimate.model.drift_columns.shape[1]
+    square = weight * residual**2 * residual.size / max(residual.size - fitted, 1)
     scatter = 1.4826 * float(np.median(np.abs(residual)))
     tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * estimate.largest_signal)
     variance = tried[:, None] ** 2 + of_load**2

@@ -98,7 +98,7 @@ class PressureShape:
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
-    """Return the shapes that a restoration weighs against each other."""
+    """Return the shapes that a restoration averages."""
     shears = _SHEARS_INCOMPRESSIBLE if (film.poisson_ratio > _FLOWING) else _SHEARS_COMPRESSIBLE
     return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
 
@@ -139,7 +139,7 @@ class ShapeFit:
 
 
 def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
-    """Fit a shape from where a Gaussian has been, and weigh departures from it."""
+    """Fit a shape, starting from the Gaussian fit, and average departures from it."""
     model, weights = start.model, start.weights
     fit = _fit(shape, model, weights, start.gaussian)
     rings = departure_basis(model, fit)

@@ -35,12 +35,12 @@ _MOST_REPEATS = 10_000
 _MOST_POSITIONS = 513
 #: Farther away, in thicknesses of the film, the signal has decayed.
 _FARTHEST = 20
-#: A step of more Gaussian widths does not sample G: what is stated of it is the prior's alone.
+#: A step of more Gaussian widths does not sample G: its width then follows from the prior alone.
 _WIDEST_STEP = 2.0
 _FEWEST_POSITIONS = 6
 _GROWTH = 1.6
 
-#: What a source is, and what would make it smaller, for those that more scanning does not.
+#: What lowers the contribution of a source that more scanning does not lower.
 _CURES = {
     "thickness": "Measure the film's thickness better.",
     "poisson_ratio": "Determine the film's Poisson's ratio better.",
