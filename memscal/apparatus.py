@@ -231,12 +231,26 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
     path : path-like
         A file written by ``memscal calibrate`` or :meth:`ApparatusFunction.save`.
 
+    Returns
+    -------
+    ApparatusFunction
+        The calibrated sensor; ``source`` names its file.
+
     Raises
     ------
     FormatError
         If the file is no artifact, is damaged, or was changed after it was written.
     SchemaVersionError
         If it was written under a newer major version of the format.
+
+    Examples
+    --------
+    >>> import memscal, tempfile
+    >>> apparatus = memscal.calibrate(memscal.simulate(seed=1)).apparatus
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     apparatus.save(f"{folder}/sensor.h5")
+    ...     memscal.load_apparatus(f"{folder}/sensor.h5").gaussian_sigma == apparatus.gaussian_sigma
+    True
     """
     from memscal.formats.artifact import artifact_from
     from memscal.formats.hdf5.reader import open_hdf5

@@ -1,1 +1,1 @@
-"""Radial profiles and the two-dimensional axisymmetric fields that they stand for."""
+"""Radial profiles and their two-dimensional fields: Hankel transforms, grids, kernels."""

@@ -2,7 +2,7 @@ r"""Grids on which fields are transformed, and the field of a radial profile on 
 
 A field lifted from a radial profile is real and even in x and in y: a quarter of the plane
 holds it all, and its Fourier transform is a type-I cosine transform
-(:class:`EvenGrid`).  A measured raster is neither; it lives on a :class:`Lattice`.
+(:class:`EvenGrid`).  A measured raster is neither; its grid is a :class:`Lattice`.
 Both scale their transforms to approximate :math:`\hat f(k) = \int f e^{-ikx} dx\,dy`.
 """
 

@@ -1,4 +1,4 @@
-r"""Radial apparatus functions whose transform is known in closed form.
+r"""Radial apparatus functions whose transform has a closed form.
 
 With the transforms of :mod:`memscal.axisymmetry.hankel`, a kernel :math:`G` of unit integral has
 :math:`\hat G(0) = 1`.
@@ -48,7 +48,7 @@ class RadialKernel(Protocol):
         """G at radii ``r`` (m), in 1/m^2."""
 
     def describe(self) -> Mapping[str, float | str]:
-        """What a simulated scan keeps as its truth: text, or SI numbers by known names."""
+        """What a simulated scan keeps as its truth: text, or SI numbers by name."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class SmoothedDisc:
     def radial(self, r: FloatArray) -> FloatArray:
         """G at radii ``r`` (m), in 1/m^2."""
         radii = np.abs(np.asarray(r, dtype=np.float64))
-        # The disc's own transform turns as fast as its radius says, J0(kr) as r does.
+        # The disc's transform oscillates in k with its radius, J0(kr) with r.
         fastest = self.radius + float(radii.max(initial=0.0))
         wavenumbers = Wavenumbers.covering(_VANISHED / self.sigma, fastest)
         return wavenumbers.synthesise(self.transform(wavenumbers.k), radii)

@@ -1,1 +1,1 @@
-"""The steps of a calibration between the estimated profile and the artifact."""
+"""Calibration from scans to the artifact: steps, uncertainty, checks, and many scans."""

@@ -17,7 +17,7 @@ from memscal.calibration.checks import quality_checks
 from memscal.calibration.stages import Solution, field_noise, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
-from memscal.deconvolution.division import Regulariser, create_regulariser
+from memscal.deconvolution.division import Regulariser, chosen_method
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
@@ -166,7 +166,7 @@ _SAME = 1e-6
 def calibration_messages(
     solution: Solution, checks: tuple[QualityCheck, ...]
 ) -> tuple[Message, ...]:
-    """Return the messages that accompany a result, the gravest first."""
+    """Return the messages that accompany a result, warnings first."""
     estimate, scan = solution.estimate, solution.scan
     messages = failed_check_messages(checks)
     messages += _channel(estimate)
@@ -352,6 +352,11 @@ class Calibration(Result):
         -------
         Sweep
             A, both widths and the reconvolution for each.
+
+        Raises
+        ------
+        InputError
+            If a number is out of range, or the scan's fields cannot be divided.
         """
         return sweep_noise(self.solution, amplitudes=amplitudes, draws=draws, seed=seed)
 
@@ -424,7 +429,7 @@ def calibrate(
         require_calibration_rod(rod_scan)
     references = _references(reference, scans)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
-    regulariser = chosen_method(method, seed, options)
+    regulariser = chosen_method(method, options, seed=seed)
     solution = solve(scans, stresses, regulariser, channel)
     effects = _effects(solution, None if alternative is None else _references(alternative, scans))
     results = uncertainties(solution, effects, correlations or {})
@@ -467,23 +472,6 @@ def _read(reference: Reference) -> StressProfile | Contact | None:
     )
 
 
-def chosen_method(method: str | Regulariser, seed: int, options: Mapping[str, Any]) -> Regulariser:
-    """Set up the method of division, by its name or as it was given."""
-    if isinstance(method, str):
-        return create_regulariser(method, seed=seed, **options)
-    if isinstance(method, type) or not callable(getattr(method, "divide", None)):
-        raise InputError(
-            f"The method is {method!r}, which cannot divide fields.",
-            cure="Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov.",
-        )
-    if options:
-        raise InputError(
-            f"Options {', '.join(options)} were given beside a regulariser that is set up already.",
-            cure="Set them on the regulariser, or give the method by name.",
-        )
-    return method
-
-
 def _settings(regulariser: Regulariser) -> Mapping[str, Any]:
     """Parameters of a regulariser, for the record."""
     method: Any = regulariser
@@ -497,9 +485,10 @@ def _effects(
     scans, estimate = solution.scans, solution.estimate
     spectra = None
     if alternatives is not None:
-        others = [other for other in alternatives if other is not None]
+        pairs = zip(alternatives, solution.stresses, strict=True)
+        stresses = [stress if other is None else other for other, stress in pairs]
         points = [estimate.points.only(i) for i in range(len(scans))]
-        spectra = reference_spectra(others, points, [scan.film.thickness for scan in scans])
+        spectra = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
     return input_effects(scans, solution.stresses, estimate, spectra)
 
 

@@ -1,4 +1,4 @@
-"""The quality checks of a calibration: value, limit, and what a failure means."""
+"""Quality checks of a calibration: value, limit, and what a failure means."""
 
 from __future__ import annotations
 
@@ -247,6 +247,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
         *_constraint(solution),
         *_agreements(solution, parameters),
         *_set_up(solution),
+        *_reference_and_outliers(solution),
         *model_checks(solution.estimate),
     )
 
@@ -328,7 +329,7 @@ def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityChe
 
 
 def _set_up(solution: Solution) -> list[QualityCheck]:
-    """Film, band, reach, baseline and reference."""
+    """Film, band, reach and baseline."""
     estimate = solution.estimate
     resolved = solution.band.resolved
     return [
@@ -363,6 +364,12 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
             "Change of the baseline across the scan over the largest signal. It is fitted and "
             "removed as a straight line; a failure means that what is left of it may bias A.",
         ),
+    ]
+
+
+def _reference_and_outliers(solution: Solution) -> list[QualityCheck]:
+    estimate = solution.estimate
+    return [
         check(
             "reference_force",
             abs(carried_force(solution.stress, estimate.model.reference) - 1.0),

@@ -67,7 +67,7 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
 def constrained_kernel(
     estimate: ProfileEstimate, fields: Fields
 ) -> Callable[[bool, bool], tuple[KernelProfile, FloatArray]]:
-    """Return what gives A G of the estimate and its values on the grid, as constrained."""
+    """Return a function for A G of the estimate under constraints, with values on the grid."""
 
     def posterior(nonnegative: bool, monotone: bool) -> tuple[KernelProfile, FloatArray]:
         profile = constrained_profile(estimate, nonnegative=nonnegative, monotone=monotone)
@@ -166,9 +166,9 @@ class RasterFields:
             raise InputError(
                 f"The raster's {points.u.size} points are not evenly spaced: they lie on no "
                 "lattice of rows and columns within a tenth of its step.",
-                why="This method divides a raster as a field, on its own lattice.",
-                cure='Use method="bayesian" (--method bayesian), which needs no lattice; or scan '
-                "evenly.",
+                why="A raster is divided as a field, on its own lattice, as in a sweep.",
+                cure='Use method="bayesian" (--method bayesian) without a sweep, which needs no '
+                "lattice; or scan evenly.",
             )
         if lattice is None:
             steps, nowhere = points.places[0].steps, np.zeros(0, dtype=np.intp)

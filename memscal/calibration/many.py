@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from typing import Any, ClassVar
 
-from memscal.calibration.calibrate import calibrate, chosen_method
+from memscal.calibration.calibrate import calibrate
+from memscal.deconvolution.division import chosen_method
 from memscal.errors import InputError, MemscalError
+from memscal.formats.opened import Scans
 from memscal.model.apparatus import ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.result import Result
 from memscal.model.scan import Scan
 from memscal.parallel import require_workers, worker_pool
 
-#: One item: a scan, its file, or several scans that are fitted together.
-FleetScan = Scan | str | PathLike[str] | Sequence[Scan]
 #: Scans that a process takes at a time.
 _LARGEST_CHUNK = 16
 
@@ -74,13 +74,13 @@ class FleetCalibration(Result):
 
 
 def calibrate_many(
-    scans: Iterable[FleetScan], *, workers: int = 1, **options: Any
+    scans: Iterable[Scans], *, workers: int = 1, **options: Any
 ) -> list[FleetCalibration]:
     """Calibrate with many scans, each by itself.
 
     Parameters
     ----------
-    scans : iterable of Scan, path, or sequence of Scan
+    scans : iterable of Scan, path, or sequence of them
         Scans or their files; a sequence within counts as one, and is fitted together.
     workers : int, default 1
         Processes that share the work.  Where these are more than one, a script needs the usual
@@ -115,7 +115,8 @@ def calibrate_many(
         )
     method, seed = options.get("method", "white-noise"), options.get("seed", 0)
     others = ("reference", "alternative", "channel", "method", "correlations", "seed")
-    chosen_method(method, seed, {name: v for name, v in options.items() if name not in others})
+    of_method = {name: value for name, value in options.items() if name not in others}
+    chosen_method(method, of_method, seed=seed)
     task = partial(_calibrated, options=options)
     items = list(enumerate(scans))
     if workers == 1 or len(items) < 2:
@@ -125,7 +126,7 @@ def calibrate_many(
         return list(pool.map(task, items, chunksize=chunk))
 
 
-def _calibrated(item: tuple[int, FleetScan], options: Mapping[str, Any]) -> FleetCalibration:
+def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCalibration:
     """Calibrate one scan; an error is part of its result."""
     index, scan = item
     try:

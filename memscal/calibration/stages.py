@@ -1,4 +1,4 @@
-"""The paper's steps from scans to A and G, without their uncertainty.
+"""Steps of the paper from scans to A and G, without their uncertainty.
 
 :func:`solve` makes the two fields of a scan and its reference, and :func:`deconvolve` divides
 them by the functions of :mod:`memscal.deconvolution.fourier_ratio`.
@@ -115,7 +115,7 @@ def prepare_fields(
 
 @dataclass(frozen=True)
 class Misfit:
-    """How well a prediction meets the scan."""
+    """Difference of a prediction from the scan."""
 
     relative_rms: float  # root-mean-square residual over the largest signal
     chi2_reduced: float  # chi-square against the noise per degree of freedom
@@ -172,6 +172,7 @@ class Solution:
             r = np.linspace(0.0, _FAR * reach, _RADII)
             flux = np.abs(spectrum.at(r)) * r
             return float(flux[r > reach].sum() / flux.sum())
+        # Within R the integral is that of R U(k) J_1(kR) dk over all k.
         k = spectrum.wavenumbers.k
         dk = 2 * np.pi * spectrum.wavenumbers.weights / k
         inside = reach * float(np.sum(dk * spectrum.values * j1(k * reach)))
@@ -214,6 +215,8 @@ class FieldNoise:
 
 def field_noise(solution: Solution, wavenumbers: FloatArray) -> FieldNoise | None:
     """Return what a raster's noise adds at wavenumbers (rad/m); ``None`` for a line scan."""
+    # Noise N of a component becomes w N/sigma in A G; over a lattice of area L^2 the mean of G over
+    # directions has cov(r, r') = 1/(2 pi L^2) int (w N/sigma)^2 J_0(kr) J_0(kr') k dk.
     estimate, deconvolution = solution.estimate, solution.deconvolution
     if not estimate.points.planar or estimate.points.scans > 1:
         return None

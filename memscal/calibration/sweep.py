@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from memscal.calibration.stages import Solution, deconvolve
+from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.deconvolution.division import Regulariser, WhiteNoise, WhiteNoiseDraw, require_count
 from memscal.errors import FitError
 from memscal.model.arrays import FloatArray
@@ -54,6 +54,8 @@ def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -
     """Repeat the division over two decades of noise amplitude and several seeds."""
     require_count("sweep", "amplitudes", amplitudes, 3)
     require_count("sweep", "draws", draws, 1)
+    # The method's own fields may be those of points that lie on no lattice: they cannot be divided.
+    solution = replace(solution, fields=prepare_fields(solution.estimate, solution.choice))
     amplitude = np.logspace(-1, 1, amplitudes)
     expected = np.array([_outcome(solution, WhiteNoise(amplitude=a)) for a in amplitude])
     drawn = np.array(

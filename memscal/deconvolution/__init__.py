@@ -1,1 +1,1 @@
-"""Division of the voltage field by the stress field: one regulariser per file."""
+"""Division of the voltage field by the stress field, on arrays."""

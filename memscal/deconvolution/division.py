@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
@@ -123,10 +123,10 @@ def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
     grid = problem.grid
     field = grid.from_image(image)
     modulus, voltage = np.abs(problem.reference_spectrum), np.abs(problem.voltage_spectrum)
-    kept = np.abs(grid.transfer(field)) * modulus
+    predicted = np.abs(grid.transfer(field)) * modulus
     # Where the reference has vanished, so has the voltage: their rounding has no window.
     relevant = modulus > _CLOSED * modulus.max()
-    window = np.divide(kept, voltage, out=np.zeros_like(kept), where=relevant)
+    window = np.divide(predicted, voltage, out=np.zeros_like(predicted), where=relevant)
     return Division(field, np.clip(window, 0.0, 1.0))
 
 
@@ -134,6 +134,7 @@ def image_division(problem: DivisionProblem, image: FloatArray) -> Division:
 class WhiteNoise:
     """Expectation of the paper's method over all draws of its complex noise, of variance s^2."""
 
+    # White noise n leaves the numerator's mean; E[1/(z + n)] = (1 - exp(-|z|^2/s^2))/z.
     amplitude: float = 1.0  # of the noise: s over a tenth of the weakest relevant component
     name: ClassVar[str] = "white-noise"
     assumes: ClassVar[str] = (
@@ -270,6 +271,25 @@ def create_regulariser(name: str, /, **options: Any) -> Regulariser:
         )
     regulariser: Regulariser = factory(**options)
     return regulariser
+
+
+def chosen_method(
+    method: str | Regulariser, options: Mapping[str, Any], **seed: int
+) -> Regulariser:
+    """Set up the method of division by its name, or check one that is set up already."""
+    if isinstance(method, str):
+        return create_regulariser(method, **seed, **options)
+    if isinstance(method, type) or not callable(getattr(method, "divide", None)):
+        raise InputError(
+            f"The method is {method!r}, which cannot divide fields.",
+            cure="Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov.",
+        )
+    if options:
+        raise InputError(
+            f"Options {', '.join(options)} were given beside a regulariser that is set up already.",
+            cure="Set them on the regulariser, or give the method by name.",
+        )
+    return method
 
 
 def _factory(name: str) -> Any:

@@ -1,4 +1,4 @@
-r"""The Fourier ratio, the paper's method on arrays: lift, divide, normalise, fit, convolve back.
+r"""Fourier ratio, the paper's method on arrays: lift, divide, normalise, fit, convolve back.
 
 .. math::
 
@@ -26,11 +26,14 @@ from memscal.deconvolution.division import (
     DivisionProblem,
     KernelProfile,
     Regulariser,
-    create_regulariser,
+    chosen_method,
 )
 from memscal.errors import FitError, InputError
 from memscal.estimation.gaussian import gauss_newton
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, finite_vector, require_increasing, require_positive
+
+#: A field of more points along half its side takes gigabytes.
+_MOST_POINTS = 8192
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,18 +144,16 @@ def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> F
     >>> float(stress.integral / (np.pi * 1e-6)).__round__(6)
     1.0
     """
-    r, profile = np.asarray(r, dtype=np.float64), np.asarray(profile, dtype=np.float64)
-    if r.ndim != 1 or r.shape != profile.shape or not np.all(np.isfinite([r, profile])):
-        raise InputError(
-            f"Radii of shape {r.shape} and values of shape {profile.shape} are no radial profile.",
-            cure="Give two arrays of one length, finite throughout.",
-        )
-    if r[0] < 0 or np.any(np.diff(r) <= 0):
-        raise InputError("The radii do not increase from the axis outward.", cure="Sort them.")
-    if not 0 < spacing < extent < np.inf:
+    r, profile = finite_vector("r", r), finite_vector("profile", profile)
+    if r.shape != profile.shape:
+        raise InputError(f"There are {profile.size} values of the profile for {r.size} radii.")
+    require_increasing("r", r)
+    if r[0] < 0:
+        raise InputError(f"r begins at {r[0]:g} m.", cure="Give radii from the axis outward.")
+    if not 0 < spacing < extent <= _MOST_POINTS * spacing:
         raise InputError(
             f"A field of half side {extent:g} m cannot have points {spacing:g} m apart.",
-            cure="Give both in m, the spacing smaller than the extent.",
+            cure=f"Give both in m: the extent is one to {_MOST_POINTS} times the spacing.",
         )
     spline = radial_spline(r, profile)
 
@@ -189,7 +190,7 @@ def divide(
         Modulus of the weakest relevant component of the stress's transform, in N: where the
         voltage's spectrum still stands clear of its noise (the paper's rule).  With a second
         number, that of the voltage's transform, in V m^2; otherwise it is read off where the
-        stress's transform first falls to the first.
+        stress's transform first falls to the first, or at the last wavenumber.
     method : str or Regulariser, default "white-noise"
         One of the methods of :func:`memscal.calibrate` that divide fields.
     posterior : callable, optional
@@ -205,7 +206,8 @@ def divide(
     Raises
     ------
     InputError
-        If the fields lie on different grids, or there is no such method.
+        If the fields lie on different grids, ``weakest`` is no positive number, or the method
+        or one of its options does not exist.
 
     Examples
     --------
@@ -217,15 +219,14 @@ def divide(
     >>> round(float(1e3 * fit_gaussian(g)), 3)  # sqrt((1 - 0.36) / 2) mm
     0.566
     """
-    if voltage.values.shape != stress.values.shape or not np.array_equal(voltage.x, stress.x):
-        raise InputError(
-            f"The voltage ({voltage!r}) and the stress ({stress!r}) lie on different grids.",
-            cure="Lift both with one spacing and one extent.",
-        )
-    regulariser = create_regulariser(method, **options) if isinstance(method, str) else method
+    _require_one_grid(voltage, stress)
+    regulariser = chosen_method(method, options)
     if not isinstance(weakest, tuple):
-        modulus = stress.spectrum()[1]
-        weakest = (weakest, float(voltage.spectrum()[1][int(np.argmax(modulus <= weakest))]))
+        relevant = stress.spectrum()[1] > weakest
+        last = int(np.argmin(relevant)) if not relevant.all() else -1
+        weakest = (weakest, float(voltage.spectrum()[1][last]))
+    for modulus in weakest:
+        require_positive("weakest relevant component", modulus)
     problem = DivisionProblem(
         voltage.grid, voltage.values, stress.values, weakest[1], weakest[0], posterior=posterior
     )
@@ -253,7 +254,11 @@ def normalise(quotient: Field) -> tuple[float, Field]:
 
     Examples
     --------
-    See :func:`divide`.
+    >>> import numpy as np
+    >>> r = np.linspace(0, 6e-3, 241)
+    >>> a, g = normalise(lift(r, np.exp(-((r / 1e-3) ** 2)), 0.1e-3, 8e-3))
+    >>> round(a / (np.pi * 1e-6), 6), round(g.integral, 6)
+    (1.0, 1.0)
     """
     a = quotient.integral
     if not a > 0:
@@ -276,7 +281,8 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     g : Field
         G, in 1/m^2.
     start : float, optional
-        Width from which the search starts, in m; from the value on the axis by default.
+        Width from which the search starts, in m; by default that of a Gaussian with the same
+        integral of the square.
 
     Returns
     -------
@@ -285,12 +291,16 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
 
     Examples
     --------
-    See :func:`divide`.
+    >>> import numpy as np
+    >>> r = np.linspace(0, 6e-3, 241)
+    >>> _, g = normalise(lift(r, np.exp(-0.5 * (r / 0.6e-3) ** 2), 0.1e-3, 8e-3))
+    >>> round(1e3 * fit_gaussian(g), 4)  # mm
+    0.6
     """
     r, radial = g.r, g.radial
     root, narrowest = np.sqrt(r), 0.5 * float(r[1] - r[0])
     if start is None:
-        start = max(float(1 / np.sqrt(2 * np.pi * np.abs(radial[0]))), 2 * narrowest)
+        start = max(float(1 / np.sqrt(4 * np.pi * g.grid.integrate(g.values**2))), 2 * narrowest)
 
     def misfit(scaled: FloatArray) -> FloatArray:
         return root * (unit_gaussian(r, scaled[0] * start) - radial) * start**2
@@ -339,6 +349,11 @@ def reconvolve(a: float, g: Field, stress: Field) -> Field:
     Field
         Voltage, in V.
 
+    Raises
+    ------
+    InputError
+        If the fields lie on different grids.
+
     Examples
     --------
     >>> import numpy as np
@@ -349,4 +364,13 @@ def reconvolve(a: float, g: Field, stress: Field) -> Field:
     >>> bool(np.allclose(reconvolve(a, g, stress).radial, voltage.radial, atol=1e-4))
     True
     """
+    _require_one_grid(g, stress)
     return replace(stress, values=a * stress.grid.convolve(g.values, stress.values))
+
+
+def _require_one_grid(first: Field, second: Field) -> None:
+    if not (np.array_equal(first.x, second.x) and np.array_equal(first.y, second.y)):
+        raise InputError(
+            f"The two fields, {first!r} and {second!r}, lie on different grids.",
+            cure="Lift both with one spacing and one extent.",
+        )

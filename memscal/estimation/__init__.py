@@ -1,1 +1,1 @@
-"""From a scan to a radial profile with its uncertainty, in data space."""
+"""Estimate of a radial profile from a scan, with its uncertainty, in data space."""

@@ -46,6 +46,8 @@ def load_groups(load: FloatArray) -> NDArray[np.intp]:
 
 def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | None:
     """Predict each group of points from the others; ``None`` with fewer than two such groups."""
+    # The distance of the group's data from the prediction, in the covariance of noise and
+    # parameters, is S(all) - S(others) of residual sums of squares (Chow, Econometrica 28, 1960).
     if np.unique(group).size < 2:
         return None
     # Clipped: many outliers in one group count together, and a single one counts little.
@@ -53,7 +55,9 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     # Centre, baseline and drift are fitted to a held-out group by itself.
     nuisances = int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
     columns = model.design[:, 2 : 2 + nuisances]
-    fold = _folds(group)[model.kept]
+    count = int(group.max()) + 1
+    # Of too many groups, neighbouring ones are joined.
+    fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
     outcomes = {
         int(i): outcome
         for i in np.unique(fold)
@@ -68,13 +72,7 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     p_value, share = min(folds * p_values[worst], 1.0), FALSE_ALARM / folds
     value, degrees, rest = outcomes[worst]
     limit = chdtri(degrees, share) / degrees if rest is None else fdtri(degrees, rest, 1 - share)
-    return HeldOut(value, float(limit), p_value, worst, folds, alone=int(group.max()) < _MOST_FOLDS)
-
-
-def _folds(group: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Join neighbouring groups until there are few enough."""
-    count = int(group.max()) + 1
-    return group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count
+    return HeldOut(value, float(limit), p_value, worst, folds, alone=count <= _MOST_FOLDS)
 
 
 def _predict(

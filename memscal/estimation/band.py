@@ -1,4 +1,4 @@
-"""The band of wavenumbers in which the scan determines the apparatus function.
+"""Band of wavenumbers in which the scan determines the apparatus function.
 
 G is resolved while the posterior standard uncertainty of its transfer function stays below a
 third of the fitted Gaussian's, which has no zeros and no lobes.  Components are relevant to a

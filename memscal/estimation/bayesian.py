@@ -11,9 +11,19 @@ amplitudes; each has a closed form on both sides of the Hankel transform,
 Lengths are in units of the width of the best Gaussian; the strength is the expected size over
 the Gaussian's, both as L2 norms over the plane.  For a shape and strength (a hypothesis) the
 model is linear, with Gaussian priors for the amplitudes and flat ones for the nuisance parameters:
-marginal likelihood and posterior are in closed form.  The estimate is the posterior mean with a
-prior probability of 0.4 for the Gaussian itself; its uncertainty is the mean squared error with
-priors that allow departures only, rougher ones among them.
+marginal likelihood and posterior are in closed form.  With the flat columns projected out
+(restricted likelihood: Patterson and Thompson, Biometrika 58, 1971), singular values :math:`s_j` of
+what is left of the shape's columns, data :math:`p_j` along its singular vectors and their rest
+:math:`\rho`,
+
+.. math::
+
+    -2\log p(u \mid \tau) = \nu\log\hat\sigma^2 + \sum_j\log(1+\tau^2 s_j^2/\hat\sigma^2), \qquad
+    \nu\hat\sigma^2 = \rho + \sum_j \frac{p_j^2}{1+\tau^2 s_j^2/\hat\sigma^2} .
+
+Of a scan that is only planned, expected squares take the place of the data's.  The estimate is the
+posterior mean with a prior probability of 0.4 for the Gaussian itself; its uncertainty is the mean
+squared error with priors that allow departures only, rougher ones among them.
 """
 
 from __future__ import annotations
@@ -93,7 +103,7 @@ class Shape:
         return Rings(plain.radius, plain.blur, plain.amplitude * gaussian / plain.size)
 
 
-#: Edges (a disc, a plateau), a core of its own (a ring, a spike), and tails.
+#: Edges (a disc, a plateau), a core (a ring, a spike), and tails.
 SHAPES = (
     Shape("edge", 0.65, 0.8),
     Shape("edge", 0.65, 1.2),
@@ -331,8 +341,8 @@ def weigh_departures(
     least_noise: float = 0.0,
 ) -> WeighedFit:
     """Average departures from a Gaussian fit over the hypotheses."""
-    # ``effective_count``: how many points the data are worth; more than there are if each is a mean
-    # of repeats.  Of a point of weight one, ``expected_noise`` is that of voltages that have none
+    # ``effective_count``: number of readings in the data, more than points if each is a mean of
+    # repeats.  Of a point of weight one, ``expected_noise`` is that of voltages that have none
     # (zero for data), ``least_noise`` the least that the covariance counts.
     standardised, flat = model.points.standardised, basis.flat
     voltages = model.signal(fit.geometry, basis.kernels(model.k)[:, flat:])
@@ -370,7 +380,7 @@ def _average(
         if p > 0:
             _add_gain(gain, linear, conditional, p)
     mean = gain @ linear.data
-    # The data move the probabilities, too: d(p m) = (m - mean) p d(log marginal likelihood).
+    # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
     moving, covariance = np.zeros_like(gain), np.zeros((count, count))
     for p, q, conditional in zip(estimate, uncertainty, conditionals, strict=True):
         if p == 0 and q == 0:

@@ -1,4 +1,4 @@
-r"""The forward model in data space: voltages at the scan's points for a given G.
+r"""Forward model in data space: voltages at the scan's points for a given G.
 
 A radial kernel :math:`K` of transform :math:`\hat K(k)` gives, at distance :math:`R` from
 the sensor's centre and per newton,
@@ -181,6 +181,11 @@ def _unit_range(positions: FloatArray) -> FloatArray:
     return np.asarray((positions - middle) / (np.ptp(positions) / 2))
 
 
+# An elliptic Gaussian has the second moments s^2 [[1 + e1, e2], [e2, 1 - e1]], e = |(e1, e2)| and
+# tan 2a = e2/e1, widths s sqrt(1 +- e), and the transform exp(-s^2 k^2/2) exp(-z cos 2(phi - a))
+# with z = s^2 k^2 e/2.  By the Jacobi-Anger expansion (DLMF 10.35.2) its response at R and angle t
+# is the sum over m of eps_m cos 2m(t - a) times 1/(2 pi) the integral of
+# exp(-s^2 k^2/2) I_m(z) sigma(k) J_2m(kR) k dk, with eps_0 = 1, the others 2.
 #: An ellipse's response is a sum of so many harmonics, its derivatives are by centred differences.
 _HARMONICS = 5
 _LARGEST = 0.95

@@ -1,4 +1,4 @@
-"""The Gaussian apparatus function that fits the scan best, in data space.
+"""Gaussian apparatus function that fits the scan best, in data space.
 
 It is fitted by weighted least squares, with A, centre, baseline and linear drift.
 """
@@ -31,7 +31,9 @@ def gauss_newton(
     linearise: Linearised, start: FloatArray, *, tolerance: float, knee: float = np.inf
 ) -> FloatArray | None:
     """Minimise the loss of the residuals (n,) of a nearly linear model; ``None`` if it fails."""
-    # Parameters are scaled to numbers near one; the loss is linear from the residual ``knee`` on.
+    # Parameters are scaled to numbers near one.  Steps d of (J'WJ) d = -J'W r, with
+    # W = (1 + r^2/c^2)^(-1/2), minimise the soft L1 loss sum 2 c^2 (sqrt(1 + r^2/c^2) - 1), linear
+    # from the residual c, ``knee``, on.
     place: FloatArray = start
     step: FloatArray = np.zeros_like(start)
     cost, halvings = np.inf, 0
@@ -167,8 +169,8 @@ def _trial_centres(model: ForwardModel) -> FloatArray:
     def inner(positions: FloatArray) -> FloatArray:
         unique = np.unique(positions)
         margin = unique.size // 10
-        kept = unique[margin : unique.size - margin]
-        return kept[:: int(np.ceil(kept.size / (12 if points.planar else 40)))]
+        central = unique[margin : unique.size - margin]
+        return central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
 
     along = [
         inner(positions) if free else np.zeros(1)
@@ -196,7 +198,7 @@ def _undetermined(model: ForwardModel, conversion_constant: float | None = None)
 
 _Loss = Literal["linear", "soft_l1"]
 
-#: A step in the ellipticity that the solver takes for one.
+#: Scale of the ellipticity in the solver.
 _TYPICAL_ELLIPTICITY = 0.2
 #: Standardised residual from which on the robust fit's loss grows linearly.
 _KNEE = 3.0
@@ -269,27 +271,18 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     def slope(scaled: FloatArray) -> FloatArray:
         return standardised(evaluate(scaled).jacobian, weights) * scale / noise
 
-    # A robust fit is only where the next one starts.
+    # A robust fit is the start of the next one: a low accuracy is enough.
     knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
+    begin = start / scale
     solution = gauss_newton(
-        lambda scaled: (residual(scaled), slope(scaled)),
-        start / scale,
-        tolerance=tolerance,
-        knee=knee,
+        lambda scaled: (residual(scaled), slope(scaled)), begin, tolerance=tolerance, knee=knee
     )
     # At a width of zero every slope by the width is zero: steps do not leave it.
     if solution is None or solution[1] < _NARROWEST:
         result = least_squares(
-            residual,
-            start / scale,
-            jac=slope,
-            loss=loss,
-            f_scale=_KNEE,
-            xtol=1e-10,
-            ftol=1e-12,
-            gtol=1e-10,
-            max_nfev=100,
-        )
+            residual, begin, slope, loss=loss, f_scale=_KNEE,
+            xtol=1e-10, ftol=1e-12, gtol=1e-10, max_nfev=100,
+        )  # fmt: skip
         if not result.success:
             raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
         solution = np.asarray(result.x)

@@ -1,4 +1,10 @@
-"""The measured points of one scan or several, flattened, and refusals of unusable ones."""
+r"""Points of one scan or several, flattened, with refusals of unusable ones.
+
+A tangential channel measures :math:`U_{xz} = A_{xz}\,(G_{xz} \otimes \tau)(R)\cos\theta`, with
+:math:`R, \theta` from the sensor to the indenter and :math:`\tau` the radial traction of the base
+on the film, positive outward.  Where the film is squeezed outward :math:`\tau` is negative, and
+the voltage falls where the indenter stands at larger x than the sensor.
+"""
 
 from __future__ import annotations
 
@@ -261,8 +267,8 @@ def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> FloatArray | None:
         return None
     repeats = scan.u_zz.size // scan.u_zz_correlation.shape[0]
     whole = np.kron(np.eye(repeats), scan.u_zz_correlation)
-    kept = keep.ravel()
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(whole[np.ix_(kept, kept)])))
+    measured = np.ix_(keep.ravel(), keep.ravel())
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(whole[measured])))
 
 
 def _stated_errors(
@@ -304,7 +310,7 @@ def _require_positive_peak(points: ScanPoints) -> None:
     u = points.u / points.load
     distance = np.hypot(points.x - np.median(points.x), points.y - np.median(points.y))
     baseline = np.median(u[distance >= np.quantile(distance, 0.75)])
-    # Three points of a peak outvote single outliers of either sign.
+    # The median of three points does not follow a single outlier.
     ordered = np.sort(u - baseline)
     rise, fall = np.median(ordered[-3:]), -np.median(ordered[:3])
     if fall > 1.5 * rise:

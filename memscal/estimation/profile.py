@@ -74,11 +74,6 @@ class ProfileEstimate:
         return self.weighed.covariance
 
     @property
-    def gaussian_covariance(self) -> FloatArray:
-        """Covariance of the Gaussian fit's own parameters, by the Jacobian's order."""
-        return self.gaussian.covariance(self.weights, self.noise_scale)
-
-    @property
     def gaussian_gain(self) -> FloatArray:
         """Derivative of the Gaussian fit's parameters by the voltages."""
         return self.gaussian.gain(self.weights)
@@ -283,14 +278,15 @@ def constrained_profile(
     deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
     deviation = np.where(deviation > 0, deviation, 1.0)
     values, vectors = np.linalg.eigh(estimate.covariance / np.outer(deviation, deviation))
-    kept = values > 1e-12 * values[-1]
-    root = deviation[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    positive = values > 1e-12 * values[-1]
+    root = deviation[:, None] * vectors[:, positive] * np.sqrt(values[positive])
     z = _least_distance(columns @ root / scale, -profile / scale - _SLACK)
     return PosteriorProfile(estimate, root @ z)
 
 
 def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
-    """Shortest z with ``matrix @ z >= bound``."""
+    """Shortest z with ``matrix @ z >= bound``: least distance programming."""
+    # Lawson and Hanson, Solving Least Squares Problems, chapter 23: by non-negative least squares.
     from scipy.optimize import nnls
 
     target = np.append(np.zeros(matrix.shape[1]), 1.0)

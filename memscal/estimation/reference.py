@@ -1,4 +1,4 @@
-"""The reference stress of a calibration: its source, its transform, and its sensitivities."""
+"""Reference stress of a calibration: its source, its transform, and its sensitivities."""
 
 from __future__ import annotations
 
@@ -87,13 +87,6 @@ def reference_profile(
     if scan.reference is not None:
         return scan.reference
     return reference_contact(scan.film, scan.indenter, scan.load)
-
-
-def reference_spectrum(
-    reference: StressProfile | Contact, points: ScanPoints, thickness: float
-) -> RadialSpectrum:
-    """Transform of one scan's reference per newton: :func:`reference_spectra` of one."""
-    return reference_spectra([reference], [points], [thickness])[0]
 
 
 def reference_spectra(

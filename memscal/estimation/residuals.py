@@ -45,7 +45,7 @@ class FreeModel:
     # variance where the noise is stated.
     data: FloatArray
     design: FloatArray  # (m, r): weighted columns of the flat parameters, then of the departures
-    kept: NDArray[np.intp]  # (m,): which points of the scan they are
+    point: NDArray[np.intp]  # (m,): which points of the scan they are
     stated: bool  # whether the noise is stated
 
 
@@ -60,10 +60,10 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
         u = np.where(ordinary, u, estimate.predicted + np.clip(u - estimate.predicted, -most, most))
         ordinary = np.ones_like(ordinary)
     weights = np.where(ordinary, weights, estimate.weights)
-    kept = np.flatnonzero(ordinary)
+    point = np.flatnonzero(ordinary)
 
     def standardised(values: FloatArray) -> FloatArray:
-        return points.standardised(values, weights)[kept]
+        return points.standardised(values, weights)[point]
 
     jacobian = estimate.gaussian.jacobian
     flat = standardised(jacobian / np.linalg.norm(jacobian, axis=0))
@@ -76,7 +76,7 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
     return FreeModel(
         data=standardised(u - estimate.gaussian.predicted),
         design=np.hstack([flat, left[:, resolved] * singular[resolved]]),
-        kept=kept,
+        point=point,
         stated=stated,
     )
 
@@ -135,8 +135,8 @@ def residuals_of(estimate: ProfileEstimate) -> Residuals:
     """Project a scan off all voltages that an apparatus function can make."""
     model = free_model(estimate)
     place, sequence = _passes(estimate)
-    order = np.argsort(place[model.kept])
-    point = model.kept[order]
+    order = np.argsort(place[model.point])
+    point = model.point[order]
     basis, data = orthonormal(model.design[order]), model.data[order]
     left_over = data - basis @ (basis.T @ data)
     return Residuals(left_over, basis, point, place[point], sequence[point], model.stated)
@@ -156,11 +156,11 @@ def pure_error_test(estimate: ProfileEstimate) -> TestOutcome | None:
     # leaves m degrees of pure error; the means take l.  This is exact also where repeats lie only
     # near each other (Christensen, Ann. Stat. 17, 1989): the design contains their difference.
     model, points = free_model(estimate), estimate.points
-    place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.kept]
+    place = np.stack([points.scan, points.of_places("index"), points.load], axis=1)[model.point]
     group = np.unique(place, axis=0, return_inverse=True)[1].ravel()
     if points.decorrelation is not None or group.max() + 1 == group.size:
         return None
-    weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.kept]
+    weight = np.sqrt(estimate.weights / estimate.outlier_weight)[model.point]
     square = np.bincount(group, weight**2)
 
     def within(columns: FloatArray) -> FloatArray:

@@ -94,7 +94,8 @@ def stress_checks(
 
 def pooled_force(profiles: Sequence[MeasuredProfile]) -> tuple[float, float]:
     """Return the mean of force over load of all profiles, and its standard uncertainty."""
-    # The load's common uncertainty counts; that of each load of one profile does not.
+    # Independent uncertainties u ("scan") and common ones c: weights 1/u^2, and the variance
+    # w'(diag(u^2) + cc')w.  The load's common uncertainty counts, that of single loads does not.
     budgets = [_relative(profile) for profile in profiles]
     scan = np.array([budget["scan"] for budget in budgets])
     weight = scan**-2 / np.sum(scan**-2)
@@ -153,7 +154,7 @@ def _two_sided(z: float) -> float:
 _NUMBERED = re.compile(r"(\w+)_(\d+)")
 
 #: Messages of a restoration that the measured stress gives itself.
-_SAID_OF_ALL = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
+_OF_ALL_PROFILES = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
 
 
 @single_threaded()
@@ -251,7 +252,7 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
         for check in stress.checks
         if (numbered := _NUMBERED.fullmatch(check.name))
     ]
-    # What failed is said by the checks, under their new numbers.
+    # The checks, under their new numbers, state what failed.
     messages = [
         replace(message, text=f"{_files_of(stress)}: {message.text}")
         for stress in stresses
@@ -329,7 +330,7 @@ def _prepared(single: SingleLoad, sensor: ApparatusFunction, signal: ContactSign
 
 
 def _placed(failure: FitError | InputError, single: SingleLoad) -> FitError | InputError:
-    """Say in which file and at which load something failed."""
+    """Return the error with its file and load in front."""
     return type(failure)(
         f"{place_of(single.scan, single)}: {failure.problem}", why=failure.why, cure=failure.cure
     )
@@ -341,12 +342,12 @@ def _messages(
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
 ) -> Iterator[Message]:
-    """Yield what a user should know, the gravest first."""
+    """Yield the messages of a measured stress, warnings first."""
     yield from failed_check_messages(checks)
     for text in overridden:
         yield Message("overridden", f"Overridden: {text}.", "warning")
     yield from failed_calibration_messages(sensor)
-    # What is true of every profile is said once.
+    # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}
     for i, load in enumerate(loads):
         for message in load.messages:
@@ -358,7 +359,7 @@ def _messages(
 
 
 def _of_profile(scan: Scan, restored: Restoration, noise: FloatArray | None) -> Iterator[Message]:
-    """Yield what one load should know of; ``noise``: where it was estimated, in V."""
+    """Yield the messages of one load; ``noise``: where it was estimated, in V."""
     if noise is not None:
         yield noise_unstated_message(float(noise.min()))
     if scan.normal_load is not None and scan.normal_load_errors is None:
@@ -369,5 +370,5 @@ def _of_profile(scan: Scan, restored: Restoration, noise: FloatArray | None) -> 
     if not scan.lubrication:
         yield Message("lubrication_unstated", "The scan does not state its lubrication.")
     for message in restored.messages:
-        if message.kind not in _SAID_OF_ALL:
+        if message.kind not in _OF_ALL_PROFILES:
             yield message

@@ -1,4 +1,4 @@
-r"""The restored stress as a posterior over shapes of pressure, their departures, and the inputs.
+r"""Posterior of the restored stress over shapes of pressure, their departures, and the inputs.
 
 The base stress is :math:`\hat\sigma_{zz}(k) = P\,T(kh)\,\hat p(k)`: the film's transfer function
 :math:`T` turns a pressure into the stress at the base.  The shapes of pressure are averaged by
@@ -98,7 +98,7 @@ class PressureShape:
 
 
 def pressure_shapes(film: ElasticFilm) -> tuple[PressureShape, ...]:
-    """Return the shapes that a restoration weighs against each other."""
+    """Return the shapes that a restoration averages."""
     shears = _SHEARS_INCOMPRESSIBLE if (film.poisson_ratio > _FLOWING) else _SHEARS_COMPRESSIBLE
     return tuple(PressureShape(m, c, film) for m in _EXPONENTS for c in shears)
 
@@ -114,7 +114,7 @@ _SMALLER = 0.4
 
 @dataclass(frozen=True, eq=False)
 class _Basis(DepartureBasis):
-    """The kernels about a fitted pressure: its own two, and rings in units of its width."""
+    """The kernels about a fitted pressure: by force and width, and rings in units of its width."""
 
     shape: PressureShape
 
@@ -135,11 +135,11 @@ class ShapeFit:
     gain: FloatArray  # (s, n): derivative of the state by the voltages
     residual: FloatArray  # (n,), in V
     noise: float  # of a point of weight one, in V, or over the stated uncertainties
-    log_evidence: float  # log marginal likelihood up to a constant of the scan
+    log_marginal: float  # marginal likelihood up to a constant of the scan
 
 
 def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
-    """Fit a shape from where a Gaussian has been, and weigh departures from it."""
+    """Fit a shape, starting from the Gaussian fit, and average departures from it."""
     model, weights = start.model, start.weights
     fit = _fit(shape, model, weights, start.gaussian)
     rings = departure_basis(model, fit)
@@ -157,14 +157,14 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
         gain=rows @ weighed.gain,
         residual=weighed.residual,
         noise=weighed.noise,
-        log_evidence=weighed.log_marginal_likelihood - 0.5 * _log_information(model, weights, fit),
+        log_marginal=weighed.log_marginal_likelihood - 0.5 * _log_information(model, weights, fit),
     )
 
 
 def _fit(
     shape: PressureShape, model: ForwardModel, weights: FloatArray, start: GaussianFit
 ) -> GaussianFit:
-    """Fit force, width, centre and drift; where that leads nowhere, stay with the Gaussian's."""
+    """Fit force, width, centre and drift; where that diverges, keep the Gaussian's."""
     free, standardised = model.points.free, model.points.standardised
     force, width = start.conversion_constant, max(start.sigma, _NARROWEST * model.points.step)
     theta = np.concatenate([[force, width], start.centre[free], start.drift])
@@ -223,7 +223,7 @@ def adopted_noise(start: ProfileEstimate, noise: float) -> float:
 
 #: A shape of less probability is left out.
 _NEGLIGIBLE = 1e-4
-#: Directions in which A G is known better than this share of its worst are exact.
+#: Eigenvalues of the covariance of A G below this share of the largest count as zero.
 _EXACT = 1e-10
 _RESOLVED = 3.0
 #: The stress is computed out to this multiple of the scan's width.
@@ -318,8 +318,8 @@ def _sum_of(shares: FloatArray, arrays: Sequence[FloatArray]) -> FloatArray:
 
 
 def _shares(fits: Sequence[ShapeFit]) -> FloatArray:
-    evidence = np.array([fit.log_evidence for fit in fits])
-    weight = np.exp(evidence - evidence.max())
+    log_marginal = np.array([fit.log_marginal for fit in fits])
+    weight = np.exp(log_marginal - log_marginal.max())
     weight[weight < _NEGLIGIBLE] = 0.0
     return np.asarray(weight / weight.sum())
 
@@ -348,8 +348,8 @@ def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray
     # Rings far out count by their area.
     ring = np.sqrt(profile.r + profile.r[1])
     values, vectors = np.linalg.eigh(covariance * np.outer(ring, ring))
-    kept = values > max(_EXACT * float(values[-1]), 0.0)
-    roots = vectors[:, kept] * np.sqrt(values[kept]) / ring[:, None]
+    uncertain = values > max(_EXACT * float(values[-1]), 0.0)
+    roots = vectors[:, uncertain] * np.sqrt(values[uncertain]) / ring[:, None]
     columns = [hankel_transform(profile.r, root, k) for root in roots.T]
     return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
 

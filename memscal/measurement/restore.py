@@ -267,7 +267,7 @@ def _expected(restored: Restoration) -> QualityCheck:
 def restoration_messages(
     restored: Restoration, checks: tuple[QualityCheck, ...]
 ) -> tuple[Message, ...]:
-    """Return the messages that accompany a result, the gravest first."""
+    """Return the messages that accompany a result, warnings first."""
     estimate, points = restored.posterior.estimate, restored.points
     messages = failed_check_messages(checks)
     messages += failed_calibration_messages(restored.apparatus)
@@ -331,8 +331,8 @@ def restore(
     r"""Restore the stress at the base of the film from a scan with a calibrated sensor.
 
     Solves :math:`U_{zz} = A\,G \otimes \sigma_{zz}` for the base stress, with a known A and G: what
-    presses on the film is a pressure of any radial shape, weighed by evidence, and the film of the
-    scan turns it into the stress at its base.  No contact is calculated.
+    presses on the film is a pressure of any radial shape, averaged by marginal likelihood, and the
+    film of the scan turns it into the stress at its base.  No contact is calculated.
 
     Parameters
     ----------
@@ -371,7 +371,7 @@ def restore(
 def restore_known(
     scan: Scan, apparatus: ApparatusFunction, expected: Expected = None
 ) -> Restoration:
-    """Restore a stress from a scan and an apparatus function that were proven to fit together."""
+    """Restore a stress from a scan and an apparatus function that were checked to fit together."""
     points = measured_points(scan)
     estimate, transfer = gaussian_pressure(scan, apparatus, points)
     wavenumbers = estimate.model.reference.wavenumbers

@@ -31,16 +31,16 @@ VARIED = ("step", "half_range", "repeats")
 """What can be varied to reach it."""
 
 _MOST_REPEATS = 10_000
-#: More positions cost more to evaluate than they are worth: repeats lower the noise as well.
+#: More positions take long to evaluate; repeats lower the noise as well.
 _MOST_POSITIONS = 513
-#: Farther away, in thicknesses of the film, there is nothing but the baseline.
+#: Farther away, in thicknesses of the film, the signal has decayed.
 _FARTHEST = 20
-#: A step of more Gaussian widths does not sample G: what is stated of it is the prior's alone.
+#: A step of more Gaussian widths does not sample G: its width then follows from the prior alone.
 _WIDEST_STEP = 2.0
 _FEWEST_POSITIONS = 6
 _GROWTH = 1.6
 
-#: What a source is, and what would make it smaller, for those that more scanning does not.
+#: What lowers the contribution of a source that more scanning does not lower.
 _CURES = {
     "thickness": "Measure the film's thickness better.",
     "poisson_ratio": "Determine the film's Poisson's ratio better.",
@@ -83,7 +83,7 @@ def require_wishes(want: Mapping[str, float], vary: str | None) -> dict[str, flo
         )
     if bool(named) != (vary is not None):
         raise InputError(
-            "A wish needs something to vary for it, and the other way round.",
+            "want and vary go together: a wish needs something to vary.",
             cure=f"Give both want and vary (one of {', '.join(VARIED)}), or neither.",
         )
     return named
@@ -238,13 +238,12 @@ def design(
 
     The covariance of the Gaussian's parameters is that of the linear model about the expected
     apparatus function, :math:`(J^T J/\sigma^2)^{-1}` (the bound of Cramer and Rao); departures from
-    a
-    Gaussian are weighed as a calibration does.  No scan is simulated, and nothing is drawn.
+    a Gaussian are weighed as a calibration does.  No scan is simulated, and nothing is drawn.
 
     Parameters
     ----------
     film, rod : ElasticFilm, Rod
-        What is pressed on what, with the uncertainties that are known of it; the paper's.
+        Film and rod with their stated uncertainties; the paper's.
     kernel, conversion_constant : RadialKernel, float
         G to expect, the paper's Gaussian of 561 um where absent, and A in V/Pa.
     load, load_uncertainty : float

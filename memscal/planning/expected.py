@@ -16,7 +16,7 @@ import numpy as np
 from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import Results, input_effects, propagate
-from memscal.deconvolution.division import Regulariser, create_regulariser
+from memscal.deconvolution.division import Regulariser, chosen_method
 from memscal.errors import FitError
 from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, weigh_departures
@@ -84,7 +84,7 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
         raise FitError(
             f"The scan as planned would find a conversion constant of "
             f"({estimate.conversion_constant * 1e3:.2g} ± {np.sqrt(variance) * 1e3:.2g}) mV/Pa: "
-            "not told apart from zero.",
+            "not distinct from zero.",
             why="It is too short to tell the profile's tail from the baseline, or too noisy.",
             cure="Plan a larger half range, more repeats, or a larger load.",
         )
@@ -94,13 +94,13 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
 def _propagated(solution: Solution) -> Results:
     estimate, deconvolution = solution.estimate, solution.deconvolution
     effects = input_effects(solution.scans, solution.stresses, estimate)
-    window = solution.fields.along_axis(deconvolution.quotient.window)[0]
-    return propagate(estimate, deconvolution, solution.window_at_nodes, window, effects, {})
+    wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
+    return propagate(estimate, deconvolution, solution.window_at_nodes, wavenumbers, effects, {})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Design(Result):
-    """A planned scan and what it would find, with standard uncertainties (k = 1).
+    """A planned scan and its expected results, with standard uncertainties (k = 1).
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class Design(Result):
 
 def evaluate(plan: Plan, method: str | Regulariser = "bayesian", seed: int = 0) -> Design:
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
-    regulariser = create_regulariser(method, seed=seed) if isinstance(method, str) else method
+    regulariser = chosen_method(method, {}, seed=seed)
     expected = expected_calibration(plan, regulariser)
     solution, results = expected.solution, expected.results
     deconvolution, fields = solution.deconvolution, solution.fields

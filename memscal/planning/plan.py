@@ -1,4 +1,4 @@
-"""A planned scan: what is pressed on what, where, how often, and with how much noise."""
+"""Plan of a line scan: film, rod, load, positions, repeats and noise."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Plan:
                 f"The noise of the planned scan is {noise:g}.",
                 why="Without noise there is no uncertainty to expect, and no scan is without.",
                 cure="Give its standard deviation: a share of the largest signal (0.005: half a "
-                "percent), or a voltage; a few readings with the rod at rest tell it.",
+                "percent), or a voltage; measure it with the rod at rest.",
             )
         if not abs(self.centre) <= self.half_range:
             raise InputError(

@@ -224,11 +224,21 @@ def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:
     assert sweep.amplitude[[0, 4, 8]] == pytest.approx([0.1, 1.0, 10.0])
     middle = slice(2, 7)  # one decade
     assert np.ptp(sweep.conversion_constant[middle]) < 0.005 * CONVERSION
-    assert sweep.conversion_constant[4] == calibration.apparatus.conversion_constant
+    assert sweep.conversion_constant[4] == pytest.approx(
+        calibration.apparatus.conversion_constant, rel=1e-9
+    )
     # More noise smooths more: the width grows, and in the end the scan is no longer met.
     assert (np.diff(sweep.gaussian_sigma_deconvolved) > 0).all()
     assert sweep.relative_rms[8] > sweep.relative_rms[0]
     assert sweep.seed_conversion_constant.shape == (9, 2)
+
+
+def test_points_on_no_lattice_cannot_be_swept() -> None:
+    scan = as_points(simulated(raster=True, points=13))
+    scan = replace(scan, x=scan.x + np.random.default_rng(1).normal(scale=0.2e-3, size=scan.x.size))
+    calibration = memscal.calibrate(scan, method="bayesian")
+    with pytest.raises(InputError, match="not evenly spaced"):
+        calibration.sweep(amplitudes=3, draws=1)
 
 
 def test_the_result_is_the_same_however_often_and_whatever_the_global_random_state() -> None:

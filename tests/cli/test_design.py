@@ -61,7 +61,7 @@ def test_wrong_use_is_told_before_anything_is_computed(run: Run, arguments, told
     (["--want", "colour=1%", "--vary", "step"], "no wish that is known"),
     (["--step", 4], "positions"),
     (["--half-range", 2, "--centre", 3], "not passed over"),
-    (["--half-range", 0.8, "--step", 0.1, "--noise", 1], "not told apart from zero"),
+    (["--half-range", 0.8, "--step", 0.1, "--noise", 1], "not distinct from zero"),
     (["--radius", 1.5], "The rod is 3 mm wide"),
     (["--method", "magic"], "magic"),
 ])  # fmt: skip

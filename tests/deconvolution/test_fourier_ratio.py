@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import memscal
+from memscal.deconvolution.division import Tikhonov
 from memscal.errors import FitError, InputError
 
 R = np.linspace(0.0, 7e-3, 281)
@@ -67,18 +68,34 @@ def test_the_weakest_component_of_the_voltage_is_read_where_that_of_the_stress_i
 
 
 def test_a_profile_that_is_none_is_refused() -> None:
-    with pytest.raises(InputError, match="do not increase"):
+    with pytest.raises(InputError, match="must increase"):
         memscal.lift(R[::-1], R, SPACING, EXTENT)
-    with pytest.raises(InputError, match="no radial profile"):
+    with pytest.raises(InputError, match="values of the profile"):
         memscal.lift(R, R[1:], SPACING, EXTENT)
-    with pytest.raises(InputError, match="half side"):
-        memscal.lift(R, R, SPACING, SPACING / 2)
+    for extent in (SPACING / 2, 1e6 * SPACING):
+        with pytest.raises(InputError, match="half side"):
+            memscal.lift(R, R, SPACING, extent)
 
 
 def test_fields_on_different_grids_are_not_divided() -> None:
     stress = memscal.lift(R, np.exp(-R / 1e-3), SPACING, 2 * EXTENT)
     with pytest.raises(InputError, match="one spacing and one extent"):
         memscal.divide(gaussian(WIDTH), stress, weakest=1e-3)
+    with pytest.raises(InputError, match="one spacing and one extent"):
+        memscal.reconvolve(1.0, gaussian(WIDTH), stress)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"weakest": 0.0}, "weakest relevant component"),
+        ({"weakest": float("nan")}, "weakest relevant component"),
+        ({"weakest": 1e-3, "method": Tikhonov(), "amplitude": 2.0}, "set up already"),
+    ],
+)
+def test_a_division_without_a_noise_or_with_idle_options_is_refused(options, message) -> None:
+    with pytest.raises(InputError, match=message):
+        memscal.divide(*voltage_and_stress(), **options)
 
 
 def test_a_quotient_without_a_positive_integral_has_no_conversion_constant() -> None:

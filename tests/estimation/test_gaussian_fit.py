@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import CONVERSION, simulated
+from helpers.scans import CONVERSION, reference_spectrum, simulated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +15,6 @@ from memscal.errors import FitError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
-from memscal.estimation.reference import reference_spectrum
 
 
 def forward(scan: Scan) -> ForwardModel:

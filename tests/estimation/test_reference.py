@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import simulated
+from helpers.scans import reference_spectrum, simulated
 
 import memscal
 from memscal.errors import InputError
@@ -12,7 +12,6 @@ from memscal.estimation.points import measured_points
 from memscal.estimation.reference import (
     film_sensitivities,
     reference_profile,
-    reference_spectrum,
     require_calibration_rod,
     rod_sensitivities,
 )

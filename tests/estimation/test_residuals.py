@@ -176,7 +176,7 @@ def test_the_pure_error_is_the_scatter_of_repeats() -> None:
     scan = simulated(repeats=3, points=33, state_noise=False)
     estimate = estimated(scan)
     found, model = pure_error_test(estimate), free_model(estimate)
-    assert model.kept.size == scan.u_zz.size
+    assert model.point.size == scan.u_zz.size
     pure = scan.u_zz.var(axis=0, ddof=1).mean()
     degrees = 33 - model.design.shape[1]
     misfit = model.data - model.design @ np.linalg.lstsq(model.design, model.data)[0]

@@ -12,7 +12,7 @@ from memscal import MeasuredStress, Process, RadialKernel, Scan, StressSensor
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
-from memscal.estimation.reference import reference_spectrum
+from memscal.estimation.reference import reference_spectra
 from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
 from memscal.simulation.contact_scan import simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
@@ -44,6 +44,13 @@ def estimated(scan: Scan) -> ProfileEstimate:
     points: ScanPoints = measured_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
     return estimate_profile(points, reference_spectrum(contact, points, scan.film.thickness))
+
+
+def reference_spectrum(
+    reference: memscal.StressProfile | memscal.Contact, points: ScanPoints, thickness: float
+) -> RadialSpectrum:
+    """Transform of one scan's reference per newton."""
+    return reference_spectra([reference], [points], [thickness])[0]
 
 
 def as_points(scan: Scan, seed: int = 0) -> Scan:

@@ -17,7 +17,7 @@ from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
-from memscal.estimation.reference import reference_spectrum
+from memscal.estimation.reference import reference_spectra
 from memscal.planning.design import varied_designs
 from memscal.planning.expected import Design, expected_calibration
 
@@ -113,8 +113,8 @@ def test_the_mean_of_repeats_is_worth_all_of_them() -> None:
         errors = np.full(u_zz.shape, noise / np.sqrt(share))
         points = measured_points(replace(clean, u_zz=u_zz, u_zz_errors=errors))
         contact = memscal.indent(clean.film, clean.indenter, load=clean.load)
-        reference = reference_spectrum(contact, points, clean.film.thickness)
-        model, weights = ForwardModel(points, (reference,)), 1 / errors.ravel() ** 2
+        references = reference_spectra([contact], [points], [clean.film.thickness])
+        model, weights = ForwardModel(points, references), 1 / errors.ravel() ** 2
         fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
         basis = departure_basis(model, fit)
         count = float(share * weights.size)
@@ -255,7 +255,7 @@ def test_a_plan_that_makes_no_scan_is_refused(given: dict[str, Any], told: str) 
 def test_too_few_positions_or_too_short_a_range_determine_nothing() -> None:
     with pytest.raises(FitError, match="5 measured positions; at least 6"):
         memscal.design(step=2e-3, half_range=4e-3)
-    with pytest.raises(FitError, match="not told apart from zero"):
+    with pytest.raises(FitError, match="not distinct from zero"):
         memscal.design(half_range=0.8e-3, step=0.1e-3, noise=0.01)
 
 
