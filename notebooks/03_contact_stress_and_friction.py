@@ -416,10 +416,10 @@ Markdown("\n".join(rows))
 # %% [markdown]
 # The interface that yields explains all loads with one number. One coefficient for all loads is
 # worse by 17 in χ²; one for each load agrees as well, with four parameters, which lowers its
-# marginal likelihood. The slip length is known to a third. It belongs to this law: with another
-# macroscopic coefficient it would scale in proportion, because the data determine the stiffness
-# $\mu \bar p / \ell$ of the interface before it slips. With the modulus known to 4.5 %, as in the
-# paper, the same voltages leave all from 0.1 to 14 µm, little more than an upper bound.
+# marginal likelihood. The slip length is known to a third, and holds for this law only: with
+# another macroscopic coefficient it would scale in proportion, because the data determine the
+# stiffness $\mu \bar p / \ell$ of the interface before it slips. With the modulus known to 4.5 %,
+# as in the paper, the same voltages leave all from 0.1 to 14 µm, little more than an upper bound.
 #
 # With the paper's own roughness for the slip length, 1.82 µm, the maxima would lie below full stick
 # by 1.5 % at 0.34 N and by 0.8 % at 2.75 N. Read as coefficients that is 0.17 and 0.3: it grows as
@@ -436,7 +436,7 @@ Markdown("\n".join(rows))
 #   slip length: here the tails leave the frictionless profile together with the centre.
 # - In a slow loading, coefficients above about 0.3 cannot be distinguished with this sphere and
 #   this film. A reading of 0.4 depends on the definition of the loading.
-# - The uncertainty of the film's modulus limits what maxima can say. Compare loads, and dry with
+# - The uncertainty of the film's modulus limits the accuracy of maxima. Compare loads, and dry with
 #   lubricated.
 
 # %%

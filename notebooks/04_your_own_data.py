@@ -50,9 +50,9 @@ plt.rcParams.update({"figure.constrained_layout.use": True, "legend.frameon": Fa
 # %% [markdown]
 # ## 1. What a table must hold
 #
-# One row for each reading: the position of the indenter, the voltage, and what tells the lines of
-# a scan apart, which is here the load that was set and the number of the pass. Order, separator
-# and decimal mark do not matter. A reading that was lost may be empty, and a row may be missing.
+# One row for each reading: the position of the indenter, the voltage, and columns that number the
+# lines of a scan, here the load that was set and the pass. Order, separator and decimal mark do not
+# matter. A lost reading may be empty, and a row may be missing.
 
 # %%
 print("".join((TABLES / "sphere_dry.csv").read_text().splitlines(keepends=True)[:9]))
