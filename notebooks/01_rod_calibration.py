@@ -16,13 +16,13 @@
 # %% [markdown]
 # # Calibrating a stress sensor with a thin rod
 #
-# A sensor under a soft film does not report the stress at a point. It reports a voltage
+# A sensor under a soft film gives a voltage
 #
 # $$U_{zz}(x, y) = A_{zz}\,\bigl(G_{zz} \otimes \sigma_{zz}\bigr)(x, y), \tag{1}$$
 #
 # the normal stress $\sigma_{zz}$ at the base of the film, blurred by the *apparatus function*
-# $G_{zz}$ (unit integral) and scaled by the *conversion constant* $A_{zz}$. This notebook finds
-# both by hand, step by step, in the order of the paper: Scheibert, Prevost, Frelat, Rey and
+# $G_{zz}$ (unit integral) and scaled by the *conversion constant* $A_{zz}$. This notebook estimates
+# both step by step, in the order of the paper: Scheibert, Prevost, Frelat, Rey and
 # Debrégeas, *Experimental evidence of non-Amontons behaviour at a multicontact interface*
 # (EPL, 2008). At the end `memscal.calibrate` does the same in one call, with uncertainties.
 #
@@ -31,7 +31,7 @@
 #
 # **The data here are synthetic.** The scan was calculated with the paper's film, rod and load and
 # a Gaussian $G$ of 561 µm, the width that the paper reports; noise, an offset and a drift were
-# added. The truth is therefore known and is compared with each result.
+# added. Each result is compared with these true values.
 
 # %%
 from pathlib import Path
@@ -80,7 +80,7 @@ plt.show()
 # %% [markdown]
 # This is the paper's Fig. 2a; most error bars are smaller than the dots. The peak is five times
 # wider than the rod: the film spreads the load over about its own thickness, and the sensor blurs
-# it further. The calibration separates the two.
+# it further.
 #
 # ## 2. Calculate the stress at the base of the film
 #
@@ -132,9 +132,9 @@ print(f"its integral is {stress.integral:.4f} N; the rest of the load lies beyon
 # %% [markdown]
 # ## 4. Centre, baseline and noise
 #
-# The peak is not at $x = 0$, and the voltage far away is not zero. Both matter: at zero wavenumber
-# Eq. (1) says $A = \int U\,\mathrm{d}x\,\mathrm{d}y / P$, so an offset left in the data is
-# integrated over the whole plane.
+# The peak is not at $x = 0$, and the voltage far away is not zero. At zero wavenumber Eq. (1) is
+# $A = \int U\,\mathrm{d}x\,\mathrm{d}y / P$, so an offset in the data is integrated over the whole
+# plane.
 
 # %%
 offset = 0.001 * np.max(u)
@@ -179,10 +179,10 @@ for name, value, error, scale, unit in (
 print(f"chi-square per degree of freedom: {2 * fit.cost / (x.size - 5):.2f}")
 
 # %% [markdown]
-# With baseline and drift subtracted, the left and the right half of the scan fall on one curve,
-# as they must if sensor and film are axisymmetric. $G$ need not be Gaussian, so what the points
-# add to the fitted model is kept, smoothed by a spline. From 3.5 mm on single points are lost in
-# noise; there the profile is the model's.
+# With baseline and drift subtracted, the left and the right half of the scan fall on one curve, if
+# sensor and film are axisymmetric. $G$ may not be Gaussian, so the difference of points and fitted
+# model is kept, smoothed by a spline. Beyond 3.5 mm noise exceeds the signal of single points, and
+# the profile is the model's.
 
 # %%
 distance = np.abs(x - centre)
@@ -212,9 +212,9 @@ ax.legend()
 plt.show()
 
 # %% [markdown]
-# Negative values cannot be drawn on this axis. The faint hump near 5.5 mm is mechanics: an
-# incompressible film that is squeezed flows outward, which its base feels. It is 0.4 % of the
-# peak, but it lies on a wide ring, and $A$ is an integral over rings.
+# Negative values cannot be drawn on this axis. The maximum near 5.5 mm comes from the film: it is
+# incompressible and moves outward when it is squeezed. It is 0.4 % of the peak, but on a wide ring,
+# and $A$ is an integral over rings.
 #
 # ## 5. Lift the voltage
 
@@ -267,9 +267,9 @@ ax.legend()
 plt.show()
 
 # %% [markdown]
-# $\mathcal F\{\sigma_{zz}\}$ decays almost like $e^{-kh}$: the film removes fine detail before
-# it reaches the sensor. The voltage decays faster still and meets its noise; to the right of the
-# crossing the black curve is the smooth continuation of the profile, not data.
+# $\mathcal F\{\sigma_{zz}\}$ decays almost like $e^{-kh}$: the film removes fine detail. The
+# voltage decays faster; to the right of its crossing with the noise the black curve is the smooth
+# continuation of the profile, not data.
 #
 # ## 7. Divide
 #
@@ -279,11 +279,11 @@ plt.show()
 #
 # $$\mathrm E\left[\frac{1}{z + n}\right] = \frac{1 - e^{-|z|^2/s^2}}{z}.$$
 #
-# On average the noise is a smooth window on the spectrum: open where
-# $|\mathcal F\{\sigma_{zz}\}| \gg s$, closed where it is lost. memscal divides with this
-# expectation. The published recipe, one seeded draw, is available too. Below, 20 draws are
-# compared with the exact quotient: the share that is left of every component, as a mean over rings
-# of nearly equal $k$.
+# On average the noise is a smooth window on the spectrum: one where
+# $|\mathcal F\{\sigma_{zz}\}| \gg s$, zero where it is much smaller. memscal divides with this
+# expectation; the published procedure, one seeded draw, is available too. The figure compares 20
+# draws with the exact quotient: the share of every component, as a mean over rings of nearly equal
+# $k$.
 
 # %%
 quotient = memscal.divide(voltage, stress, weakest=weakest)
@@ -326,9 +326,9 @@ ax.legend(loc="lower left")
 plt.show()
 
 # %% [markdown]
-# Where the window is open, draws and expectation agree. Where it closes, the quotient of two
-# components that are both lost in noise has no finite variance, and even the mean of many draws
-# settles slowly. The expectation is therefore the default.
+# Where the window is near one, draws and expectation agree. Where it falls to zero, the quotient of
+# two components below the noise has no finite variance, and the mean of many draws converges
+# slowly. The expectation is therefore the default.
 #
 # ## 8. Normalise, and fit a Gaussian
 #
@@ -347,8 +347,8 @@ print(f"sigma = {sigma / UM:.0f} µm, true {truth['gaussian_sigma'] / UM:.0f}")
 # %% [markdown]
 # ## 9. Convolve back
 #
-# The paper's own test: $A\,(G \otimes \sigma_{zz})$, Eq. (1), must give back the scan. The
-# residuals are judged by the noise.
+# The paper's test: $A\,(G \otimes \sigma_{zz})$, Eq. (1), must agree with the scan within its
+# noise.
 
 # %%
 back = memscal.reconvolve(A, G, stress)
@@ -368,8 +368,8 @@ plt.show()
 print(f"mean square of residual / noise: {np.mean(residual**2):.2f}")
 
 # %% [markdown]
-# This test is necessary, not sufficient: what the rod does not excite cannot be seen in it. A $G$
-# with a wrong fine structure beyond the resolved band would pass as well.
+# The test is necessary, not sufficient: a $G$ with a wrong fine structure beyond the resolved band
+# passes as well, because the rod does not excite it.
 #
 # ## 10. The same in one call
 #
@@ -418,9 +418,9 @@ plt.show()
 # the paper. The paper's 561 µm was put into the scan, and the conversion constant is invented: the
 # paper does not print its own.
 #
-# Every result draws itself. In the last panel everything to the right of the resolved wavenumber is
-# extrapolation: there the scan says little about $G$, whatever the method. A contact that is wide
-# against this wavelength, such as the paper's sphere, has no power there.
+# In the last panel $G$ is extrapolated to the right of the resolved wavenumber, by every method.
+# The spectrum of a contact that is wide against this wavelength, such as the paper's sphere, is
+# negligible there.
 
 # %%
 calibration.plot()
@@ -432,9 +432,8 @@ print(f"resolved: {limit:.2f} rad/mm, a wavelength of {2 * np.pi / limit:.1f} mm
 # %% [markdown]
 # ## 11. Where the uncertainty comes from
 #
-# Each source is propagated on its own: the scan's noise, what the window may have hidden, the
-# load, and the film and rod on which the reference rests. Young's modulus contributes nothing: at
-# a given load the stress in a linear film does not depend on it.
+# Each source is propagated on its own: noise, the window, load, film and rod. Young's modulus
+# contributes nothing: at a given load the stress in a linear film does not depend on it.
 
 # %%
 names = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
@@ -450,8 +449,7 @@ ax.legend()
 plt.show()
 
 # %% [markdown]
-# The load and the noise limit the conversion constant; the film's thickness limits the width. A
-# better measurement of the film would reduce it, a better sensor would not.
+# The load and the noise limit the conversion constant; the film's thickness limits the width.
 #
 # ## 12. The amplitude of the white noise
 #
@@ -463,18 +461,17 @@ sweep = calibration.sweep(amplitudes=9, draws=4)
 sweep.plot()
 
 # %% [markdown]
-# With the expectation the claim holds. Below the rule's amplitude hardly anything changes; far
-# above it the window cuts into the resolved band, $G$ gets wider, and the reconvolution worse.
+# With the expectation this is so. Below the rule's amplitude the results hardly change; far above
+# it the window reduces the resolved band, $G$ gets wider, and the reconvolution worse.
 #
 # Of single draws, $A$ is stable near the rule's amplitude, because $A$ is the quotient at zero
-# wavenumber, where both spectra are strongest. Their width is not: at any amplitude some
-# components are divided by almost nothing, and the ripples in $G$ move a Gaussian fitted to it by
-# ten percent, sometimes by far more. The paper's recipe, read literally, is a single draw.
+# wavenumber, where both spectra are strongest. Their width is not: at any amplitude some components
+# are divided by values near zero, and the ripples in $G$ change the width of a Gaussian fitted to
+# it by ten percent, sometimes by far more. The paper describes a single draw.
 #
 # ## 13. Save, load, and predict another load
 #
-# The result is one file: the apparatus function with its uncertainty, the checks, and the origin
-# of all of it.
+# The artifact holds the apparatus function with its uncertainty, the checks, and the provenance.
 
 # %%
 with TemporaryDirectory() as folder:
@@ -487,8 +484,8 @@ print(f"made by {loaded.process.program} {loaded.process.version} from {source.f
 print(f"sha256 of that file: {source.sha256[:16]}...")
 
 # %% [markdown]
-# The better test is a scan that was *not* used. `rod_scan_three_loads.h5` holds three lines, at
-# 0.5, 1 and 1.5 N. Only position, baseline and drift are fitted to them.
+# A better test is a scan that was *not* used. `rod_scan_three_loads.h5` holds three lines, at 0.5,
+# 1 and 1.5 N. Only position, baseline and drift are fitted to them.
 
 # %%
 loads = memscal.read_scan(DATA / "rod_scan_three_loads.h5")
@@ -518,9 +515,9 @@ plt.show()
 # %% [markdown]
 # ## How this differs from the paper
 #
-# - The scan is synthetic, calculated by the same linear model that the reference uses. A real film
-#   under a rod that sinks in by half a millimetre is not quite linear, and a real sensor disturbs
-#   the stress that it measures. Neither is included here.
+# - The scan is synthetic, calculated by the linear model of the reference. A real film under a rod
+#   that sinks in by half a millimetre is not linear, and a real sensor disturbs the stress that it
+#   measures. Neither is included here.
 # - The truth is exactly Gaussian and axisymmetric. The paper's $G$ is only nearly so.
 # - Our scan has 65 points, spaced 0.25 mm; the paper's spheres were scanned at 33 points, 0.5 mm
 #   apart (`rod_scan_33.h5` is spaced like that), and its rod scan's spacing is not printed.

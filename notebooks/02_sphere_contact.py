@@ -16,13 +16,11 @@
 # %% [markdown]
 # # A sphere on a film, with friction
 #
-# A glass sphere is pressed on a soft film that is bonded to a rigid base. How deep does it sink,
-# how wide is the contact, and what stress arrives at the base, where the sensor is? Friction
-# between glass and film changes all three, and the result depends on the path of loading. This
-# notebook calculates the paper's sphere (Scheibert, Prevost, Frelat, Rey and Debrégeas, EPL 2008)
-# and compares the numbers with the paper's.
-#
-# Everything here is calculated; nothing is measured, and nothing is tuned to meet the paper.
+# A glass sphere is pressed on a soft film that is bonded to a rigid base. Depth, contact radius and
+# the stress at the base, where the sensor is, depend on the friction between glass and film and on
+# the path of loading. This notebook calculates them for the paper's sphere (Scheibert, Prevost,
+# Frelat, Rey and Debrégeas, EPL 2008) and compares them with the paper. Nothing is measured, and
+# nothing is adjusted to agree with the paper.
 
 # %%
 import math
@@ -55,8 +53,8 @@ def name(friction):
 # %% [markdown]
 # ## 1. Three contacts
 #
-# A load of 1.37 N, without friction, with a friction coefficient of 0.3, and with a film that
-# sticks wherever it has touched: first the contact with 0.3 as memscal draws it, then all three.
+# A load of 1.37 N, without friction, with a friction coefficient of 0.3, and with full stick: first
+# the contact with 0.3 as memscal draws it, then all three.
 
 # %%
 middling = memscal.indent(film, sphere, load=1.37, friction=0.3)
@@ -79,15 +77,15 @@ fig.suptitle("Pressure (solid) and shear (dashed, positive outward)")
 plt.show()
 
 # %% [markdown]
-# The film is squeezed outward under the sphere. Friction holds it back (the shear on the film is
-# negative): more of the load arrives at the centre of the base, and less around the edge of the
-# contact. This is the effect of friction that the sensor can measure.
+# The film is squeezed outward under the sphere. Friction opposes this (the shear on the film is
+# negative): the stress at the base is larger at the centre, and smaller around the edge of the
+# contact. The sensor measures this effect.
 #
 # ## 2. Accuracy
 #
-# Two methods share nothing but the contact conditions: Hankel transforms on an infinite film, and
-# finite elements on a film of 25 mm radius with a free edge. The last column is the change when
-# the discretisation is refined.
+# Two methods share only the contact conditions: Hankel transforms on an infinite film, and finite
+# elements on a film of 25 mm radius with a free edge. The last column is the change when the
+# discretisation is refined.
 
 # %%
 rows = [
@@ -184,15 +182,15 @@ Markdown("\n".join(rows))
 # %% [markdown]
 # - **Without friction** the calculated depths agree with the paper's to its rounding for
 #   $\nu = 0.495$; for an incompressible film they are half a micrometre to a micrometre smaller.
-# - **The "contact diameters" are radii.** Taken as diameters they are half of what any film of this
-#   thickness and modulus gives; taken as radii they agree to 0.02 mm.
+# - **The "contact diameters" are radii.** As diameters they are half of those of any film of this
+#   thickness and modulus; as radii they agree to 0.02 mm.
 # - **With $\mu = \infty$** the paper's film is stiffer than ours. The definition of the loading
 #   explains a part: from incremental to total the depth falls by 0.3, 1.1 and 1.9 µm, toward the
 #   paper's. A difference of 0.6, 1.4 and 1.5 µm (4 to 5 %) remains for an incompressible film, and
 #   more for $\nu = 0.495$. The paper's mesh of 50 µm and its finite load steps may account for it;
 #   its text does not say.
 #
-# ## 5. What the sensor would report
+# ## 5. The sensor's signal
 #
 # The sensor blurs the stress with its apparatus function $G$. Here $G$ comes from calibrating the
 # shipped rod scan (synthetic, with the paper's width of 561 µm). The paper's Fig. 3 compares
@@ -236,8 +234,8 @@ ax.legend()
 plt.show()
 
 # %% [markdown]
-# And its Fig. 5 reads a friction coefficient off the largest stress, relative to the frictionless
-# one, at each load. Solid: incremental; dashed: total.
+# Its Fig. 5 gives a friction coefficient at each load from the largest stress, relative to the
+# frictionless one. Solid: incremental; dashed: total.
 
 # %%
 fig, ax = plt.subplots(figsize=(4.6, 3.4))
@@ -253,9 +251,9 @@ ax.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
 
 # %% [markdown]
-# **The effect of friction saturates.** In this geometry a slow loading never drives the film far
-# sideways before it sticks. Beyond a modest coefficient the whole contact sticks, and a larger
-# one changes nothing. The largest distance of each profile from the sticking one:
+# **The effect of friction saturates.** In a slow loading the film moves little before it sticks.
+# Beyond some coefficient the whole contact sticks, and a larger one changes nothing. The largest
+# distance of each profile from that of full stick:
 
 # %%
 fig, axes = plt.subplots(1, 2, sharey=True)
@@ -275,8 +273,8 @@ axes[1].legend()
 plt.show()
 
 # %% [markdown]
-# A measured profile can distinguish an effective coefficient of 0.1 from 0.2. In a slow loading it
-# cannot distinguish 0.4 from 1.6: a coefficient above about 0.3 is a lower bound, not a value.
+# A measured profile distinguishes an effective coefficient of 0.1 from 0.2. In a slow loading it
+# does not distinguish 0.4 from 1.6: a coefficient above about 0.3 is a lower bound.
 #
 # ## 6. An interface that yields
 #

@@ -17,15 +17,14 @@
 # # Contact stress and friction: the paper's figures
 #
 # A glass sphere is pressed on a rough soft film, dry and lubricated, and a calibrated sensor at the
-# base of the film measures the normal stress. How much friction is in the contact? Scheibert,
-# Prevost, Frelat, Rey and Debrégeas, *Experimental evidence of non-Amontons behaviour at a
-# multicontact interface* (EPL, 2008), answered with four figures. This notebook builds Figures 2 to
-# 5 again, in their order, and says under each what agrees with the paper, what does not, and why.
+# base of the film measures the normal stress, from which the friction of the contact is estimated.
+# This notebook draws Figures 2 to 5 of Scheibert, Prevost, Frelat, Rey and Debrégeas, *Experimental
+# evidence of non-Amontons behaviour at a multicontact interface* (EPL, 2008), in their order, and
+# states under each what agrees with the paper, what does not, and why.
 #
-# **All data here are synthetic.** They come from a virtual laboratory with the paper's film, rod,
-# sphere, loads and spacing; nothing was measured, and nothing is tuned to meet the paper. The
-# paper's own voltages are not published as numbers. What can be compared is the method and the
-# mechanics.
+# **All data here are synthetic**, simulated with the paper's film, rod, sphere, loads and spacing;
+# nothing is adjusted to agree with the paper. The paper's voltages are not published as numbers, so
+# only the method and the mechanics can be compared.
 
 # %%
 from dataclasses import replace
@@ -93,13 +92,12 @@ plt.show()
 print(repr(apparatus))
 
 # %% [markdown]
-# *What agrees.* The voltage is wider than the stress, and a bell of about 600 µm width accounts for
-# the difference; convolved with the stress it gives back the scan, the deconvolved one and the
-# Gaussian alike. *What does not, and why.* Our Gaussian of 561 µm was put in, and our conversion
-# constant is invented: the paper prints none. Our rod presses on a linear film; the paper's
-# sinks half a millimetre into two, where its film was hardly linear (notebook 01). The band on the
-# right is what the scan leaves open: fine detail of G is not resolved, and the contacts below do
-# not need it.
+# *What agrees.* The voltage is wider than the stress by a G of about 600 µm width; the deconvolved
+# G and the Gaussian, convolved with the stress, agree with the scan. *What does not, and why.* Our
+# Gaussian of 561 µm is an input, and our conversion constant is invented: the paper prints none.
+# Our rod presses on a linear film; the paper's sinks half a millimetre into two, where a film is
+# hardly linear (notebook 01). The band on the right shows that fine detail of G is not resolved;
+# the contacts below do not depend on it.
 #
 # ## Figure 3: measured stress between no friction and full stick
 #
@@ -171,8 +169,8 @@ Markdown("\n".join(rows))
 
 # %% [markdown]
 # *What agrees.* The measured profiles lie between the two limits within their uncertainty, at the
-# centre and in the tails, over more than two decades; below that they are lost in noise. Friction
-# raises the centre and narrows the profile, more so at higher loads. *What does not, and why.* The
+# centre and in the tails, over more than two decades, down to the noise. Friction raises the centre
+# and narrows the profile, more so at higher loads. *What does not, and why.* The
 # paper's "contact diameters" are radii: as diameters they would be half of what any film of this
 # thickness and modulus gives. Its depths without friction are ours with Poisson's ratio 0.495, and
 # half a micrometre to a micrometre above those of 0.5. With $\mu = \infty$ its film is stiffer than
@@ -181,8 +179,8 @@ Markdown("\n".join(rows))
 # increasingly departs from it". In our calculation the profile of one coefficient departs at both:
 # 0.2 takes the centre 79 % of the way from no friction to full stick at 2.75 N, and the stress at
 # 5 mm 65 % of it; an interface that yields (below) does much the same. Far out the two limits are
-# 2 kPa apart or less, so the baseline must be known to better than that. Something that widens
-# profiles, such as a normal compliance, may be at work in the experiment; it is not in ours.
+# 2 kPa apart or less, so the baseline must be known to better than that. An effect that widens
+# profiles, such as a normal compliance, may exist in the experiment; our simulation has none.
 #
 # ## Figure 4: dry against lubricated
 #
@@ -228,7 +226,7 @@ Markdown("\n".join(rows))
 
 # %% [markdown]
 # *What agrees.* The lubricated profile is wider and lower, and the frictionless calculation agrees
-# with it with nothing adjusted. The dry one is a few percent higher at the centre, and some
+# with it with nothing adjusted. The dry one is a few percent higher at the centre, and one
 # coefficient describes all of it. *What does not, and why.* The paper distinguishes 0.3 from 0.4
 # and both from infinity, "with a resolution of order 0.1". In our calculation 0.3, 0.4 and ∞ differ
 # by at most 0.7 % of the maximum where the load grows slowly: the contact sticks as it grows, and
@@ -347,9 +345,9 @@ comparison.plot()
 #
 # The paper finds that $\mu_e$ grows with the load and stays far below the macroscopic
 # $\mu_{macro} \approx 1.6$, and ascribes both to the interface: a layer of asperities that yields
-# elastically, by about its roughness of 1.82 µm, before it slips. Let this be the truth: a friction
-# coefficient of 1.6, reached after 6 µm. (That is three times the roughness, so that the effect is
-# large enough to be seen.) The rod is scanned eight times and each load four times.
+# elastically, by about its roughness of 1.82 µm, before it slips. This simulation has a friction
+# coefficient of 1.6, reached after 6 µm, which is three times the roughness and makes the effect
+# visible. The rod is scanned eight times and each load four times.
 #
 # With the paper's film the voltages give only bounds, at every load: a modulus of 2.2 ± 0.1 MPa
 # alone makes the calculated stresses uncertain by 1.5 %. Here the modulus is known to 0.5 % and
@@ -418,10 +416,10 @@ Markdown("\n".join(rows))
 # %% [markdown]
 # The interface that yields explains all loads with one number. One coefficient for all loads is
 # worse by 17 in χ²; one for each load agrees as well, with four parameters, which lowers its
-# marginal likelihood. The slip length is known to a third. It belongs to this law: with another
-# macroscopic coefficient it would scale in proportion, because the data determine the stiffness
-# $\mu \bar p / \ell$ of the interface before it slips. With the modulus known to 4.5 %, as in the
-# paper, the same voltages leave all from 0.1 to 14 µm, little more than an upper bound.
+# marginal likelihood. The slip length is known to a third, and holds for this law only: with
+# another macroscopic coefficient it would scale in proportion, because the data determine the
+# stiffness $\mu \bar p / \ell$ of the interface before it slips. With the modulus known to 4.5 %,
+# as in the paper, the same voltages leave all from 0.1 to 14 µm, little more than an upper bound.
 #
 # With the paper's own roughness for the slip length, 1.82 µm, the maxima would lie below full stick
 # by 1.5 % at 0.34 N and by 0.8 % at 2.75 N. Read as coefficients that is 0.17 and 0.3: it grows as
@@ -438,7 +436,7 @@ Markdown("\n".join(rows))
 #   slip length: here the tails leave the frictionless profile together with the centre.
 # - In a slow loading, coefficients above about 0.3 cannot be distinguished with this sphere and
 #   this film. A reading of 0.4 depends on the definition of the loading.
-# - The uncertainty of the film's modulus limits what maxima can say. Compare loads, and dry with
+# - The uncertainty of the film's modulus limits the accuracy of maxima. Compare loads, and dry with
 #   lubricated.
 
 # %%

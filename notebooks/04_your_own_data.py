@@ -18,10 +18,9 @@
 # %% [markdown]
 # # Your own data: from tables to a friction coefficient
 #
-# You have three tables: a scan with a thin rod, and scans of contacts with a sphere, dry and
-# lubricated. This notebook leads from there to the friction coefficient of the contact with its
-# interval, and says what to check at each step. Replace the tables and the numbers in the commands
-# by yours.
+# From three tables (a scan with a thin rod, and scans of contacts with a sphere, dry and
+# lubricated) this notebook estimates the friction coefficient of the contact with its interval, and
+# states what to check at each step. Replace the tables and the numbers in the commands by yours.
 #
 # **The tables here are synthetic.** They were calculated for an invented film, sensor and sphere,
 # with a friction coefficient of 0.12; `calibration_data/make_tables.py` made them.
@@ -51,9 +50,9 @@ plt.rcParams.update({"figure.constrained_layout.use": True, "legend.frameon": Fa
 # %% [markdown]
 # ## 1. What a table must hold
 #
-# One row for each reading: the position of the indenter, the voltage, and what tells the lines of
-# a scan apart, which is here the load that was set and the number of the pass. Order, separator
-# and decimal mark do not matter. A reading that was lost may be empty, and a row may be missing.
+# One row for each reading: the position of the indenter, the voltage, and columns that number the
+# lines of a scan, here the load that was set and the pass. Order, separator and decimal mark do not
+# matter. A lost reading may be empty, and a row may be missing.
 
 # %%
 print("".join((TABLES / "sphere_dry.csv").read_text().splitlines(keepends=True)[:9]))
@@ -109,9 +108,9 @@ run(
 # `--load-scatter`, in percent, is independent from contact to contact: it is noise, and repeats
 # average it.
 #
-# Read the notes. They say how many readings, lines and places the table holds, and what is
-# missing. Without the load among the columns of `--repeat`, the contacts of three loads would stand
-# in one line, and the import would warn of it.
+# Read the notes: how many readings, lines and places the table holds, and what is missing. Without
+# the load among the columns of `--repeat`, the contacts of three loads would be in one line; the
+# import warns of it.
 #
 # ## 3. Look at the scans
 #
@@ -148,9 +147,10 @@ calibration.plot()
 # Check, in this order:
 #
 # - **the residuals** (b): they lie within their band and show no wave;
-# - **the resolved band** (f): what is hatched was not measured. Contacts that are wide against
-#   the film do not need it;
-# - **the uncertainty of A**: every stress inherits it. `memscal design` says how to halve it;
+# - **the resolved band** (f): G is not measured in the hatched range. Contacts that are wide
+#   against the film do not depend on it;
+# - **the uncertainty of A**: it is part of every stress. `memscal design` finds the scan that
+#   halves it;
 # - **the checks**: all passed here. `docs/quality.md` explains each one.
 #
 # ## 5. The measured stress
@@ -181,9 +181,9 @@ def forces(measured):
 forces(measured)
 
 # %% [markdown]
-# **Look at the force first.** It does not depend on the shape of G, and therefore tests A and the
-# loads alone. Then the logarithmic panel: the profile falls smoothly over two to three decades,
-# until the points are lost in noise.
+# **Check the force first.** It does not depend on the shape of G, and therefore tests A and the
+# loads alone. Then check the logarithmic panel: the profile falls smoothly over two to three
+# decades, down to the noise.
 #
 # ## 6. The friction coefficient
 #
@@ -198,11 +198,11 @@ comparison = memscal.compare(measured, apparatus, friction=FRICTION)
 comparison.plot()
 
 # %% [markdown]
-# The points lie between the curve without friction and the one of full stick (a). Friction keeps
-# the film from being squeezed outward and sends more of the load to the centre; the maxima (b) are
-# larger than without it by a few percent. Error bars hold what all points of a profile have in
-# common, too: an error of A moves all of them alike, so that neighbouring residuals (c) may lie to
-# one side together. Chi-square accounts for that.
+# The points lie between the curve without friction and the one of full stick (a). Friction opposes
+# the outward motion of the film and raises the stress at the centre; the maxima (b) are larger than
+# without it by a few percent. Error bars include errors that all points of a profile share, such as
+# that of A, so neighbouring residuals (c) may lie to one side together. Chi-square accounts for
+# this.
 
 
 # %%
@@ -237,14 +237,14 @@ coefficients(comparison)
 # - **An interval that ends at ∞ is a bound.** Beyond some coefficient the whole contact sticks,
 #   and a larger one changes nothing; such data have no upper limit, whatever the noise. Quote the
 #   lower end.
-# - **An interval that begins at 0** says that no friction was detected. The lubricated contacts,
+# - **An interval that begins at 0** means that no friction was detected. The lubricated contacts,
 #   the control, must be of this kind.
 # - **All loads together** have one coefficient, if Amontons' law holds. If the coefficients of
 #   single loads rise or fall beyond their intervals, it does not (notebook 03).
 # - **The definition of the loading** is not a statistical question: it follows from the
 #   experiment. For small coefficients both agree.
 #
-# The likelihoods are the full answer: a parabola is a measurement; a curve that is flat to the
+# The likelihoods show both: a parabola is a value with an uncertainty; a curve that is flat to the
 # right below the level of 95 % is a lower bound.
 
 # %%
@@ -271,12 +271,12 @@ for source, contribution in sorted(budget.items(), key=lambda item: -item[1]):
     print(f"{source.replace('_', ' '):16} {contribution:.4f}")
 
 # %% [markdown]
-# This is what each source contributes to the standard uncertainty of the coefficient: the first
-# lines say what to measure better next time. The truth of these tables is 0.12.
+# This is each source's contribution to the standard uncertainty of the coefficient; the first are
+# worth a better measurement. The true coefficient of these tables is 0.12.
 #
 # ## 7. The checks, and what to do when one fails
 #
-# A failed check does not stop a comparison, but look at it before you quote a number.
+# A failed check does not stop a comparison; find its cause before you quote a number.
 
 # %%
 with_p = [check for check in comparison.checks if check.p_value is not None]
@@ -315,9 +315,8 @@ wrong_gain = [replace(scan, u_zz=1.05 * scan.u_zz) for scan in (dry, lubricated)
 forces(memscal.measure_stress(wrong_gain, apparatus))
 
 # %% [markdown]
-# Every force is about 5 % too large. A single profile hardly shows it; all together do, and the
-# ratio says by how much. Undetected, it would look like friction: full stick adds no more than
-# 12 to 21 % to these maxima.
+# Every force is about 5 % too large. A single profile hardly shows it; all together do. Undetected,
+# it would look like friction: full stick adds no more than 12 to 21 % to these maxima.
 #
 # Second, a film whose stated thickness is 5 % too large, in the calibration and in the measurement:
 
@@ -338,10 +337,10 @@ for state, by_loading in wrong.joint.items():
 print("failed:", [check.name for check in wrong.checks if not check.passed])
 
 # %% [markdown]
-# No check failed, and the truth is no longer in the interval of the dry contacts. But the interval
-# of the lubricated ones does not begin at 0 any more: the control shows friction where there is
-# none. Lubricated contacts are what distinguishes a wrong film from friction. The stated
-# uncertainty of the thickness, 1 %, was a fifth of the error: state it in full.
+# No check failed, and the true value is not in the interval of the dry contacts. The interval of
+# the lubricated ones does not begin at 0: the control shows friction where there is none.
+# Lubricated contacts distinguish a wrong film from friction. The stated uncertainty of the
+# thickness, 1 %, was a fifth of the error: state it in full.
 #
 # Third, the artifact of another sensor:
 
@@ -355,7 +354,7 @@ except memscal.MemscalError as error:
 # %% [markdown]
 # ## 8. The same at the terminal
 #
-# Every step has its command, with figures and JSON for other programs:
+# Every step has its command, with figures and JSON:
 
 # %%
 run(f"apply {folder}/sensor.apparatus.h5 {folder}/lubricated.h5 -o {folder}/lubricated.stress.h5")
