@@ -60,7 +60,7 @@ class ApparatusFunction(Result, ApparatusData):
     def content_digest(self) -> str:
         """The digest that its artifact states, or would state if it were saved."""
         from memscal.formats.artifact import artifact_tree
-        from memscal.formats.schema import DIGEST_ATTRIBUTE
+        from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 
         return str(artifact_tree(self).attributes[DIGEST_ATTRIBUTE])
 
@@ -240,7 +240,7 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
     """
     from memscal.formats.artifact import artifact_from
     from memscal.formats.hdf5.reader import open_hdf5
-    from memscal.formats.schema import DIGEST_ATTRIBUTE
+    from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 
     with open_hdf5(path) as file:
         data = artifact_from(file)

@@ -10,8 +10,7 @@ from memscal.errors import FormatError
 from memscal.formats import groups
 from memscal.formats.codec import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, file_tree, write_tree
-from memscal.formats.schema import ARTIFACT_SCHEMA
+from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, Node, file_tree, write_tree
 from memscal.formats.values import altered, require_scalar, require_schema
 from memscal.model import records
 from memscal.model.apparatus import (

@@ -11,7 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from memscal.errors import InputError, OutputError, UnsafeFileError
-from memscal.formats.schema import MAX_FILE_BYTES
+
+MAX_FILE_BYTES = 256 * 2**20
 
 _UNTOUCHED = "Nothing was written; what was there before is untouched."
 _CURES = {

@@ -10,8 +10,7 @@ import numpy as np
 from memscal.errors import FormatError, InputError
 from memscal.formats.codec import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import Group, Node, Number, index_axis, si
-from memscal.formats.json_text import to_json
+from memscal.formats.hdf5.writer import Group, Node, Number, index_axis, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.formats.values import any_scalar, json_value, require_array, require_text, units_of
 from memscal.model import records

@@ -14,9 +14,7 @@ from memscal.formats.artifact import artifact_from
 from memscal.formats.codec import listed, origins
 from memscal.formats.groups import estimated_record, read_quality
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.reference import profile_from
-from memscal.formats.scan import scan_from
-from memscal.formats.schema import (
+from memscal.formats.hdf5.writer import (
     ARTIFACT_SCHEMA,
     DIGEST_ATTRIBUTE,
     REFERENCE_SCHEMA,
@@ -24,6 +22,8 @@ from memscal.formats.schema import (
     SCHEMA_ATTRIBUTE,
     STRESS_SCHEMA,
 )
+from memscal.formats.reference import profile_from
+from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.values import altered, require_schema, units_of

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 from memscal.errors import InputError
 from memscal.formats.hdf5.reader import open_hdf5
+from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.scan import read_scan, scan_from
-from memscal.formats.schema import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.stress import stress_from
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan

@@ -15,9 +15,17 @@ from memscal.formats import groups
 from memscal.formats.codec import read_record, write_record
 from memscal.formats.files import ensure_writable
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, index_axis, si, write_tree
-from memscal.formats.json_text import to_json
-from memscal.formats.schema import SCAN_SCHEMA
+from memscal.formats.hdf5.writer import (
+    SCAN_SCHEMA,
+    Group,
+    Node,
+    Number,
+    file_tree,
+    index_axis,
+    si,
+    to_json,
+    write_tree,
+)
 from memscal.formats.values import (
     any_scalar,
     json_value,

@@ -13,9 +13,16 @@ from memscal.errors import FormatError
 from memscal.formats import groups
 from memscal.formats.codec import read_record, read_source, write_record, write_source
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, count, file_tree, si, write_tree
-from memscal.formats.json_text import to_json
-from memscal.formats.schema import STRESS_SCHEMA
+from memscal.formats.hdf5.writer import (
+    STRESS_SCHEMA,
+    Group,
+    Node,
+    count,
+    file_tree,
+    si,
+    to_json,
+    write_tree,
+)
 from memscal.formats.values import (
     altered,
     json_value,

@@ -14,11 +14,10 @@ from helpers.builders import make_artifact, make_profile, make_scan
 from memscal.errors import FormatError, SchemaVersionError
 from memscal.formats.artifact import read_artifact, write_artifact
 from memscal.formats.hdf5.reader import open_hdf5
-from memscal.formats.hdf5.writer import content_digest
+from memscal.formats.hdf5.writer import CONTENTS_PATH, SCHEMA_VERSION, content_digest
 from memscal.formats.inspection import check
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
-from memscal.formats.schema import CONTENTS_PATH, SCHEMA_VERSION
 from memscal.formats.values import json_value, stored_items
 
 
