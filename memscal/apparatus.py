@@ -1,4 +1,4 @@
-"""Apparatus function in use: predicted voltages, convolved stresses, measured stresses."""
+"""Apparatus function: predicted voltages, convolved stresses, measured stresses."""
 
 from __future__ import annotations
 
@@ -254,4 +254,11 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
 
 def opened_apparatus(apparatus: ApparatusFunction | str | PathLike[str]) -> ApparatusFunction:
     """Return the apparatus function, read from its artifact where it is a path."""
-    return apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
+    if isinstance(apparatus, str | PathLike):
+        return load_apparatus(apparatus)
+    if not isinstance(apparatus, ApparatusFunction):
+        raise InputError(
+            f"There is a {type(apparatus).__name__} where an apparatus function is needed.",
+            cure="Give one, such as Calibration.apparatus, or the path of its artifact.",
+        )
+    return apparatus

@@ -1,4 +1,4 @@
-"""Processes that share work, and threads of the linear algebra library: one for each."""
+"""Processes that share work, each with one thread of the linear algebra library."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ def single_threaded() -> Iterator[None]:
             yield
 
 
-#: Systems refuse more, and no machine gains by them.
+#: Windows refuses more.
 _MOST_WORKERS = 61
 
 
 def require_workers(workers: Any) -> None:
-    """Refuse a number of processes that makes no sense."""
+    """Refuse a number of processes that is not whole, or out of range."""
     if not isinstance(workers, Integral) or not 1 <= int(workers) <= _MOST_WORKERS:
         raise InputError(
             f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}.",

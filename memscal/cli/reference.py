@@ -12,6 +12,7 @@ import click
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
+    PAPER_FILM,
     Quantity,
     film_from,
     film_options,
@@ -112,9 +113,6 @@ def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-#: The paper's film.
-FILM = {"young-modulus": 2.2, "poisson-ratio": 0.5, "thickness": 2.0}
-
 EXAMPLES = """\b
 Examples:
   memscal reference rod
@@ -153,7 +151,7 @@ Examples:
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
-@film_options(defaults=FILM, uncertainties=False)
+@film_options(defaults=PAPER_FILM, uncertainties=False)
 @option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
@@ -191,8 +189,8 @@ def command(
 ) -> int:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
-    Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and
-    2 mm; a rod of radius 0.25 mm, a sphere of radius 128.8 mm.
+    Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and thickness 2 mm; a
+    rod of radius 0.25 mm, a sphere of radius 128.8 mm.
     """
     _check_usage(loads, depths, output, mesh, options)
     files = [path for path in (output, mesh, *figures) if path is not None]

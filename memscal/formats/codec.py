@@ -149,7 +149,7 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
 
 
 def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, Any]:
-    """Return what quantities say of a file's origin, by their names; JSON notes come last."""
+    """Return the origin of a file as its quantities state it, by their names; JSON notes last."""
     texts: dict[str, Any] = {}
     notes: dict[str, Any] = {}
     for at, quantity in paths:
@@ -159,6 +159,6 @@ def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, 
         elif isinstance(value, str):
             texts[quantity.origin] = value
         else:
-            is_told = quantity.dimension == "messages"
-            notes[quantity.origin] = [message.text for message in value] if is_told else value
+            of_messages = quantity.dimension == "messages"
+            notes[quantity.origin] = [item.text for item in value] if of_messages else value
     return texts | notes

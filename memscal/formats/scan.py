@@ -48,7 +48,7 @@ _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
 _OF_ONE_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _POINTS = ("point",)
-# One name for each axis of the correlation: netCDF tools want each dimension once.
+# One name for each axis of the correlation: netCDF tools need each dimension once.
 _PAIRS = ("point", "point_prime")
 _SYNTHETIC = (
     "The data of this file are synthetic: calculated from the known truth below, not measured."
@@ -201,10 +201,10 @@ def _data_group(scan: Scan) -> Group:
     if scan.u_zz_correlation is not None:
         data |= {axis: index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
         data |= _nodes({"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
-    rest = {
+    optional = {
         name: getattr(scan, name) for name in ("u_zz_errors", "normal_load", "normal_load_errors")
     }
-    data |= _nodes(rest | dict(scan.channels), axes)
+    data |= _nodes(optional | dict(scan.channels), axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 

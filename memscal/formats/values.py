@@ -1,4 +1,4 @@
-"""Single values of a safe file by kind, and whether the file is as it was written."""
+"""Single values of a safe file by kind, its schema, and its digest."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def require_schema(file: SafeFile, schema: str) -> str:
     """Return the schema version; refuse another schema or a newer major version."""
     stored = file.attribute("/", SCHEMA_ATTRIBUTE)
     if stored != schema:
-        what = "no memscal schema" if stored is None else f'the schema "{stored}"'
+        held = "no memscal schema" if stored is None else f'the schema "{stored}"'
         raise FormatError(
-            f'{file.name} has {what}, but "{schema}" is needed here.',
-            why=f"The root attribute {SCHEMA_ATTRIBUTE} says what a file holds.",
+            f'{file.name} has {held}, but "{schema}" is needed here.',
+            why=f"The root attribute {SCHEMA_ATTRIBUTE} names what a file holds.",
             cure="Give the right file, or make one with `memscal import` or `memscal calibrate`.",
         )
     version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")

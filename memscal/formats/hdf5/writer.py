@@ -1,4 +1,4 @@
-"""The one HDF5 writer: a tree becomes bytes in memory, and the bytes a file in one step."""
+"""The one HDF5 writer, its schemas and their version; a tree becomes bytes, and they a file."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """A NeXus group; an attribute whose value is empty text is left out when it is written."""
+    """A NeXus group: its class, children by name, and attributes."""
 
     nx_class: str
     children: Mapping[str, Node]
@@ -111,7 +111,7 @@ def _json_value(subject: str, value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_json_value(subject, item) for item in value]
     raise InputError(
-        f"{subject} holds a {type(value).__name__}, which JSON cannot say.",
+        f"{subject} holds a {type(value).__name__}, which JSON cannot hold.",
         cure="Give numbers, text, truth values, lists and mappings.",
     )
 
@@ -131,7 +131,10 @@ DigestItem = tuple[str, "np.ndarray[Any, Any] | str | None", Mapping[str, Any]]
 
 
 def content_digest(items: Iterable[DigestItem]) -> str:
-    """Return the SHA-256 over paths, values and attributes, as hexadecimal text."""
+    """Return the SHA-256 over paths, values and attributes, as hexadecimal text.
+
+    It shows accidents and careless edits; it is not a signature.
+    """
     total = hashlib.sha256()
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)
