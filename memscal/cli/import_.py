@@ -200,7 +200,7 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @option("--title", metavar="TEXT")("Scan: title.")
 @reference_options
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
-@radius_options()
+@radius_options("the rod or of the sphere's curvature")
 @film_options()
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")

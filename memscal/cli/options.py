@@ -141,11 +141,15 @@ def film_options(
 
 
 def radius_options(
-    *, default: float | None = None, uncertainty: float | None = None, uncertainties: bool = True
+    of: str = "the rod",
+    *,
+    default: float | None = None,
+    uncertainty: float | None = None,
+    uncertainties: bool = True,
 ) -> _Adder:
     """Return the option of the indenter's radius, with or without its uncertainty."""
     entries: list[tuple[str, Quantity, str]] = [
-        ("radius", Quantity("mm"), "Radius of the rod (not its diameter), in mm.")
+        ("radius", Quantity("mm"), f"Radius of {of} (not the diameter), in mm.")
     ]
     if uncertainties:
         spread = Quantity("mm", open_low=False)

@@ -135,7 +135,7 @@ Examples:
 @option("--depth depths", Quantity("um"), multiple=True)(
     "Indentation depth, in um, in place of a load. May be repeated."
 )
-@radius_options(uncertainties=False)
+@radius_options("the rod or of the sphere's curvature", uncertainties=False)
 @option("--inclination", Quantity("deg", high=89.0))(
     "Cone: angle between its face and the film, in degrees."
 )
@@ -249,20 +249,20 @@ def _write(
     *,
     force: bool,
 ) -> None:
-    """Write the files; what is drawn is drawn before the first of them is there."""
+    """Write the files: figures are drawn before, and a mesh, which may be refused, comes first."""
     drawn: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.stress import contact_figure
 
         drawn = rendered(lambda: contact_figure(contacts), figures)
-    if output is not None:
-        from memscal.formats.reference import write_reference
-
-        write_reference(contacts[0].profile(), output, overwrite=force)
     if mesh is not None:
         from memscal.formats.meshes.mesh_files import write_mesh
 
         write_mesh(contacts[0].mesh(), mesh, overwrite=force)
+    if output is not None:
+        from memscal.formats.reference import write_reference
+
+        write_reference(contacts[0].profile(), output, overwrite=force)
     write_files(drawn, force=force)
 
 

@@ -122,7 +122,7 @@ def _stand_in_for_h5py(heavy: Mapping[str, Any]) -> None:
     """Let meshio find, where it looks for h5py, the arrays that were read for it beforehand."""
 
     class Node:
-        def __init__(self, path: str, _mode: str = "r") -> None:
+        def __init__(self, path: str) -> None:
             self.path = path
 
         def __getitem__(self, key: str | tuple[()]) -> Any:
@@ -133,12 +133,12 @@ def _stand_in_for_h5py(heavy: Mapping[str, Any]) -> None:
             return heavy[self.path]
 
     module = types.ModuleType("h5py")
-    module.__dict__["File"] = lambda path, mode="r": Node(f"{os.path.basename(path)}:", mode)
+    module.__dict__["File"] = lambda path, *_: Node(f"{os.path.basename(path)}:")
     sys.modules["h5py"] = module
 
 
 def _read(meshio: Any, kind: str, path: str) -> tuple[str, Any]:
-    """Return what meshio says about a mesh, and the mesh."""
+    """Return what meshio prints about a mesh, and the mesh."""
     printed = io.StringIO()
     with (
         warnings.catch_warnings(),
