@@ -26,8 +26,12 @@ THREAD_VARIABLES = (
 )
 
 
+#: Those of them that an open pool has set, which the user has not.
+_SET_BY_POOL: set[str] = set()
+
+
 def _set_by_user() -> bool:
-    return any(name in os.environ for name in THREAD_VARIABLES)
+    return any(name in os.environ for name in THREAD_VARIABLES if name not in _SET_BY_POOL)
 
 
 def one_thread_per_process() -> None:
@@ -82,9 +86,11 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
     unset = [name for name in THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
+    _SET_BY_POOL.update(unset)
     try:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
             yield pool
     finally:
+        _SET_BY_POOL.difference_update(unset)
         for name in unset:
             os.environ.pop(name, None)
