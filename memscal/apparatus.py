@@ -1,4 +1,4 @@
-"""Apparatus function in use: predicted voltages, convolved stresses, measured stresses."""
+"""Apparatus function: predicted voltages, convolved stresses, measured stresses."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class ApparatusFunction(Result, ApparatusData):
     def content_digest(self) -> str:
         """The digest that its artifact states, or would state if it were saved."""
         from memscal.formats.artifact import artifact_tree
-        from memscal.formats.schema import DIGEST_ATTRIBUTE
+        from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 
         return str(artifact_tree(self).attributes[DIGEST_ATTRIBUTE])
 
@@ -254,7 +254,7 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
     """
     from memscal.formats.artifact import artifact_from
     from memscal.formats.hdf5.reader import open_hdf5
-    from memscal.formats.schema import DIGEST_ATTRIBUTE
+    from memscal.formats.hdf5.writer import DIGEST_ATTRIBUTE
 
     with open_hdf5(path) as file:
         data = artifact_from(file)
@@ -268,4 +268,11 @@ def load_apparatus(path: str | PathLike[str]) -> ApparatusFunction:
 
 def opened_apparatus(apparatus: ApparatusFunction | str | PathLike[str]) -> ApparatusFunction:
     """Return the apparatus function, read from its artifact where it is a path."""
-    return apparatus if isinstance(apparatus, ApparatusFunction) else load_apparatus(apparatus)
+    if isinstance(apparatus, str | PathLike):
+        return load_apparatus(apparatus)
+    if not isinstance(apparatus, ApparatusFunction):
+        raise InputError(
+            f"There is a {type(apparatus).__name__} where an apparatus function is needed.",
+            cure="Give one, such as Calibration.apparatus, or the path of its artifact.",
+        )
+    return apparatus

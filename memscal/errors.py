@@ -1,4 +1,4 @@
-"""Errors that memscal raises on purpose; each says what is wrong, why, and what to do about it.
+"""Errors that memscal raises on purpose; each states what is wrong, why, and what to do.
 
 The command line exits with the ``exit_code`` of an error; a user catches :class:`MemscalError`.
 """
@@ -20,7 +20,7 @@ class MemscalError(Exception):
 
     def __init__(self, problem: str, *, why: str = "", cure: str = "") -> None:
         self.problem, self.why, self.cure = problem, why, cure
-        super().__init__("\n".join(part for part in (problem, why, cure) if part))
+        super().__init__("\n".join(text for text in (problem, why, cure) if text))
 
 
 class InputError(MemscalError, ValueError):
@@ -44,7 +44,7 @@ class SchemaVersionError(FormatError):
 
 
 class UnsafeFileError(FormatError):
-    """A file whose structure could read, run, hang or exhaust something: refused unread."""
+    """A file refused unread: it could read other files, run code, hang or exhaust the memory."""
 
 
 class FitError(MemscalError):

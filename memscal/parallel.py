@@ -1,4 +1,4 @@
-"""Processes that share work, and threads of the linear algebra library: one for each."""
+"""Processes that share work, each with one thread of the linear algebra library."""
 
 from __future__ import annotations
 
@@ -26,8 +26,12 @@ THREAD_VARIABLES = (
 )
 
 
+#: Those of them that an open pool has set, which the user has not.
+_SET_BY_POOL: set[str] = set()
+
+
 def _set_by_user() -> bool:
-    return any(name in os.environ for name in THREAD_VARIABLES)
+    return any(name in os.environ for name in THREAD_VARIABLES if name not in _SET_BY_POOL)
 
 
 def one_thread_per_process() -> None:
@@ -58,12 +62,12 @@ def single_threaded() -> Iterator[None]:
             yield
 
 
-#: Systems refuse more, and no machine gains by them.
+#: Windows refuses more.
 _MOST_WORKERS = 61
 
 
 def require_workers(workers: Any) -> None:
-    """Refuse a number of processes that makes no sense."""
+    """Refuse a number of processes that is not whole, or out of range."""
     if not isinstance(workers, Integral) or not 1 <= int(workers) <= _MOST_WORKERS:
         raise InputError(
             f"workers is {workers!r}, but it is a whole number from 1 to {_MOST_WORKERS}.",
@@ -82,9 +86,11 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
     unset = [name for name in THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
+    _SET_BY_POOL.update(unset)
     try:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
             yield pool
     finally:
+        _SET_BY_POOL.difference_update(unset)
         for name in unset:
             os.environ.pop(name, None)

@@ -10,7 +10,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import memscal
-from memscal.parallel import THREAD_VARIABLES, single_threaded
+from memscal.parallel import THREAD_VARIABLES, single_threaded, worker_pool
 
 
 def blas_threads() -> set[int]:
@@ -49,6 +49,13 @@ def test_the_user_s_own_number_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     with single_threaded():
         assert blas_threads() == {2}
+
+
+@pytest.mark.usefixtures("two_threads")
+def test_the_limit_holds_while_a_pool_of_processes_is_open() -> None:
+    with worker_pool(1), single_threaded():
+        assert blas_threads() == {1}
+    assert blas_threads() == {2}
 
 
 @pytest.mark.usefixtures("two_threads")

@@ -53,9 +53,9 @@ def command(
     """Turn contact SCANs into measured stress with a calibrated sensor (ARTIFACT).
 
     For each load of each scan, finds centre and baseline and gives the profile S_zz = U/A at the
-    base of the film with its standard uncertainty, its maximum, and its total force, which is held
-    against the applied load. It is the stress as the sensor blurs it: compare it with calculated
-    stress by memscal compare.
+    base of the film with its standard uncertainty, its maximum, and its total force, which is
+    compared with the applied load. S_zz is the stress as the sensor blurs it: compare it with
+    calculated stress by memscal compare.
 
     A failed quality check is exit code 1: the result is written all the same.
     """

@@ -218,7 +218,7 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
 )
 @force_option
 @option("--dry-run", is_flag=True)(
-    "Read and check every input, say what would be done, and write nothing."
+    "Read and check every input, print what would be done, and write nothing."
 )
 @debug_option
 def command(
@@ -249,7 +249,7 @@ def command(
     Several scans, at other loads, with other rods or films, are fitted together: A and G are
     shared, and each scan has its own centre and baseline.
 
-    A failed quality check is exit code 1: the artifact is written and says so.
+    A failed quality check is exit code 1: the artifact is written and states it.
     """
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
     output = output or beside(scans[0], ending)
@@ -301,7 +301,7 @@ def _read(
     for scan, path in zip(scans, paths, strict=True):
         require_calibration_rod(scan)
         if reference is not None and scan.reference is not None:
-            note(f"The reference in {path.name} gives way to {reference.name}.")
+            note(f"{reference.name} is used in place of the reference in {path.name}.")
     return scans, None if reference is None else _read_reference(reference)
 
 
@@ -312,7 +312,7 @@ def _read_reference(path: Path) -> StressProfile:
     if path.suffix.lower() in (".csv", ".txt", ".tsv", ".dat"):
         raise InputError(
             f"The reference {path} looks like a table, not like a memscal-reference file.",
-            why="A table does not say its units, nor the load it was calculated for.",
+            why="A table states neither its units nor the load it was calculated for.",
             cure=f"Convert it first, such as: memscal import {path} --format reference --r r "
             "--r-unit mm --sigma sigma_zz --sigma-unit Pa --load 1 "
             f"-o {path.with_suffix('.h5')}",

@@ -1,4 +1,4 @@
-"""``memscal check``: whether a file can be trusted."""
+"""``memscal check``: safety, schema, digest and content of a file."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ COMMANDS = {
     "compare": ("compare", "Compare measured with calculated stress: effective friction."),
     "design": ("design", "Predict the uncertainties of a scan before it is made."),
     "simulate": ("simulate", "Make a synthetic scan, or the scans of an experiment."),
-    "import": ("import_", "Convert a table (CSV) to a scan or a reference."),
+    "import": ("import_", "Convert a table (CSV) or a mesh to a scan or a reference."),
     "inspect": ("inspect", "Show what a file holds."),
     "check": ("check", "Check a file's safety, schema, digest and content."),
     "completion": ("completion", "Print the shell's completion script."),
@@ -46,7 +46,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find a command; name the ones that a misspelt one may mean."""
+        """Find a command; suggest names close to a misspelt one."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
             from difflib import get_close_matches
@@ -72,7 +72,7 @@ Examples:
 Exit codes:
   0    done
   1    done, but a quality check failed; the artifact is marked so
-  2    the command was not used as its help says
+  2    wrong usage of a command
   3    the input was refused
   4    the output was not written; what was there before is untouched
   70   a fault in memscal itself
@@ -87,10 +87,10 @@ def memscal() -> None:
     """Calibrate stress sensors under an elastic film.
 
     A sensor at the base of a film reports U = A G (x) sigma_zz: the normal stress there, blurred
-    by its apparatus function G and scaled by its conversion constant A. memscal finds both from a
-    scan with a thin rigid rod, with standard uncertainties and quality checks.
+    by its apparatus function G and scaled by its conversion constant A. memscal estimates both
+    from a scan with a thin rigid rod, with standard uncertainties and quality checks.
 
-    Lengths are in mm, depths in um, loads in N and moduli in MPa; every option says its unit.
+    Lengths are in mm, depths in um, loads in N and moduli in MPa; each option states its unit.
     """
     if os.environ.get("SOURCE_DATE_EPOCH") is not None:
         _check_clock()

@@ -103,7 +103,7 @@ cache_options = options_of(
         "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
         "the user's cache folder]"
     ),
-    option("--no-cache", is_flag=True)("Calculate anew, and keep nothing."),
+    option("--no-cache", is_flag=True)("Calculate all contacts, and store none."),
 )
 
 
@@ -155,7 +155,7 @@ Examples:
 )
 @option("--interface", is_flag=True)(
     "Also explain the profiles by an interface that yields before it slips, at the "
-    "macroscopic friction, and say which of the two explanations is more likely."
+    "macroscopic friction, and report which of the two explanations is more likely."
 )
 @option("--override", is_flag=True)(
     "Compare although sensor, channel or film of artifact and scan differ; recorded."
@@ -194,10 +194,10 @@ def command(
 
     In place of the scans, give the measured STRESS that memscal apply wrote of them. The sensor's
     conversion constant and apparatus function come from ARTIFACT. A sphere is pressed on the film
-    by calculation, at the measured loads and with several friction coefficients; what reaches the
-    sensor is held against what it measured, load by load and over all loads. The effective friction
-    coefficient comes with a confidence interval, or as a bound where the data tell no more, by the
-    maximum of each profile and by the whole of it.
+    by calculation, at the measured loads and with several friction coefficients; the calculated
+    stress, blurred by the apparatus function, is compared with the measured one, for each load and
+    for all loads. The effective friction coefficient is given with a confidence interval, or as a
+    bound where the data determine no more, by the maximum of each profile and by all its points.
 
     A failed quality check is exit code 1: the results are printed all the same.
     """

@@ -9,6 +9,7 @@ import click
 
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
+    PAPER_FILM,
     Quantity,
     film_from,
     film_options,
@@ -21,21 +22,31 @@ from memscal.cli.options import (
     require_one_kernel,
     si,
 )
-from memscal.cli.output import FigurePath, emit_json, emit_tables, message, note, prove_writable
-from memscal.cli.simulate import FILM
+from memscal.cli.output import (
+    FigurePath,
+    emit_json,
+    emit_tables,
+    message,
+    note,
+    prove_writable,
+    rendered,
+    write_files,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from memscal.planning.expected import Design
 
-    _WishType = click.ParamType[tuple[str, float]]
+    _TargetType = click.ParamType[tuple[str, float]]
 else:  # generic since click 8.2 only
-    _WishType = click.ParamType
+    _TargetType = click.ParamType
 
 _VARIED = ("step", "half-range", "repeats")
 
 _HIDDEN = (
-    "G beyond the resolved band is the prior's: its uncertainty there does not scatter from scan "
-    "to scan, and repeats do not show it."
+    "Beyond the resolved band G follows from the prior: its uncertainty there does not scatter "
+    "from scan to scan, and repeats do not show it."
 )
 
 EXAMPLES = """\b
@@ -49,15 +60,15 @@ Examples:
 """
 
 
-class _Wish(_WishType):
-    """What is wanted: ``sigma=1%``, or ``resolved=4`` in rad/mm."""
+class _Target(_TargetType):
+    """A target: ``sigma=1%``, or ``resolved=4`` in rad/mm."""
 
-    name = "wish"
+    name = "target"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, float]:
-        """Read name and number; the name is the library's to judge."""
+        """Read name and number; the library checks the name."""
         if isinstance(value, tuple):
             return value
         name, equals, text = str(value).partition("=")
@@ -68,11 +79,11 @@ class _Wish(_WishType):
             equals = ""
             number = 0.0
         if not equals:
-            self.fail(f"{value!r} is no wish: write sigma=1% or resolved=4 (rad/mm).", param, ctx)
+            self.fail(f"{value!r} is no target: write sigma=1% or resolved=4 (rad/mm).", param, ctx)
         name = name.strip()
         if percent == (name == "resolved"):
             unit = "in rad/mm, without %" if percent else "in percent: write the %"
-            self.fail(f"{value!r}: {name} is wanted {unit}.", param, ctx)
+            self.fail(f"{value!r}: {name} is given {unit}.", param, ctx)
         return name, si(number, -2) if percent else si(number, 3)
 
 
@@ -83,7 +94,7 @@ class _Wish(_WishType):
     "Standard uncertainty (k = 1) of the load, in percent."
 )
 @radius_options(default=0.25, uncertainty=0.0025)
-@film_options(defaults=FILM)
+@film_options(defaults=PAPER_FILM)
 @option("--step", Quantity("mm"), 0.25)("Distance of neighbouring positions, in mm.")
 @option("--half-range", Quantity("mm"), 8.0)("Positions run from minus to plus this, in mm.")
 @option("--repeats", click.IntRange(min=1), 1)("How often the line is scanned.")
@@ -98,9 +109,9 @@ class _Wish(_WishType):
 @option("--method", default="bayesian")(
     "Method of memscal calibrate with which the scan would be evaluated."
 )
-@option("--want wishes", _Wish(), multiple=True, metavar="WISH")(
+@option("--want targets", _Target(), multiple=True, metavar="TARGET")(
     "What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
-    "uncertainty, or resolved=4 at least, in rad/mm. May be repeated: all of them."
+    "uncertainty, or resolved=4 at least, in rad/mm. Repeated: all are to be reached."
 )
 @option("--vary", click.Choice(_VARIED))(
     "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
@@ -111,7 +122,7 @@ class _Wish(_WishType):
 @output_options
 def command(
     figures: tuple[Path, ...],
-    wishes: tuple[tuple[str, float], ...],
+    targets: tuple[tuple[str, float], ...],
     vary: str | None,
     as_json: bool,
     force: bool,
@@ -119,16 +130,16 @@ def command(
 ) -> int:
     """Predict the uncertainties of a calibration before its scan is made.
 
-    Without simulation: from the Fisher information of the planned scan and the prior of the
-    estimate, with the uncertainties of film, rod and load. Defaults are the
-    paper's. With --want and --vary, the least scan that reaches what is wanted.
+    They follow, without simulation, from the Fisher information of the planned scan, the prior of
+    the estimate and the uncertainties of film, rod and load. Defaults are the paper's. With --want
+    and --vary, the smallest scan that reaches the targets is found.
     """
     require_one_kernel(options)
-    if bool(wishes) != (vary is not None):
-        raise click.UsageError("--want and --vary go together: what to reach, and by what.")
+    if bool(targets) != (vary is not None):
+        raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
     prove_writable(figures, force=force)
-    planned = _designed(options, dict(wishes), vary)
-    _draw(planned, vary, figures, force=force)
+    planned = _designed(options, dict(targets), vary)
+    write_files(rendered(lambda: _figure(planned, vary), figures), force=force)
 
     if as_json:
         emit_json({"schema_version": "1", **planned.to_dict()})
@@ -142,7 +153,7 @@ def command(
     return DONE
 
 
-def _designed(options: dict[str, Any], wishes: dict[str, float], vary: str | None) -> Design:
+def _designed(options: dict[str, Any], targets: dict[str, float], vary: str | None) -> Design:
     from memscal.model.indenter import Rod
     from memscal.planning.design import design
 
@@ -162,17 +173,12 @@ def _designed(options: dict[str, Any], wishes: dict[str, float], vary: str | Non
         noise_voltage=si(options["noise_voltage"], -3),
         centre=si(options["centre"], -3),
         method=options["method"],
-        want=wishes,
+        want=targets,
         vary=None if vary is None else vary.replace("-", "_"),
     )
 
 
-def _draw(planned: Design, vary: str | None, figures: tuple[Path, ...], *, force: bool) -> None:
-    if not figures:
-        return
+def _figure(planned: Design, vary: str | None) -> Figure:
     from memscal.figures.design import design_figure
-    from memscal.figures.style import save_figure
 
-    figure = design_figure(planned, vary="step" if vary is None else vary.replace("-", "_"))
-    for path in figures:
-        save_figure(figure, path, overwrite=force)
+    return design_figure(planned, vary="step" if vary is None else vary.replace("-", "_"))

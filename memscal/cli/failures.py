@@ -1,4 +1,4 @@
-"""From exceptions to exit codes and plain words: the user never meets a traceback unasked."""
+"""Exit codes and messages of exceptions; a traceback is shown with --debug only."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 @dataclass
 class Session:
-    """What one run of the program keeps: whether tracebacks are wanted."""
+    """State of one run of the program: whether tracebacks are shown."""
 
     debug: bool = False
 
@@ -71,17 +71,17 @@ def guarded(run: Callable[[Session], int]) -> int:
                 cure="Close other programs, or give a scan with fewer points.",
             )
             return INTERNAL
-        except Exception as failure:  # noqa: BLE001 - the last resort, and it says so
+        except Exception as failure:  # noqa: BLE001 - the last resort, and reported as such
             _traceback(session)
             return _internal(failure)
 
 
 def _internal(failure: BaseException) -> int:
-    said = " ".join(str(failure).split())
+    text = " ".join(str(failure).split())
     kind = type(failure).__name__
     error(
-        f"memscal itself failed, and not because of anything you did: {kind}"
-        + (f" ({said})." if said else "."),
+        f"memscal failed by a fault of its own, not of its input: {kind}"
+        + (f" ({text})." if text else "."),
         cure="Please report it, with what `memscal --debug` and the same arguments print.",
     )
     return INTERNAL

@@ -33,13 +33,11 @@ if TYPE_CHECKING:
 _SHARED = ("r_unit", "sigma", "sigma_unit", "shear", "sign", "shear_sign", "solver")
 _OF_TABLES = ("r",)
 _OF_MESHES = ("vertical", "base", "centre")
-NAMES = (*_OF_TABLES, *_SHARED, *_OF_MESHES)
+_REFERENCE_NAMES = (*_OF_TABLES, *_SHARED, *_OF_MESHES)
 """The options that only a reference has."""
 
 _READING = ("delimiter", "decimal")
 _POSITION = Quantity("mm", low=-float("inf"))
-
-
 _SIGN = click.Choice(["1", "-1"])
 reference_options = options_of(
     option("--r", metavar="COLUMN")("Reference: column of the radius."),
@@ -73,21 +71,21 @@ reference_options = options_of(
         "Mesh in 3-D: where the indenter's axis meets the base, in mm.  [default: 0 0]"
     ),
 )
-"""The options that say what a table or a mesh of stress at the base holds."""
+"""The options that describe a table or a mesh of stress at the base."""
 
 
-def needed(path: Path) -> tuple[str, ...]:
+def _needed_by_reference(path: Path) -> tuple[str, ...]:
     """Return the options without which a reference cannot be read."""
-    return (*(() if is_mesh(path) else _OF_TABLES), "r_unit", "sigma", "sigma_unit", "load")
+    return (*(() if _is_mesh(path) else _OF_TABLES), "r_unit", "sigma", "sigma_unit", "load")
 
 
-def strange(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
-    """Return the options given that a mesh, or a table, has no use for, and which it is."""
-    kind, names = ("mesh", (*_OF_TABLES, *_READING)) if is_mesh(path) else ("table", _OF_MESHES)
+def _unused_options(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """Return mesh or table, and the options given that such a file has no use for."""
+    kind, names = ("mesh", (*_OF_TABLES, *_READING)) if _is_mesh(path) else ("table", _OF_MESHES)
     return kind, tuple(name for name in names if options[name] is not None)
 
 
-def read(path: Path, options: dict[str, Any]) -> ImportedProfile:
+def _read_reference(path: Path, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting: dict[str, Any] = {
         "film": None if all(options[name] is None for name in FILM) else film_from(options),
@@ -95,7 +93,7 @@ def read(path: Path, options: dict[str, Any]) -> ImportedProfile:
         if options["radius"] is None
         else indenter_from(options["indenter"], options),
     }
-    if not is_mesh(path):
+    if not _is_mesh(path):
         from memscal.formats.tables.reference import read_reference_table
 
         return read_reference_table(
@@ -113,7 +111,7 @@ def read(path: Path, options: dict[str, Any]) -> ImportedProfile:
     )
 
 
-def is_mesh(path: Path) -> bool:
+def _is_mesh(path: Path) -> bool:
     """Return whether a file's name says that it is a mesh."""
     from memscal.formats.meshes import mesh_files
 
@@ -151,7 +149,7 @@ _TABLE_NAMES = ["load", "delimiter", "decimal"]
 
 _ONLY = {
     "scan": [*_SCAN_NAMES, "load_scatter", "position_error", *_SENSOR_NAMES.values()],
-    "reference": NAMES,
+    "reference": _REFERENCE_NAMES,
 }
 _NEEDED = ("x", "x_unit", "u", "u_unit")
 
@@ -181,7 +179,7 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 )
 @option("--load-scatter", Quantity("percent", open_low=False))(
     "Scan: standard uncertainty of each point's own load, independent from point to point, "
-    "in percent: a weight set down by hand."
+    "in percent, such as of weights set down by hand."
 )
 @option("--position-error", Quantity("um", open_low=False))(
     "Scan: standard uncertainty of each position, independent from point to point, in um."
@@ -202,7 +200,7 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @option("--title", metavar="TEXT")("Scan: title.")
 @reference_options
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
-@radius_options()
+@radius_options("the rod or of the sphere's curvature")
 @film_options()
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
@@ -212,15 +210,15 @@ def command(
 ) -> int:
     """Convert a TABLE (CSV) to a scan or to a reference, or a mesh (VTU, VTK, XDMF) to a reference.
 
-    A table says neither its units nor what was pressed on what: the options do. Readings are kept
-    as they are. How many readings, repeats and places were read, and what is missing, is printed,
-    and kept in the notes of the file.
+    The options state the units, the film and the indenter, which a table does not. Readings are
+    kept as they are. The numbers of readings, repeats, places and missing values are printed, and
+    kept in the notes of the file.
     """
     options["repeat"] = options["repeat"] or None
     _check_usage(table, kind, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
     prove_writable([output], force=force, inputs=[table])
-    imported = _scan(table, options) if kind == "scan" else read(table, options)
+    imported = _scan(table, options) if kind == "scan" else _read_reference(table, options)
     _write(imported, output, force)
     warnings = [note for note in imported.notes if note.severity == "warning"]
     if as_json:
@@ -235,9 +233,9 @@ def command(
 
 def _check_usage(path: Path, kind: str, options: dict[str, Any]) -> None:
     """Name every option that is missing, or that belongs to something else, at once."""
-    if kind == "scan" and is_mesh(path):
+    if kind == "scan" and _is_mesh(path):
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
-    names = _NEEDED if kind == "scan" else needed(path)
+    names = _NEEDED if kind == "scan" else _needed_by_reference(path)
     missing = [name for name in names if options[name] is None]
     if missing:
         raise click.UsageError(
@@ -251,9 +249,9 @@ def _check_usage(path: Path, kind: str, options: dict[str, Any]) -> None:
     if misplaced:
         raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
     if kind == "reference":
-        what, unused = strange(path, options)
+        file_kind, unused = _unused_options(path, options)
         if unused:
-            raise click.UsageError(f"A {what} has no use for {_named(unused)}.")
+            raise click.UsageError(f"A {file_kind} has no use for {_named(unused)}.")
 
 
 def _named(names: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""``memscal inspect``: what a file holds."""
+"""``memscal inspect``: contents of a file."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ Examples:
 @json_option
 @debug_option
 def command(file: Path, as_json: bool) -> int:
-    """Show what a scan, a reference or an artifact holds.
+    """Show what a scan, a reference, an artifact or a file of measured stress holds.
 
     Quantities with their standard uncertainties, arrays with shape and range, quality checks, and
-    where all of it came from. Lengths are shown in mm and moduli in MPa; with --json, numbers are
+    the origin of the data. Lengths are shown in mm and moduli in MPa; with --json, numbers are
     in the units of the file.
     """
     from memscal.formats.inspection import describe

@@ -1,4 +1,4 @@
-"""Options that several commands share; each says its unit."""
+"""Options that several commands share, each with its unit in its help text."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ else:  # generic since click 8.2 only
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 FILE = click.Path(path_type=Path)
-"""A file's name; whether it can be read or written is the library's to say."""
+"""A file's name; the library checks whether it can be read or written."""
 
 
 class Quantity(_Number):
@@ -107,6 +107,16 @@ output_options = options_of(json_option, force_option, debug_option)
 FILM = ("young_modulus", "poisson_ratio", "thickness")
 """What describes a film, by the names of its options."""
 
+#: The paper's film, in the units of the command line.
+PAPER_FILM = {
+    "young-modulus": 2.2,
+    "poisson-ratio": 0.5,
+    "thickness": 2.0,
+    "young-modulus-uncertainty": 0.1,
+    "poisson-ratio-uncertainty": 0.005,
+    "thickness-uncertainty": 0.02,
+}
+
 _UNCERTAINTY = "Standard uncertainty (k = 1) of "
 
 
@@ -131,11 +141,15 @@ def film_options(
 
 
 def radius_options(
-    *, default: float | None = None, uncertainty: float | None = None, uncertainties: bool = True
+    of: str = "the rod",
+    *,
+    default: float | None = None,
+    uncertainty: float | None = None,
+    uncertainties: bool = True,
 ) -> _Adder:
     """Return the option of the indenter's radius, with or without its uncertainty."""
     entries: list[tuple[str, Quantity, str]] = [
-        ("radius", Quantity("mm"), "Radius of the rod (not its diameter), in mm.")
+        ("radius", Quantity("mm"), f"Radius of {of} (not the diameter), in mm.")
     ]
     if uncertainties:
         spread = Quantity("mm", open_low=False)

@@ -39,15 +39,15 @@ def emit(text: str) -> None:
 
 
 def _write_all(stream: TextIO, text: str) -> None:
-    """Write to the last byte: an unbuffered stream may take a part and say nothing."""
+    """Write to the last byte: an unbuffered stream may take fewer without an error."""
     buffer = getattr(stream, "buffer", None)
     if buffer is None:
         stream.write(text)
         return
     stream.flush()
-    rest = memoryview(text.encode(stream.encoding, stream.errors or "strict"))
-    while rest:
-        rest = rest[buffer.write(rest) :]
+    remaining = memoryview(text.encode(stream.encoding, stream.errors or "strict"))
+    while remaining:
+        remaining = remaining[buffer.write(remaining) :]
 
 
 def _discard_stdout() -> None:
@@ -65,17 +65,17 @@ def emit_json(value: Mapping[str, Any]) -> None:
 
 
 def message(text: str) -> None:
-    """Tell the user something, on standard error."""
+    """Write a message to standard error."""
     _to_stderr([text])
 
 
 def note(text: str) -> None:
-    """Tell the user something that helps to judge the result."""
+    """Write a note, which helps to judge the result."""
     _to_stderr([f"Note: {text}"])
 
 
 def warn(text: str) -> None:
-    """Tell the user something that puts the result in doubt."""
+    """Write a warning, which puts the result in doubt."""
     _to_stderr([f"Warning: {text}"])
 
 
@@ -86,8 +86,8 @@ def show_messages(messages: Iterable[Message]) -> None:
 
 
 def error(problem: str, why: str = "", cure: str = "") -> None:
-    """Say what is wrong, why that stops the work, and what to do."""
-    _to_stderr([f"Error: {problem}", *(f"  {part}" for part in (why, cure) if part)])
+    """Write an error: what is wrong, why that stops the work, and what to do."""
+    _to_stderr([f"Error: {problem}", *(f"  {text}" for text in (why, cure) if text)])
 
 
 def _to_stderr(lines: Sequence[str]) -> None:
@@ -98,7 +98,7 @@ def _to_stderr(lines: Sequence[str]) -> None:
             text = click.wrap_text(text.strip(), _width(), indent, "  ")
         try:
             click.echo(text, err=True)
-        except OSError:  # nobody is left to be told
+        except OSError:  # standard error is closed
             return
 
 
@@ -114,9 +114,9 @@ _CLEAR = "\r\x1b[K"
 
 
 @contextmanager
-def working(what: str) -> Iterator[Callable[[str], None]]:
-    """Show on a terminal what is being done, if it takes long; yield what replaces the text."""
-    shown = [what]
+def working(task: str) -> Iterator[Callable[[str], None]]:
+    """Show a task on a terminal, if it takes long; yield what replaces its text."""
+    shown = [task]
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None
         return

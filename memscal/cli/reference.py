@@ -12,6 +12,7 @@ import click
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
+    PAPER_FILM,
     Quantity,
     film_from,
     film_options,
@@ -112,9 +113,6 @@ def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-#: The paper's film.
-FILM = {"young-modulus": 2.2, "poisson-ratio": 0.5, "thickness": 2.0}
-
 EXAMPLES = """\b
 Examples:
   memscal reference rod
@@ -137,7 +135,7 @@ Examples:
 @option("--depth depths", Quantity("um"), multiple=True)(
     "Indentation depth, in um, in place of a load. May be repeated."
 )
-@radius_options(uncertainties=False)
+@radius_options("the rod or of the sphere's curvature", uncertainties=False)
 @option("--inclination", Quantity("deg", high=89.0))(
     "Cone: angle between its face and the film, in degrees."
 )
@@ -153,7 +151,7 @@ Examples:
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
-@film_options(defaults=FILM, uncertainties=False)
+@film_options(defaults=PAPER_FILM, uncertainties=False)
 @option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
@@ -191,8 +189,8 @@ def command(
 ) -> int:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
-    Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and
-    2 mm; a rod of radius 0.25 mm, a sphere of radius 128.8 mm.
+    Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and thickness 2 mm; a
+    rod of radius 0.25 mm, a sphere of radius 128.8 mm.
     """
     _check_usage(loads, depths, output, mesh, options)
     files = [path for path in (output, mesh, *figures) if path is not None]
@@ -251,20 +249,20 @@ def _write(
     *,
     force: bool,
 ) -> None:
-    """Write the files; what is drawn is drawn before the first of them is there."""
+    """Write the files: figures are drawn before, and a mesh, which may be refused, comes first."""
     drawn: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.stress import contact_figure
 
         drawn = rendered(lambda: contact_figure(contacts), figures)
-    if output is not None:
-        from memscal.formats.reference import write_reference
-
-        write_reference(contacts[0].profile(), output, overwrite=force)
     if mesh is not None:
         from memscal.formats.meshes.mesh_files import write_mesh
 
         write_mesh(contacts[0].mesh(), mesh, overwrite=force)
+    if output is not None:
+        from memscal.formats.reference import write_reference
+
+        write_reference(contacts[0].profile(), output, overwrite=force)
     write_files(drawn, force=force)
 
 

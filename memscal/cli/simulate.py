@@ -13,6 +13,7 @@ from click.core import ParameterSource
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
+    PAPER_FILM,
     Quantity,
     film_from,
     film_options,
@@ -34,9 +35,9 @@ if TYPE_CHECKING:
     from memscal.simulation.experiment import Experiment
 
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
-"""The files of an experiment; a test compares them with what the laboratory names."""
+"""The files of an experiment; a test compares them with the names of its scans."""
 
-NAMES = (
+_SPHERE_NAMES = (
     *("lubricated_loads", "sphere_radius", "sphere_radius_uncertainty", "friction", "loading"),
     *("slip_length", "greenwood_tripp", "exponential", "contacts", "spacing", "load_scatter"),
     *("record_loads", "position_error", "draw_inputs", "gain", "thickness_factor"),
@@ -78,10 +79,10 @@ _sphere_options = options_of(
         "state the nominal ones, and the truth beside."
     ),
     option("--gain", Quantity("ratio"), 1.0)(
-        "Sphere: a mistake to be found, a factor on the voltages of the sphere's scans only."
+        "Sphere: a deliberate error, a factor on the voltages of the sphere's scans only."
     ),
     option("--thickness-factor", Quantity("ratio"), 1.0)(
-        "Sphere: a mistake to be found, the film's true thickness over the one stated."
+        "Sphere: a deliberate error, the film's true thickness over the one stated."
     ),
 )
 
@@ -172,16 +173,6 @@ def _entry(name: str, value: float | str) -> tuple[str, str]:
     return shown.words, f"{value / shown.scale:.6g} {shown.unit}".rstrip()
 
 
-#: The paper's film as the virtual laboratory has it, in the units of the command line.
-FILM = {
-    "young-modulus": 2.2,
-    "poisson-ratio": 0.5,
-    "thickness": 2.0,
-    "young-modulus-uncertainty": 0.1,
-    "poisson-ratio-uncertainty": 0.005,
-    "thickness-uncertainty": 0.02,
-}
-
 _ROD_NAMES = ("half_range", "raster")
 """The options that only a rod scan alone has."""
 
@@ -218,7 +209,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "0.34, 0.69, 1.37 and 2.75]"
 )
 @radius_options(default=0.25, uncertainty=0.0025)
-@film_options(defaults=FILM)
+@film_options(defaults=PAPER_FILM)
 @option("--half-range", Quantity("mm"), 8.0)(
     "Rod scan alone: positions run from minus to plus this, in mm."
 )
@@ -281,13 +272,13 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
     """Refuse options that contradict each other, or belong to the other experiment."""
     context = click.get_current_context()
     typed = ParameterSource.COMMANDLINE
-    others = NAMES if experiment == "rod" else _ROD_NAMES
-    strange = [name for name in others if context.get_parameter_source(name) == typed]
-    if strange:
+    others = _SPHERE_NAMES if experiment == "rod" else _ROD_NAMES
+    misplaced = [name for name in others if context.get_parameter_source(name) == typed]
+    if misplaced:
         names = [
             option.opts[0]
             for option in context.command.params
-            if isinstance(option, click.Option) and option.name in strange
+            if isinstance(option, click.Option) and option.name in misplaced
         ]
         other = "sphere" if experiment == "rod" else "rod"
         belongs = "belongs" if len(names) == 1 else "belong"

@@ -1,1 +1,1 @@
-"""Figures and the report: the only room that draws."""
+"""Figures by matplotlib, and the report as an HTML page."""

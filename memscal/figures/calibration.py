@@ -20,7 +20,7 @@ from memscal.figures.style import (
 )
 from memscal.model.apparatus import ApparatusData, ApparatusRadial
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import QualityCheck
+from memscal.model.checks import failed_check_messages
 from memscal.model.quantities import KPA, MM, PER_MM, PER_MM2, measured_text
 from memscal.summaries.calibration import Calibrated, apparatus_of, sensor_title
 
@@ -116,7 +116,7 @@ def _shown_radius(radial: ApparatusRadial) -> float:
     gaussian_alive = np.flatnonzero(radial.g_gaussian > 1e-3 * peak)
     if not alive.size or not gaussian_alive.size:
         return float(radial.r[-1])
-    # Ripples of a poor deconvolution reach far; the Gaussian says where the sensor ends.
+    # Ripples of a poor deconvolution reach far; the Gaussian bounds the sensor.
     far = min(radial.r[alive[-1]], 1.6 * radial.r[gaussian_alive[-1]])
     return float(min(1.1 * far, radial.r[-1])) or float(radial.r[-1])
 
@@ -182,18 +182,8 @@ def values_text(data: ApparatusData) -> str:
     return ",  ".join(values)
 
 
-def failed_checks_text(checks: tuple[QualityCheck, ...]) -> list[str]:
-    """Return one sentence for each failed check, in words."""
-    return [
-        f"Failed check, {check.name.replace('_', ' ')}: {check.value:.3g} "
-        f"against a limit of {check.limit:.3g}. {check.meaning}"
-        for check in checks
-        if not check.passed
-    ]
-
-
 def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
-    """Return the lines above the panels, each with colour and weight."""
+    """Return the lines above the panels, with the colour and the weight of each."""
     ink = COLOURS["measured"]
     # A long name is cut, not the channel behind it.
     name, _, channel = sensor_title(data).rpartition(", channel ")
@@ -211,12 +201,12 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
         rows.append((f"All {len(data.checks)} quality checks passed.", ink, "normal"))
     failed = [
         (line, COLOURS["failed"], "normal")
-        for sentence in failed_checks_text(data.checks)
-        for line in _wrapped(sentence)
+        for message in failed_check_messages(data.checks)
+        for line in _wrapped(message.text)
     ]
     if len(failed) > _MAX_FAILED_LINES:
-        rest = "… and more failed checks: see the report, or `memscal inspect`."
-        failed = [*failed[: _MAX_FAILED_LINES - 1], (rest, COLOURS["failed"], "normal")]
+        ending = "… and more failed checks: see the report, or `memscal inspect`."
+        failed = [*failed[: _MAX_FAILED_LINES - 1], (ending, COLOURS["failed"], "normal")]
     return [(line, ink, weight) for row, ink, weight in rows for line in _wrapped(row)] + failed
 
 

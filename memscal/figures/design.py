@@ -86,7 +86,7 @@ def _draw_transfer(axes: Axes, planned: Design) -> None:
 
 def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
     label, scale = _AXES[vary]
-    here = getattr(planned.plan, vary)
+    number = getattr(planned.plan, vary)
     designs = varied_designs(planned, vary, _values(planned, vary))
     along = np.array([getattr(varied.plan, vary) for varied in designs]) / scale
     for name, symbol, colour, marker in _CURVES:
@@ -96,20 +96,20 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
         axes.plot(along, 100 * share, label=symbol, **shown)
         axes.plot(along, 100 * np.array(noise), ls="--", mfc="none", **shown)
     axes.plot([], [], color="0.4", ls="--", label="noise alone")
-    axes.axvline(here / scale, color=COLOURS["muted"], ls=":", lw=0.8)
+    axes.axvline(number / scale, color=COLOURS["muted"], ls=":", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty (%)")
     _plain_ticks(axes)
     legend_above(axes, columns=3)
 
 
 def _values(planned: Design, vary: str) -> list[float]:
-    here = getattr(planned.plan, vary)
+    number = getattr(planned.plan, vary)
     if vary == "repeats":
-        return sorted({max(1, round(here * factor)) for factor in _FACTORS})
+        return sorted({max(1, round(number * factor)) for factor in _FACTORS})
     most = max(_MOST_POSITIONS, planned.plan.positions) / planned.plan.positions
     factors = [f for f in _FACTORS if (1 / f if vary == "step" else f) <= most]
-    values = [float(here * factor) for factor in factors]
-    # The sensor has to stay within.
+    values = [float(number * factor) for factor in factors]
+    # The scan has to reach over the sensor.
     return [v for v in values if vary == "step" or v > abs(planned.plan.centre)]
 
 

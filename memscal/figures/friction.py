@@ -1,4 +1,4 @@
-"""A comparison of measured with calculated stress at a glance, and all of its figures."""
+"""Figures of a comparison of measured with calculated stress."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ _COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
 def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
     """Draw laws of the interface, of a comparison with friction or of the laws alone.
 
-    Panel a, profile likelihood of the length; b, evidence of each law over that of the best; c, of
-    dry scans, the coefficient that the slip length means at each load, beside the measured one.
+    Panel a, profile likelihood of the length; b, marginal likelihood of each law over that of the
+    best; c, of dry scans, the coefficient by the slip length at each load, beside the measured one.
     """
     laws = comparison if isinstance(comparison, InterfaceComparison) else comparison.interface
     loads: Sequence[LoadComparison] = ()
@@ -72,7 +72,7 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
         implied = None if slip is None else slip.implied
         panels = figure.subplots(1, 2 if implied is None else 3)
         _draw_lengths(panels[0], laws.by_direction)
-        _draw_evidence(panels[1], laws.by_direction)
+        _draw_marginal_likelihoods(panels[1], laws.by_direction)
         if slip is not None and implied is not None:
             measured = [load for load in loads if load.lubrication == slip.lubrication]
             _draw_implied(panels[2], implied, measured)
@@ -100,8 +100,8 @@ def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     legend_above(axes, columns=1)
 
 
-def _draw_evidence(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
-    """Draw the logarithm of each law's evidence, below that of the best of its kind."""
+def _draw_marginal_likelihoods(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
+    """Draw the logarithm of each law's marginal likelihood over that of the best of its kind."""
     names, height = [], 0
     for direction, compared in by_direction.items():
         best = max(law.log_evidence for law in compared.laws)
@@ -114,7 +114,7 @@ def _draw_evidence(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     axes.yaxis.set_ticks(list(range(height)), names)
     axes.set_ylim(height - 0.5, -0.5)
     axes.axvline(0.0, color="0.6", lw=0.6)
-    axes.set_xlabel("ln of evidence over the best")
+    axes.set_xlabel("ln of marginal likelihood over the best")
 
 
 def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadComparison]) -> None:

@@ -82,13 +82,13 @@ def draw_profiles(
     else:
         axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
         axes.set_xlim(0, max(float(at_load.profile.r[-1]) for at_load in loads) / MM)
-        _say_what(axes, comparison, loads[0])
+        _annotate_curves(axes, comparison, loads[0])
     axes.set_ylabel("stress at the base (kPa)")
     legend_above(axes, columns=4 if not logarithmic else 2)
 
 
-def _say_what(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    """Say inside the frame, where no data are, which scan and which curves these are."""
+def _annotate_curves(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
+    """Name the scan and the curves inside the frame, where no data are."""
     ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
     lines = [lubricated_words(at_load.lubrication)]
     lines += [f"{at_load.loading} loading"] if at_load.loading else []

@@ -137,7 +137,7 @@ def _panels(
 
 
 def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
-    """Put what any of the panels shows above them all, each thing once."""
+    """Put the entries of all panels above them, each label once."""
     shown: dict[str, Any] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

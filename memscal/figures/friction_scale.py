@@ -1,4 +1,4 @@
-"""What figures of friction share: an axis that reaches infinity, colours, and who is drawn."""
+"""Parts that figures of friction share: an axis to infinity, colours, points, loads drawn."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ALIKE = 1.05
 #: Radii closer than this, in m, count as one.
 _CLOSE = 1e-6
 _TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
-#: Marker and filling of a lubrication, so that both are told apart in grey.
+#: Marker and filling of a lubrication, distinct in grey print.
 LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
 
 
@@ -118,10 +118,10 @@ def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
     from scipy.interpolate import CubicSpline
 
     kept = _apart(r)
-    inner, known = r[kept], values[:, kept]
+    inner, samples = r[kept], values[:, kept]
     start = 1 if inner[0] < _CLOSE else 0
     mirrored = np.concatenate([-inner[start:][::-1], inner])
-    both = np.concatenate([known[:, start:][:, ::-1], known], axis=1)
+    both = np.concatenate([samples[:, start:][:, ::-1], samples], axis=1)
     return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
 
 
@@ -134,9 +134,9 @@ def _apart(r: FloatArray) -> Sequence[int]:
     return kept
 
 
-#: Coverage factor of the grey band, and of what stands clear of zero.
+#: Coverage factor of the grey band, and of points distinct from zero.
 EXPANDED = 2.0
-#: How strongly points are drawn that do not stand clear of zero.
+#: How strongly points are drawn that are not distinct from zero.
 _PALE = 0.25
 _LEAST_LIMIT = 3.5
 

@@ -1,4 +1,4 @@
-"""A calibration as one HTML page that opens anywhere: no other file, no network, no script."""
+"""Report of a calibration as one HTML page, without other files, network or scripts."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ figcaption { color: #555; font-size: .92rem; }
 }
 """
 
-# The policy makes the promise binding: nothing is fetched and nothing is run.
+# By this policy a browser fetches nothing and runs nothing.
 _PAGE = Template(
     """<!DOCTYPE html>
 <html lang="en">
@@ -182,10 +182,10 @@ def _provenance(data: ApparatusData) -> str:
     return "\n".join([*blocks, "<h3>Messages</h3>", messages])
 
 
-def _source_rows(what: str, source: SourceFile | None) -> list[tuple[str, str]]:
+def _source_rows(name: str, source: SourceFile | None) -> list[tuple[str, str]]:
     if source is None:
         return []
-    return [(f"input {what}", source.file_name), (f"its SHA-256 ({what})", source.sha256)]
+    return [(f"input {name}", source.file_name), (f"its SHA-256 ({name})", source.sha256)]
 
 
 def _plain(value: object) -> str:

@@ -168,14 +168,14 @@ def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     """Draw the rod's diameter (or the sphere's contact) as the paper's black patch."""
     radius: float | None = data.indenter.radius
-    what = "rod"
+    form = "rod"
     if data.indenter.shape != "rod":
-        radius, what = data.reference.contact_radius, "contact"
+        radius, form = data.reference.contact_radius, "contact"
     if radius is None:
         return
     left = (_centre(data) - radius) / MM
     patch = Rectangle((left, 0.0), 2 * radius / MM, 0.035, transform=axes.get_xaxis_transform())
-    patch.set(facecolor="black", lw=0, zorder=4, label=f"{what}, diameter {2 * radius / MM:.3g} mm")
+    patch.set(facecolor="black", lw=0, zorder=4, label=f"{form}, diameter {2 * radius / MM:.3g} mm")
     axes.add_patch(patch)
 
 

@@ -1,12 +1,10 @@
-"""Style of all figures: type, colours, layout, and writing a figure to a file."""
+"""Style of all figures: type, colours, layout, and the bytes of a figure's file."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -18,7 +16,6 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
-from memscal.formats.files import atomic_write_bytes
 from memscal.model.apparatus import ApparatusData
 
 
@@ -133,7 +130,7 @@ def marker_size(points: int) -> float:
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 """What a figure's file name may end in."""
 
-# matplotlib writes the time and its own version unless it is told not to.
+# matplotlib writes the time and its own version unless the metadata leave them out.
 _METADATA: Mapping[str, dict[str, str | None]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None},
@@ -161,9 +158,3 @@ def render_figure(figure: Figure, file_format: str, *, dpi: float = 200.0) -> by
     with house_style():
         figure.savefig(buffer, format=file_format, dpi=dpi, metadata=metadata)
     return buffer.getvalue()
-
-
-def save_figure(figure: Figure, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a figure as PNG (200 dots per inch), SVG or PDF, by the suffix of its name."""
-    file_format = figure_format(Path(path).suffix)
-    atomic_write_bytes(path, render_figure(figure, file_format), overwrite=overwrite)

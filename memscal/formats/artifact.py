@@ -9,9 +9,8 @@ import numpy as np
 from memscal.errors import FormatError
 from memscal.formats import groups
 from memscal.formats.codec import read_record, write_record
-from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, file_tree, write_tree
-from memscal.formats.schema import ARTIFACT_SCHEMA
+from memscal.formats.hdf5.reader import SafeFile
+from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, Node, file_tree, write_tree
 from memscal.formats.values import altered, require_scalar, require_schema
 from memscal.model import records
 from memscal.model.apparatus import (
@@ -23,14 +22,8 @@ from memscal.model.apparatus import (
 )
 
 
-def read_artifact(path: str | os.PathLike[str]) -> ApparatusData:
-    """Read an apparatus function, in SI units; refuse a file that was changed."""
-    with open_hdf5(path) as file:
-        return artifact_from(file)
-
-
 def artifact_from(file: SafeFile) -> ApparatusData:
-    """Read the apparatus function of an open memscal-artifact file."""
+    """Read the apparatus function of an open memscal-artifact file; refuse one that was changed."""
     require_schema(file, ARTIFACT_SCHEMA)
     problem = altered(file)
     if problem:

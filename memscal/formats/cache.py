@@ -47,7 +47,7 @@ _OTHERS = {
 
 
 def table_key(content: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of what a table depends on, in plain values that JSON can say."""
+    """Return the SHA-256 of what a table depends on, in plain values for JSON."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 

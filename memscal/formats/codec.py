@@ -11,8 +11,16 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import Attribute, Group, Node, count, index_axis, note, si
-from memscal.formats.json_text import to_json
+from memscal.formats.hdf5.writer import (
+    Attribute,
+    Group,
+    Node,
+    count,
+    index_axis,
+    note,
+    si,
+    to_json,
+)
 from memscal.formats.values import json_value, require_array, require_scalar, require_text
 from memscal.model.checks import messages_from_json, messages_to_json
 from memscal.model.provenance import SourceFile
@@ -141,7 +149,7 @@ def _read(file: SafeFile, at: str, quantity: Quantity, lengths: dict[str, int]) 
 
 
 def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, Any]:
-    """Return what quantities say of a file's origin, by their names; JSON notes come last."""
+    """Return the origin of a file as its quantities state it, by their names; JSON notes last."""
     texts: dict[str, Any] = {}
     notes: dict[str, Any] = {}
     for at, quantity in paths:
@@ -151,6 +159,6 @@ def origins(file: SafeFile, paths: Iterable[tuple[str, Quantity]]) -> dict[str, 
         elif isinstance(value, str):
             texts[quantity.origin] = value
         else:
-            is_told = quantity.dimension == "messages"
-            notes[quantity.origin] = [message.text for message in value] if is_told else value
+            of_messages = quantity.dimension == "messages"
+            notes[quantity.origin] = [item.text for item in value] if of_messages else value
     return texts | notes

@@ -1,4 +1,4 @@
-"""The one way a file is written: whole or not at all, and never over an input."""
+"""Bytes of files: written whole or not at all, never over an input; read within a limit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from memscal.errors import InputError, OutputError, UnsafeFileError
-from memscal.formats.schema import MAX_FILE_BYTES
+
+MAX_FILE_BYTES = 256 * 2**20
 
 _UNTOUCHED = "Nothing was written; what was there before is untouched."
 _CURES = {
@@ -33,7 +34,7 @@ def ensure_writable(
     overwrite: bool = False,
     inputs: Iterable[str | os.PathLike[str]] = (),
 ) -> None:
-    """Prove that an output can be written: permissions do not say that a disk is full."""
+    """Prove that an output can be written, by writing beside it: permissions show no full disk."""
     target = _checked_target(path, overwrite=overwrite, inputs=inputs)
     temporary = _temporary_name(target)
     try:
@@ -125,7 +126,7 @@ def _write_durably(temporary: Path, data: bytes | memoryview) -> None:
 
 
 def _place_new(temporary: Path, target: Path) -> None:
-    """Give the temporary file its name only if nobody else took it in the meantime."""
+    """Give the temporary file its name, only if no other file has taken it in the meantime."""
     try:
         os.link(temporary, target)
     except FileExistsError:

@@ -10,8 +10,7 @@ import numpy as np
 from memscal.errors import FormatError, InputError
 from memscal.formats.codec import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import Group, Node, Number, index_axis, si
-from memscal.formats.json_text import to_json
+from memscal.formats.hdf5.writer import Group, Node, Number, index_axis, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.formats.values import any_scalar, json_value, require_array, require_text, units_of
 from memscal.model import records
@@ -24,7 +23,7 @@ from memscal.model.quantities import TRUTH, Record, declared_quantity, estimated
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
-# One name for each axis of the covariance: netCDF tools want each dimension once.
+# One name for each axis of the covariance: netCDF tools need each dimension once.
 _AXES = ("parameter", "parameter_prime")
 _COVARIANCE = (
     "Covariance of the numbers, in the order of names: each parameter in the unit of its dataset."
@@ -80,7 +79,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
     if not names or len(set(names)) != len(names):
         raise FormatError(
             f"{file.where(path)}/names is missing or names a parameter twice.",
-            why="It says which parameters there are, and the order of their covariance.",
+            why="It lists the parameters, in the order of their covariance.",
         )
     pairs = [any_scalar(file, f"{path}/{name}") for name in names]
     scale = np.array([_unit_scale(file, f"{path}/{name}") for name in names])

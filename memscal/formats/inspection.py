@@ -1,4 +1,4 @@
-"""What a file holds, and whether it can be trusted: for ``memscal inspect`` and ``check``."""
+"""Contents of a file, and its checks step by step: for ``memscal inspect`` and ``check``."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from memscal.formats.artifact import artifact_from
 from memscal.formats.codec import listed, origins
 from memscal.formats.groups import estimated_record, read_quality
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.reference import profile_from
-from memscal.formats.scan import scan_from
-from memscal.formats.schema import (
+from memscal.formats.hdf5.writer import (
     ARTIFACT_SCHEMA,
     DIGEST_ATTRIBUTE,
     REFERENCE_SCHEMA,
@@ -24,6 +22,8 @@ from memscal.formats.schema import (
     SCHEMA_ATTRIBUTE,
     STRESS_SCHEMA,
 )
+from memscal.formats.reference import profile_from
+from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.values import altered, require_schema, units_of
@@ -36,8 +36,6 @@ _READERS: dict[str, Callable[[SafeFile], Any]] = {
     ARTIFACT_SCHEMA: artifact_from,
     STRESS_SCHEMA: stress_from,
 }
-
-
 _MEASURED_ON = {
     "/entry/indenter": records.INDENTER,
     "/entry/sample/film": records.FILM,
@@ -90,7 +88,7 @@ class Finding:
 
 
 def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return what a file of memscal holds, in its units and in plain values that JSON can say."""
+    """Return what a file of memscal holds, in its units and in plain values for JSON."""
     with open_hdf5(path) as file:
         schema = _schema(file)
         version = require_schema(file, schema)
@@ -219,6 +217,6 @@ def _checks(file: SafeFile) -> Iterator[dict[str, Any]]:
 
 
 def _plain(value: Any) -> float | int | None:
-    """Return a number that standard JSON can say."""
+    """Return a number, or ``None`` where it is not finite, for standard JSON."""
     number = np.asarray(value).reshape(-1)[0].item()
     return number if np.isfinite(number) else None

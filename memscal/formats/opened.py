@@ -8,9 +8,9 @@ from typing import Any, TypeAlias
 
 from memscal.errors import InputError
 from memscal.formats.hdf5.reader import open_hdf5
+from memscal.formats.hdf5.writer import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
 from memscal.formats.scan import read_scan, scan_from
-from memscal.formats.schema import SCHEMA_ATTRIBUTE, STRESS_SCHEMA
-from memscal.formats.stress import stress_from
+from memscal.formats.stress import read_stress, stress_from
 from memscal.model.measured_stress import MeasuredStress
 from memscal.model.scan import Scan
 
@@ -36,10 +36,14 @@ def opened_scans(scans: Scans) -> tuple[Scan, ...]:
 
 def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
     """Return measured stress that is given itself or as a path."""
-    if isinstance(measured, MeasuredStress):
-        return measured
-    with open_hdf5(measured) as file:
-        return stress_from(file)
+    if isinstance(measured, str | PathLike):
+        return read_stress(measured)
+    if not isinstance(measured, MeasuredStress):
+        raise InputError(
+            f"There is a {type(measured).__name__} where measured stress is needed.",
+            cure="Give what measure_stress returns, or the path of its file.",
+        )
+    return measured
 
 
 def opened_contacts(contacts: Contacts) -> tuple[Scan | MeasuredStress, ...]:

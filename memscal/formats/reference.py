@@ -6,8 +6,7 @@ import os
 
 from memscal.formats.groups import profile_groups, read_profile
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, file_tree, write_tree
-from memscal.formats.schema import REFERENCE_SCHEMA
+from memscal.formats.hdf5.writer import REFERENCE_SCHEMA, Group, file_tree, write_tree
 from memscal.formats.values import require_schema
 from memscal.model.stress import StressProfile
 

@@ -15,9 +15,17 @@ from memscal.formats import groups
 from memscal.formats.codec import read_record, write_record
 from memscal.formats.files import ensure_writable
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, Number, file_tree, index_axis, si, write_tree
-from memscal.formats.json_text import to_json
-from memscal.formats.schema import SCAN_SCHEMA
+from memscal.formats.hdf5.writer import (
+    SCAN_SCHEMA,
+    Group,
+    Node,
+    Number,
+    file_tree,
+    index_axis,
+    si,
+    to_json,
+    write_tree,
+)
 from memscal.formats.values import (
     any_scalar,
     json_value,
@@ -40,7 +48,7 @@ _DECLARED = by_name(records.SCAN_DATA.quantities)
 # The other arrays have the shape of the signal, which is that of the scan.
 _OF_ONE_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _POINTS = ("point",)
-# One name for each axis of the correlation: netCDF tools want each dimension once.
+# One name for each axis of the correlation: netCDF tools need each dimension once.
 _PAIRS = ("point", "point_prime")
 _SYNTHETIC = (
     "The data of this file are synthetic: calculated from the known truth below, not measured."
@@ -193,10 +201,10 @@ def _data_group(scan: Scan) -> Group:
     if scan.u_zz_correlation is not None:
         data |= {axis: index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
         data |= _nodes({"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
-    rest = {
+    optional = {
         name: getattr(scan, name) for name in ("u_zz_errors", "normal_load", "normal_load_errors")
     }
-    data |= _nodes(rest | dict(scan.channels), axes)
+    data |= _nodes(optional | dict(scan.channels), axes)
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 

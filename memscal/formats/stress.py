@@ -13,9 +13,16 @@ from memscal.errors import FormatError
 from memscal.formats import groups
 from memscal.formats.codec import read_record, read_source, write_record, write_source
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import Group, Node, count, file_tree, si, write_tree
-from memscal.formats.json_text import to_json
-from memscal.formats.schema import STRESS_SCHEMA
+from memscal.formats.hdf5.writer import (
+    STRESS_SCHEMA,
+    Group,
+    Node,
+    count,
+    file_tree,
+    si,
+    to_json,
+    write_tree,
+)
 from memscal.formats.values import (
     altered,
     json_value,
@@ -116,7 +123,7 @@ def _old_scan(file: SafeFile, profile: str, source: SourceFile | None) -> Measur
 _BUDGET = {"force": "force", "maximum": "stress"}
 _PREFIX = "covariance_"
 _MOST_SCANS = 10_000
-# The covariance's second axis has its own name: netCDF tools want each dimension once.
+# The covariance's second axis has its own name: netCDF tools need each dimension once.
 _AXES = ("r", "r_prime")
 
 
@@ -243,9 +250,9 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     arrays = write_record(records.STRESS_PROFILE, profile)
     numbers = dict(write_record(records.STRESS_NUMBERS, _numbers(profile)).children)
     # What not every profile has comes last.
-    rest = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
+    optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
     if profile.curve_r.size:
-        rest["curve"] = write_record(records.STRESS_CURVE, profile)
+        optional["curve"] = write_record(records.STRESS_CURVE, profile)
     children: dict[str, Node] = {
         **arrays.children,
         "sources": to_json("sources", list(profile.covariances)),
@@ -262,13 +269,13 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
             f"points_{channel}": write_record(records.points_record(channel), points)
             for channel, points in profile.points.items()
         },
-        **rest,
+        **optional,
     }
     return replace(arrays, children=children)
 
 
 def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
-    """Return the numbers of a profile; a line does not tell where its centre lies across it."""
+    """Return the numbers of a profile; a line does not determine its centre across it."""
     names = {quantity.name for quantity in records.STRESS_NUMBERS.quantities}
     numbers = {name: getattr(profile, name) for name in names if not name.startswith("centre")}
     for i, name in enumerate(("centre", "centre_y")):

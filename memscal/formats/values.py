@@ -1,21 +1,22 @@
-"""Single values of a safe file by kind, and whether the file is as it was written."""
+"""Single values of a safe file by kind, its schema, and its digest."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from typing import Any
 
-from memscal.errors import FormatError, SchemaVersionError
+from memscal.errors import FormatError, InputError, SchemaVersionError
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import DigestItem, content_digest
-from memscal.formats.json_text import from_json
-from memscal.formats.schema import (
+from memscal.formats.hdf5.writer import (
     CONTENTS_PATH,
     DIGEST_ATTRIBUTE,
     SCHEMA_ATTRIBUTE,
     SCHEMA_VERSION,
     VERSION_ATTRIBUTE,
+    DigestItem,
+    content_digest,
 )
 from memscal.formats.units import SI_UNITS, dimension_of, to_si
 from memscal.model.arrays import FloatArray
@@ -27,10 +28,10 @@ def require_schema(file: SafeFile, schema: str) -> str:
     """Return the schema version; refuse another schema or a newer major version."""
     stored = file.attribute("/", SCHEMA_ATTRIBUTE)
     if stored != schema:
-        what = "no memscal schema" if stored is None else f'the schema "{stored}"'
+        held = "no memscal schema" if stored is None else f'the schema "{stored}"'
         raise FormatError(
-            f'{file.name} has {what}, but "{schema}" is needed here.',
-            why=f"The root attribute {SCHEMA_ATTRIBUTE} says what a file holds.",
+            f'{file.name} has {held}, but "{schema}" is needed here.',
+            why=f"The root attribute {SCHEMA_ATTRIBUTE} names what a file holds.",
             cure="Give the right file, or make one with `memscal import` or `memscal calibrate`.",
         )
     version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")
@@ -117,7 +118,12 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     """Return JSON of a given type (``list`` or ``dict``), or the default where there is none."""
     if not file.has(path):
         return default
-    value = from_json(file.where(path), file.text(path))
+    try:
+        value = json.loads(file.text(path))
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{file.where(path)} is not JSON: {error}.", cure="Write the file again."
+        ) from error
     if not isinstance(value, kind):
         raise FormatError(f"{file.where(path)} should hold a JSON {kind.__name__}.")
     if isinstance(value, (list, dict)) and len(value) > _MAX_ITEMS:

@@ -105,7 +105,7 @@ class ParameterSet:
     ----------
     names, units : tuple of str
         Such as ``conversion_constant`` and ``gaussian_sigma``; their SI units, needed only for
-        names that the file format does not know.
+        names that the file format does not define.
     values, covariance : ndarray, shape (n,), (n, n)
         Estimates and their joint covariance, systematic contributions included.
 

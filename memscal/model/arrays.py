@@ -15,26 +15,26 @@ from memscal.errors import InputError
 FloatArray = NDArray[np.float64]
 
 
-def require_positive(what: str, value: float, unit: str = "") -> None:
+def require_positive(name: str, value: float, unit: str = "") -> None:
     """Refuse a value that is not a finite number above zero."""
     if not (math.isfinite(value) and value > 0):
         raise InputError(
-            f"{what} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero.",
+            f"{name} is {value:g} {unit}".rstrip() + ", but it must be finite and above zero.",
             cure="Check the value and its unit.",
         )
 
 
-def require_non_negative(what: str, value: float) -> None:
+def require_non_negative(name: str, value: float) -> None:
     """Refuse a value that is not a finite number of at least zero."""
     if not (math.isfinite(value) and value >= 0):
-        raise InputError(f"{what} is {value:g}, but it must be finite and not negative.")
+        raise InputError(f"{name} is {value:g}, but it must be finite and not negative.")
 
 
-def require_range(what: str, value: float, low: float, high: float, unit: str = "") -> None:
+def require_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     """Refuse a value outside the closed range from ``low`` to ``high``."""
     if not (math.isfinite(value) and low <= value <= high):
         raise InputError(
-            f"{what} is {value:g} {unit}".rstrip() + f", but it must lie from {low:g} to {high:g}.",
+            f"{name} is {value:g} {unit}".rstrip() + f", but it must lie from {low:g} to {high:g}.",
             cure="Check the value and its unit.",
         )
 
@@ -52,28 +52,28 @@ def freeze_arrays(owner: object, *names: str) -> None:
         object.__setattr__(owner, name, frozen_array(getattr(owner, name)))
 
 
-def finite_vector(what: str, values: ArrayLike) -> FloatArray:
+def finite_vector(name: str, values: ArrayLike) -> FloatArray:
     """Return a read-only 1-D copy; refuse another shape or a value that is not finite."""
     array = frozen_array(values)
     if array.ndim != 1 or array.size == 0:
-        raise InputError(f"{what} has shape {array.shape}, but a 1-D array with values is needed.")
+        raise InputError(f"{name} has shape {array.shape}, but a 1-D array with values is needed.")
     if not np.all(np.isfinite(array)):
-        raise InputError(f"{what} holds a value that is not finite.")
+        raise InputError(f"{name} holds a value that is not finite.")
     return array
 
 
-def require_increasing(what: str, values: FloatArray) -> None:
+def require_increasing(name: str, values: FloatArray) -> None:
     """Refuse an axis that does not strictly increase."""
     if np.any(np.diff(values) <= 0):
-        raise InputError(f"{what} must increase strictly.", cure="Sort it; merge equal positions.")
+        raise InputError(f"{name} must increase strictly.", cure="Sort it; merge equal positions.")
 
 
-def whole_numbers(what: str, values: ArrayLike) -> NDArray[np.int64]:
+def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     """Return a read-only copy of a vector of whole numbers."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1 or not np.isfinite(array).all() or np.any(array != np.rint(array)):
         raise InputError(
-            f"{what} has shape {array.shape}, or holds values that are no whole numbers.",
+            f"{name} has shape {array.shape}, or holds values that are no whole numbers.",
             cure="Give one whole number for each point.",
         )
     numbers = array.astype(np.int64)

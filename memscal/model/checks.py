@@ -15,7 +15,7 @@ OUTLIER_LIMIT = 0.10
 #: A point of less weight is an outlier.
 OUTLIER_WEIGHT = 0.5
 
-#: Kinds of messages that code asks for.
+#: Kinds of messages that code selects by.
 FAILED_CHECK = "failed_check"
 FAILED_CALIBRATION = "failed_calibration"
 NOISE_UNSTATED = "noise_unstated"

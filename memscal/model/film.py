@@ -23,7 +23,7 @@ class ElasticFilm:
         Root-mean-square roughness of the free surface, in m.
     young_modulus_uncertainty, poisson_ratio_uncertainty, thickness_uncertainty : float, optional
         Standard uncertainties (k = 1), in the unit of the quantity.  ``None`` means "not stated":
-        a calibration counts nothing for that source and says so.
+        a calibration counts nothing for that source and notes it.
     name : str
         Which film it is, where there are several; scans that name the same film must agree on it.
 

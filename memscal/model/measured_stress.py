@@ -226,7 +226,7 @@ class MeasuredStress(Result):
     overridden : tuple of str
         Mismatches of artifact and scan that were accepted.
     process : Process
-        What was done, with what; its messages are what a user should know.
+        Options, versions, input files and messages.
     artifact, artifact_digest : SourceFile, str, optional
         File of the apparatus function, where it was read from one, and its content digest, empty
         in files of version 1.0.
@@ -266,7 +266,7 @@ class MeasuredStress(Result):
 
     @property
     def messages(self) -> tuple[Message, ...]:
-        """What a user should know, the gravest first."""
+        """Notes and warnings of the measurement, the most serious first."""
         return self.process.messages
 
     @property

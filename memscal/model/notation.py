@@ -1,4 +1,4 @@
-"""How a measured value is written: with its uncertainty, rounded by it, and with its unit."""
+"""Notation of measured values: with uncertainty, rounded by it, and unit; printable text."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _two_digits(spread: Decimal) -> Decimal:
 
 
 def format_bound(bound: float, *, upper: bool) -> str:
-    """Write a bound to two digits, rounded outward: no more is said than was found."""
+    """Write a bound to two digits, rounded outward, so that it still holds."""
     if bound <= 0:
         return "0"
     place = 1 - math.floor(math.log10(bound))

@@ -1,4 +1,4 @@
-"""Where data came from, and what was done to them."""
+"""Provenance of data: files that were read, processing, time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Process:
         Every option with its value, the seed included; versions of Python and of the numerical
         libraries; both JSON-serialisable.
     messages : tuple of Message
-        What the user was told while it ran.
+        Notes and warnings that were shown.
     input_scan, input_reference : SourceFile, optional
         The files that were read.
     """

@@ -108,7 +108,7 @@ def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, Ev
 
 
 def _even_axis(positions: FloatArray) -> EvenAxis | None:
-    """Fit the coarsest even lattice that meets all positions; steps are counted between them."""
+    """Fit the coarsest even lattice through all positions; steps are counted between them."""
     order = np.argsort(positions, kind="stable")
     gaps = np.diff(positions[order])
     # One of the gaps is about the step; the others are noise and missing rows.
@@ -184,7 +184,7 @@ def _typical_step(values: FloatArray, cluster: IntArray) -> float:
 
 
 LUBRICATIONS = ("", "dry", "lubricated")
-"""What can be between indenter and film; empty where a scan does not say."""
+"""States of lubrication; empty where a scan states none."""
 
 #: A combination of voltages with less of the noise than this would outweigh all others.
 _LEAST_EIGENVALUE = 1e-8
@@ -260,15 +260,15 @@ def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
 
 
 def require_plane(x: FloatArray, y: FloatArray) -> None:
-    """Refuse points of a plane that lie along a line: they tell no centre across it."""
+    """Refuse points of a plane that lie along a line: their centre across it is not determined."""
     spread = float(np.ptp(x)), float(np.ptp(y))
     thin = int(np.argmin(spread))
     if spread[thin] <= _LINE * spread[1 - thin]:
         raise InputError(
             f"The points spread over {spread[0] * 1e3:.4g} mm along x and {spread[1] * 1e3:.4g} mm "
             "along y.",
-            why=f"With less than {_LINE:.0%} of the one along the other they are a line, which "
-            "tells no centre across it.",
+            why=f"With less than {_LINE:.0%} of the one along the other they are a line: the "
+            "centre across it is not determined.",
             cure="Leave y out." if thin else "Give the positions along y as x; direction='y'.",
         )
 
@@ -409,9 +409,9 @@ class Scan:
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
         shape = " x ".join(map(str, self.u_zz.shape))
-        what = shape if self.kind == "points" else f"{self.kind}, {shape}"
+        form = shape if self.kind == "points" else f"{self.kind}, {shape}"
         reach = f"{self.x.min() * 1e3:.4g} to {self.x.max() * 1e3:.4g} mm"
-        return f"<Scan: {what} points, x from {reach}, load {self.load:.4g} N>"
+        return f"<Scan: {form} points, x from {reach}, load {self.load:.4g} N>"
 
     @property
     def kind(self) -> str:

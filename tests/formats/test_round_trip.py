@@ -14,8 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, InputError, OutputError, UnitError
-from memscal.formats.artifact import read_artifact, write_artifact
+from memscal.formats.artifact import write_artifact
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 from memscal.model.apparatus import ParameterSet
@@ -30,7 +31,7 @@ EXACT = 4.5e-16
 def assert_same(found: Any, expected: Any, *, but: tuple[str, ...] = (), where: str = "") -> None:
     """Compare two values of the model field by field, numbers to the last bit but one."""
     if dataclasses.is_dataclass(expected):
-        assert type(found) is type(expected), where
+        assert isinstance(found, type(expected)), where
         for field in dataclasses.fields(expected):
             if field.name not in but:
                 pair = getattr(found, field.name), getattr(expected, field.name)
@@ -127,7 +128,7 @@ def test_a_reference_in_a_scan_without_parameters_takes_those_of_the_scan(tmp_pa
 
 def test_an_artifact_comes_back(tmp_path: Path):
     write_artifact(make_artifact(), tmp_path / "a.h5")
-    found = read_artifact(tmp_path / "a.h5")
+    found = load_apparatus(tmp_path / "a.h5")
     assert_same(found, make_artifact(), but=("source", "units"))
     assert found.parameters.units == ("V/Pa", "m", "m", "m", "V")
 
@@ -140,7 +141,7 @@ def test_a_covariance_between_different_units_comes_back(tmp_path: Path):
         data.parameters, covariance=correlation * spread[:, None] * spread
     )
     write_artifact(make_artifact(parameters=parameters), tmp_path / "a.h5")
-    found = read_artifact(tmp_path / "a.h5").parameters
+    found = load_apparatus(tmp_path / "a.h5").parameters
     np.testing.assert_allclose(found.covariance, parameters.covariance, rtol=1e-14)
     with h5py.File(tmp_path / "a.h5") as file:  # as another program would read it
         group = file["/entry/parameters"]
@@ -156,7 +157,7 @@ def test_a_parameter_of_an_unknown_name_needs_a_unit_and_keeps_it(tmp_path: Path
     assert not (tmp_path / "a.h5").exists()
     parameters = ParameterSet(("tilt",), values, covariance, units=("V/m",))
     write_artifact(make_artifact(parameters=parameters, budget={}), tmp_path / "a.h5")
-    found = read_artifact(tmp_path / "a.h5").parameters
+    found = load_apparatus(tmp_path / "a.h5").parameters
     assert found.units == ("V/m",)
     assert found["tilt"] == 2.0
 
@@ -172,7 +173,7 @@ def test_a_parameter_name_that_cannot_stand_in_a_file_is_refused(tmp_path: Path,
 def test_check_names_are_kept_as_they_are_and_two_alike_are_refused(tmp_path: Path):
     check = QualityCheck("Gaussian misfit (far)", 1.0, 2.0, True, "Fine.")
     write_artifact(make_artifact(checks=(check,)), tmp_path / "a.h5")
-    assert read_artifact(tmp_path / "a.h5").checks == (check,)
+    assert load_apparatus(tmp_path / "a.h5").checks == (check,)
     with pytest.raises(InputError, match="gaussian_misfit_far"):
         write_artifact(make_artifact(checks=(check, check)), tmp_path / "b.h5")
 
@@ -189,7 +190,7 @@ def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp
     data = make_artifact()
     process = dataclasses.replace(data.process, configuration=configuration)
     write_artifact(make_artifact(process=process), tmp_path / "a.h5")
-    found = read_artifact(tmp_path / "a.h5").process.configuration
+    found = load_apparatus(tmp_path / "a.h5").process.configuration
     assert found == {"seed": 3, "mu": "inf", "loads": [1.0, 2.0]}
 
 

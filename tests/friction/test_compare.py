@@ -218,3 +218,5 @@ def test_what_is_no_scan_is_refused(apparatus: memscal.ApparatusFunction) -> Non
         memscal.compare([1.0], apparatus)
     with pytest.raises(InputError, match="no scan"):
         memscal.compare([], apparatus)
+    with pytest.raises(InputError, match="where measured stress is needed"):
+        memscal.compare_shear(1.0, apparatus)

@@ -214,6 +214,7 @@ BAD = {
         "determines no stress",
     ),
     "no scan": (1.0, EXACT, "where a Scan is needed"),
+    "no apparatus": (SCAN, 1.0, "where an apparatus function is needed"),
 }
 
 

@@ -1,4 +1,9 @@
-"""What a dataset may claim before any of it is read."""
+"""Limits of what a dataset, a text or an attribute may claim, checked before any of it is read.
+
+HDF5 sets aside the memory that a text of variable length claims, up to 4 GiB, and can walk for ever
+through a damaged heap.  The claim is a descriptor of 16 bytes: length, address, index ("HDF5 File
+Format Specification", section VIII).
+"""
 
 from __future__ import annotations
 
@@ -152,7 +157,7 @@ def claimed_bytes(dataset: Any) -> int:
 
 
 def check_type(where: str, kind: Any, *, text: bool) -> None:
-    """Refuse a type that is not a plain number, or not a string where text is wanted."""
+    """Refuse a type that is not a plain number, or not a string where text is expected."""
     type_class = kind.get_class()
     if text:
         if type_class != h5py.h5t.STRING:

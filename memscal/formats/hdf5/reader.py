@@ -46,8 +46,8 @@ def damage_named(
     except MemoryError as error:
         raise UnsafeFileError(f"{problem}: it asks for more memory than there is.") from error
     except Exception as error:
-        said = printable(" ".join(str(error).split()), 200) or type(error).__name__
-        raise FormatError(f"{problem}.", why=f"{why} ({said}).", cure=cure) from error
+        reason = printable(" ".join(str(error).split()), 200) or type(error).__name__
+        raise FormatError(f"{problem}.", why=f"{why} ({reason}).", cure=cure) from error
 
 
 _MAX_TOTAL_BYTES = 512 * 2**20
@@ -234,7 +234,7 @@ class SafeFile:
             return np.asarray(value).reshape(-1)[0].item() if number else None
         if len(attribute.shape) == 0:
             return printable(value, _MAX_ATTRIBUTE_BYTES)
-        return tuple(printable(part, _MAX_ATTRIBUTE_BYTES) for part in value)
+        return tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in value)
 
 
 class _Owner:

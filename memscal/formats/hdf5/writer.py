@@ -1,9 +1,10 @@
-"""The one HDF5 writer: a tree becomes bytes in memory, and the bytes a file in one step."""
+"""The one HDF5 writer, its schemas and their version; a tree becomes bytes, and they a file."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,15 +18,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
 from memscal.formats.files import atomic_write_bytes
-from memscal.formats.json_text import to_json
-from memscal.formats.schema import (
-    DIGEST_ATTRIBUTE,
-    SCHEMA_ATTRIBUTE,
-    SCHEMA_VERSION,
-    VERSION_ATTRIBUTE,
-)
 from memscal.formats.units import from_si
 from memscal.model.notation import printable
+
+SCAN_SCHEMA = "memscal-scan"
+REFERENCE_SCHEMA = "memscal-reference"
+ARTIFACT_SCHEMA = "memscal-artifact"
+STRESS_SCHEMA = "memscal-stress"
+SCHEMA_VERSION = "1.1.0"
+
+SCHEMA_ATTRIBUTE = "memscal_schema"
+VERSION_ATTRIBUTE = "memscal_schema_version"
+DIGEST_ATTRIBUTE = "memscal_content_sha256"
+
+# The list of what was written: a reader can follow it without ever listing a group.
+CONTENTS_PATH = "/entry/contents/data"
 
 Attribute = str | int | tuple[str, ...]
 
@@ -42,7 +49,7 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """A NeXus group; an attribute whose value is empty text is left out when it is written."""
+    """A NeXus group: its class, children by name, and attributes."""
 
     nx_class: str
     children: Mapping[str, Node]
@@ -85,6 +92,30 @@ def note(text: str, *, media_type: str = "text/plain", description: str = "") ->
     return Group("NXnote", children)
 
 
+def to_json(subject: str, value: Any) -> str:
+    """Write plain values as JSON; numbers that are not finite become strings."""
+    return json.dumps(_json_value(subject, value), sort_keys=True, allow_nan=False)
+
+
+def _json_value(subject: str, value: Any) -> Any:
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    if isinstance(value, np.generic):
+        return _json_value(subject, value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if isinstance(value, np.ndarray):
+        return _json_value(subject, value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _json_value(subject, item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_json_value(subject, item) for item in value]
+    raise InputError(
+        f"{subject} holds a {type(value).__name__}, which JSON cannot hold.",
+        cure="Give numbers, text, truth values, lists and mappings.",
+    )
+
+
 def walk(root: Group, path: str = "") -> Iterator[tuple[str, Node]]:
     """Yield every node with its path, parents first, the root as ``"/"``."""
     yield path or "/", root
@@ -100,7 +131,10 @@ DigestItem = tuple[str, "np.ndarray[Any, Any] | str | None", Mapping[str, Any]]
 
 
 def content_digest(items: Iterable[DigestItem]) -> str:
-    """Return the SHA-256 over paths, values and attributes, as hexadecimal text."""
+    """Return the SHA-256 over paths, values and attributes, as hexadecimal text.
+
+    It shows accidents and careless edits; it is not a signature.
+    """
     total = hashlib.sha256()
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)

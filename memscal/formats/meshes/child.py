@@ -1,7 +1,7 @@
 """The guard around meshio: a child process with limits of time and memory that sees one file.
 
-Meshio trusts what a file says.  So it runs on a copy in a folder of its own, and gives back plain
-arrays, never pickles.
+meshio does not check what a file claims.  It runs on a copy in a folder of its own and returns
+plain arrays, never pickles.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The base of the film in a mesh: which way is up, what lies on the base, means over circles."""
+"""Base of the film in a mesh: its axes, nodes and cells, and means over circles."""
 
 from __future__ import annotations
 
@@ -102,19 +102,19 @@ def find_base(mesh: Mesh, frame: Frame, level: float | None) -> Base:
         corners = frame.points[block.nodes[of_side]]
         sides.append((block, of_side, (weight * corners).sum(axis=1) / weight.sum(axis=1)))
     base_nodes = np.unique(np.concatenate(nodes))
-    what = f"{AXES[frame.vertical]} = {position * 1e3:.6g} mm"
+    level_text = f"{AXES[frame.vertical]} = {position * 1e3:.6g} mm"
     if base_nodes.size < _FEWEST:
         nearest = float(heights[np.argmin(np.abs(heights - position))])
         raise InputError(
             f"Only {base_nodes.size} nodes of the film in {mesh.source.file_name} lie on its base, "
-            f"at {what}.",
+            f"at {level_text}.",
             why=f"The mesh reaches from {AXES[frame.vertical]} = {lowest * 1e3:.6g} mm to "
             f"{highest * 1e3:.6g} mm, and its nearest node is at {nearest * 1e3:.6g} mm.",
             cure="Name the axis across the film (vertical; --vertical) or the position of the "
             "flat base on it (base; --base).",
         )
     which = ", its lowest level" if level is None else ""
-    note = f"The base was taken at {what}{which}: {base_nodes.size} nodes."
+    note = f"The base was taken at {level_text}{which}: {base_nodes.size} nodes."
     return Base(base_nodes, tuple(sides), outward, (note,))
 
 

@@ -6,6 +6,7 @@ import hashlib
 import importlib.util
 import os
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -133,34 +134,20 @@ def _checked(
         points = np.column_stack([points, np.zeros(len(points))])
     if not np.all(np.isfinite(points)):
         raise _unusable(sources[0], "a point whose coordinates are not finite")
-    blocks = []
-    for block in header["cells"]:
-        numbers = arrays[block["nodes"]]
-        if not len(numbers):
-            continue
-        if not numbers.size:
-            raise _unusable(sources[0], "a cell without nodes")
-        with np.errstate(invalid="ignore"):
-            nodes = numbers.astype(np.int64)
-        if nodes.ndim != 2 or not (
-            np.array_equal(nodes, numbers) and 0 <= nodes.min() <= nodes.max() < len(points)
-        ):
-            raise _unusable(sources[0], "a cell with a node that is not there")
-        fields = {key: arrays[i] for key, i in block["data"].items()}
-        blocks.append(Cells(int(block["dimension"]), nodes, _fields(fields, len(nodes))))
-    if not blocks:
+    cells = tuple(_cells(header["cells"], arrays, len(points), sources[0]))
+    if not cells:
         raise _unusable(sources[0], "no cells")
     notes = [
         f"Its numbers are those of {drawn.file_name} (sha256 {drawn.sha256})."
         for drawn in sources[1:]
     ]
-    if words := printable(header["said"], _MAX_NOTES):
+    if words := printable(header["printed"], _MAX_NOTES):
         notes.append(f"meshio says: {words}")
     if not header["limited"]:
         notes.append("It was read without a limit of memory, which this system does not offer.")
     return Mesh(
         points=points,
-        cells=tuple(blocks),
+        cells=cells,
         point_data=_fields(
             {key: arrays[i] for key, i in header["point_data"].items()}, len(points)
         ),
@@ -168,6 +155,29 @@ def _checked(
         notes=tuple(notes),
         tensor_order=tensor_order,
     )
+
+
+def _cells(
+    blocks: list[dict[str, Any]],
+    arrays: list[np.ndarray[Any, Any]],
+    points: int,
+    source: SourceFile,
+) -> Iterator[Cells]:
+    """Yield the blocks that have cells, with their nodes as whole numbers below ``points``."""
+    for block in blocks:
+        numbers = arrays[block["nodes"]]
+        if not len(numbers):
+            continue
+        if not numbers.size:
+            raise _unusable(source, "a cell without nodes")
+        with np.errstate(invalid="ignore"):
+            nodes = numbers.astype(np.int64)
+        if nodes.ndim != 2 or not (
+            np.array_equal(nodes, numbers) and 0 <= nodes.min() <= nodes.max() < points
+        ):
+            raise _unusable(source, "a cell with a node that is not there")
+        fields = {key: arrays[i] for key, i in block["data"].items()}
+        yield Cells(int(block["dimension"]), nodes, _fields(fields, len(nodes)))
 
 
 def _fields(fields: dict[str, np.ndarray[Any, Any]], count: int) -> dict[str, FloatArray]:
@@ -179,9 +189,9 @@ def _fields(fields: dict[str, np.ndarray[Any, Any]], count: int) -> dict[str, Fl
     }
 
 
-def _unusable(source: SourceFile, what: str) -> FormatError:
+def _unusable(source: SourceFile, content: str) -> FormatError:
     return FormatError(
-        f"{source.file_name} has {what}.",
+        f"{source.file_name} has {content}.",
         why="A stress at the base cannot be found in it.",
         cure="Save the mesh again, as an unstructured grid (.vtu).",
     )
@@ -209,8 +219,8 @@ def write_mesh(mesh: FieldMesh, path: str | os.PathLike[str], *, overwrite: bool
         meshio.vtu.write(plain, written)
         with open(plain, "rb") as file:
             data = file.read()
-    head, grid, rest = data.partition(b"<UnstructuredGrid>")
-    atomic_write_bytes(path, head + _comment(mesh) + grid + rest, overwrite=overwrite)
+    head, grid, body = data.partition(b"<UnstructuredGrid>")
+    atomic_write_bytes(path, head + _comment(mesh) + grid + body, overwrite=overwrite)
 
 
 def _comment(mesh: FieldMesh) -> bytes:

@@ -69,17 +69,18 @@ def read_reference_mesh(
     footing = find_base(mesh, frame, base)
     places, values = _at_base(mesh, frame, footing, normal)
     columns = {"sigma_zz": sign * to_si(values, sigma_unit, "stress", f"{name}: {sigma}")}
+    treatment = "compression negative" if sign < 0 else "as it is"
     notes = [
         *import_notes([f"Imported from {name} (sha256 {mesh.source.sha256}).", *mesh.notes]),
         *frame.notes,
         *import_notes(footing.notes),
-        _told(normal, "Normal stress", "compression negative" if sign < 0 else "as it is"),
+        _component_note(normal, "Normal stress", treatment),
     ]
     if tangential is not None:
         turned = footing.outward if shear_sign is None else shear_sign
         values = _at_base(mesh, frame, footing, tangential)[1]
         columns["sigma_rz"] = turned * to_si(values, sigma_unit, "stress", name)
-        notes.append(_told(tangential, "Radial shear", f"times {turned}"))
+        notes.append(_component_note(tangential, "Radial shear", f"times {turned}"))
     samples = Samples(
         columns=columns,
         source=mesh.source,
@@ -155,20 +156,20 @@ def _at_base(
     if component.at_points:
         places = frame.points[base.nodes][:, radial]
         return places, mesh.point_data[component.field][base.nodes, component.column]
-    here = [block for block in base.cells if component.field in block[0].data]
-    if not sum(len(cells) for _, cells, _ in here):
+    blocks = [block for block in base.cells if component.field in block[0].data]
+    if not sum(len(cells) for _, cells, _ in blocks):
         raise InputError(
             f"No cell with a value of {component.field!r} has a side on the base in "
             f"{mesh.source.file_name}.",
             cure="Name the position of the base (base; --base), or save the stress at the nodes.",
         )
-    places = np.concatenate([middles for _, _, middles in here])[:, radial]
-    values = [block.data[component.field][cells, component.column] for block, cells, _ in here]
+    places = np.concatenate([middles for _, _, middles in blocks])[:, radial]
+    values = [block.data[component.field][cells, component.column] for block, cells, _ in blocks]
     return places, np.concatenate(values)
 
 
-def _told(component: Component, what: str, how: str) -> Message:
-    text = f"{what}: {component}, {how}"
+def _component_note(component: Component, name: str, treatment: str) -> Message:
+    text = f"{name}: {component}, {treatment}"
     if not component.at_points:
         text += "; each value is taken at the middle of its cell's side on the base"
     return Message("import", f"{text}.")

@@ -28,7 +28,7 @@ class Component:
     tensor: bool = False
 
     def __str__(self) -> str:
-        """Return how the notes speak of it."""
+        """Return its name in notes."""
         place = "at the nodes" if self.at_points else "of the cells"
         return f"{self.meaning} of the field {self.field!r} {place}"
 
@@ -107,14 +107,14 @@ def _no_such_field(
         more = len(fields) - len(names)
         return f"{where}: " + ", ".join(names) + (f" and {more} more" if more else "")
 
-    parts = [
+    lists = [
         listed(fields, where)
         for fields, where in ((points, "at the nodes"), (cells, "in the cells"))
         if fields
     ]
     has = (
-        f"It has, with their numbers of components, {'; '.join(parts)}."
-        if parts
+        f"It has, with their numbers of components, {'; '.join(lists)}."
+        if lists
         else ("It has no fields at all.")
     )
     return InputError(

@@ -25,7 +25,7 @@ _NUMBERS = re.compile("U?Int(8|16|32|64)|Float(32|64)")
 # Bytes that are not XML follow the first underscore of a raw section.
 _RAW = re.compile(rb"""<AppendedData[^>]*encoding\s*=\s*["']raw["'][^>]*>\s*_""")
 _MOST_FILES = 32
-_MOST_SAID = 300
+_MOST_PRINTED = 300
 _FORBIDDEN = {"ctypes", "ftplib", "pickle", "pty", "shutil", "socket", "subprocess", "urllib"}
 # What an import does: modules that are needed late, such as an encoding, may still be loaded.
 _ALLOWED_OF_OS = {"os.listdir", "os.scandir"}
@@ -50,8 +50,8 @@ def main() -> None:
         path = f"mesh.{request['kind']}"
         _forbid_other_files(path)
         try:
-            said, mesh = _read(meshio, request["kind"], path)
-            header = {**_described(mesh, arrays), "said": said, "limited": limited}
+            printed, mesh = _read(meshio, request["kind"], path)
+            header = {**_described(mesh, arrays), "printed": printed, "limited": limited}
             if sum(values.nbytes for values in arrays) > request["output"]:
                 raise MemoryError
         except BaseException as error:  # noqa: BLE001 - meshio ends the program on some files
@@ -65,7 +65,7 @@ def _failure(error: BaseException, memory: int) -> dict[str, Any]:
     """Return why a mesh was not read, and whether the file tried what no mesh needs."""
     if isinstance(error, MemoryError):
         return {"error": f"its numbers take more than {memory // 2**20:,} MB", "unsafe": True}
-    words = " ".join(str(error).split())[:_MOST_SAID]
+    words = " ".join(str(error).split())[:_MOST_PRINTED]
     if isinstance(error, ValueError | PermissionError) and words:
         return {"error": words, "unsafe": isinstance(error, PermissionError)}
     return {"error": f"{type(error).__name__}: {words}", "unsafe": False}
@@ -122,7 +122,7 @@ def _stand_in_for_h5py(heavy: Mapping[str, Any]) -> None:
     """Let meshio find, where it looks for h5py, the arrays that were read for it beforehand."""
 
     class Node:
-        def __init__(self, path: str, _mode: str = "r") -> None:
+        def __init__(self, path: str) -> None:
             self.path = path
 
         def __getitem__(self, key: str | tuple[()]) -> Any:
@@ -133,17 +133,17 @@ def _stand_in_for_h5py(heavy: Mapping[str, Any]) -> None:
             return heavy[self.path]
 
     module = types.ModuleType("h5py")
-    module.__dict__["File"] = lambda path, mode="r": Node(f"{os.path.basename(path)}:", mode)
+    module.__dict__["File"] = lambda path, *_: Node(f"{os.path.basename(path)}:")
     sys.modules["h5py"] = module
 
 
 def _read(meshio: Any, kind: str, path: str) -> tuple[str, Any]:
-    """Return what meshio says about a mesh, and the mesh."""
-    said = io.StringIO()
+    """Return what meshio prints about a mesh, and the mesh."""
+    printed = io.StringIO()
     with (
         warnings.catch_warnings(),
-        contextlib.redirect_stdout(said),
-        contextlib.redirect_stderr(said),
+        contextlib.redirect_stdout(printed),
+        contextlib.redirect_stderr(printed),
     ):
         warnings.simplefilter("ignore")
         # numpy only warns of text that is not a number, and cuts the array short.
@@ -156,8 +156,8 @@ def _read(meshio: Any, kind: str, path: str) -> tuple[str, Any]:
         try:
             mesh = getattr(meshio, kind).read(path)
         except SystemExit as error:
-            raise ValueError(said.getvalue()) from error
-    return " ".join(said.getvalue().split())[:_MOST_SAID], mesh
+            raise ValueError(printed.getvalue()) from error
+    return " ".join(printed.getvalue().split())[:_MOST_PRINTED], mesh
 
 
 def _tidy_vtu(data: bytes) -> Element:
@@ -204,13 +204,13 @@ def _put_inline(root: Element, raw: bytes) -> None:
             body = int(np.frombuffer(raw, size, count, begin + 3 * size.itemsize).sum())
             middle = begin + (3 + count) * size.itemsize
             # meshio decodes the header by itself.
-            parts = [raw[begin:middle], raw[middle : middle + body]]
+            chunks = [raw[begin:middle], raw[middle : middle + body]]
         else:
-            parts = [raw[begin : middle + body]]
+            chunks = [raw[begin : middle + body]]
         if not count:
             array.set("format", "ascii")
-            parts = []
-        array.text = b"".join(map(base64.b64encode, parts)).decode()
+            chunks = []
+        array.text = b"".join(map(base64.b64encode, chunks)).decode()
 
 
 def _tidy_xdmf(data: bytes) -> Element:
@@ -236,7 +236,7 @@ def _tidy_xdmf(data: bytes) -> Element:
 
 
 def _mesh_and_fields(grid: Element) -> Iterator[Element]:
-    """Give the elements of a grid that are its mesh or a field on it, with XDMF's defaults."""
+    """Yield the elements of a grid that are its mesh or a field on it, with XDMF's defaults."""
     for element in grid:
         element[:] = element.findall("DataItem")
         if element.tag == "Attribute":
@@ -275,7 +275,7 @@ def _described(mesh: Any, arrays: list[Any]) -> dict[str, Any]:
             {
                 "dimension": int(block.dim),
                 "nodes": add(block.data),
-                "data": fields({name: parts[i] for name, parts in mesh.cell_data.items()}),
+                "data": fields({name: of_blocks[i] for name, of_blocks in mesh.cell_data.items()}),
             }
             for i, block in enumerate(mesh.cells)
         ],

@@ -1,4 +1,4 @@
-"""From samples of a calculated stress to a reference: what every import of one checks and does."""
+"""References from samples of a calculated stress, checked; and from tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Import of tables: scans as they leave an experiment, profiles as they leave a FEM program."""
+"""Scans from tables with one row per reading."""
 
 from __future__ import annotations
 
@@ -75,27 +75,18 @@ def read_scan_table(
         f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
         *table.notes,
     ]
-    columns = {"u_zz": u_sign * _voltage(table, u, u_unit, u_scale)}
-    if u_sign < 0:
-        notes.append("The sign of u_zz was changed.")
-    for name, column in (("u_xz", u_xz), ("u_yz", u_yz)):
-        if column is not None:
-            columns[name] = _voltage(table, column, u_unit, u_scale)
-    if u_scale is not None:
-        notes.append(
-            f"The readings are in {u_unit}, not in volts: {u_scale:g} V was taken for one "
-            f"{u_unit}, and every voltage and conversion constant carries this choice."
-        )
+    channels = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz}
+    columns = {
+        name: _voltage(table, column, u_unit, u_scale)
+        for name, column in channels.items()
+        if column is not None
+    }
+    columns["u_zz"] = u_sign * columns["u_zz"]
+    notes += _about_voltages(u_sign, u_unit, u_scale)
     if load_column is not None:
         where = table.where(load_column)
         columns["normal_load"] = to_si(table.column(load_column), load_unit, "force", where)
-        if load is None:
-            load = float(np.nanmedian(columns["normal_load"]))
-            notes.append(f"The nominal load is the median of the column: {load:g} N.")
-    if load is None:
-        raise InputError(
-            "The load of the scan is not given.", cure="Give the load in N, or its column."
-        )
+    load = _nominal_load(load, columns, notes)
     if load_scatter is not None and "normal_load" not in columns:
         columns["normal_load"] = np.full(columns["u_zz"].shape, load)
     columns["x"] = to_si(table.column(x), x_unit, "length", table.where(x))
@@ -229,6 +220,29 @@ def _mixed_loads(
         "pass)."
     )
     return [Message("mixed_loads", text, "warning")]
+
+
+def _about_voltages(sign: int, unit: str, scale: float | None) -> list[str]:
+    notes = ["The sign of u_zz was changed."] if sign < 0 else []
+    if scale is not None:
+        notes.append(
+            f"The readings are in {unit}, not in volts: {scale:g} V was taken for one {unit}, and "
+            "every voltage and conversion constant carries this choice."
+        )
+    return notes
+
+
+def _nominal_load(load: float | None, columns: Mapping[str, FloatArray], notes: list[str]) -> float:
+    """Return the load in N: the one given, or the median of the column of loads."""
+    if load is not None:
+        return load
+    if "normal_load" not in columns:
+        raise InputError(
+            "The load of the scan is not given.", cure="Give the load in N, or its column."
+        )
+    median = float(np.nanmedian(columns["normal_load"]))
+    notes.append(f"The nominal load is the median of the column: {median:g} N.")
+    return median
 
 
 def _voltage(table: Table, column: Column, unit: str, scale: float | None) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Tables of numbers as text: delimiter, decimal mark and header are found, and reported."""
+"""Tables of numbers as text, whose delimiter, decimal mark and header are detected."""
 
 from __future__ import annotations
 
