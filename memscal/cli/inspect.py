@@ -125,19 +125,15 @@ def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    from memscal.summaries.table import stated_text
+
     for name, value in provenance.items():
         words = name.replace("_", " ")
         if isinstance(value, Mapping):
             for key, item in value.items():
-                yield f"{words}: {key}".replace("_", " "), _plain(item)
+                yield f"{words}: {key}".replace("_", " "), stated_text(item)
         elif isinstance(value, list):
             for item in value:
                 yield words, str(item)
         else:
             yield from ((words, line) for line in str(value).splitlines() if line)
-
-
-def _plain(value: object) -> str:
-    if isinstance(value, Mapping):
-        return "; ".join(f"{key}: {_plain(item)}" for key, item in value.items()) or "none"
-    return "not given" if value is None else str(value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from html import escape
 from string import Template
 
@@ -17,7 +17,7 @@ from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import PER_MM, Record, estimated_quantity
 from memscal.summaries.calibration import sensor_title, tables
-from memscal.summaries.table import Table, checks_table
+from memscal.summaries.table import Table, checks_table, stated_text
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -175,7 +175,7 @@ def _provenance(data: ApparatusData) -> str:
     blocks = [Table("What was run on what", ("item", "value"), rows).html()]
     for caption, mapping in (("Options", process.configuration), ("Versions", process.environment)):
         if mapping:
-            rows = [(str(key), _plain(value)) for key, value in mapping.items()]
+            rows = [(str(key), stated_text(value)) for key, value in mapping.items()]
             blocks.append(Table(caption, ("name", "value"), rows).html())
     items = "\n".join(f"<li>{escape(message.text)}</li>" for message in process.messages)
     messages = f"<ul>\n{items}\n</ul>" if items else "<p>None.</p>"
@@ -186,13 +186,6 @@ def _source_rows(name: str, source: SourceFile | None) -> list[tuple[str, str]]:
     if source is None:
         return []
     return [(f"input {name}", source.file_name), (f"its SHA-256 ({name})", source.sha256)]
-
-
-def _plain(value: object) -> str:
-    """Return an option's value for reading: groups as "name: value", not as Python."""
-    if isinstance(value, Mapping):
-        return "; ".join(f"{key}: {_plain(item)}" for key, item in value.items()) or "none"
-    return "not given" if value is None else str(value)
 
 
 def _figure(data: ApparatusData) -> str:

@@ -134,7 +134,7 @@ def compare(
     r"""Hold measured stress against calculated contacts, and find the friction that explains it.
 
     The calculated base stress of a sphere on the film is convolved with the sensor's G, and the
-    voltages are held against it: :math:`U = A\,(G \otimes \sigma_\mu)` with centre, baseline and
+    voltages are compared with it: :math:`U = A\,(G \otimes \sigma_\mu)` with centre, baseline and
     drift of each load free, and with the uncertainties of A G, film, sphere, loads and positions
     in the likelihood.  The effective friction coefficient is that of least chi-square; its
     interval is what the profile likelihood does not exclude, and has no upper end where the

@@ -49,7 +49,7 @@ class LoadPoints:
     ``offset``: position from the centre along the scan, in m; ``log_load``: logarithm of the
     point's load over the nominal one; ``noise``: standard deviation in V, larger for outliers;
     ``load_errors`` (relative) and ``x_errors`` (m): independent standard uncertainties; ``flat``
-    (n, d): baseline and drift, of unknown size; ``free_centre``: whether the centre is to be found;
+    (n, d): baseline and drift, of unknown size; ``free_centre``: whether the centre is free;
     ``load_share``, ``position_share``: relative standard uncertainty of all loads, and of the
     stage's scale; ``correlation`` (n, n): of the electronic noise.
     """

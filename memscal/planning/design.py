@@ -19,7 +19,7 @@ from memscal.planning.expected import Design, evaluate
 from memscal.planning.plan import Plan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
-WISHES = {
+TARGETS = {
     "A": "conversion_constant",
     "sigma": "gaussian_sigma",
     "fwhm": "fwhm",
@@ -63,15 +63,15 @@ class _Search:
     words: Callable[[Plan], str]
 
 
-def require_wishes(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
-    """Return the wishes by their full names; refuse unknown ones, and those without ``vary``."""
+def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
+    """Return the targets by their full names; refuse unknown ones, and those without ``vary``."""
     named = {}
     for name, value in want.items():
-        full = WISHES.get(name, name)
-        if full not in WISHES.values():
+        full = TARGETS.get(name, name)
+        if full not in TARGETS.values():
             raise InputError(
-                f"The design is wanted to reach {name!r}, which is no wish that is known.",
-                cure=f"Choose from {', '.join(WISHES)}.",
+                f"The design is wanted to reach {name!r}, which is no known target.",
+                cure=f"Choose from {', '.join(TARGETS)}.",
             )
         if not 0 < value < np.inf:
             raise InputError(f"The {name} that is wanted is {value:g}, but it must be above zero.")
@@ -83,18 +83,18 @@ def require_wishes(want: Mapping[str, float], vary: str | None) -> dict[str, flo
         )
     if bool(named) != (vary is not None):
         raise InputError(
-            "want and vary go together: a wish needs something to vary.",
+            "want and vary go together: a target needs something to vary.",
             cure=f"Give both want and vary (one of {', '.join(VARIED)}), or neither.",
         )
     return named
 
 
 def least_design(
-    plan: Plan, wishes: Mapping[str, float], vary: str, evaluate: Callable[[Plan], Design]
+    plan: Plan, targets: Mapping[str, float], vary: str, evaluate: Callable[[Plan], Design]
 ) -> Design:
-    """Find the coarsest step, the shortest range or the fewest repeats that reach the wishes.
+    """Find the coarsest step, the shortest range or the fewest repeats that reach the targets.
 
-    ``wishes`` by full name: largest relative uncertainty, or smallest resolved wavenumber in
+    ``targets`` by full name: largest relative uncertainty, or smallest resolved wavenumber in
     rad/m.  Where they are out of reach, the error states the best design and its limiting source.
     """
     search = _search(plan, vary)
@@ -104,12 +104,12 @@ def least_design(
         if count not in tried:
             tried[count] = _attempt(search.plan(count), evaluate)
         design = tried[count]
-        return design is not None and all(_met(design, *wish) for wish in wishes.items())
+        return design is not None and all(_met(design, *target) for target in targets.items())
 
     fails, works = search.least - 1, search.least
     while not meets(works):
         if works == search.most:
-            raise _out_of_reach(search, wishes, [d for d in tried.values() if d is not None])
+            raise _out_of_reach(search, targets, [d for d in tried.values() if d is not None])
         fails, works = works, min(max(works + 1, round(_GROWTH * works)), search.most)
     while works - fails > 1:
         middle = (works + fails) // 2
@@ -171,21 +171,21 @@ def _met(design: Design, name: str, value: float) -> bool:
 def _in_words(name: str, value: float) -> str:
     if name == "resolved_wavenumber":
         return f"a resolved wavenumber of {value * 1e-3:.4g} rad/mm"
-    short = next(key for key, full in WISHES.items() if full == name)
+    short = next(key for key, full in TARGETS.items() if full == name)
     return f"a standard uncertainty of {short} of {value * 100:.3g} %"
 
 
-def _out_of_reach(search: _Search, wishes: Mapping[str, float], tried: list[Design]) -> FitError:
+def _out_of_reach(search: _Search, targets: Mapping[str, float], tried: list[Design]) -> FitError:
     """Return the error with the best that can be reached, and its limiting source."""
     if not tried:
         return FitError(
             f"No {search.name} makes a scan that can be calibrated with.",
             cure="Plan more repeats, less noise, a larger load or a larger half range.",
         )
-    name = next(n for n, v in wishes.items() if not _met(tried[-1], n, v))
+    name = next(n for n, v in targets.items() if not _met(tried[-1], n, v))
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
-    goal = f"{_in_words(name, wishes[name])} is out of reach by the {search.name} alone"
+    goal = f"{_in_words(name, targets[name])} is out of reach by the {search.name} alone"
     problem = (
         f"{goal[0].upper()}{goal[1:]}: the best is {_in_words(name, _reached(best, name))}, with "
         f"{search.words(best.plan)}."
@@ -273,9 +273,9 @@ def design(
     Raises
     ------
     InputError
-        If a number is out of range, the scan misses the sensor, or a wish is unknown.
+        If a number is out of range, the scan misses the sensor, or a target is unknown.
     FitError
-        If the scan would not determine the parameters, or a wish is out of reach: with the best
+        If the scan would not determine the parameters, or a target is out of reach: with the best
         that can be reached, and its limiting source.
 
     Examples
@@ -290,7 +290,7 @@ def design(
     >>> finer.plan.repeats
     3
     """
-    wishes = require_wishes(want or {}, vary)
+    targets = require_targets(want or {}, vary)
     plan = Plan(
         film=film,
         rod=rod,
@@ -306,7 +306,7 @@ def design(
         centre=centre,
     )
     evaluated = partial(evaluate, method=method, seed=seed)
-    planned = evaluated(plan) if vary is None else least_design(plan, wishes, vary, evaluated)
+    planned = evaluated(plan) if vary is None else least_design(plan, targets, vary, evaluated)
     return replace(planned, want=dict(want or {}))
 
 

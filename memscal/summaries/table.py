@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any, TextIO
@@ -42,6 +42,13 @@ def readable(text: str, stream: TextIO | None = None) -> str:
 def finite(value: float | None) -> float | None:
     """Return a number that JSON can say, ``None`` (null) in place of any other."""
     return float(value) if value is not None and math.isfinite(value) else None
+
+
+def stated_text(value: object) -> str:
+    """Return an option's value for reading: groups as "name: value", not as Python."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key}: {stated_text(item)}" for key, item in value.items()) or "none"
+    return "not given" if value is None else str(value)
 
 
 def texts_of(messages: Iterable[Message]) -> list[str]:

@@ -218,7 +218,7 @@ def test_a_wish_out_of_reach_names_the_best_and_what_stands_in_the_way(want, var
 
 
 @pytest.mark.parametrize(("want", "vary", "told"), [
-    ({"colour": 0.01}, "step", "'colour', which is no wish"),
+    ({"colour": 0.01}, "step", "'colour', which is no target"),
     ({"sigma": 0.0}, "step", "above zero"),
     ({"sigma": float("nan")}, "step", "above zero"),
     ({"sigma": 0.01}, "weather", "'weather', which cannot be varied"),

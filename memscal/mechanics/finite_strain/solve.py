@@ -129,7 +129,7 @@ class _Request:
     edge: float | None
 
     def solve(self, refinement: float, *, coarse: list[Contact] | None) -> list[Contact]:
-        """Return the contacts on one mesh; their convergence is held against a coarser one."""
+        """Return the contacts on one mesh; convergence against a coarser one."""
         pressing = self._pressing(refinement, coarse)
         contacts: list[Contact] = []
         try:
