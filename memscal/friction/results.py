@@ -299,7 +299,7 @@ class InterfaceLaw:
 
 @dataclass(frozen=True)
 class BayesFactor:
-    r"""How much more the data speak for one law than for another, by names of the laws.
+    r"""Ratio of the evidences of two laws, by their names.
 
     :math:`\ln B = \ln p(u | \text{favoured}) - \ln p(u | \text{against})` is not negative.
 
@@ -327,7 +327,7 @@ class BayesFactor:
 class PriorChoice:
     """The logarithm of the yielding law's Bayes factor over the rigid one under another prior.
 
-    It is negative where the data speak for the rigid law; ``prior`` is in words with its range.
+    It is negative where the data favour the rigid law; ``prior`` is in words with its range.
     """
 
     prior: str

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response
-from memscal.mechanics.film_response import HalfSpaceIntegrals, base_normal_stress
+from memscal.mechanics.film_response import HalfSpaceIntegrals, base_stress
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
@@ -39,7 +39,11 @@ from memscal.model.film import ElasticFilm
 def rod_integrals(
     rho: FloatArray, pressure_terms: FloatArray, shear_terms: FloatArray
 ) -> HalfSpaceIntegrals:
-    """Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's."""
+    r"""Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's.
+
+    By :math:`j_{2n}(\xi) = (-1)^n\int_0^1 P_{2n}(t)\cos\xi t\,dt`, of odd order with sines, and the
+    Hankel transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
+    """
     even, odd = _series(pressure_terms, 0), _series(shear_terms, 1)
     nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
     share, weights = (nodes + 1) / 2, weights / 2
@@ -274,7 +278,7 @@ def _largest_change(fine: _Terms, coarse: _Terms, ratio: float, nu: float) -> fl
     film = ElasticFilm(young_modulus=1.0, poisson_ratio=nu, thickness=1.0)
     r = np.linspace(0.0, ratio + 4.0, 60)
     stress = [
-        base_normal_stress(film, RodTraction(ratio, 1.0, terms[1], terms[2]), r)
+        base_stress(film, RodTraction(ratio, 1.0, terms[1], terms[2]), r)
         for terms in (fine, coarse)
     ]
     by_stress = np.max(np.abs(stress[0] - stress[1])) / np.max(np.abs(stress[0]))
