@@ -100,7 +100,7 @@ def elasto_plastic_family(
         raise InputError(
             f"The macroscopic friction coefficient is {friction:g}.",
             why="A slip length says at which displacement the shear reaches friction times "
-            "pressure: without friction, or with an unlimited one, it says nothing.",
+            "pressure: without friction, or with an unlimited one, it has no effect.",
             cure="Give the coefficient at which the indenter slides, such as 1.6.",
         )
     paths = [

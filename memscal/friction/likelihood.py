@@ -114,7 +114,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         raise _missing(profile, channel)
     if points.noise is None:
         raise InputError(
-            f"{profile.label}: u_{channel} is there, but not its noise, u_{channel}_errors.",
+            f"{profile.label}: the noise of u_{channel}, u_{channel}_errors, is missing.",
             why="Contacts are told apart by a chi-square.",
             cure=f"State the electronic noise of u_{channel}.",
         )

@@ -9,8 +9,8 @@ They differ in how that changes with the load.  All dry loads together are expla
 (c) by the elasto-plastic law at the macroscopic coefficient, with a slip length,
 
 each with what A, G, film, sphere and loads leave uncertain, and weighed by evidence
-(:mod:`memscal.friction.marginal_likelihood`).  From
-lubricated loads, which bear no shear, follows likewise whether the interface yields normally.
+(:mod:`memscal.friction.marginal_likelihood`).  From lubricated loads,
+which bear no shear, follows likewise whether the interface yields normally.
 """
 
 from __future__ import annotations
@@ -183,7 +183,9 @@ def compare_interface(
     ``yielding`` (normally compliant).
     """
     if not profiles:
-        raise InputError("No measured profile is there to compare laws of the interface with.")
+        raise InputError(
+            "Laws of the interface are compared with measured profiles, but none is given."
+        )
     require_positive("macroscopic friction coefficient", macroscopic)
     if macroscopic_uncertainty is not None:
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)

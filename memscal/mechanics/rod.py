@@ -113,7 +113,7 @@ _MOST_TERMS = 128
 _SETTLED = 1e-9
 # ... and a solution that changes by more than this in the last doubling is refused.
 _TOLERABLE = 1e-5
-# A wider rod would need more terms, and probes no film.
+# A wider rod would need more terms; its film responds like a column at every point.
 _WIDEST = 100.0
 # x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
 _LARGEST_KH = 22.0
@@ -221,7 +221,7 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
         raise ConvergenceError(
             f"Under a rod whose radius is {radius_ratio:g} times the film's thickness, the base "
             f"stress changes by {change:.1g} of its maximum in the last refinement.",
-            why=f"The model promises {_TOLERABLE:g}.",
+            why=f"The largest change allowed is {_TOLERABLE:g}.",
             cure="Use a narrower rod, a thicker film, or a rod that slides freely (friction 0).",
         )
     stiffness, pressure_terms, shear_terms = fine
