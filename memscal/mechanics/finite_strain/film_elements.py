@@ -29,7 +29,7 @@ from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
 # Share of K that does not go through the pressure, in shear moduli: enough to keep elements from
-# buckling (Auricchio et al., Int. J. Numer. Meth. Eng. 95 (2013)), too little to make them lock.
+# buckling (Auricchio et al., IJNME 95 (2013)), too little to make them lock.
 _HELD = 1.0
 
 
