@@ -63,6 +63,9 @@ def amontons_family(
 SLIP_LENGTHS = (0.0, 0.15e-6, 0.5e-6, 1.5e-6, 4e-6, 1e-5, 3e-5, 1e-4, 4e-4, math.inf)
 """Slip lengths in m, from the rigid interface to the one that bears no shear."""
 
+# The scale of both lengths is h^2/R, that of the film's displacements: twice the height to which
+# the sphere rises over a film's thickness.
+
 #: Lengths of a normally compliant interface in units of the film's roughness.
 _LENGTHS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0)
 #: Roughness in m where a film states none.
@@ -97,7 +100,7 @@ def elasto_plastic_family(
         raise InputError(
             f"The macroscopic friction coefficient is {friction:g}.",
             why="A slip length says at which displacement the shear reaches friction times "
-            "pressure: without friction, or with an unlimited one, it says nothing.",
+            "pressure: without friction, or with an unlimited one, it has no effect.",
             cure="Give the coefficient at which the indenter slides, such as 1.6.",
         )
     paths = [

@@ -119,7 +119,7 @@ def comparison_messages(
     checks: tuple[QualityCheck, ...],
     macroscopic: tuple[float, float | None] | None,
 ) -> tuple[Message, ...]:
-    """Return the messages of a comparison and of its measured stress, the gravest first."""
+    """Return the messages of a comparison and of its measured stress, failed checks first."""
     messages = [
         *failed_check_messages(checks),
         *synthetic_messages(measured),

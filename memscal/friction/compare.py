@@ -106,7 +106,7 @@ def require_macroscopic(value: float | None, uncertainty: float | None, *, inter
             "The macroscopic friction coefficient is not given.",
             why="Laws of the interface are weighed at it."
             if interface
-            else "Its uncertainty alone says nothing.",
+            else "Its uncertainty has no use without it.",
             cure="Give macroscopic, such as from a measurement of sliding.",
         )
 

@@ -36,6 +36,7 @@ def bracketed_share(
     measured: FloatArray, errors: FloatArray, calculated: FloatArray, calculated_errors: FloatArray
 ) -> float:
     """Return the share of stresses (n,) within 1.96 u of the extremes of calculated ones (m, n)."""
+    # Away from the axis the profiles cross: the larger of the two extremes is above.
     ends, end_errors = calculated[[0, -1]], calculated_errors[[0, -1]]
     allowed = _EXPANDED * np.hypot(errors, end_errors)
     above = (ends + allowed).max(axis=0)
@@ -60,10 +61,11 @@ def profile_estimate(
     level: float = LEVEL,
     unit: str = "",
 ) -> BoundedEstimate:
-    """Return best value and interval of chi-square (m,) along an increasing bounded coordinate.
+    r"""Return best value and interval of chi-square (m,) along an increasing bounded coordinate t.
 
-    There is a value where the interval has an upper end (with ``two_sided`` both ends); elsewhere
-    ``reason`` says why not.
+    The interval is :math:`\{t : \chi^2(t) - \min\chi^2 \le \chi^2_{1,p}\}`; at an end of the
+    coordinate that it holds, it is open.  There is a value where the interval has an upper end
+    (with ``two_sided`` both ends); elsewhere ``reason`` says why not.
     """
     from scipy.interpolate import CubicSpline
 
@@ -224,9 +226,9 @@ def confront(
 
 def fine_values(family: ProfileFamily) -> FloatArray:
     """Return values along a family, even in its bounded coordinate, its own among them."""
-    known = family.coordinates
-    even = np.linspace(known[0], known[-1], _FINE)
-    apart = np.abs(np.subtract.outer(even, known)).min(axis=1) > 0.2 * (even[1] - even[0])
+    nodes = family.coordinates
+    even = np.linspace(nodes[0], nodes[-1], _FINE)
+    apart = np.abs(np.subtract.outer(even, nodes)).min(axis=1) > 0.2 * (even[1] - even[0])
     # The family's own values are kept as they are, not as their coordinates give them back.
     return np.sort(np.concatenate([family.values, family.values_at(even[apart])]))
 
@@ -237,7 +239,7 @@ def random_uncertainty(budget: Mapping[str, float]) -> float:
 
 
 def with_loading(estimate: BoundedEstimate, other: BoundedEstimate | None) -> BoundedEstimate:
-    """Add to a budget what the other loading would have given: a rectangle's u, of their width."""
+    """Add the standard uncertainty of a rectangle between both loadings, width / sqrt(12)."""
     if estimate.value is None or other is None or other.value is None:
         return estimate
     apart = abs(estimate.value - other.value) / math.sqrt(12)

@@ -46,7 +46,7 @@ class Measured:
         return sum(points.degrees for points in self.points)
 
     def tables(self, values: FloatArray) -> Tables:
-        """Return what the loads tell at values of the family's parameter."""
+        """Return the statistics of the loads at values of the family's parameter."""
         loads = range(len(self.points))
         return likelihood(self.points, self.sensor, self.family.at(values), loads).tables()
 

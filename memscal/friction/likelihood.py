@@ -105,13 +105,16 @@ class LoadPoints:
 
 
 def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
-    """Return the points of a measured profile, with the noise that is stated, or was estimated."""
+    """Return the points of a measured profile, with the noise that is stated, or was estimated.
+
+    A stated noise is not raised by a misfit: chi-square would not show it then.
+    """
     points = profile.points.get(channel)
     if points is None:
         raise _missing(profile, channel)
     if points.noise is None:
         raise InputError(
-            f"{profile.label}: u_{channel} is there, but not its noise, u_{channel}_errors.",
+            f"{profile.label}: the noise of u_{channel}, u_{channel}_errors, is missing.",
             why="Contacts are told apart by a chi-square.",
             cure=f"State the electronic noise of u_{channel}.",
         )
@@ -170,8 +173,8 @@ def _unit_range(position: FloatArray) -> FloatArray:
     return np.asarray((position - middle) / (np.ptp(position) / 2))
 
 
-#: Directions in which A G changes the signal by less than this share of its worst are dropped.
-_UNFELT = 1e-4
+#: Directions in which A G changes the signal by less than this share of its largest are dropped.
+_NEGLIGIBLE = 1e-4
 #: Radii at which that is judged.
 _RADII = 64
 
@@ -217,7 +220,7 @@ class Predicted:
 
 
 def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float) -> Sensor:
-    """Return a sensor at a family's nodes, with the changes of A G that its stresses feel."""
+    """Return a sensor at a family's nodes, with the changes of A G that change the signal."""
     nodes = family.wavenumbers
     middle = family.spectra[family.values.size // 2]
     changes = apparatus_changes(apparatus, nodes.k)
@@ -225,11 +228,11 @@ def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float)
     kernel = bessel(np.multiply.outer(np.linspace(0.0, reach, _RADII), nodes.k)) * nodes.weights
     largest = np.abs(middle).max(axis=1) if family.order else middle[:, 0]
     shapes = middle / largest[:, None]
-    felt = np.concatenate([(kernel * row) @ changes for row in shapes])
+    signals = np.concatenate([(kernel * row) @ changes for row in shapes])
     # Any rotation of independent changes is another set of them: in this one few matter.
     if changes.shape[1]:
-        _, sizes, axes = np.linalg.svd(felt, full_matrices=False)
-        changes = changes @ axes[sizes > _UNFELT * sizes[0]].T
+        _, sizes, axes = np.linalg.svd(signals, full_matrices=False)
+        changes = changes @ axes[sizes > _NEGLIGIBLE * sizes[0]].T
     a = apparatus.conversion_constant
     return Sensor(nodes, a * sensor_transfer(apparatus, nodes.k), changes, a, family.order)
 
@@ -242,8 +245,8 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
     spectra, transfer = members.spectra[:, load], sensor.transfer
     by_load = bessel.values(transfer * members.by_load[:, load])
     slope = bessel.slopes(transfer * spectra)
-    felt = [bessel.values(change * spectra) for change in sensor.changes.T]
-    columns = {"apparatus": np.stack(felt, axis=-1)} if felt else {}
+    changed = [bessel.values(change * spectra) for change in sensor.changes.T]
+    columns = {"apparatus": np.stack(changed, axis=-1)} if changed else {}
     for source, change in members.changes.items():
         columns[source] = bessel.values(transfer * change[:, load])[..., None]
     columns["load"] = (points.load_share * by_load)[..., None]
@@ -413,7 +416,7 @@ class Likelihood:
         return np.asarray(np.einsum("vn,vn->v", slope, self._inverse_times(slope)))
 
     def budget(self, index: int) -> dict[str, float]:
-        """Contribution of each source to the coordinate's uncertainty, at one of the values."""
+        """Contribution of each source to the coordinate's uncertainty: their squares add up."""
         slope = np.concatenate([load.slope for load in self.loads], axis=1)
         information = float(self.information[index])
         if not information > 0:

@@ -14,11 +14,10 @@ F^TN^{-1}`,
     \ln\det C = \ln\det N + \ln\det F^TN^{-1}F + \ln\det M,
 
 with :math:`g = D^TQ\rho` and :math:`M = 1 + D^TQD`, up to constants that no law changes.  The
-determinant must not be left out: D is in proportion to the calculated stress, and a law that
-makes the stress less certain would be rewarded for its small :math:`\chi^2` but not charged for
-the data that it makes less probable.
+determinant must not be left out: D is in proportion to the calculated stress, and without it a law
+that makes the stress less certain has a smaller :math:`\chi^2` at no cost.
 
-Groups only share :math:`\xi`: what they tell adds up in :math:`\rho^TQ\rho`, g, M and the
+Groups only share :math:`\xi`: their contributions add up in :math:`\rho^TQ\rho`, g, M and the
 determinants.  A law with one parameter of each load is therefore integrated load by load.
 """
 
@@ -36,12 +35,12 @@ from memscal.model.arrays import FloatArray
 #: Paths through the loads along which a parameter of each load is drawn: a power of two.
 _PATHS = 256
 #: A systematic direction that moves the data by less than this, in standard deviations, is none.
-_UNFELT = 1e-2
+_NEGLIGIBLE = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    r"""What J groups tell at M values of a parameter, nuisances of their own integrated.
+    r"""Statistics of J groups at M values of a parameter, their own nuisances integrated.
 
     ``squares`` (M, J): :math:`\rho^T Q \rho`; ``pulls`` (M, J, q): :math:`D^T Q \rho`; ``grips``
     (M, J, q, q): :math:`D^T Q D`; ``volumes`` (M, J): :math:`\ln\det N + \ln\det F^T N^{-1} F`.
@@ -156,7 +155,7 @@ def _compressed(tables: Sequence[Tables]) -> list[Tables]:
     """Keep the systematic directions that move any datum: the work goes with their cube."""
     largest = np.sum([np.mean(table.grips[:, 0], axis=0) for table in tables], axis=0)
     values, vectors = np.linalg.eigh(largest)
-    basis = vectors[:, values > _UNFELT**2]
+    basis = vectors[:, values > _NEGLIGIBLE**2]
     return [
         Tables(
             table.squares,

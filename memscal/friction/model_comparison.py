@@ -2,15 +2,15 @@ r"""Laws of the interface against an effective friction coefficient, by evidence
 
 A rigid interface that slips at less shear than the one that was measured macroscopically, or one
 that slips there but yields before: both make the stress under a sphere less than full stick does.
-What tells them apart is how it goes with the load.  All dry loads together are explained
+They differ in how that changes with the load.  All dry loads together are explained
 
 (a) by Amontons' law with one effective coefficient,
 (b) by Amontons' law with a coefficient of each load, and
 (c) by the elasto-plastic law at the macroscopic coefficient, with a slip length,
 
 each with what A, G, film, sphere and loads leave uncertain, and weighed by evidence
-(:mod:`memscal.friction.marginal_likelihood`).  Lubricated loads, which bear no shear, tell
-likewise whether the interface yields normally.
+(:mod:`memscal.friction.marginal_likelihood`).  From lubricated loads,
+which bear no shear, follows likewise whether the interface yields normally.
 """
 
 from __future__ import annotations
@@ -179,10 +179,13 @@ def compare_interface(
 
     The macroscopic coefficient is that at which the indenter slides.  Families without a load
     within 1 % of each measured one are calculated: ``amontons`` (incremental, from 0 to ``inf``),
-    ``slipping`` (elasto-plastic at the macroscopic coefficient), ``yielding`` (normally compliant).
+    ``slipping`` (elasto-plastic at the macroscopic coefficient, its uncertainty among the changes),
+    ``yielding`` (normally compliant).
     """
     if not profiles:
-        raise InputError("No measured profile is there to compare laws of the interface with.")
+        raise InputError(
+            "Laws of the interface are compared with measured profiles, but none is given."
+        )
     require_positive("macroscopic friction coefficient", macroscopic)
     if macroscopic_uncertainty is not None:
         require_positive("uncertainty of the macroscopic coefficient", macroscopic_uncertainty)

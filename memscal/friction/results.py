@@ -119,7 +119,7 @@ class BoundedEstimate:
 
 
 def _rounded(value: float, low: float, high: float) -> str:
-    """Return a value and its interval, with the digits that its closer end deserves.
+    """Return a value and its interval, with the digits that follow from its closer end.
 
     Two digits of the distance to it if that begins with 1 or 2, one otherwise.
     """
@@ -299,7 +299,7 @@ class InterfaceLaw:
 
 @dataclass(frozen=True)
 class BayesFactor:
-    r"""How much more the data speak for one law than for another, by names of the laws.
+    r"""Ratio of the evidences of two laws, by their names.
 
     :math:`\ln B = \ln p(u | \text{favoured}) - \ln p(u | \text{against})` is not negative.
 
@@ -327,7 +327,7 @@ class BayesFactor:
 class PriorChoice:
     """The logarithm of the yielding law's Bayes factor over the rigid one under another prior.
 
-    It is negative where the data speak for the rigid law; ``prior`` is in words with its range.
+    It is negative where the data favour the rigid law; ``prior`` is in words with its range.
     """
 
     prior: str
@@ -369,7 +369,7 @@ class LawComparison:
 
     @property
     def yielding_preferred(self) -> bool:
-        """Whether there is positive evidence for the law that yields against every other."""
+        """Whether the evidence for the law that yields is positive against every other."""
         others = max(law.log_evidence for law in self.laws[:-1])
         return 2 * (self.laws[-1].log_evidence - others) >= _WORDS[0][0]
 

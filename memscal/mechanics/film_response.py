@@ -36,7 +36,6 @@ Chateauminois, J. Phys. D 40 (2007) 5418.)
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -173,62 +172,41 @@ _DECAYED = 45.0
 _BASE_STRESS_CHUNK = 128
 
 
-def base_normal_stress(
-    elastic_film: ElasticFilm, traction: InterfaceTraction, r: FloatArray
+def base_spectrum(
+    film: ElasticFilm, traction: InterfaceTraction, k: FloatArray, *, order: int = 0
 ) -> FloatArray:
-    """Return the normal stress at the base at ``r`` (m) in Pa, accurate to 1e-13 of its maximum."""
-    return _hankel_synthesis(
-        elastic_film, traction, r, lambda k: base_normal_spectrum(elastic_film, traction, k), j0
-    )
+    r"""Return :math:`T\hat p - N\hat q` or, of ``order`` one, :math:`-(S\hat p + R\hat q)`, in N.
+
+    At ``k`` (rad/m): transforms of the base's normal stress and of its traction on the film.
+    """
+    x, nu = k * film.thickness, film.poisson_ratio
+    p, q = traction.pressure_transform(k), traction.shear_transform(k)
+    if order:
+        return -(base_shear_from_pressure(x, nu) * p + base_shear_from_shear(x, nu) * q)
+    return base_normal_from_pressure(x, nu) * p - base_normal_from_shear(x, nu) * q
 
 
-def base_normal_spectrum(
-    elastic_film: ElasticFilm, traction: InterfaceTraction, k: FloatArray
+def base_stress(
+    film: ElasticFilm, traction: InterfaceTraction, r: FloatArray, *, order: int = 0
 ) -> FloatArray:
-    r"""Return :math:`\int\sigma_{zz}\,J_0(kr)\,r\,dr` of the base at ``k`` (rad/m), in N."""
-    x, nu = k * elastic_film.thickness, elastic_film.poisson_ratio
-    pressed = base_normal_from_pressure(x, nu) * traction.pressure_transform(k)
-    return pressed - base_normal_from_shear(x, nu) * traction.shear_transform(k)
+    r"""Return :math:`\int\hat\sigma(k)\,J_n(kr)\,k\,dk` of the base at ``r`` (m), in Pa.
 
-
-def base_shear_stress(
-    elastic_film: ElasticFilm, traction: InterfaceTraction, r: FloatArray
-) -> FloatArray:
-    """Return the radial traction of the base on the film at ``r`` (m) in Pa, positive outward."""
-    return _hankel_synthesis(
-        elastic_film, traction, r, lambda k: base_shear_spectrum(elastic_film, traction, k), j1
-    )
-
-
-def base_shear_spectrum(
-    elastic_film: ElasticFilm, traction: InterfaceTraction, k: FloatArray
-) -> FloatArray:
-    r"""Return :math:`\int\tau\,J_1(kr)\,r\,dr` of the base's traction on the film, in N."""
-    x, nu = k * elastic_film.thickness, elastic_film.poisson_ratio
-    pressed = base_shear_from_pressure(x, nu) * traction.pressure_transform(k)
-    return -(pressed + base_shear_from_shear(x, nu) * traction.shear_transform(k))
-
-
-def _hankel_synthesis(
-    elastic_film: ElasticFilm,
-    traction: InterfaceTraction,
-    r: FloatArray,
-    spectrum: Callable[[FloatArray], FloatArray],
-    bessel: Callable[[FloatArray], FloatArray],
-) -> FloatArray:
-    """Sum ``spectrum(k) bessel(k r) k dk`` at all radii, chunk by chunk of similar radii."""
-    h = elastic_film.thickness
+    Compression and outward traction are positive; accurate to 1e-13 of the maximum.
+    """
+    bessel = j1 if order else j0
+    h = film.thickness
     flat = np.ravel(r)
     inside = np.flatnonzero(flat <= traction.radius + _DECAYED * h)
-    order = inside[np.argsort(flat[inside], kind="stable")]
+    sorting = inside[np.argsort(flat[inside], kind="stable")]
     stress = np.zeros_like(flat)
-    for start in range(0, order.size, _BASE_STRESS_CHUNK):
-        chunk = order[start : start + _BASE_STRESS_CHUNK]
+    for start in range(0, sorting.size, _BASE_STRESS_CHUNK):
+        chunk = sorting[start : start + _BASE_STRESS_CHUNK]
         # The integrand turns at the rate r (Bessel function) + radius (transform of the traction);
         # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
         rate = flat[chunk[-1]] + traction.radius
         k, weights = gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / rate))
-        stress[chunk] = bessel(np.outer(flat[chunk], k)) @ (weights * k * spectrum(k))
+        spectrum = base_spectrum(film, traction, k, order=order)
+        stress[chunk] = bessel(np.outer(flat[chunk], k)) @ (weights * k * spectrum)
     return stress.reshape(np.shape(r))
 
 

@@ -19,10 +19,8 @@ from memscal.mechanics.film_response import (
     HalfSpaceIntegrals,
     InterfaceTraction,
     RingTraction,
-    base_normal_spectrum,
-    base_normal_stress,
-    base_shear_spectrum,
-    base_shear_stress,
+    base_spectrum,
+    base_stress,
     hat_transforms,
 )
 from memscal.mechanics.half_space import coupling_integrals, singular_integrals
@@ -74,19 +72,19 @@ class HankelField:
 
     def base_normal(self, r: FloatArray) -> FloatArray:
         """Return the normal stress at the base in Pa; zero where it is below 1e-13 of its peak."""
-        return base_normal_stress(self.film, self.traction, r)
+        return base_stress(self.film, self.traction, r)
 
     def base_shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction of the base on the film in Pa."""
-        return base_shear_stress(self.film, self.traction, r)
+        return base_stress(self.film, self.traction, r, order=1)
 
     def base_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
-        return 2 * np.pi * base_normal_spectrum(self.film, self.traction, k)
+        return 2 * np.pi * base_spectrum(self.film, self.traction, k)
 
     def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        return 2 * np.pi * base_shear_spectrum(self.film, self.traction, k)
+        return 2 * np.pi * base_spectrum(self.film, self.traction, k, order=1)
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics import film_response
-from memscal.mechanics.film_response import HalfSpaceIntegrals, base_normal_stress
+from memscal.mechanics.film_response import HalfSpaceIntegrals, base_stress
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
@@ -39,7 +39,11 @@ from memscal.model.film import ElasticFilm
 def rod_integrals(
     rho: FloatArray, pressure_terms: FloatArray, shear_terms: FloatArray
 ) -> HalfSpaceIntegrals:
-    """Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's."""
+    r"""Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's.
+
+    By :math:`j_{2n}(\xi) = (-1)^n\int_0^1 P_{2n}(t)\cos\xi t\,dt`, of odd order with sines, and the
+    Hankel transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
+    """
     even, odd = _series(pressure_terms, 0), _series(shear_terms, 1)
     nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
     share, weights = (nodes + 1) / 2, weights / 2
@@ -109,7 +113,7 @@ _MOST_TERMS = 128
 _SETTLED = 1e-9
 # ... and a solution that changes by more than this in the last doubling is refused.
 _TOLERABLE = 1e-5
-# A wider rod would need more terms, and probes no film.
+# A wider rod would need more terms; its film responds like a column at every point.
 _WIDEST = 100.0
 # x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
 _LARGEST_KH = 22.0
@@ -217,7 +221,7 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
         raise ConvergenceError(
             f"Under a rod whose radius is {radius_ratio:g} times the film's thickness, the base "
             f"stress changes by {change:.1g} of its maximum in the last refinement.",
-            why=f"The model promises {_TOLERABLE:g}.",
+            why=f"The largest change allowed is {_TOLERABLE:g}.",
             cure="Use a narrower rod, a thicker film, or a rod that slides freely (friction 0).",
         )
     stiffness, pressure_terms, shear_terms = fine
@@ -274,7 +278,7 @@ def _largest_change(fine: _Terms, coarse: _Terms, ratio: float, nu: float) -> fl
     film = ElasticFilm(young_modulus=1.0, poisson_ratio=nu, thickness=1.0)
     r = np.linspace(0.0, ratio + 4.0, 60)
     stress = [
-        base_normal_stress(film, RodTraction(ratio, 1.0, terms[1], terms[2]), r)
+        base_stress(film, RodTraction(ratio, 1.0, terms[1], terms[2]), r)
         for terms in (fine, coarse)
     ]
     by_stress = np.max(np.abs(stress[0] - stress[1])) / np.max(np.abs(stress[0]))

@@ -16,7 +16,7 @@ from memscal.model.arrays import FloatArray, require_non_negative, require_posit
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Sphere
 from memscal.model.scan import Scan, StressSensor
-from memscal.simulation.rod_scan import PAPER_FILM
+from memscal.simulation.rod_scan import PAPER_FILM, checked_loads
 from memscal.simulation.sensor import (
     Disturbances,
     apparatus_function,
@@ -54,9 +54,10 @@ class LoadPath:
         *,
         order: int = 0,
     ) -> FloatArray:
-        """Return the blurred stress in Pa at ``radius`` (m) and ``ratio``, load over nominal load.
+        r"""Return the blurred stress in Pa at ``radius`` (m) and ``ratio``, load over nominal load.
 
-        ``order`` one gives the shear's radial component.
+        :math:`S + S't + S''t^2/2` with :math:`t = \ln(P_i/P)`, its derivatives by finite
+        differences.  ``order`` one gives the shear's radial component.
         """
         values = blurred_stress(self.states[index], kernel, radius, order=order)
         if len(values) == 1:
@@ -131,7 +132,12 @@ def simulate_contacts(
     :func:`memscal.simulate_experiment` for one scan; each nominal ``load`` gives ``repeats`` rows;
     ``load_scale``: all true loads over the stated ones.
     """
-    loads = _checked_loads(load)
+    loads = checked_loads(load)
+    if np.unique(loads).size != loads.size:
+        raise InputError(
+            f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N.",
+            cure="Give each load once, and the number of its repeats.",
+        )
     require_range("spacing", spacing, 1e-9, 0.1, "m")
     require_non_negative("noise", noise)
     require_range("load_scatter", load_scatter, 0.0, _MOST_SCATTER)
@@ -245,20 +251,6 @@ def _described(interface: Interface) -> dict[str, float | str]:
     if interface.normal_law is not None and interface.normal is not None:
         law |= {name: float(value) for name, value in asdict(interface.normal).items()}
     return law | ({"interface": interface.description} if law else {})
-
-
-def _checked_loads(load: float | Sequence[float]) -> FloatArray:
-    loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
-    if loads.ndim != 1 or loads.size == 0:
-        raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
-    for value in loads:
-        require_positive("load", float(value), "N")
-    if np.unique(loads).size != loads.size:
-        raise InputError(
-            f"A load is given twice: {', '.join(f'{value:g}' for value in loads)} N.",
-            cure="Give each load once, and the number of its repeats.",
-        )
-    return loads
 
 
 def _require_plausible(points: int, repeats: int, seed: int) -> None:

@@ -120,13 +120,9 @@ def simulate(
         )
     truth = apparatus_function(kernel)
     shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
-    loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
+    loads = checked_loads(load)
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
-    if loads.size == 0:
-        raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
-    for value in loads:
-        require_positive("load", float(value), "N")
     x = np.linspace(-half_range, half_range, points)
     y = x if raster else np.zeros(1)
     radius = np.hypot.outer(y - centre[1], x - centre[0])
@@ -183,3 +179,13 @@ def _require_plausible(
     require_non_negative("noise", noise)
     if points < 2 or repeats < 1:
         raise InputError("A scan needs two positions and one repeat at least.")
+
+
+def checked_loads(load: float | Sequence[float]) -> FloatArray:
+    """Return one load or several, in N, as a flat array; refuse none, and one not positive."""
+    loads = np.atleast_1d(np.asarray(load, dtype=np.float64))
+    if loads.ndim != 1 or loads.size == 0:
+        raise InputError("The list of loads is empty.", cure="Give one load or several, in N.")
+    for value in loads:
+        require_positive("load", float(value), "N")
+    return loads

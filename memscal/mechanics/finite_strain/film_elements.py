@@ -3,10 +3,13 @@ r"""Finite elements for the film at finite strain: energy, forces and their exac
 With the deformation gradient :math:`F` (components rr, rz, zr, zz, hoop) and :math:`J = \det F`
 the neo-Hookean energy per undeformed volume is
 
-.. math:: W = G\left[\tfrac12(F:F - 3) - (J - 1)\right] + \tfrac{K}{2}(J - 1)^2 .
+.. math:: W = G\left[\tfrac12(F:F - 3) - (J - 1)\right] + \tfrac{K}{2}(J - 1)^2,
+          \qquad K = \lambda + G,
 
-A share :math:`\kappa` of the bulk modulus acts directly, the rest by a pressure
-:math:`p = (\kappa - K)(J - 1)`, which stays finite where :math:`K` does not.  Displacement is
+without a logarithm, so that Newton's method may pass through trial states that are turned inside
+out (Smith, de Goes and Kim, ACM Trans. Graphics 37 (2018) 12, eq. 13).  A share :math:`\kappa` of
+:math:`K` acts directly, the rest by a pressure :math:`p = (\kappa - K)(J - 1)`, which stays finite
+where :math:`K` does not.  Displacement is
 quadratic and pressure linear on triangles of the undeformed cross-section (Taylor and Hood).
 Lengths are in mm, stresses in MPa, forces in N; in SI units the direct solver loses digits.
 """
@@ -25,8 +28,8 @@ from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
-# Share of the bulk modulus that does not go through the pressure, in shear moduli: enough to keep
-# elements from buckling, and too little to make them lock.
+# Share of K that does not go through the pressure, in shear moduli: enough to keep elements from
+# buckling (Auricchio et al., IJNME 95 (2013)), too little to make them lock.
 _HELD = 1.0
 
 

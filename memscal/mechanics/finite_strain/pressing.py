@@ -83,7 +83,7 @@ _SETTLED = 1e-7
 _LOOSE_SLIDING = 1e-3
 _LOOSE_STICKING = 1e-6
 _MOST_ITERATIONS = 40
-# A Newton step that moves something farther than so many thicknesses leads nowhere.
+# A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
 # A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
 _INSIDE = 1e-10
@@ -171,7 +171,7 @@ class Pressing:
         chosen[0] = True
         if np.array_equal(chosen, touches):
             return None
-        if (key := chosen.tobytes()) in seen:  # a node that comes and goes stays
+        if (key := chosen.tobytes()) in seen:  # a node that enters and leaves by turns is kept
             chosen |= touches
             if np.array_equal(chosen, touches):
                 return None

@@ -112,7 +112,7 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
     radial, upward = forces[nodes] * touching, forces[nodes + elements.n] * touching
     pushed, dragged = up * radial - along * upward, along * radial + up * upward
     r, z = elements.nodes[0][nodes] + x[nodes], x[nodes + elements.n]
-    # The axis keeps its radial force to itself: it is none of the indenter's.
+    # The axis is held: its radial force is not the indenter's.
     if r[0] < 1e-12:
         dragged[0] = 0.0
     side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))

@@ -114,7 +114,7 @@ class PathPoint:
     state: ContactState
     steps: int  # from the untouched film
     elastic_energy: float
-    work: float | None  # None where one step says nothing of the way
+    work: float | None  # None after one step: it depends on the way
     dissipated_energy: float | None
 
 
@@ -139,7 +139,7 @@ def _in_one_step(
 
 @dataclass(eq=False)
 class _Walk:
-    """Where the path has come to, and what the way has cost."""
+    """The state that the path has reached, its steps, and the work and dissipation (J)."""
 
     problem: ContactProblem
     state: ContactState

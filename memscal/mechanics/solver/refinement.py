@@ -55,7 +55,7 @@ _SETTLED = 1e-4
 _TOLERABLE = 5e-3
 # Rings of the coarse contact that tells where to place the others.
 _COARSE = 40
-# A contact wider than this many film thicknesses is no probe of the film.
+# A film responds like a column at every point of a contact wider than so many thicknesses.
 _WIDEST = 100.0
 # Where the pressure is below this share of its largest, there is no contact.
 _EDGE = 1e-3
@@ -98,7 +98,7 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
         error = ConvergenceError(
             f"On {count} rings the contact still changes by {max(changes):.1g} of its largest base "
             "stress, its load or its depth when they are doubled.",
-            why=f"The model promises {_TOLERABLE:g}.",
+            why=f"The largest change allowed is {_TOLERABLE:g}.",
             cure="Give more rings, or ask for a state nearer to one that was solved.",
         )
         error.last = contacts[-1]
