@@ -17,7 +17,6 @@ from .calibration.monte_carlo import MonteCarlo as MonteCarlo
 from .calibration.monte_carlo import monte_carlo as monte_carlo
 from .calibration.sweep import Sweep as Sweep
 from .calibration.uncertainty import InputEffect as InputEffect
-from .deconvolution.division import KernelProfile as KernelProfile
 from .deconvolution.fourier_ratio import Field as Field
 from .deconvolution.fourier_ratio import Quotient as Quotient
 from .deconvolution.fourier_ratio import divide as divide

@@ -14,10 +14,10 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
-from memscal.calibration.stages import Solution, field_noise, solve
+from memscal.calibration.stages import Solution, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
-from memscal.deconvolution.division import Regulariser, chosen_method
+from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
@@ -221,12 +221,12 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
 
 def _method(solution: Solution) -> list[Message]:
     """Return what the uncertainty leaves out where the method is no fixed window."""
-    regulariser = solution.regulariser
-    if regulariser.name in _WINDOWS:
+    method = solution.method
+    if method.name in _WINDOWS:
         return []
     text = (
-        f"Method {regulariser.name}: uncertainties are first-order through its effective window, "
-        f"without its own scatter. {regulariser.fails}"
+        f"Method {method.name}: uncertainties are first-order through its effective window, "
+        f"without its own scatter. {method.fails}"
     )
     return [Message("method", text)]
 
@@ -328,7 +328,7 @@ class Calibration(Result):
 
     def __repr__(self) -> str:
         """Return method and result, without arrays."""
-        return f"<Calibration by {self.solution.regulariser.name}: {self.apparatus!r}>"
+        return f"<Calibration by {self.solution.method.name}: {self.apparatus!r}>"
 
     @property
     def passed(self) -> bool:
@@ -368,7 +368,7 @@ def calibrate(
     reference: Reference | Sequence[Reference] = None,
     alternative: Reference | Sequence[Reference] = None,
     channel: str = "zz",
-    method: str | Regulariser = "white-noise",
+    method: str | Method = "white-noise",
     correlations: Mapping[tuple[str, str], float] | None = None,
     seed: int = 0,
     **options: Any,
@@ -429,13 +429,13 @@ def calibrate(
         require_calibration_rod(rod_scan)
     references = _references(reference, scans)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
-    regulariser = chosen_method(method, options, seed=seed)
-    solution = solve(scans, stresses, regulariser, channel)
+    chosen = chosen_method(method, options, seed=seed)
+    solution = solve(scans, stresses, chosen, channel)
     effects = _effects(solution, None if alternative is None else _references(alternative, scans))
     results = uncertainties(solution, effects, correlations or {})
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)
-    configuration = {"method": regulariser.name, "seed": seed, **_settings(regulariser)}
+    configuration = {"method": chosen.name, "seed": seed, **_settings(chosen)}
     if channel != "zz":
         configuration["channel"] = channel
     if correlations:
@@ -472,9 +472,9 @@ def _read(reference: Reference) -> StressProfile | Contact | None:
     )
 
 
-def _settings(regulariser: Regulariser) -> Mapping[str, Any]:
-    """Parameters of a regulariser, for the record."""
-    method: Any = regulariser
+def _settings(chosen: Method) -> Mapping[str, Any]:
+    """Parameters of a method, for the record."""
+    method: Any = chosen
     stated = is_dataclass(method) and not isinstance(method, type)
     return {"options": asdict(method) if stated else {}}
 
@@ -498,13 +498,6 @@ def uncertainties(
     correlations: Mapping[tuple[str, str], float],
 ) -> Results:
     """Propagate noise and inputs through a calibration's steps."""
-    wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
-    return propagate(
-        solution.estimate,
-        solution.deconvolution,
-        solution.window_at_nodes,
-        wavenumbers,
-        effects,
-        correlations,
-        field_noise(solution, wavenumbers),
-    )
+    deconvolution = solution.deconvolution
+    wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
+    return propagate(solution, deconvolution, wavenumbers, effects, correlations)

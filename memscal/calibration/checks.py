@@ -8,7 +8,6 @@ from scipy.special import chdtrc
 
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Misfit, Solution
-from memscal.deconvolution.division import Bayesian
 from memscal.estimation.assumptions import (
     ExtraColumns,
     axisymmetry_test,
@@ -19,6 +18,7 @@ from memscal.estimation.assumptions import (
     symmetry_test,
 )
 from memscal.estimation.band import RESOLVED
+from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import carried_force
 from memscal.estimation.residuals import (
@@ -255,7 +255,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
 def _reconvolutions(solution: Solution) -> list[QualityCheck]:
     removed = (
         "the posterior mean of G misses something that the scan shows"
-        if isinstance(solution.regulariser, Bayesian)
+        if isinstance(solution.method, Bayesian)
         else "the regularisation has removed something that the scan shows (see method bayesian)"
     )
     stated = solution.estimate.points.u_errors is not None
@@ -280,7 +280,7 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
 
 def _constraint(solution: Solution) -> list[QualityCheck]:
     """Compare a G that was kept from falling below zero, or from rising, with the free one."""
-    regulariser, estimate = solution.regulariser, solution.estimate
+    regulariser, estimate = solution.method, solution.estimate
     if not (isinstance(regulariser, Bayesian) and regulariser.constrained):
         return []
     weights = estimate.weights / estimate.noise_scale**2
@@ -303,7 +303,7 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
 
 def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
     """Compare the deconvolved G with the Gaussian; the two are fitted to the same noise."""
-    if isinstance(solution.regulariser, Bayesian):
+    if isinstance(solution.method, Bayesian):
         source, failure = "of the free G in data space", ""
     else:
         source = "of the G by division of the fields"

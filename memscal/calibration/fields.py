@@ -9,15 +9,18 @@ from typing import TypeAlias
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
+from scipy.special import j0
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice, cut, on_grid
-from memscal.deconvolution.division import NOISE_RATIO, KernelProfile
+from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
 from memscal.estimation.band import Band
 from memscal.estimation.forward import elliptic_departure
 from memscal.estimation.gaussian import GaussianFit
-from memscal.estimation.profile import ProfileEstimate, constrained_profile
+from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
+from memscal.estimation.smoothing import SmoothedProfile
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import EvenAxis, even_lattice
 
@@ -64,18 +67,6 @@ def choose_grid(estimate: ProfileEstimate, band: Band) -> GridChoice:
     return GridChoice(spacing=float(spacing), support=support, extent=max(span, 1.25 * support))
 
 
-def constrained_kernel(
-    estimate: ProfileEstimate, fields: Fields
-) -> Callable[[bool, bool], tuple[KernelProfile, FloatArray]]:
-    """Return a function for A G of the estimate under constraints, with values on the grid."""
-
-    def posterior(nonnegative: bool, monotone: bool) -> tuple[KernelProfile, FloatArray]:
-        profile = constrained_profile(estimate, nonnegative=nonnegative, monotone=monotone)
-        return profile, fields.kernel(profile.radial)
-
-    return posterior
-
-
 def _taper(radius: FloatArray, support: float) -> FloatArray:
     """One up to half of the support, then a cosine that falls to zero at its edge."""
     # A sharp edge would cut G's ripples at full height, and A would depend on where it lies.
@@ -93,14 +84,16 @@ class LineFields:
     radius: FloatArray
 
     @classmethod
-    def lift(cls, estimate: ProfileEstimate, choice: GridChoice) -> LineFields:
-        """Lift the profile of the estimate, and the reference."""
+    def lift(
+        cls, estimate: ProfileEstimate, spectrum: RadialSpectrum, choice: GridChoice
+    ) -> LineFields:
+        """Lift the profile of the voltages, by its transform, and the reference."""
         cells = scipy.fft.next_fast_len(int(np.ceil(choice.extent / choice.spacing)), real=True)
         grid = EvenGrid(cells + 1, choice.spacing)
         step = choice.spacing / 2
         # Both at once: they share the Bessel functions of their transforms.
         reference = estimate.model.reference
-        spectra = np.stack([estimate.spectrum.scalar.values, reference.scalar.values], axis=1)
+        spectra = np.stack([spectrum.scalar.values, reference.scalar.values], axis=1)
         wavenumbers = reference.wavenumbers
         both = on_grid(lambda r: wavenumbers.synthesise(spectra, r), grid, step)
         voltage, stress = (Field(grid, v) for v in np.ascontiguousarray(np.moveaxis(both, -1, 0)))
@@ -109,7 +102,11 @@ class LineFields:
     @property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return _taper(self.grid.radius, self.support * self.grid.spacing)
+        return self.taper(self.grid.radius)
+
+    def taper(self, radius: FloatArray) -> FloatArray:
+        """Taper at radii, in m."""
+        return _taper(radius, self.support * self.grid.spacing)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Lift a radial function about a kernel's zero."""
@@ -119,7 +116,7 @@ class LineFields:
         """Return the values of a field at the measured points."""
         return cut(field, self.grid, self.radius)
 
-    def on_support(self, kernel: FloatArray, _: KernelProfile | None) -> Field:
+    def on_support(self, kernel: FloatArray, _: PosteriorProfile | None) -> Field:
         """Return a kernel on its support."""
         # The lifted profile's grid is fine enough to be read as it is.
         inside = slice(0, self.support + 1)
@@ -131,6 +128,8 @@ class LineFields:
 
 
 _REFINEMENT = 5
+#: A node whose points count in full has nothing of the profile.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +157,15 @@ class RasterFields:
     index: tuple[NDArray[np.intp], NDArray[np.intp]]
 
     @classmethod
-    def place(cls, estimate: ProfileEstimate, choice: GridChoice, *, divided: bool) -> RasterFields:
-        """Place the raster, continued by the fitted profile; a field that is divided is even."""
+    def place(
+        cls,
+        estimate: ProfileEstimate,
+        smoothed: SmoothedProfile,
+        choice: GridChoice,
+        *,
+        divided: bool,
+    ) -> RasterFields:
+        """Place the raster, continued by its smoothed profile; a field that is divided is even."""
         points = estimate.points
         lattice = even_lattice(points.x, points.y, points.places[0].count)
         if lattice is None and divided:
@@ -180,10 +186,10 @@ class RasterFields:
         y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
-        voltage = on_grid(estimate.spectrum.at, grid, step)
+        voltage = on_grid(smoothed.spectrum.at, grid, step)
         if rows.size:
             # A point that is missing keeps the profile; an outlier keeps most of it.
-            departure = estimate.weighed.residual * estimate.outlier_weight + estimate.oval
+            departure = (smoothed.signal - smoothed.predicted) * smoothed.outlier_weight
             voltage += _mean_at(voltage.shape, (rows, columns), departure / points.load)
         stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
         oval = _Oval(estimate.gaussian)
@@ -192,7 +198,11 @@ class RasterFields:
     @property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return _taper(self._kernel_grid.radius, self.support)
+        return self.taper(self._kernel_grid.radius)
+
+    def taper(self, radius: FloatArray) -> FloatArray:
+        """Taper at radii, in m."""
+        return _taper(radius, self.support)
 
     @property
     def _kernel_grid(self) -> Lattice:
@@ -207,7 +217,26 @@ class RasterFields:
         """Return the values of a field at the measured points."""
         return np.asarray(field[self.index])
 
-    def on_support(self, kernel: FloatArray, profile: KernelProfile | None) -> Field:
+    def gain(self, smoothed: SmoothedProfile) -> FloatArray:
+        """Derivative of the field's transform by the voltages, (k, n), its mean over directions.
+
+        The transform is a sum over the lattice: of the points, and of the profile elsewhere.
+        """
+        points, k = smoothed.estimate.points, smoothed.estimate.model.k
+        weights = smoothed.spectrum.wavenumbers.weights
+        readings = np.zeros(self.voltage.values.shape)
+        np.add.at(readings, self.index, 1.0)
+        share = smoothed.outlier_weight / readings[self.index]
+        profiled = np.ones_like(readings)
+        np.subtract.at(profiled, self.index, share)
+        kept = profiled > _ROUNDING
+        rings = self.grid.radius[kept]
+        bessel = j0(np.multiply.outer(k, rings))
+        elsewhere = (bessel * profiled[kept]) @ (bessel.T * weights) @ smoothed.gain
+        own = j0(np.multiply.outer(k, self.grid.radius[self.index])) * (share / points.load)
+        return np.asarray(self.grid.cell_area * (own + elsewhere))
+
+    def on_support(self, kernel: FloatArray, profile: PosteriorProfile | None) -> Field:
         """Return a kernel on its support."""
         step = float(self.grid.x[1] - self.grid.x[0])
         # Odd, so that the kernel's zero stays a point of the lattice.

@@ -170,7 +170,7 @@ class DrawnScans:
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
         first = self.solution
-        solution = solve(scans, first.stresses, first.regulariser, first.estimate.points.channel)
+        solution = solve(scans, first.stresses, first.method, first.estimate.points.channel)
         result, radii = solution.deconvolution, first.deconvolution.g.r
         r, g = result.g.r, result.g.radial
         g = np.where(radii <= r[-1], radial_spline(r, g)(np.minimum(radii, r[-1])), 0.0)

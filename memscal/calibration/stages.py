@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import j0, j1
+from scipy.special import j1
 
 from memscal.calibration.fields import (
     Fields,
@@ -18,9 +18,8 @@ from memscal.calibration.fields import (
     LineFields,
     RasterFields,
     choose_grid,
-    constrained_kernel,
 )
-from memscal.deconvolution.division import Bayesian, Regulariser
+from memscal.deconvolution.division import Method
 from memscal.deconvolution.fourier_ratio import (
     Field,
     Quotient,
@@ -31,9 +30,15 @@ from memscal.deconvolution.fourier_ratio import (
 )
 from memscal.errors import InputError
 from memscal.estimation.band import Band, find_band
+from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import channel_order, joined_points, measured_points
-from memscal.estimation.profile import ProfileEstimate, estimate_profile
+from memscal.estimation.profile import (
+    ProfileEstimate,
+    constrained_profile,
+    estimate_profile,
+)
 from memscal.estimation.reference import reference_spectra
+from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
@@ -47,57 +52,73 @@ _RADII = 2001
 def solve(
     scans: Sequence[Scan],
     stresses: Sequence[StressProfile | Contact],
-    regulariser: Regulariser,
+    method: Method,
     channel: str = "zz",
 ) -> Solution:
     """Find A and G: profile of the scans, fields over the plane, and their division."""
-    require_channel_method(channel, regulariser)
+    require_channel_method(channel, method)
     points = [measured_points(scan, channel) for scan in scans]
     references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
     estimate = estimate_profile(joined_points(points), *references)
-    band = find_band(estimate)
+    smoothed = None if estimate.model.order else smooth_profile(estimate)
+    band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
-    fields = prepare_fields(estimate, choice, divided=not isinstance(regulariser, Bayesian))
+    fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
     return Solution(
         scans=tuple(scans),
         stresses=tuple(stresses),
         estimate=estimate,
+        smoothed=smoothed,
         band=band,
         choice=choice,
         fields=fields,
-        regulariser=regulariser,
-        deconvolution=deconvolve(estimate, band, fields, regulariser),
+        method=method,
+        deconvolution=deconvolve(estimate, band, fields, method),
         gaussian_misfit=_misfit(estimate, estimate.gaussian.predicted),
     )
 
 
 def deconvolve(
-    estimate: ProfileEstimate, band: Band, fields: Fields, regulariser: Regulariser
+    estimate: ProfileEstimate, band: Band, fields: Fields, method: Method
 ) -> Deconvolution:
-    """Divide the fields, normalise, fit a Gaussian, and convolve back."""
-    require_channel_method(estimate.points.channel, regulariser)
+    """Find A and G by a method: divide the fields, or take the posterior's; convolve back."""
+    require_channel_method(estimate.points.channel, method)
+    if isinstance(method, Bayesian):
+        return _of_posterior(estimate, fields, method)
     # Eq. 2: A G.
-    quotient = divide(
-        fields.voltage,
-        fields.stress,
-        weakest=(band.weakest_reference, band.weakest_voltage),
-        method=regulariser,
-        posterior=constrained_kernel(estimate, fields),
-    )
+    weakest = (band.weakest_reference, band.weakest_voltage)
+    quotient = divide(fields.voltage, fields.stress, weakest=weakest, method=method)
     quotient = replace(quotient, values=quotient.values * fields.confinement)
     # Eq. 3: A, and G of unit integral.
-    a, g = normalise(fields.on_support(quotient.values, quotient.profile))
+    a, g = normalise(fields.on_support(quotient.values, None))
     sigma = fit_gaussian(g, estimate.gaussian.sigma)
     # Eq. 1: the voltage that A and G predict.
     predicted = _reconvolved(estimate, fields, quotient) + estimate.background
     return Deconvolution(quotient, a, g, sigma, predicted, _misfit(estimate, predicted))
 
 
-def require_channel_method(channel: str, regulariser: Regulariser) -> None:
+def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -> Deconvolution:
+    """Take A G of the posterior, as constrained, on the grid of the fields."""
+    profile = constrained_profile(
+        estimate, nonnegative=method.nonnegative, monotone=method.monotone
+    )
+    values = fields.kernel(profile.radial) * fields.confinement
+    open_window = np.ones(fields.grid.transfer(values).shape)
+    a, g = normalise(fields.on_support(values, profile))
+    sigma = fit_gaussian(g, estimate.gaussian.sigma)
+    geometry = estimate.model.geometry(estimate.centres)
+    signal = estimate.model.signal(geometry, profile.transform(estimate.model.k)) + estimate.oval
+    predicted = signal + estimate.background
+    quotient = Quotient(fields.grid, values, open_window)
+    misfit = _misfit(estimate, predicted)
+    return Deconvolution(quotient, a, g, sigma, predicted, misfit, divided=False)
+
+
+def require_channel_method(channel: str, method: Method) -> None:
     """Refuse to divide the fields of a tangential channel, and a channel that does not exist."""
-    if channel_order(channel) and not isinstance(regulariser, Bayesian):
+    if channel_order(channel) and not isinstance(method, Bayesian):
         raise InputError(
-            f"Channel {channel} cannot be calibrated by method {regulariser.name}.",
+            f"Channel {channel} cannot be calibrated by method {method.name}.",
             why="It divides fields, and the transform of a shear is zero along a line and at "
             "k = 0, where A is read off.",
             cure='Use method="bayesian" (--method bayesian), which divides none.',
@@ -105,12 +126,18 @@ def require_channel_method(channel: str, regulariser: Regulariser) -> None:
 
 
 def prepare_fields(
-    estimate: ProfileEstimate, choice: GridChoice, *, divided: bool = True
+    estimate: ProfileEstimate,
+    smoothed: SmoothedProfile | None,
+    choice: GridChoice,
+    *,
+    divided: bool = True,
 ) -> Fields:
     """Lift the profile of lines or several scans, or place a raster (evenly if it is divided)."""
+    if smoothed is None:
+        return LineFields.lift(estimate, estimate.spectrum, choice)
     if estimate.points.as_raster:
-        return RasterFields.place(estimate, choice, divided=divided)
-    return LineFields.lift(estimate, choice)
+        return RasterFields.place(estimate, smoothed, choice, divided=divided)
+    return LineFields.lift(estimate, smoothed.spectrum, choice)
 
 
 @dataclass(frozen=True)
@@ -132,6 +159,7 @@ class Deconvolution:
     gaussian_sigma: float  # of the Gaussian nearest to G, in m
     predicted: FloatArray  # (n,): voltages at the measured points, in V
     misfit: Misfit
+    divided: bool = True  # by a division of the fields; else the posterior's
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,11 +168,12 @@ class Solution:
 
     scans: tuple[Scan, ...]
     stresses: tuple[StressProfile | Contact, ...]  # the reference of each scan
-    estimate: ProfileEstimate  # centre, baseline, noise, outliers and profile
+    estimate: ProfileEstimate  # centre, baseline, noise, and the posterior of the profile
+    smoothed: SmoothedProfile | None  # the profile that is divided; none of a shear
     band: Band  # signal and noise of the voltage's transform
     choice: GridChoice
     fields: Fields
-    regulariser: Regulariser
+    method: Method
     deconvolution: Deconvolution  # A and G by the division, and their misfit
     gaussian_misfit: Misfit  # the Gaussian fitted in data space against the scan
 
@@ -157,12 +186,6 @@ class Solution:
     def stress(self) -> StressProfile | Contact:
         """The reference of the first scan, which the fields are made with."""
         return self.stresses[0]
-
-    @property
-    def window_at_nodes(self) -> FloatArray:
-        """The regularisation's window at the estimate's nodes; zero beyond the grid."""
-        k, window = self.fields.along_axis(self.deconvolution.quotient.window)
-        return np.interp(self.estimate.model.k, k, window, right=0.0)
 
     @property
     def tail_share(self) -> float:
@@ -180,11 +203,7 @@ class Solution:
 
 
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
-    """Signal of the deconvolved A G at the points, in V: each scan through its own reference."""
-    model, profile = estimate.model, quotient.profile
-    if profile is not None:
-        geometry = model.geometry(estimate.centres)
-        return np.asarray(model.signal(geometry, profile.transform(model.k)) + estimate.oval)
+    """Signal of the quotient at the points, in V: each scan through its own reference."""
     if estimate.points.scans == 1:
         back = reconvolve(1.0, quotient, fields.stress)
         return fields.at_points(back.values) * estimate.points.load
@@ -202,35 +221,3 @@ def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
     return Misfit(rms, float(np.sum(weight * (residual / noise) ** 2) / degrees), degrees)
-
-
-@dataclass(frozen=True, eq=False)
-class FieldNoise:
-    """What a raster's noise adds to the uncertainties."""
-
-    conversion_constant: float  # in V/Pa
-    radial: FloatArray  # (n, m): columns whose squares add up to the variance of G, in 1/m^2
-    transfer: FloatArray  # (p,): standard uncertainty of single components
-
-
-def field_noise(solution: Solution, wavenumbers: FloatArray) -> FieldNoise | None:
-    """Return what a raster's noise adds at wavenumbers (rad/m); ``None`` for a line scan."""
-    # Noise N of a component becomes w N/sigma in A G; over a lattice of area L^2 the mean of G over
-    # directions has cov(r, r') = 1/(2 pi L^2) int (w N/sigma)^2 J_0(kr) J_0(kr') k dk.
-    estimate, deconvolution = solution.estimate, solution.deconvolution
-    if not estimate.points.planar or estimate.points.scans > 1:
-        return None
-    k, weights = estimate.model.k, estimate.model.reference.wavenumbers.weights
-    fields = solution.fields
-    # Where both vanish, window and reference are divided on the grid, not interpolated apart.
-    axis, window = fields.along_axis(deconvolution.quotient.window)
-    reference = fields.along_axis(np.abs(fields.grid.forward(fields.stress.values)))[1]
-    ratio = np.divide(window, reference, out=np.zeros_like(window), where=window > 0)
-    amplified = solution.band.noise * np.interp(k, axis, ratio, right=0.0)
-    area = fields.grid.cell_area * fields.voltage.values.size
-    columns = j0(np.multiply.outer(deconvolution.g.r, k)) * (np.sqrt(weights / area) * amplified)
-    return FieldNoise(
-        conversion_constant=float(amplified[0]),
-        radial=columns / deconvolution.conversion_constant,
-        transfer=np.interp(wavenumbers, k, amplified) / deconvolution.conversion_constant,
-    )

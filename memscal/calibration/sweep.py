@@ -55,7 +55,9 @@ def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -
     require_count("sweep", "amplitudes", amplitudes, 3)
     require_count("sweep", "draws", draws, 1)
     # The method's own fields may be those of points that lie on no lattice: they cannot be divided.
-    solution = replace(solution, fields=prepare_fields(solution.estimate, solution.choice))
+    solution = replace(
+        solution, fields=prepare_fields(solution.estimate, solution.smoothed, solution.choice)
+    )
     amplitude = np.logspace(-1, 1, amplitudes)
     expected = np.array([_outcome(solution, WhiteNoise(amplitude=a)) for a in amplitude])
     drawn = np.array(

@@ -1,13 +1,19 @@
 r"""First-order propagation of noise, regularisation and uncertain inputs to A, G and its widths.
 
-Every result is a linear function of the posterior of the profile's parameters (:math:`w`) and of
-the Gaussian fit's (:math:`f`).  What scatters from scan to scan, by their derivatives by the
-voltages, is ``noise``; the rest of the expected squared error of :math:`w` is ``regularisation``,
-with what a window hides beyond it.  Inputs add one column each, the change of all results by one
-standard uncertainty.  An input that is larger than stated changes the estimate as voltages would:
-by :math:`-A\,G\otimes\delta\sigma_{zz}` for the base stress, by :math:`-U'(R)\,\delta R` for the
-positions.  A change of the load scales A alone.  Numbers read off G(r) are functionals of it:
-their derivative is a row that multiplies a change of G.
+A division is linear in the voltages: :math:`A\,G(r)` is the inverse transform of the window times
+the smoothed voltages' transform over the reference's.  Its covariance by noise is exact for given
+centre, weights, smoothing and window; centre, baseline and drift are those of the estimate, by
+their derivatives.  What window and smoothing hide is stated apart (``window``): what they take from
+the posterior mean of the Bayesian estimate, and from its posterior about that.
+
+Method ``bayesian`` is a linear function of the posterior of the profile's parameters: what
+scatters from scan to scan is ``noise``, the rest of the expected squared error ``regularisation``.
+
+Inputs add one column each, the change of all results by one standard uncertainty.  An input that
+is larger than stated changes the results as voltages would: by :math:`-A\,G\otimes\delta
+\sigma_{zz}` for the base stress, by :math:`-U'(R)\,\delta R` for the positions.  A change of the
+load scales A alone.  Numbers read off G(r) are functionals of it: their derivative is a row that
+multiplies a change of G.
 """
 
 from __future__ import annotations
@@ -20,11 +26,13 @@ from scipy.special import j0
 
 from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform, radial_spline, ring_areas
 from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
-from memscal.calibration.stages import Deconvolution, FieldNoise
+from memscal.calibration.fields import RasterFields
+from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import carried_force, film_sensitivities, rod_sensitivities
+from memscal.estimation.smoothing import SmoothedProfile
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
@@ -237,61 +245,50 @@ class Results:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Derivatives by (w, f) of the parameters, G and the transfer function, and what is hidden."""
+    """Derivatives of all results: of the parameters, then G at its radii, then the transfer."""
 
     names: tuple[str, ...]  # of the parameters
     values: FloatArray
-    radii: int
-    matrix: FloatArray
-    hidden: FloatArray
-    opened: FloatArray  # rows of G as it is stored, through the window
+    by_voltage: FloatArray  # (m, n)
+    by_state: FloatArray  # (m, p): by the posterior's parameters, beside what voltages do to them
+    hidden: FloatArray | None = None  # (m, q): columns of what window and smoothing hide
 
-    @property
-    def stored(self) -> int:
-        """How many results have a covariance: parameters and G."""
-        return len(self.names) + self.radii
+    def columns(self, estimate: ProfileEstimate) -> dict[str, FloatArray]:
+        """Contributions of the scan itself."""
+        own = {
+            "noise": self.by_voltage @ estimate.noise_root,
+            "regularisation": self.by_state @ _fixed_root(estimate),
+        }
+        return own if self.hidden is None else own | {"window": self.hidden}
 
 
 def propagate(
-    estimate: ProfileEstimate,
+    solution: Solution,
     deconvolution: Deconvolution,
-    window: FloatArray,
     wavenumbers: FloatArray,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
-    raster: FieldNoise | None = None,
 ) -> Results:
-    """Propagate all stated uncertainties: ``window`` at the nodes, ``wavenumbers`` in rad/m."""
-    rows = _rows(estimate, deconvolution, window, wavenumbers)
-    random, fixed = _noise_roots(estimate)
-    columns = {
-        "noise": rows.matrix @ random,
-        "regularisation": rows.matrix @ fixed,
-        "window": rows.hidden[:, None],
-    }
-    if raster is not None:
-        columns["raster_noise"] = _raster_columns(rows, deconvolution, raster)
+    """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
+    estimate = solution.estimate
+    rows = _rows(solution, deconvolution, wavenumbers)
+    columns = rows.columns(estimate)
     independent = list(columns.values())
-    columns |= {name: _input_column(rows, estimate, effect) for name, effect in effects.items()}
+    columns |= {name: _input_column(rows, effect) for name, effect in effects.items()}
     if effects:
         together = np.hstack([columns[name] for name in effects])
-        joined = _root(correlation_matrix(list(effects), correlations))
-        independent.append(together @ joined)
+        independent.append(together @ _root(correlation_matrix(list(effects), correlations)))
     everything = np.hstack(independent)
-    stored = everything[: rows.stored] @ everything[: rows.stored].T
     count = len(rows.names)
-    scatter = [rows.opened @ random[: rows.opened.shape[1]]]
-    if effects:
-        moved = estimate.weighed.gain @ np.stack([e.voltage for e in effects.values()], axis=1)
-        scatter.append(rows.opened @ moved @ joined)
-    if raster is not None:
-        scatter.append(raster.radial)
+    radial = slice(count, count + deconvolution.g.r.size)
+    stored = everything[: radial.stop] @ everything[: radial.stop].T
+    scatter = [columns["noise"][radial], *([independent[-1][radial]] if effects else [])]
     return Results(
         parameters=ParameterSet(rows.names, rows.values, stored[:count, :count]),
         budget={name: _budget(rows, columns, stored, name) for name in BUDGETED},
         radial_covariance=stored[count:, count:],
         cross_covariance=stored[count:, :count],
-        transfer_errors=np.linalg.norm(everything[rows.stored :], axis=1),
+        transfer_errors=np.linalg.norm(everything[radial.stop :], axis=1),
         radial_scatter=np.linalg.norm(np.hstack(scatter), axis=1),
     )
 
@@ -309,44 +306,110 @@ def _budget(
     return budget
 
 
-def _input_column(rows: _Rows, estimate: ProfileEstimate, effect: InputEffect) -> FloatArray:
-    gain = np.vstack([estimate.weighed.gain, estimate.gaussian_gain])
-    column = rows.matrix @ (gain @ effect.voltage)
+def _input_column(rows: _Rows, effect: InputEffect) -> FloatArray:
+    column = rows.by_voltage @ effect.voltage
     scales = np.array([name.startswith("conversion_constant") for name in rows.names])
     column[: scales.size] += np.where(scales, rows.values, 0.0) * effect.scaling
     return np.asarray(column[:, None])
 
 
-def _rows(
-    estimate: ProfileEstimate,
-    deconvolution: Deconvolution,
-    window: FloatArray,
-    wavenumbers: FloatArray,
-) -> _Rows:
+def _rows(solution: Solution, deconvolution: Deconvolution, wavenumbers: FloatArray) -> _Rows:
+    """Derivatives of the results of either route."""
+    estimate, smoothed = solution.estimate, solution.smoothed
+    a, g = deconvolution.conversion_constant, deconvolution.g
+    functionals = kernel_functionals(g, deconvolution.gaussian_sigma)
+    if deconvolution.divided and smoothed is not None:
+        kernel = _divided_kernel(solution, smoothed, deconvolution, wavenumbers)
+    else:
+        kernel = _posterior_kernel(estimate, deconvolution, wavenumbers)
+    read = np.stack([functional.row for functional in functionals])
+    of_kernel = ("conversion_constant", *(functional.name for functional in functionals))
+    values = dict(zip(of_kernel, (a, *(f.value for f in functionals)), strict=True))
+    blocks = {
+        name: np.vstack([block[:1], read @ block[1 : 1 + g.r.size]])
+        for name, block in kernel.items()
+    }
+    fitted = _fitted_rows(estimate)
+    names = _order(of_kernel, tuple(fitted))
+    shapes = {"by_voltage": estimate.points.u.size, "by_state": estimate.basis.integrals.size}
+    stacked = {}
+    for block, of_numbers in blocks.items():
+        rows = dict(zip(of_kernel, of_numbers, strict=True))
+        for name, (value, by_voltage, by_state) in fitted.items():
+            values[name] = value
+            rows[name] = {"by_voltage": by_voltage, "by_state": by_state}.get(
+                block, np.zeros(of_numbers.shape[1])
+            )
+        stacked[block] = np.vstack([*(rows[name] for name in names), kernel[block][1:]])
+    assert all(stacked[block].shape[1] == size for block, size in shapes.items())
+    return _Rows(names, np.array([values[name] for name in names]), **stacked)
+
+
+def _order(of_kernel: tuple[str, ...], fitted: tuple[str, ...]) -> tuple[str, ...]:
+    """Parameters in the order in which they are reported."""
+    first, *others = of_kernel
+    sigma, *ellipse = (name for name in fitted if name.startswith(("gaussian_sigma", "ellip")))
+    nuisances = [name for name in fitted if name not in (sigma, *ellipse)]
+    return (first, sigma, *ellipse, *others, *nuisances)
+
+
+def _posterior_kernel(
+    estimate: ProfileEstimate, deconvolution: Deconvolution, wavenumbers: FloatArray
+) -> dict[str, FloatArray]:
+    """Derivatives of A, G and its transfer function, by the posterior's parameters."""
     basis, k = estimate.basis, estimate.model.k
     a, r = deconvolution.conversion_constant, deconvolution.g.r
-    fitted = estimate.gaussian.jacobian.shape[1]
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
-    synthesis = j0(np.multiply.outer(r, k)) * estimate.model.reference.wavenumbers.weights
     normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
     transfer = _interpolated(wavenumbers, k, normalised)
-    hidden = (1 - window) * estimate.kernel / a
-    hidden_radial = synthesis @ hidden
-    opened = radial - synthesis @ ((1 - window)[:, None] * normalised)
-    functionals = kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma)
-    scalars, names, values = _scalar_rows(estimate, deconvolution, functionals, opened)
-    hidden_scalars = np.zeros(len(names))
-    for functional in functionals:
-        hidden_scalars[names.index(functional.name)] = functional.row @ hidden_radial
-    return _Rows(
-        names=names,
-        values=values,
-        radii=r.size,
-        matrix=np.vstack([scalars, np.pad(np.vstack([radial, transfer]), ((0, 0), (0, fitted)))]),
-        hidden=np.concatenate([hidden_scalars, hidden_radial, np.interp(wavenumbers, k, hidden)]),
-        opened=opened,
-    )
+    rows = np.vstack([basis.integrals, radial, transfer])
+    return {"by_voltage": rows @ estimate.weighed.gain, "by_state": rows}
+
+
+def _divided_kernel(
+    solution: Solution,
+    smoothed: SmoothedProfile,
+    deconvolution: Deconvolution,
+    wavenumbers: FloatArray,
+) -> dict[str, FloatArray]:
+    """Derivatives of A, G and its transfer function by division, and what it hides of them."""
+    estimate, fields = solution.estimate, solution.fields
+    basis, model = estimate.basis, estimate.model
+    a, r, g = deconvolution.conversion_constant, deconvolution.g.r, deconvolution.g.radial
+    gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
+    # Window over reference on the grid's axis: where both vanish, they are not interpolated apart.
+    axis, window = fields.along_axis(deconvolution.quotient.window)
+    reference = fields.along_axis(fields.grid.forward(fields.stress.values).real)[1]
+    ratio = np.divide(window, reference, out=np.zeros_like(window), where=window > 0)
+    weights = model.reference.wavenumbers.weights * np.interp(model.k, axis, ratio, right=0.0)
+    synthesis = fields.taper(r)[:, None] * j0(np.multiply.outer(r, model.k)) * weights
+    rings = ring_areas(r)
+
+    def normalised(radial: FloatArray) -> FloatArray:
+        """Changes of A, G and its transfer function for changes of A G (r, m)."""
+        of_a = rings @ radial
+        of_g = (radial - np.multiply.outer(g, of_a)) / a
+        transfer = (j0(np.multiply.outer(wavenumbers, r)) * rings) @ of_g
+        return np.vstack([of_a[None, :], of_g, transfer])
+
+    direct = normalised(synthesis @ gain)
+    # Centre, baseline and drift are parameters of the estimate, the first of its nuisances.
+    geometry = model.geometry(estimate.centres)
+    nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
+    places = slice(2, 2 + nuisance.shape[1])
+    by_nuisance = -direct @ nuisance
+    by_state = np.zeros((len(direct), basis.integrals.size))
+    by_state[:, places] = by_nuisance
+    signals = model.signal(geometry, np.column_stack([estimate.kernel, basis.kernels(model.k)]))
+    radial = np.column_stack([estimate.radial(r), basis.radial(r)]) - synthesis @ (gain @ signals)
+    lost = normalised(radial)
+    spread = lost[:, 1:] @ _root(estimate.covariance)
+    return {
+        "by_voltage": direct + by_nuisance @ estimate.weighed.gain[places],
+        "by_state": by_state,
+        "hidden": np.hstack([lost[:, :1], spread]),
+    }
 
 
 def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) -> FloatArray:
@@ -356,73 +419,44 @@ def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) ->
     return np.asarray((1 - share) * columns[left] + share * columns[left + 1])
 
 
-def _scalar_rows(
+def _fitted_rows(
     estimate: ProfileEstimate,
-    deconvolution: Deconvolution,
-    functionals: tuple[Functional, ...],
-    opened: FloatArray,
-) -> tuple[FloatArray, tuple[str, ...], FloatArray]:
-    count, fitted = estimate.basis.integrals.size, estimate.gaussian.jacobian.shape[1]
-    gaussian = estimate.gaussian
-    entries: list[tuple[str, float, FloatArray, int]] = [
-        ("conversion_constant", deconvolution.conversion_constant, estimate.basis.integrals, 0),
-        ("gaussian_sigma", gaussian.sigma, _unit(fitted, 1), count),
-        *_ellipse(estimate),
-        *((f.name, f.value, f.row @ opened, 0) for f in functionals),
-        *_nuisances(estimate),
-        ("conversion_constant_gaussian", gaussian.conversion_constant, _unit(fitted, 0), count),
-    ]
-    rows = np.zeros((len(entries), count + fitted))
-    for row, (_, _, derivative, first) in zip(rows, entries, strict=True):
-        row[first : first + derivative.size] = derivative
-    return rows, tuple(e[0] for e in entries), np.array([e[1] for e in entries])
+) -> dict[str, tuple[float, FloatArray, FloatArray]]:
+    """Value and derivatives (by voltages, by the posterior's parameters) of what is fitted."""
+    gaussian, states = estimate.gaussian, estimate.basis.integrals.size
+    none, fit, gain = np.zeros(states), estimate.gaussian_gain, estimate.weighed.gain
+    rows: dict[str, tuple[float, FloatArray, FloatArray]] = {
+        "gaussian_sigma": (gaussian.sigma, fit[1], none)
+    }
+    # The Gaussian's ellipticity: a round departure beside it would be read as less of both.
+    first = estimate.basis.flat - estimate.points.ellipse
+    for i, name in enumerate(("ellipticity", "ellipticity_diagonal")[: estimate.points.ellipse]):
+        rows[name] = (float(gaussian.ellipticity[i]), fit[first + i], none)
+    for i, (name, value, scale) in enumerate(_nuisances(estimate), start=2):
+        rows[name] = (value, scale * gain[i], scale * _unit(states, i))
+    rows["conversion_constant_gaussian"] = (gaussian.conversion_constant, fit[0], none)
+    return rows
 
 
-def _nuisances(estimate: ProfileEstimate) -> list[tuple[str, float, FloatArray, int]]:
-    """Centre, baseline and drift of each scan; the second scan's end in ``_2``, and so on."""
-    count, free = estimate.basis.integrals.size, estimate.points.free
+def _nuisances(estimate: ProfileEstimate) -> list[tuple[str, float, float]]:
+    """Centre, baseline and drift of each scan, with their scale; of the second ending in ``_2``."""
+    free = estimate.points.free
     centres = [("centre", "centre_y")[axis] + _number(scan) for scan, axis in np.argwhere(free)]
+    entries = [
+        (name, float(value), 1.0)
+        for name, value in zip(centres, estimate.centres[free], strict=True)
+    ]
     drifts: list[tuple[str, float]] = []
     for scan, directions in enumerate(free):
         # The drift is stated across the whole range; its coefficient spans half of it.
         along = [("drift", "drift_y")[axis] for axis in np.flatnonzero(directions)]
         drifts += [("baseline" + _number(scan), 1.0), *((n + _number(scan), 2.0) for n in along)]
-    entries = [
-        (name, float(value), _unit(count, 2 + i), 0)
-        for i, (name, value) in enumerate(zip(centres, estimate.centres[free], strict=True))
-    ]
-    first = 2 + len(centres)
-    for i, ((name, scale), value) in enumerate(zip(drifts, estimate.drifts, strict=True)):
-        entries.append((name, scale * float(value), scale * _unit(count, first + i), 0))
-    return entries
-
-
-def _ellipse(estimate: ProfileEstimate) -> list[tuple[str, float, FloatArray, int]]:
-    """The Gaussian's ellipticity: a round departure beside it would be read as less of both."""
-    count, fitted = estimate.basis.integrals.size, estimate.basis.flat
-    names, values = ("ellipticity", "ellipticity_diagonal"), estimate.gaussian.ellipticity
-    first = fitted - estimate.points.ellipse
-    return [
-        (names[i], float(values[i]), _unit(fitted, first + i), count)
-        for i in range(estimate.points.ellipse)
-    ]
+    pairs = zip(drifts, estimate.drifts, strict=True)
+    return entries + [(name, scale * float(value), scale) for (name, scale), value in pairs]
 
 
 def _number(scan: int) -> str:
     return "" if scan == 0 else f"_{scan + 1}"
-
-
-def _raster_columns(rows: _Rows, deconvolution: Deconvolution, raster: FieldNoise) -> FloatArray:
-    """Noise of a measured field: a column for A, then those of G, then each of the transfer's."""
-    count, components = len(rows.names), raster.transfer.size
-    columns = np.zeros((rows.hidden.size, 1 + raster.radial.shape[1] + components))
-    columns[rows.names.index("conversion_constant"), 0] = raster.conversion_constant
-    inner = slice(1, 1 + raster.radial.shape[1])
-    for functional in kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma):
-        columns[rows.names.index(functional.name), inner] = functional.row @ raster.radial
-    columns[count : rows.stored, inner] = raster.radial
-    columns[rows.stored :, inner.stop :] = np.diag(raster.transfer)
-    return columns
 
 
 def _unit(count: int, index: int) -> FloatArray:
@@ -431,13 +465,10 @@ def _unit(count: int, index: int) -> FloatArray:
     return row
 
 
-def _noise_roots(estimate: ProfileEstimate) -> tuple[FloatArray, FloatArray]:
-    """Square roots of the joint covariance of (w, f): what scatters, and what does not."""
-    # A Gaussian fit has no prior: all of its error scatters.
+def _fixed_root(estimate: ProfileEstimate) -> FloatArray:
+    """Square root of what of the posterior's covariance does not scatter from scan to scan."""
     covariance, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
-    fitted = estimate.gaussian_gain @ estimate.noise_root
-    fixed = _root(covariance - random @ random.T, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    return np.vstack([random, fitted]), np.pad(fixed, ((0, fitted.shape[0]), (0, 0)))
+    return _root(covariance - random @ random.T, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
 
 def _root(covariance: FloatArray, scale: FloatArray | None = None) -> FloatArray:

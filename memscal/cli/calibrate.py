@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
     from memscal.calibration.monte_carlo import MonteCarlo
     from memscal.calibration.sweep import Sweep
-    from memscal.deconvolution.division import Regulariser
+    from memscal.deconvolution.division import Method
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
 
@@ -97,7 +97,7 @@ class Outputs:
 
 def _chosen_method(
     method: str | None, options: tuple[str, ...], seed: int | None, channel: str = "zz"
-) -> Regulariser:
+) -> Method:
     """Set up the method, by default the channel's; a wrong name or option is a usage error."""
     from memscal.deconvolution.division import create_regulariser
     from memscal.errors import InputError
@@ -140,7 +140,7 @@ def _option(text: str) -> tuple[str, Any]:
         return name, value
 
 
-def _check_kinds(values: dict[str, Any], usual: Regulariser) -> None:
+def _check_kinds(values: dict[str, Any], usual: Method) -> None:
     """Refuse text where the method's default is a number, or a fraction where it is a count."""
     for name, value in values.items():
         default = getattr(usual, name, None)
@@ -324,7 +324,7 @@ def _rehearse(
     scans: list[Scan],
     profile: StressProfile | None,
     channel: str,
-    regulariser: Regulariser,
+    regulariser: Method,
     outputs: Outputs,
     as_json: bool,
 ) -> None:

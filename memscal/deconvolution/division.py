@@ -1,27 +1,28 @@
 r"""Methods of division, for the paper's :math:`A\hat G = \hat U_{zz}/\hat\sigma_{zz}` (Eq. 2).
 
 Both transforms vanish at large wavenumbers, and methods differ in their quotient there: by a
-window on the spectra (the paper's white noise, Tikhonov's), by the restoration of an image
-(:mod:`memscal.deconvolution.scikit_image`), or by Bayesian model averaging in data space, which
-divides nothing.  Other packages add methods under an entry point.
+window on the spectra (the paper's white noise, Tikhonov's), or by the restoration of an image
+(:mod:`memscal.deconvolution.scikit_image`).  Other packages add methods under an entry point.
+Method ``bayesian`` divides nothing (:mod:`memscal.estimation.bayesian`).
 """
 
 from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 import scipy.fft
 
 from memscal.axisymmetry.grids import FieldGrid
 from memscal.errors import InputError
+from memscal.estimation.bayesian import Bayesian
 from memscal.model.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -31,16 +32,6 @@ if TYPE_CHECKING:
 NOISE_RATIO = 0.1
 
 _CLOSED = 1e-9
-
-
-class KernelProfile(Protocol):
-    """A radial kernel, in closed form on both sides of the Hankel transform."""
-
-    def radial(self, r: FloatArray) -> FloatArray:
-        """Values at radii (m)."""
-
-    def transform(self, k: FloatArray) -> FloatArray:
-        """Transform at wavenumbers (rad/m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +44,6 @@ class DivisionProblem:
     # Moduli of the fields' transforms where the voltage's is ten times its noise, V m^2/N and 1.
     weakest_voltage: float
     weakest_reference: float
-    # A G (V/Pa/m^2) of the points, and on the grid: not negative, not rising with the radius.
-    posterior: Callable[[bool, bool], tuple[KernelProfile, FloatArray]] | None = None
 
     @cached_property
     def voltage_spectrum(self) -> FloatArray:
@@ -73,7 +62,6 @@ class Division:
 
     field: FloatArray  # A G on the grid, in V/Pa/m^2
     window: FloatArray  # what is left of each spectral component, from 0 to 1
-    profile: KernelProfile | None = None  # of a field that is no quotient: finer than any grid
 
 
 class Regulariser(Protocol):
@@ -90,6 +78,10 @@ class Regulariser(Protocol):
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide the voltage field by the stress field."""
+
+
+Method: TypeAlias = Regulariser | Bayesian
+"""A way from a scan to A and G: by a division, or by Bayesian model averaging."""
 
 
 def require_amplitude(method: str, amplitude: Any) -> None:
@@ -207,40 +199,12 @@ class Tikhonov:
         return filtered_division(problem, power / (power + alpha))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Bayesian:
-    """Bayesian model averaging in data space: the posterior mean of A G, or its MAP estimate."""
-
-    nonnegative: bool = False  # G is nowhere negative
-    monotone: bool = False  # G nowhere rises with the radius (a ring's does)
-    name: ClassVar[str] = "bayesian"
-    assumes: ClassVar[str] = "G is a Gaussian, or departs from one smoothly."
-    fails: ClassVar[str] = (
-        "Detail finer than a third of G's width that the film hides is not found, only allowed for."
-    )
-
-    @property
-    def constrained(self) -> bool:
-        """Whether a constraint is set."""
-        return self.nonnegative or self.monotone
-
-    def divide(self, problem: DivisionProblem) -> Division:
-        """Return the posterior's estimate; its window is open everywhere."""
-        if problem.posterior is None:
-            raise InputError(
-                "Method bayesian was given fields without the scan that they came from.",
-                cure="Use it by memscal.calibrate(scan, method='bayesian').",
-            )
-        profile, field = problem.posterior(self.nonnegative, self.monotone)
-        return Division(field, np.ones(problem.voltage_spectrum.shape), profile)
-
-
 ENTRY_POINT_GROUP = "memscal.regularisers"
 
 _SCIKIT_IMAGE = "memscal.deconvolution.scikit_image"
 _OWN = {
     "white-noise": (__name__, "WhiteNoise"),
-    "bayesian": (__name__, "Bayesian"),
+    "bayesian": ("memscal.estimation.bayesian", "Bayesian"),
     "white-noise-draw": (__name__, "WhiteNoiseDraw"),
     "tikhonov": (__name__, "Tikhonov"),
     "wiener": (_SCIKIT_IMAGE, "Wiener"),
@@ -257,7 +221,7 @@ def regulariser_names() -> tuple[str, ...]:
     return (*_OWN, *others)
 
 
-def create_regulariser(name: str, /, **options: Any) -> Regulariser:
+def create_regulariser(name: str, /, **options: Any) -> Method:
     """Create a regulariser by its present or former name; ``seed`` only for those that draw."""
     factory = _factory(_ALIASES.get(name, name))
     accepted = inspect.signature(factory).parameters
@@ -269,17 +233,16 @@ def create_regulariser(name: str, /, **options: Any) -> Regulariser:
             f"Method {name} has no option {', '.join(unknown)}.",
             cure=f"Its options are: {', '.join(accepted) or 'none'}.",
         )
-    regulariser: Regulariser = factory(**options)
-    return regulariser
+    method: Method = factory(**options)
+    return method
 
 
-def chosen_method(
-    method: str | Regulariser, options: Mapping[str, Any], **seed: int
-) -> Regulariser:
-    """Set up the method of division by its name, or check one that is set up already."""
+def chosen_method(method: str | Method, options: Mapping[str, Any], **seed: int) -> Method:
+    """Set up a method by its name, or check one that is set up already."""
     if isinstance(method, str):
         return create_regulariser(method, **seed, **options)
-    if isinstance(method, type) or not callable(getattr(method, "divide", None)):
+    divides = isinstance(method, Bayesian) or callable(getattr(method, "divide", None))
+    if isinstance(method, type) or not divides:
         raise InputError(
             f"The method is {method!r}, which cannot divide fields.",
             cure="Give a method's name, or a regulariser that is set up: Tikhonov(), not Tikhonov.",

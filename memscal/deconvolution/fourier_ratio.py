@@ -12,7 +12,6 @@ profiles from any source.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -24,11 +23,11 @@ from memscal.axisymmetry.hankel import radial_spline
 from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
 from memscal.deconvolution.division import (
     DivisionProblem,
-    KernelProfile,
     Regulariser,
     chosen_method,
 )
 from memscal.errors import FitError, InputError
+from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.gaussian import gauss_newton
 from memscal.model.arrays import FloatArray, finite_vector, require_increasing, require_positive
 
@@ -103,12 +102,9 @@ class Quotient(Field):
     ----------
     window : ndarray
         What the regularisation leaves of each spectral component, from 0 to 1.
-    profile : KernelProfile or None
-        The radial function that the field was sampled from, where it was no division.
     """
 
     window: FloatArray
-    profile: KernelProfile | None = None
 
 
 def lift(r: FloatArray, profile: FloatArray, spacing: float, extent: float) -> Field:
@@ -170,7 +166,6 @@ def divide(
     *,
     weakest: float | tuple[float, float],
     method: str | Regulariser = "white-noise",
-    posterior: Callable[[bool, bool], tuple[KernelProfile, FloatArray]] | None = None,
     **options: Any,
 ) -> Quotient:
     r"""Divide a voltage field by a stress field in Fourier space, with regularisation.
@@ -193,8 +188,6 @@ def divide(
         stress's transform first falls to the first, or at the last wavenumber.
     method : str or Regulariser, default "white-noise"
         One of the methods of :func:`memscal.calibrate` that divide fields.
-    posterior : callable, optional
-        What method ``"bayesian"`` returns in place of a quotient.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -221,17 +214,21 @@ def divide(
     """
     _require_one_grid(voltage, stress)
     regulariser = chosen_method(method, options)
+    if isinstance(regulariser, Bayesian):
+        raise InputError(
+            "Method bayesian divides no fields.",
+            why="It takes G from the points of a scan.",
+            cure="Use it by memscal.calibrate(scan, method='bayesian').",
+        )
     if not isinstance(weakest, tuple):
         relevant = stress.spectrum()[1] > weakest
         last = int(np.argmin(relevant)) if not relevant.all() else -1
         weakest = (weakest, float(voltage.spectrum()[1][last]))
     for modulus in weakest:
         require_positive("weakest relevant component", modulus)
-    problem = DivisionProblem(
-        voltage.grid, voltage.values, stress.values, weakest[1], weakest[0], posterior=posterior
-    )
+    problem = DivisionProblem(voltage.grid, voltage.values, stress.values, weakest[1], weakest[0])
     division = regulariser.divide(problem)
-    return Quotient(voltage.grid, division.field, division.window, division.profile)
+    return Quotient(voltage.grid, division.field, division.window)
 
 
 def normalise(quotient: Field) -> tuple[float, Field]:

@@ -32,6 +32,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import i0e, j0
@@ -49,6 +50,24 @@ _FEWEST_RINGS = 6
 #: A field is cut at this multiple of its extent, where its envelope has fallen to 1e-5.
 _REACH = 2.2
 _SCALES = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bayesian:
+    """Bayesian model averaging in data space: the posterior mean of A G, or its MAP estimate."""
+
+    nonnegative: bool = False  # G is nowhere negative
+    monotone: bool = False  # G nowhere rises with the radius (a ring's does)
+    name: ClassVar[str] = "bayesian"
+    assumes: ClassVar[str] = "G is a Gaussian, or departs from one smoothly."
+    fails: ClassVar[str] = (
+        "Detail finer than a third of G's width that the film hides is not found, only allowed for."
+    )
+
+    @property
+    def constrained(self) -> bool:
+        """Whether a constraint is set."""
+        return self.nonnegative or self.monotone
 
 
 @dataclass(frozen=True, eq=False)

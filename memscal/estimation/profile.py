@@ -167,7 +167,7 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     fit = fit_gaussian_to_points(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
     residual = points.u - fit.predicted
-    outlier = _outlier_weight(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
+    outlier = outlier_weights(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
     least = NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
     least = least if points.u_errors is None else 1.0
     for _ in range(_WEIGHING_ROUNDS):
@@ -177,7 +177,7 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
         weighed = weigh_departures(
             model, fit, basis, weights, float(outlier.sum()), least_noise=least
         )
-        updated = _outlier_weight(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
+        updated = outlier_weights(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
         outlier = updated
@@ -228,7 +228,7 @@ def _require_determined(estimate: ProfileEstimate) -> None:
         )
 
 
-def _outlier_weight(standardised: FloatArray, threshold: float) -> FloatArray:
+def outlier_weights(standardised: FloatArray, threshold: float) -> FloatArray:
     """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
     scale = 1.4826 * np.median(np.abs(standardised))
     z = np.abs(standardised) / max(scale, np.finfo(float).tiny)

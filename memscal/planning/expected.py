@@ -16,7 +16,7 @@ import numpy as np
 from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import Results, input_effects, propagate
-from memscal.deconvolution.division import Regulariser, chosen_method
+from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import FitError
 from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, weigh_departures
@@ -29,6 +29,7 @@ from memscal.estimation.reference import (
     reference_spectra,
     require_calibration_rod,
 )
+from memscal.estimation.smoothing import smooth_profile
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, freeze_arrays
 from memscal.model.result import Result
@@ -43,7 +44,7 @@ class Expected:
     results: Results
 
 
-def expected_calibration(plan: Plan, regulariser: Regulariser) -> Expected:
+def expected_calibration(plan: Plan, method: Method) -> Expected:
     """Calibrate the planned scan, with expected squares in place of data."""
     scan = plan.scan()
     require_calibration_rod(scan)
@@ -51,18 +52,20 @@ def expected_calibration(plan: Plan, regulariser: Regulariser) -> Expected:
     points = measured_points(scan)
     references = reference_spectra([stress], [points], [plan.film.thickness])
     estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)
-    band = find_band(estimate)
+    smoothed = smooth_profile(estimate)
+    band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
-    fields = prepare_fields(estimate, choice)
-    deconvolution = deconvolve(estimate, band, fields, regulariser)
+    fields = prepare_fields(estimate, smoothed, choice)
+    deconvolution = deconvolve(estimate, band, fields, method)
     solution = Solution(
         scans=(scan,),
         stresses=(stress,),
         estimate=estimate,
+        smoothed=smoothed,
         band=band,
         choice=choice,
         fields=fields,
-        regulariser=regulariser,
+        method=method,
         deconvolution=deconvolution,
         gaussian_misfit=deconvolution.misfit,
     )
@@ -95,7 +98,7 @@ def _propagated(solution: Solution) -> Results:
     estimate, deconvolution = solution.estimate, solution.deconvolution
     effects = input_effects(solution.scans, solution.stresses, estimate)
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
-    return propagate(estimate, deconvolution, solution.window_at_nodes, wavenumbers, effects, {})
+    return propagate(solution, deconvolution, wavenumbers, effects, {})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,16 +164,16 @@ class Design(Result):
         return max(self.budget[name], key=self.budget[name].__getitem__)
 
 
-def evaluate(plan: Plan, method: str | Regulariser = "bayesian", seed: int = 0) -> Design:
+def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> Design:
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
-    regulariser = chosen_method(method, {}, seed=seed)
-    expected = expected_calibration(plan, regulariser)
+    chosen = chosen_method(method, {}, seed=seed)
+    expected = expected_calibration(plan, chosen)
     solution, results = expected.solution, expected.results
     deconvolution, fields = solution.deconvolution, solution.fields
     k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)))
     return Design(
         plan=plan,
-        method=regulariser.name,
+        method=chosen.name,
         parameters=results.parameters,
         budget=results.budget,
         r=deconvolution.g.r,

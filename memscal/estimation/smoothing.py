@@ -1,0 +1,260 @@
+r"""Smoothing spline through the voltages of a scan: the profile that a division of fields divides.
+
+Centre, baseline and drift are removed.  What is left, per newton of load, is a radial function
+:math:`f(r)`, even about the axis, of both sides and all repeats: the quintic spline that
+minimises
+
+.. math::
+
+    \sum_i w_i\,\bigl(y_i - f(r_i)\bigr)^2
+    + \lambda \int_0^R \rho(r)\,\bigl(f'''(r)\bigr)^2\,dr .
+
+Its one parameter :math:`\lambda` maximises the restricted likelihood of the voltages (Wahba, Ann.
+Stat. 13 (1985) 1378).  The curvature of what a film transmits falls off as its stress does, so
+that :math:`\rho` is the inverse square of the reference's own profile.  Beyond the last point R the
+profile goes on as the reference's decay, with the amplitude of the outer quarter of the points.
+
+For given centre, weights and :math:`\lambda` the result is linear in the voltages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import j0, j1
+
+from memscal.axisymmetry.hankel import RadialSpectrum, gauss_between
+from memscal.estimation.profile import OUTLIER_THRESHOLD, ProfileEstimate, outlier_weights
+from memscal.model.arrays import FloatArray
+
+#: Order of the derivative that is penalised; the spline is of degree 2 m - 1.
+_ORDER = 3
+_DEGREE = 2 * _ORDER - 1
+#: Intervals of the spline, at most: finer ones than the scan's step show nothing.
+_MOST_INTERVALS = 400
+#: The reference's profile counts as no less than this share of its maximum.
+_FLOOR = 0.01
+#: The tail is fitted to the points beyond this share of the reach.
+_OUTER = 0.75
+#: Nodes of the quadrature in each interval.
+_NODES = 8
+_ROUNDS = 4
+#: A residual is divided by the root of what its own point leaves free, at least this.
+_LEAST_FREEDOM = 0.05
+#: Misfit of a scan without noise, relative to its signal.
+_LEAST = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothedProfile:
+    """The radial profile of the voltages, per newton, as a linear function of them."""
+
+    estimate: ProfileEstimate  # whose centre, baseline, drift and noise it takes
+    gain: FloatArray  # (k, n): derivative of the profile's transform by the voltages, in m^2/N
+    predicted: FloatArray  # (n,): the smoothed voltages less background at the points, in V
+    outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
+
+    @property
+    def signal(self) -> FloatArray:
+        """Voltages less background, shape (n,), in V."""
+        return self.estimate.points.u - self.estimate.background
+
+    @cached_property
+    def spectrum(self) -> RadialSpectrum:
+        """Transform of the profile per newton, in V m^2/N."""
+        return replace(self.estimate.model.reference, values=self.gain @ self.signal)
+
+    @cached_property
+    def noise(self) -> FloatArray:
+        """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
+        return np.asarray(np.linalg.norm(self.gain @ self.estimate.noise_root, axis=1))
+
+
+def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
+    """Smooth the voltages of scans about their centres; of several references, put together."""
+    points, references = estimate.points, estimate.model.references
+    predicted, weight = np.zeros(points.u.size), np.ones(points.u.size)
+    gains = []
+    for scans in _groups(references):
+        rows = np.flatnonzero(np.isin(points.scan, scans))
+        spline, fit = _fitted(estimate, references[scans[0]], rows)
+        predicted[rows] = points.load[rows] * fit.predicted
+        weight[rows] = fit.outlier_weight
+        gain = np.zeros((estimate.model.k.size, points.u.size))
+        gain[:, rows] = spline.transform @ fit.gain / points.load[rows]
+        gains.append((references[scans[0]].values, gain))
+    return SmoothedProfile(estimate, _joined(gains, estimate), predicted, weight)
+
+
+def _groups(references: Sequence[RadialSpectrum]) -> list[list[int]]:
+    """Return the scans that share a reference."""
+    groups: list[list[int]] = []
+    for scan, reference in enumerate(references):
+        for group in groups:
+            if np.array_equal(references[group[0]].values, reference.values):
+                group.append(scan)
+                break
+        else:
+            groups.append([scan])
+    return groups
+
+
+def _joined(
+    gains: Sequence[tuple[FloatArray, FloatArray]], estimate: ProfileEstimate
+) -> FloatArray:
+    r"""Join profiles of several references to that of the first, by least squares at each k.
+
+    .. math:: \hat U = \hat\sigma_1 \sum_s \hat\sigma_s \hat U_s / v_s
+              \Big/ \sum_s \hat\sigma_s^2 / v_s
+    """
+    first, gain = gains[0]
+    if len(gains) == 1:
+        return gain
+    variances = [np.sum((g @ estimate.noise_root) ** 2, axis=1) for _, g in gains]
+    pairs = list(zip(gains, variances, strict=True))
+    above = np.sum([(stress / v)[:, None] * g for (stress, g), v in pairs], axis=0)
+    below = np.sum([stress**2 / v for (stress, _), v in pairs], axis=0)
+    return np.asarray((first / below)[:, None] * above)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A spline through some of the points, by voltages per newton."""
+
+    gain: FloatArray  # (m, n): derivative of the coefficients by the voltages
+    predicted: FloatArray  # (n,)
+    outlier_weight: FloatArray  # (n,)
+
+
+def _fitted(
+    estimate: ProfileEstimate, reference: RadialSpectrum, rows: NDArray[np.intp]
+) -> tuple[_RadialSpline, _Fit]:
+    """Fit the points of one reference; outliers are found by the residuals of the spline."""
+    points, load = estimate.points, estimate.points.load[rows]
+    y = (points.u - estimate.background)[rows] / load
+    stated = (estimate.weights / estimate.outlier_weight)[rows] * load**2
+    spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
+    weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
+    for _ in range(_ROUNDS):
+        gain = spline.gain(y, stated * weight)
+        predicted = spline.design @ (gain @ y)
+        own = np.einsum("ij,ji->i", spline.design, gain)
+        left = (y - predicted) * np.sqrt(stated / np.clip(1 - own, _LEAST_FREEDOM, 1.0))
+        updated = outlier_weights(left, threshold)
+        threshold = OUTLIER_THRESHOLD
+        if np.allclose(updated, weight, atol=0.02):
+            break
+        weight = updated
+    return spline, _Fit(gain, predicted, weight)
+
+
+@dataclass(frozen=True, eq=False)
+class _RadialSpline:
+    """Even splines on [0, R], continued by the reference's tail."""
+
+    design: FloatArray  # (n, m + 1): splines at the points; the last column is the tail's
+    penalty: FloatArray  # (m, m)
+    transform: FloatArray  # (k, m + 1): their transforms
+    outer: NDArray[np.bool_]  # (n,): which points the amplitude of the tail is fitted to
+    tail: FloatArray  # (n,): the reference's profile at the points
+
+    @classmethod
+    def through(cls, radius: FloatArray, reference: RadialSpectrum, step: float) -> _RadialSpline:
+        """Place the splines for points at radii (m), ``step`` apart."""
+        reach = float(radius.max()) * (1 + 1e-9)
+        intervals = int(np.clip(np.ceil(reach / step), _DEGREE, _MOST_INTERVALS))
+        knots = np.linspace(0.0, reach, intervals + 1)
+        basis = _even_splines(knots)
+        nodes, weights = gauss_between(knots, _NODES)
+        stress = reference.at(np.append(nodes, [0.0, reach]))
+        peak, end = stress[-2], stress[-1]
+        slope = -float(
+            (reference.wavenumbers.weights * reference.wavenumbers.k * reference.values)
+            @ j1(reference.wavenumbers.k * reach)
+        )
+        # At R a spline and its slope are those of the tail.
+        ends = np.vstack([basis(np.array([reach]), 0), step * basis(np.array([reach]), 1)])
+        _, _, rotation = np.linalg.svd(ends)
+        free = rotation[2:].T
+        tied = np.linalg.pinv(ends) @ np.array([end, step * slope])
+        columns = np.column_stack([free, tied])
+        curved = basis(nodes, _ORDER) * step**_ORDER
+        # The curvature of what the film transmits falls off as its stress does.
+        rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
+        roughness = (curved * (weights * rho)[:, None]).T @ curved
+        bessel = 2 * np.pi * j0(np.multiply.outer(reference.wavenumbers.k, nodes)) * weights * nodes
+        transform = bessel @ basis(nodes, 0) @ columns
+        transform[:, -1] += reference.values - bessel @ stress[:-2]
+        return cls(
+            design=basis(radius, 0) @ columns,
+            penalty=free.T @ roughness @ free,
+            transform=transform,
+            outer=radius >= _OUTER * reach,
+            tail=reference.at(radius),
+        )
+
+    def gain(self, y: FloatArray, weight: FloatArray) -> FloatArray:
+        """Return derivatives of the coefficients by values y, shape (m + 1, n)."""
+        weighted = self.tail * np.where(self.outer, weight, 0.0)
+        amplitude = weighted / (weighted @ self.tail)
+        free, tied = self.design[:, :-1], self.design[:, -1]
+        left = np.eye(y.size) - np.outer(tied, amplitude)
+        root = np.sqrt(weight)
+        design = root[:, None] * free
+        normal = design.T @ design
+        right = design.T @ (root * (left @ y))
+        total = float((root * (left @ y)) @ (root * (left @ y)))
+        smoothing = _restricted_likelihood(normal, self.penalty, right, total, y.size)
+        gain = np.linalg.solve(normal + smoothing * self.penalty, design.T * root) @ left
+        return np.vstack([gain, amplitude])
+
+
+def _restricted_likelihood(
+    normal: FloatArray, penalty: FloatArray, right: FloatArray, total: float, count: int
+) -> float:
+    """Return the smoothing parameter of the largest restricted likelihood, its noise free."""
+    from scipy.linalg import cho_factor, cho_solve
+    from scipy.optimize import minimize_scalar
+
+    scale = float(np.trace(normal) / np.trace(penalty))
+
+    def loss(log_smoothing: float) -> float:
+        smoothing = scale * float(np.exp(log_smoothing))
+        try:
+            factor = cho_factor(normal + smoothing * penalty, lower=True)
+        except np.linalg.LinAlgError:
+            return np.inf
+        misfit = max(total - float(right @ cho_solve(factor, right)), _LEAST * total)
+        log_determinant = 2 * float(np.log(np.diag(factor[0])).sum())
+        return count * float(np.log(misfit)) + log_determinant - len(penalty) * log_smoothing
+
+    grid = np.arange(-30.0, 31.0, 2.0)
+    losses = [loss(place) for place in grid]
+    best = float(grid[int(np.argmin(losses))])
+    found = minimize_scalar(loss, bounds=(best - 2.0, best + 2.0), method="bounded")
+    return scale * float(np.exp(found.x))
+
+
+def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
+    """Return even B-splines on even knots from zero: their derivatives at radii, (n, m)."""
+    from scipy.interpolate import BSpline
+
+    step = knots[1] - knots[0]
+    both = np.concatenate([-knots[:0:-1], knots])
+    outside = step * np.arange(_DEGREE, 0, -1)
+    extended = np.concatenate([both[0] - outside, both, both[-1] + outside[::-1]])
+    count = extended.size - _DEGREE - 1
+    spline = BSpline(extended, np.eye(count), _DEGREE)
+
+    def values(radius: FloatArray, derivative: int) -> FloatArray:
+        columns = spline(radius, nu=derivative)
+        middle = count // 2
+        folded = columns[:, middle:].copy()
+        folded[:, count % 2 :] += columns[:, :middle][:, ::-1]
+        return np.asarray(folded)
+
+    return values
