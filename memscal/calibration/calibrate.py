@@ -14,11 +14,12 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
-from memscal.calibration.stages import Solution, solve
+from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import InputError
+from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
     reference_profile,
@@ -28,7 +29,13 @@ from memscal.estimation.reference import (
 )
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import Contact
-from memscal.model.apparatus import ApparatusField, ApparatusRadial, Reconvolution, TransferFunction
+from memscal.model.apparatus import (
+    ApparatusField,
+    ApparatusRadial,
+    OtherEstimate,
+    Reconvolution,
+    TransferFunction,
+)
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
     NOISE_UNSTATED,
@@ -45,10 +52,19 @@ from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
 
+#: Parameters that differ between a division and the Bayesian estimate.
+_OF_A_ROUTE = (
+    "conversion_constant",
+    "gaussian_sigma_deconvolved",
+    "fwhm",
+    "noise_equivalent_area",
+)
+
 
 def assemble(
     solution: Solution,
     results: Results,
+    other: Results | None,
     checks: tuple[QualityCheck, ...],
     messages: tuple[Message, ...],
     configuration: Mapping[str, Any],
@@ -58,7 +74,7 @@ def assemble(
     reference = stress.profile() if isinstance(stress, Contact) else stress
     return ApparatusFunction(
         field=_field(solution, results),
-        radial_profile=_radial(solution, results),
+        radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=_transfer(solution, results),
         reconvolution=_reconvolution(solution),
         parameters=results.parameters,
@@ -88,7 +104,17 @@ def assemble(
             input_reference=reference.source,
         ),
         budget=results.budget,
+        other=_other(solution, other),
     )
+
+
+def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
+    """Return the estimate by the other route, with what is its own."""
+    if solution.other is None or results is None:
+        return None
+    parameters = results.parameters.only(_OF_A_ROUTE)
+    method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
+    return OtherEstimate(method, parameters, _radial(solution, solution.other, results))
 
 
 def _sensor(solution: Solution) -> StressSensor:
@@ -114,8 +140,8 @@ def _field(solution: Solution, results: Results) -> ApparatusField:
     return ApparatusField(g.x, g.y, g.image, np.interp(np.hypot.outer(g.y, g.x), g.r, errors))
 
 
-def _radial(solution: Solution, results: Results) -> ApparatusRadial:
-    g = solution.deconvolution.g
+def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:
+    g = deconvolution.g
     covariance = results.radial_covariance
     gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
     errors = np.sqrt(np.diag(covariance))
@@ -432,7 +458,10 @@ def calibrate(
     chosen = chosen_method(method, options, seed=seed)
     solution = solve(scans, stresses, chosen, channel)
     effects = _effects(solution, None if alternative is None else _references(alternative, scans))
-    results = uncertainties(solution, effects, correlations or {})
+    results = uncertainties(solution, solution.deconvolution, effects, correlations or {})
+    other = None
+    if solution.other is not None:
+        other = uncertainties(solution, solution.other, effects, correlations or {})
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)
     configuration = {"method": chosen.name, "seed": seed, **_settings(chosen)}
@@ -440,7 +469,7 @@ def calibrate(
         configuration["channel"] = channel
     if correlations:
         configuration["correlations"] = {" ".join(pair): c for pair, c in correlations.items()}
-    apparatus = assemble(solution, results, checks, messages, configuration)
+    apparatus = assemble(solution, results, other, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(correlations or {}))
 
 
@@ -494,10 +523,10 @@ def _effects(
 
 def uncertainties(
     solution: Solution,
+    deconvolution: Deconvolution,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
 ) -> Results:
-    """Propagate noise and inputs through a calibration's steps."""
-    deconvolution = solution.deconvolution
+    """Propagate noise and inputs through the steps of one route."""
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
     return propagate(solution, deconvolution, wavenumbers, effects, correlations)

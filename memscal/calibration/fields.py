@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 import scipy.fft
@@ -82,6 +82,7 @@ class LineFields:
     stress: Field
     support: int
     radius: FloatArray
+    even: ClassVar[bool] = True  # so that they can be divided
 
     @classmethod
     def lift(
@@ -155,6 +156,7 @@ class RasterFields:
     step: float
     oval: _Oval
     index: tuple[NDArray[np.intp], NDArray[np.intp]]
+    even: bool
 
     @classmethod
     def place(
@@ -168,6 +170,7 @@ class RasterFields:
         """Place the raster, continued by its smoothed profile; a field that is divided is even."""
         points = estimate.points
         lattice = even_lattice(points.x, points.y, points.places[0].count)
+        even = lattice is not None
         if lattice is None and divided:
             raise InputError(
                 f"The raster's {points.u.size} points are not evenly spaced: they lie on no "
@@ -193,7 +196,8 @@ class RasterFields:
             voltage += _mean_at(voltage.shape, (rows, columns), departure / points.load)
         stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
         oval = _Oval(estimate.gaussian)
-        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, (rows, columns))
+        index = (rows, columns)
+        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, index, even)
 
     @property
     def confinement(self) -> FloatArray:

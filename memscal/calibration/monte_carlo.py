@@ -170,7 +170,8 @@ class DrawnScans:
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
         first = self.solution
-        solution = solve(scans, first.stresses, first.method, first.estimate.points.channel)
+        channel = first.estimate.points.channel
+        solution = solve(scans, first.stresses, first.method, channel, both=False)
         result, radii = solution.deconvolution, first.deconvolution.g.r
         r, g = result.g.r, result.g.radial
         g = np.where(radii <= r[-1], radial_spline(r, g)(np.minimum(radii, r[-1])), 0.0)
@@ -397,7 +398,9 @@ def monte_carlo(
         g_uncertainty=g.std(axis=0, ddof=1),
         g_symmetric=np.quantile(g, _TAILS, axis=0),
         g_shortest=shortest_interval(g),
-        g_first_order=uncertainties(solution, effects, calibration.correlations).radial_scatter,
+        g_first_order=uncertainties(
+            solution, solution.deconvolution, effects, calibration.correlations
+        ).radial_scatter,
         messages=tuple(_messages(calibration, comparisons, failures, draws)),
     )
 

@@ -19,7 +19,7 @@ from memscal.calibration.fields import (
     RasterFields,
     choose_grid,
 )
-from memscal.deconvolution.division import Method
+from memscal.deconvolution.division import Method, WhiteNoise
 from memscal.deconvolution.fourier_ratio import (
     Field,
     Quotient,
@@ -54,8 +54,14 @@ def solve(
     stresses: Sequence[StressProfile | Contact],
     method: Method,
     channel: str = "zz",
+    *,
+    both: bool = True,
 ) -> Solution:
-    """Find A and G: profile of the scans, fields over the plane, and their division."""
+    """Find A and G: profile of the scans, fields over the plane, and their division.
+
+    With ``both``, the estimate by the other route, too: of a division the Bayesian, of that the
+    division with white noise, where the fields can be divided.
+    """
     require_channel_method(channel, method)
     points = [measured_points(scan, channel) for scan in scans]
     references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
@@ -64,6 +70,9 @@ def solve(
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, smoothed, choice, divided=not isinstance(method, Bayesian))
+    other: Method = WhiteNoise() if isinstance(method, Bayesian) else Bayesian()
+    divisible = smoothed is not None and fields.even
+    beside = deconvolve(estimate, band, fields, other) if both and divisible else None
     return Solution(
         scans=tuple(scans),
         stresses=tuple(stresses),
@@ -74,6 +83,7 @@ def solve(
         fields=fields,
         method=method,
         deconvolution=deconvolve(estimate, band, fields, method),
+        other=beside,
         gaussian_misfit=_misfit(estimate, estimate.gaussian.predicted),
     )
 
@@ -174,7 +184,8 @@ class Solution:
     choice: GridChoice
     fields: Fields
     method: Method
-    deconvolution: Deconvolution  # A and G by the division, and their misfit
+    deconvolution: Deconvolution  # A and G by the method, and their misfit
+    other: Deconvolution | None  # by the other route
     gaussian_misfit: Misfit  # the Gaussian fitted in data space against the scan
 
     @property

@@ -43,6 +43,8 @@ from memscal.model.stress import StressProfile
 _FINE = 20
 #: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
 _RECTANGLE = 1 / np.sqrt(3)
+#: Windows below this have closed.
+_CLOSED = 1e-9
 #: What sums of squares lose to rounding.
 _ROUNDING = 1e-9
 #: Parameters whose uncertainty is broken down by source.
@@ -319,7 +321,8 @@ def _rows(solution: Solution, deconvolution: Deconvolution, wavenumbers: FloatAr
     a, g = deconvolution.conversion_constant, deconvolution.g
     functionals = kernel_functionals(g, deconvolution.gaussian_sigma)
     if deconvolution.divided and smoothed is not None:
-        kernel = _divided_kernel(solution, smoothed, deconvolution, wavenumbers)
+        division = _division_map(solution, smoothed, deconvolution, wavenumbers)
+        kernel = _divided_kernel(estimate, division)
     else:
         kernel = _posterior_kernel(estimate, deconvolution, wavenumbers)
     read = np.stack([functional.row for functional in functionals])
@@ -367,22 +370,37 @@ def _posterior_kernel(
     return {"by_voltage": rows @ estimate.weighed.gain, "by_state": rows}
 
 
-def _divided_kernel(
+@dataclass(frozen=True, eq=False)
+class _DivisionMap:
+    """A division of fields as a linear map from voltages less background to A, G and transfer."""
+
+    direct: FloatArray  # (m, n): of voltages, for given centre, baseline and drift
+    nuisance: FloatArray  # (n, q): voltages by free centres, baselines and drifts
+    signals: FloatArray  # (n, 1 + p): voltages of the posterior mean, and by its parameters
+    lost: FloatArray  # (m, 1 + p): what the division hides of these
+
+    @property
+    def places(self) -> slice:
+        """Places of centres, baselines and drifts among the posterior's parameters."""
+        return slice(2, 2 + self.nuisance.shape[1])
+
+
+def _division_map(
     solution: Solution,
     smoothed: SmoothedProfile,
     deconvolution: Deconvolution,
     wavenumbers: FloatArray,
-) -> dict[str, FloatArray]:
-    """Derivatives of A, G and its transfer function by division, and what it hides of them."""
+) -> _DivisionMap:
     estimate, fields = solution.estimate, solution.fields
     basis, model = estimate.basis, estimate.model
     a, r, g = deconvolution.conversion_constant, deconvolution.g.r, deconvolution.g.radial
     gain = fields.gain(smoothed) if isinstance(fields, RasterFields) else smoothed.gain
-    # Window over reference on the grid's axis: where both vanish, they are not interpolated apart.
+    reference = model.reference
     axis, window = fields.along_axis(deconvolution.quotient.window)
-    reference = fields.along_axis(fields.grid.forward(fields.stress.values).real)[1]
-    ratio = np.divide(window, reference, out=np.zeros_like(window), where=window > 0)
-    weights = model.reference.wavenumbers.weights * np.interp(model.k, axis, ratio, right=0.0)
+    window = np.interp(model.k, axis, window, right=0.0)
+    # Where the window has closed the reference may have vanished.
+    ratio = np.divide(window, reference.values, out=np.zeros_like(window), where=window > _CLOSED)
+    weights = reference.wavenumbers.weights * ratio
     synthesis = fields.taper(r)[:, None] * j0(np.multiply.outer(r, model.k)) * weights
     rings = ring_areas(r)
 
@@ -393,23 +411,58 @@ def _divided_kernel(
         transfer = (j0(np.multiply.outer(wavenumbers, r)) * rings) @ of_g
         return np.vstack([of_a[None, :], of_g, transfer])
 
-    direct = normalised(synthesis @ gain)
-    # Centre, baseline and drift are parameters of the estimate, the first of its nuisances.
     geometry = model.geometry(estimate.centres)
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
-    places = slice(2, 2 + nuisance.shape[1])
-    by_nuisance = -direct @ nuisance
-    by_state = np.zeros((len(direct), basis.integrals.size))
-    by_state[:, places] = by_nuisance
     signals = model.signal(geometry, np.column_stack([estimate.kernel, basis.kernels(model.k)]))
-    radial = np.column_stack([estimate.radial(r), basis.radial(r)]) - synthesis @ (gain @ signals)
-    lost = normalised(radial)
-    spread = lost[:, 1:] @ _root(estimate.covariance)
+    radial = np.column_stack([estimate.radial(r), basis.radial(r)])
+    return _DivisionMap(
+        direct=normalised(synthesis @ gain),
+        nuisance=nuisance,
+        signals=signals,
+        lost=normalised(radial - synthesis @ (gain @ signals)),
+    )
+
+
+def _divided_kernel(estimate: ProfileEstimate, division: _DivisionMap) -> dict[str, FloatArray]:
+    """Derivatives of A, G and its transfer function by division, and what it hides of them."""
+    # Centre, baseline and drift are parameters of the estimate.
+    by_nuisance = -division.direct @ division.nuisance
+    by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
+    by_state[:, division.places] = by_nuisance
+    spread = division.lost[:, 1:] @ _root(estimate.covariance)
     return {
-        "by_voltage": direct + by_nuisance @ estimate.weighed.gain[places],
+        "by_voltage": division.direct + by_nuisance @ estimate.weighed.gain[division.places],
         "by_state": by_state,
-        "hidden": np.hstack([lost[:, :1], spread]),
+        "hidden": np.hstack([division.lost[:, :1], spread]),
     }
+
+
+def route_difference(solution: Solution) -> float | None:
+    r"""Difference of division and Bayesian estimate beyond what the division hides, over its size.
+
+    The division of the residuals of the Bayesian fit: of A in standard deviations, of G as the
+    root of :math:`\int \Delta G^2\,dA` over its expectation; the larger one.  ``None`` where
+    there is one estimate only.
+    """
+    estimate, smoothed = solution.estimate, solution.smoothed
+    if solution.other is None or smoothed is None:
+        return None
+    division = solution.deconvolution if solution.deconvolution.divided else solution.other
+    linear = _division_map(solution, smoothed, division, np.zeros(0))
+    changes = linear.signals[:, 1:].copy()
+    changes[:, linear.places] += linear.nuisance
+    fitted = changes @ estimate.weighed.gain
+    roots = [
+        estimate.noise_root - fitted @ estimate.noise_root,
+        changes @ _fixed_root(estimate),
+    ]
+    residual = estimate.points.u - estimate.predicted
+    difference = linear.direct @ (residual + estimate.oval)
+    variance = np.sum((linear.direct @ np.hstack(roots)) ** 2, axis=1)
+    rings = ring_areas(division.g.r)
+    of_a = abs(difference[0]) / np.sqrt(variance[0])
+    of_g = np.sqrt((rings @ difference[1:] ** 2) / (rings @ variance[1:]))
+    return float(max(of_a, of_g))
 
 
 def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) -> FloatArray:

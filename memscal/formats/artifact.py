@@ -17,6 +17,7 @@ from memscal.model.apparatus import (
     ApparatusData,
     ApparatusField,
     ApparatusRadial,
+    OtherEstimate,
     Reconvolution,
     TransferFunction,
 )
@@ -53,6 +54,7 @@ def artifact_from(file: SafeFile) -> ApparatusData:
         load=load,
         reference=groups.read_profile(file, load=load, film=film, indenter=indenter),
         process=groups.read_process(file, "/entry/process"),
+        other=_read_other(file),
     )
 
 
@@ -85,7 +87,26 @@ def _entry(data: ApparatusData) -> Group:
         **groups.reference_groups(data.reference),
         "process": groups.process_group(data.process),
     }
+    if data.other is not None:
+        name = data.other.route
+        children |= {
+            f"radial_profile_{name}": write_record(records.RADIAL, data.other.radial_profile),
+            f"radial_covariance_{name}": write_record(
+                records.RADIAL_COVARIANCE, data.other.radial_profile
+            ),
+            f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
+        }
     return Group("NXentry", children, {"default": "apparatus_function"})
+
+
+def _read_other(file: SafeFile) -> OtherEstimate | None:
+    """Read the estimate by the route that was not chosen; a division is one by white noise."""
+    for route, method in (("bayesian", "bayesian"), ("division", "white-noise")):
+        places = [f"/entry/{name}_{route}" for name in ("radial_profile", "radial_covariance")]
+        if file.has(places[0]):
+            parameters = groups.read_parameters(file, f"/entry/parameters_{route}")
+            return OtherEstimate(method, parameters, _read_radial(file, *places))
+    return None
 
 
 def _read_radial(file: SafeFile, path: str, covariance_path: str) -> ApparatusRadial:

@@ -65,6 +65,8 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         "/entry/apparatus_function": records.FIELD,
         "/entry/radial_profile": records.RADIAL_VERSION_1_0,
         "/entry/radial_covariance": records.RADIAL_COVARIANCE,
+        "/entry/radial_profile_bayesian": records.RADIAL,
+        "/entry/radial_profile_division": records.RADIAL,
         "/entry/transfer_function": records.TRANSFER,
         "/entry/reconvolution": records.RECONVOLUTION,
         **_MEASURED_ON,

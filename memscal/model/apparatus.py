@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -143,6 +143,13 @@ class ParameterSet:
         i = self._index(name)
         return float(np.sqrt(self.covariance[i, i]))
 
+    def only(self, names: Sequence[str]) -> ParameterSet:
+        """Return some of the parameters, with their joint covariance."""
+        chosen = [self._index(name) for name in names]
+        units = tuple(self.units[i] for i in chosen) if self.units else ()
+        covariance = self.covariance[np.ix_(chosen, chosen)]
+        return ParameterSet(tuple(names), self.values[chosen], covariance, units)
+
     def _index(self, name: str) -> int:
         if name not in self.names:
             raise InputError(
@@ -151,12 +158,30 @@ class ParameterSet:
         return self.names.index(name)
 
 
+@dataclass(frozen=True, eq=False)
+class OtherEstimate:
+    """A and G of the same scan by the route that was not chosen: a division, or ``bayesian``.
+
+    ``parameters``: the conversion constant and the widths of G; ``radial_profile``: G(r).
+    """
+
+    method: str
+    parameters: ParameterSet
+    radial_profile: ApparatusRadial
+
+    @property
+    def route(self) -> str:
+        """``"bayesian"`` or ``"division"``."""
+        return self.method if self.method == "bayesian" else "division"
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ApparatusData:
     """Everything that an apparatus-function artifact stores, in SI units.
 
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
-    of the conversion constant and of both Gaussian widths by source.
+    of the conversion constant and of both Gaussian widths by source; ``other`` is the estimate by
+    the route that was not chosen, where there is one.
     """
 
     field: ApparatusField
@@ -172,6 +197,7 @@ class ApparatusData:
     reference: StressProfile
     process: Process
     budget: Mapping[str, Mapping[str, float]]
+    other: OtherEstimate | None = None
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""

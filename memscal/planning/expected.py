@@ -67,6 +67,7 @@ def expected_calibration(plan: Plan, method: Method) -> Expected:
         fields=fields,
         method=method,
         deconvolution=deconvolution,
+        other=None,
         gaussian_misfit=deconvolution.misfit,
     )
     return Expected(solution, _propagated(solution))

@@ -11,7 +11,7 @@ from memscal.calibration.stages import Misfit
 from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.model import records
-from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.apparatus import ApparatusData, OtherEstimate, ParameterSet
 from memscal.model.quantities import MM, PER_MM, measured_text, parameter_quantity
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -25,20 +25,67 @@ Calibrated: TypeAlias = Calibration | ApparatusData
 
 _IN_JSON = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "centre",
             "baseline")  # fmt: skip
+_OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm",
+               "noise_equivalent_area")  # fmt: skip
+#: Checks that a G that is Gaussian passes.
+_OF_GAUSSIAN = ("gaussian_misfit", "width_agreement")
 
 
 def tables(result: Calibrated) -> list[Table]:
     """Return the estimates with their standard uncertainties, and the quality checks."""
     apparatus = apparatus_of(result)
     rows = estimate_rows(apparatus.parameters, apparatus.resolved_wavenumber)
-    if method := apparatus.process.configuration.get("method"):
-        rows.insert(-1, ("method of division", "", str(method)))
+    if method := _method(apparatus):
+        rows.insert(-1, ("method", "", method))
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
         rows.append(("reconvolution with the deconvolved G", "", _misfit(misfit)))
         rows.append(("reconvolution with the Gaussian", "", _misfit(gaussian)))
-    title = f"{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
-    return [Table(title, ("", "", ""), rows), checks_table(apparatus.checks)]
+    title = f"{advice(apparatus)}\n{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
+    beside = [] if apparatus.other is None else [_other_table(apparatus.other)]
+    return [Table(title, ("", "", ""), rows), *beside, checks_table(apparatus.checks)]
+
+
+def advice(apparatus: ApparatusData) -> str:
+    """Return which A and which description of G to use, and why."""
+    parameters, method = apparatus.parameters, _method(apparatus)
+    failed = [c.name for c in apparatus.checks if c.name in _OF_GAUSSIAN and not c.passed]
+    which = (
+        f"its Gaussian of σ = {measured_text(parameters, 'gaussian_sigma')} suffices: the scan "
+        "shows no departure from it."
+        if not failed
+        else f"use G(r), for the Gaussian fails the check {' and '.join(failed)}."
+    ).replace("_", " ")
+    by = f" (method {method})" if method else ""
+    return f"Use A = {measured_text(parameters, 'conversion_constant')}{by}; {which}"
+
+
+def _method(apparatus: ApparatusData) -> str:
+    return str(apparatus.process.configuration.get("method") or "")
+
+
+def _other_table(other: OtherEstimate) -> Table:
+    """Return A and the widths of G by the route that was not chosen."""
+    parameters = other.parameters
+    quantities = {name: parameter_quantity(parameters, name) for name in parameters.names}
+    rows = [(q.words, q.symbol, measured_text(parameters, name)) for name, q in quantities.items()]
+    return Table(f"The same by method {other.method}, to compare", ("", "", ""), rows)
+
+
+def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
+    """Return A and the description of G by each method, and by the Gaussian alone."""
+    parameters, other = apparatus.parameters, apparatus.other
+    own = {name: parameter_json(parameters, name) for name in _OF_A_ROUTE if name in parameters}
+    estimates: dict[str, Any] = {_method(apparatus) or "chosen": own}
+    if other is not None:
+        names = other.parameters.names
+        estimates[other.method] = {name: parameter_json(other.parameters, name) for name in names}
+    if "conversion_constant_gaussian" in parameters:
+        estimates["gaussian"] = {
+            "conversion_constant": parameter_json(parameters, "conversion_constant_gaussian"),
+            "gaussian_sigma": parameter_json(parameters, "gaussian_sigma"),
+        }
+    return estimates
 
 
 def mapping(result: Calibrated) -> dict[str, Any]:
@@ -47,9 +94,10 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     parameters = apparatus.parameters
     values: dict[str, Any] = {
         "schema_version": "1",
-        "method": apparatus.process.configuration.get("method"),
+        "method": _method(apparatus) or None,
         **{name: parameter_json(parameters, name) for name in _IN_JSON if name in parameters},
         **members(records.TRANSFER.quantities[-1:], apparatus),
+        "estimates": _estimates_json(apparatus),
     }
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
