@@ -36,6 +36,8 @@ _POWERS = {
     "wavenumber": {"rad/m": 0, "rad/mm": 3, "1/m": 0, "1/mm": 3},
     "voltage per length": {"V/m": 0, "mV/mm": 0},
     "angle": {"rad": 0},
+    "energy": {"J": 0},
+    "stress per length": {"MPa/mm": 9},
     "dimensionless": {"1": 0, "": 0},
 }
 _CANONICAL = {

@@ -215,7 +215,7 @@ STRESS_NUMBERS = record(
     Quantity("lubrication", "text", "dry or lubricated"),
     *measured(Quantity("force", "force", "total force", "F", required=True)),
     *measured(Quantity("maximum", _P, "maximum of S_zz", "S", required=True)),
-    *measured(Quantity("centre", _L, "centre along x", "x₀", required=True), required=True),
+    *measured(Quantity("centre", _L, "centre", "x₀", required=True), required=True),
     *measured(Quantity("centre_y", _L, "centre along y", "y₀")),
     *measured(Quantity("baseline", _U, "baseline", "U₀", required=True), required=True),
     Quantity("contact_radius", _L, "contact radius", "a", required=True),

@@ -193,5 +193,5 @@ def test_a_normal_compliance_is_found_where_it_is_the_truth() -> None:
 
 
 def test_nothing_measured_is_refused() -> None:
-    with pytest.raises(InputError, match="No measured profile"):
+    with pytest.raises(InputError, match="measured profiles, but none"):
         compare_interface([], None, macroscopic=1.6)

@@ -182,7 +182,7 @@ def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
     ({"resolved": 3.8e3}, "repeats"),
     ({"A": 0.018, "sigma": 0.028}, "repeats"),
 ])  # fmt: skip
-def test_what_is_found_reaches_the_wish_and_one_less_does_not(want, vary) -> None:
+def test_what_is_found_reaches_the_target_and_one_less_does_not(want, vary) -> None:
     found = memscal.design(noise=0.01, want=want, vary=vary)
     less = {
         "step": {"step": 2 * found.plan.half_range / (found.plan.positions - 2)},
@@ -211,21 +211,21 @@ def reaches(planned: Design, want: dict[str, float]) -> bool:
     ({"resolved": 20e3}, "half_range", "best is a resolved wavenumber"),
     ({"resolved": 4e3, "step": 1e-3}, "repeats", r"step of 1 mm samples no more than 3\.142"),
 ])  # fmt: skip
-def test_a_wish_out_of_reach_names_the_best_and_what_stands_in_the_way(want, vary, told) -> None:
+def test_a_target_out_of_reach_names_the_best_and_what_stands_in_the_way(want, vary, told) -> None:
     step = want.pop("step", 0.25e-3)
     with pytest.raises(FitError, match=told):
         memscal.design(step=step, want=want, vary=vary)
 
 
 @pytest.mark.parametrize(("want", "vary", "told"), [
-    ({"colour": 0.01}, "step", "'colour', which is no target"),
+    ({"colour": 0.01}, "step", "'colour', which is no known target"),
     ({"sigma": 0.0}, "step", "above zero"),
     ({"sigma": float("nan")}, "step", "above zero"),
     ({"sigma": 0.01}, "weather", "'weather', which cannot be varied"),
     ({"sigma": 0.01}, None, "something to vary"),
     ({}, "step", "something to vary"),
 ])  # fmt: skip
-def test_a_wish_that_is_none_is_refused(want, vary, told) -> None:
+def test_a_target_that_is_none_is_refused(want, vary, told) -> None:
     with pytest.raises(InputError, match=told):
         memscal.design(want=want, vary=vary)
 
