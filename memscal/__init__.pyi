@@ -59,6 +59,7 @@ from .mechanics.interface import NormalLaw as NormalLaw
 from .mechanics.surface import FilmField as FilmField
 from .model.apparatus import ApparatusField as ApparatusField
 from .model.apparatus import ApparatusRadial as ApparatusRadial
+from .model.apparatus import OtherEstimate as OtherEstimate
 from .model.apparatus import ParameterSet as ParameterSet
 from .model.apparatus import Reconvolution as Reconvolution
 from .model.apparatus import TransferFunction as TransferFunction

@@ -228,10 +228,15 @@ def _require_determined(estimate: ProfileEstimate) -> None:
         )
 
 
-def outlier_weights(standardised: FloatArray, threshold: float) -> FloatArray:
-    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
+def outlier_weights(
+    standardised: FloatArray, threshold: float, least: float = np.finfo(float).tiny
+) -> FloatArray:
+    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3.
+
+    The residuals count in robust standard deviations of their own, of ``least`` or more.
+    """
     scale = 1.4826 * np.median(np.abs(standardised))
-    z = np.abs(standardised) / max(scale, np.finfo(float).tiny)
+    z = np.abs(standardised) / max(scale, least)
     return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))
 
 

@@ -12,7 +12,8 @@ minimises
 Its one parameter :math:`\lambda` maximises the restricted likelihood of the voltages (Wahba, Ann.
 Stat. 13 (1985) 1378).  The curvature of what a film transmits falls off as its stress does, so
 that :math:`\rho` is the inverse square of the reference's own profile.  Beyond the last point R the
-profile goes on as the reference's decay, with the amplitude of the outer quarter of the points.
+profile goes on as the film's own decay, that of the reference: its amplitude is fitted with the
+spline, whose logarithmic slope at R is that of the reference.
 
 For given centre, weights and :math:`\lambda` the result is linear in the voltages.
 """
@@ -34,15 +35,19 @@ from memscal.model.arrays import FloatArray
 #: Order of the derivative that is penalised; the spline is of degree 2 m - 1.
 _ORDER = 3
 _DEGREE = 2 * _ORDER - 1
-#: Intervals of the spline, at most: finer ones than the scan's step show nothing.
-_MOST_INTERVALS = 400
+#: Intervals of the spline: so many for each step of the scan, and at most.
+_PER_STEP, _MOST_INTERVALS = 2, 400
+#: Error of a spline, relative to the largest voltage: what it leaves of a scan without noise.
+_FLOOR_OF_NOISE = 5e-6
 #: The reference's profile counts as no less than this share of its maximum.
 _FLOOR = 0.01
-#: The tail is fitted to the points beyond this share of the reach.
-_OUTER = 0.75
+#: Weight of the spline itself beside its third derivative, in units of the scan's step.
+_NEXT_TO_NOTHING = 1e-6
 #: Nodes of the quadrature in each interval.
 _NODES = 8
 _ROUNDS = 4
+#: Residuals of less than this share of the noise show no outliers.
+_LEAST_SCALE = 0.5
 #: A residual is divided by the root of what its own point leaves free, at least this.
 _LEAST_FREEDOM = 0.05
 #: Misfit of a scan without noise, relative to its signal.
@@ -71,7 +76,9 @@ class SmoothedProfile:
     @cached_property
     def noise(self) -> FloatArray:
         """Standard uncertainty of each component of the transform from noise, in V m^2/N."""
-        return np.asarray(np.linalg.norm(self.gain @ self.estimate.noise_root, axis=1))
+        floor = _FLOOR_OF_NOISE * float(np.abs(self.signal).max())
+        electronic = np.sum((self.gain @ self.estimate.noise_root) ** 2, axis=1)
+        return np.asarray(np.sqrt(electronic + floor**2 * np.sum(self.gain**2, axis=1)))
 
 
 def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
@@ -136,7 +143,7 @@ def _fitted(
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     points, load = estimate.points, estimate.points.load[rows]
     y = (points.u - estimate.background)[rows] / load
-    stated = (estimate.weights / estimate.outlier_weight)[rows] * load**2
+    stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
     spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
     weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
     for _ in range(_ROUNDS):
@@ -144,7 +151,7 @@ def _fitted(
         predicted = spline.design @ (gain @ y)
         own = np.einsum("ij,ji->i", spline.design, gain)
         left = (y - predicted) * np.sqrt(stated / np.clip(1 - own, _LEAST_FREEDOM, 1.0))
-        updated = outlier_weights(left, threshold)
+        updated = outlier_weights(left, threshold, _LEAST_SCALE)
         threshold = OUTLIER_THRESHOLD
         if np.allclose(updated, weight, atol=0.02):
             break
@@ -156,17 +163,15 @@ def _fitted(
 class _RadialSpline:
     """Even splines on [0, R], continued by the reference's tail."""
 
-    design: FloatArray  # (n, m + 1): splines at the points; the last column is the tail's
-    penalty: FloatArray  # (m, m)
-    transform: FloatArray  # (k, m + 1): their transforms
-    outer: NDArray[np.bool_]  # (n,): which points the amplitude of the tail is fitted to
-    tail: FloatArray  # (n,): the reference's profile at the points
+    design: FloatArray  # (n, m): splines at the points
+    root: FloatArray  # (m, m): triangular root of the penalty
+    transform: FloatArray  # (k, m): transforms of the splines
 
     @classmethod
     def through(cls, radius: FloatArray, reference: RadialSpectrum, step: float) -> _RadialSpline:
         """Place the splines for points at radii (m), ``step`` apart."""
         reach = float(radius.max()) * (1 + 1e-9)
-        intervals = int(np.clip(np.ceil(reach / step), _DEGREE, _MOST_INTERVALS))
+        intervals = int(np.clip(np.ceil(_PER_STEP * reach / step), _DEGREE, _MOST_INTERVALS))
         knots = np.linspace(0.0, reach, intervals + 1)
         basis = _even_splines(knots)
         nodes, weights = gauss_between(knots, _NODES)
@@ -176,67 +181,54 @@ class _RadialSpline:
             (reference.wavenumbers.weights * reference.wavenumbers.k * reference.values)
             @ j1(reference.wavenumbers.k * reach)
         )
-        # At R a spline and its slope are those of the tail.
-        ends = np.vstack([basis(np.array([reach]), 0), step * basis(np.array([reach]), 1)])
-        _, _, rotation = np.linalg.svd(ends)
-        free = rotation[2:].T
-        tied = np.linalg.pinv(ends) @ np.array([end, step * slope])
-        columns = np.column_stack([free, tied])
+        # At R a spline has the logarithmic slope of the tail, which goes on from there.
+        ending = basis(np.array([reach]), 0)
+        tied = step * (end * basis(np.array([reach]), 1) - slope * ending)
+        free = np.linalg.svd(tied)[2][1:].T
         curved = basis(nodes, _ORDER) * step**_ORDER
         # The curvature of what the film transmits falls off as its stress does.
         rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
-        roughness = (curved * (weights * rho)[:, None]).T @ curved
+        # What no penalty holds, a parabola, is held by next to nothing.
+        rows = np.vstack([curved, _NEXT_TO_NOTHING * basis(nodes, 0)]) @ free
+        rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
         bessel = 2 * np.pi * j0(np.multiply.outer(reference.wavenumbers.k, nodes)) * weights * nodes
-        transform = bessel @ basis(nodes, 0) @ columns
-        transform[:, -1] += reference.values - bessel @ stress[:-2]
-        return cls(
-            design=basis(radius, 0) @ columns,
-            penalty=free.T @ roughness @ free,
-            transform=transform,
-            outer=radius >= _OUTER * reach,
-            tail=reference.at(radius),
-        )
+        beyond = (reference.values - bessel @ stress[:-2]) / end
+        transform = (bessel @ basis(nodes, 0) + np.outer(beyond, ending)) @ free
+        return cls(basis(radius, 0) @ free, np.linalg.qr(rows, mode="r"), transform)
 
     def gain(self, y: FloatArray, weight: FloatArray) -> FloatArray:
-        """Return derivatives of the coefficients by values y, shape (m + 1, n)."""
-        weighted = self.tail * np.where(self.outer, weight, 0.0)
-        amplitude = weighted / (weighted @ self.tail)
-        free, tied = self.design[:, :-1], self.design[:, -1]
-        left = np.eye(y.size) - np.outer(tied, amplitude)
+        """Return derivatives of the coefficients by values y, shape (m, n)."""
+        from scipy.linalg import solve_triangular
+
         root = np.sqrt(weight)
-        design = root[:, None] * free
-        normal = design.T @ design
-        right = design.T @ (root * (left @ y))
-        total = float((root * (left @ y)) @ (root * (left @ y)))
-        smoothing = _restricted_likelihood(normal, self.penalty, right, total, y.size)
-        gain = np.linalg.solve(normal + smoothing * self.penalty, design.T * root) @ left
-        return np.vstack([gain, amplitude])
+        design = solve_triangular(self.root, (root[:, None] * self.design).T, trans="T").T
+        left, values, right = np.linalg.svd(design, full_matrices=False)
+        data = root * y
+        smoothing = _restricted_likelihood(values, left.T @ data, float(data @ data), y.size)
+        filtered = (values / (values**2 + smoothing))[:, None] * (left.T * root)
+        return np.asarray(solve_triangular(self.root, right.T @ filtered))
 
 
-def _restricted_likelihood(
-    normal: FloatArray, penalty: FloatArray, right: FloatArray, total: float, count: int
-) -> float:
-    """Return the smoothing parameter of the largest restricted likelihood, its noise free."""
-    from scipy.linalg import cho_factor, cho_solve
+def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, count: int) -> float:
+    """Return the smoothing parameter of the largest restricted likelihood, its noise free.
+
+    ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
+    the voltages along their vectors; ``total``: sum of the squares of all ``count``.
+    """
     from scipy.optimize import minimize_scalar
 
-    scale = float(np.trace(normal) / np.trace(penalty))
+    squares, power = values**2, data**2
 
     def loss(log_smoothing: float) -> float:
-        smoothing = scale * float(np.exp(log_smoothing))
-        try:
-            factor = cho_factor(normal + smoothing * penalty, lower=True)
-        except np.linalg.LinAlgError:
-            return np.inf
-        misfit = max(total - float(right @ cho_solve(factor, right)), _LEAST * total)
-        log_determinant = 2 * float(np.log(np.diag(factor[0])).sum())
-        return count * float(np.log(misfit)) + log_determinant - len(penalty) * log_smoothing
+        smoothing = squares[0] * np.exp(log_smoothing)
+        kept = squares / (squares + smoothing)
+        misfit = max(total - float(power @ kept), _LEAST * total)
+        return float(count * np.log(misfit) + np.log1p(squares / smoothing).sum())
 
-    grid = np.arange(-30.0, 31.0, 2.0)
-    losses = [loss(place) for place in grid]
-    best = float(grid[int(np.argmin(losses))])
-    found = minimize_scalar(loss, bounds=(best - 2.0, best + 2.0), method="bounded")
-    return scale * float(np.exp(found.x))
+    grid = np.arange(-80.0, 11.0, 1.0)
+    best = float(grid[int(np.argmin([loss(place) for place in grid]))])
+    found = minimize_scalar(loss, bounds=(best - 1.0, best + 1.0), method="bounded")
+    return float(squares[0] * np.exp(found.x))
 
 
 def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:

@@ -6,9 +6,7 @@ from helpers.scans import CONVERSION, RING, SIGMA, TAILS, estimated, plane_error
 from scipy.stats import multivariate_normal
 
 import memscal
-from memscal.axisymmetry.grids import EvenGrid
 from memscal.axisymmetry.hankel import Wavenumbers
-from memscal.deconvolution.division import DivisionProblem, create_regulariser
 from memscal.errors import InputError
 from memscal.estimation.bayesian import HYPOTHESES, SHAPES, Rings
 from memscal.estimation.profile import constrained_profile
@@ -112,17 +110,14 @@ def test_a_ring_is_no_falling_profile_and_its_constrained_fit_misses_the_scan() 
     assert residual[falling] > residual[free]
 
 
-def test_the_method_needs_a_scan_and_says_so() -> None:
-    grid = EvenGrid(9, 1e-3)
-    field = np.ones((9, 9))
-    with pytest.raises(InputError, match="without the scan"):
-        create_regulariser("bayesian").divide(DivisionProblem(grid, field, field, 1.0, 1.0))
-
-
-def test_the_method_leaves_nothing_to_a_window() -> None:
+def test_the_method_divides_no_fields_and_has_no_window() -> None:
+    r = np.linspace(0.0, 6e-3, 61)
+    field = memscal.lift(r, np.exp(-((r / 1e-3) ** 2)), 0.1e-3, 8e-3)
+    with pytest.raises(InputError, match="divides no fields"):
+        memscal.divide(field, field, weakest=1e-9, method="bayesian")
     apparatus = memscal.calibrate(simulated(), method="bayesian").apparatus
     assert np.all(apparatus.transfer.window == 1.0)
-    assert apparatus.budget["gaussian_sigma_deconvolved"]["window"] == 0.0
+    assert "window" not in apparatus.budget["gaussian_sigma_deconvolved"]
     assert apparatus.gaussian_sigma == pytest.approx(SIGMA, rel=0.1)
     assert apparatus.conversion_constant == pytest.approx(CONVERSION, rel=0.05)
 
