@@ -246,22 +246,36 @@ class Results:
 
 
 @dataclass(frozen=True, eq=False)
-class _Rows:
-    """Derivatives of all results: of the parameters, then G at its radii, then the transfer."""
+class _Derivatives:
+    """Derivatives of results, one row each, and what the regularisation hides of them."""
 
-    names: tuple[str, ...]  # of the parameters
-    values: FloatArray
     by_voltage: FloatArray  # (m, n)
     by_state: FloatArray  # (m, p): by the posterior's parameters, beside what voltages do to them
-    hidden: FloatArray | None = None  # (m, q): columns of what window and smoothing hide
+    hidden: FloatArray  # (m, q): columns
+
+    def __getitem__(self, rows: slice) -> _Derivatives:
+        return _Derivatives(self.by_voltage[rows], self.by_state[rows], self.hidden[rows])
+
+    def combined(self, row: FloatArray) -> _Derivatives:
+        """Derivatives of a sum of the results."""
+        parts = (self.by_voltage, self.by_state, self.hidden)
+        return _Derivatives(*((row @ part)[None, :] for part in parts))
 
     def columns(self, estimate: ProfileEstimate) -> dict[str, FloatArray]:
-        """Contributions of the scan itself."""
-        own = {
+        """Contributions of the scan to the uncertainties, by source."""
+        return {
             "noise": self.by_voltage @ estimate.noise_root,
             "regularisation": self.by_state @ _fixed_root(estimate),
+            "window": self.hidden,
         }
-        return own if self.hidden is None else own | {"window": self.hidden}
+
+
+def _stacked(parts: Sequence[_Derivatives]) -> _Derivatives:
+    return _Derivatives(
+        np.vstack([part.by_voltage for part in parts]),
+        np.vstack([part.by_state for part in parts]),
+        np.vstack([part.hidden for part in parts]),
+    )
 
 
 def propagate(
@@ -272,34 +286,40 @@ def propagate(
     correlations: Mapping[tuple[str, str], float],
 ) -> Results:
     """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
-    estimate = solution.estimate
-    rows = _rows(solution, deconvolution, wavenumbers)
+    estimate, radii = solution.estimate, deconvolution.g.r.size
+    kernel = _kernel_derivatives(solution, deconvolution, wavenumbers)
+    numbers = _numbers(estimate, deconvolution, kernel)
+    names = tuple(numbers)
+    values = np.array([value for value, _ in numbers.values()])
+    rows = _stacked([*(derivatives for _, derivatives in numbers.values()), kernel[1:]])
     columns = rows.columns(estimate)
     independent = list(columns.values())
-    columns |= {name: _input_column(rows, effect) for name, effect in effects.items()}
+    scaled = [name.startswith("conversion_constant") for name in names]
+    for source, effect in effects.items():
+        column = rows.by_voltage @ effect.voltage
+        column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
+        columns[source] = column[:, None]
     if effects:
         together = np.hstack([columns[name] for name in effects])
         independent.append(together @ _root(correlation_matrix(list(effects), correlations)))
     everything = np.hstack(independent)
-    count = len(rows.names)
-    radial = slice(count, count + deconvolution.g.r.size)
-    stored = everything[: radial.stop] @ everything[: radial.stop].T
-    scatter = [columns["noise"][radial], *([independent[-1][radial]] if effects else [])]
+    count, stop = len(names), len(names) + radii
+    stored = everything[:stop] @ everything[:stop].T
+    scatter = [columns["noise"], *(independent[-1:] if effects else [])]
     return Results(
-        parameters=ParameterSet(rows.names, rows.values, stored[:count, :count]),
-        budget={name: _budget(rows, columns, stored, name) for name in BUDGETED},
+        parameters=ParameterSet(names, values, stored[:count, :count]),
+        budget={name: _budget(names.index(name), columns, stored) for name in BUDGETED},
         radial_covariance=stored[count:, count:],
         cross_covariance=stored[count:, :count],
-        transfer_errors=np.linalg.norm(everything[radial.stop :], axis=1),
-        radial_scatter=np.linalg.norm(np.hstack(scatter), axis=1),
+        transfer_errors=np.linalg.norm(everything[stop:], axis=1),
+        radial_scatter=np.linalg.norm(np.hstack(scatter)[count:stop], axis=1),
     )
 
 
 def _budget(
-    rows: _Rows, columns: Mapping[str, FloatArray], covariance: FloatArray, name: str
+    row: int, columns: Mapping[str, FloatArray], covariance: FloatArray
 ) -> dict[str, float]:
     """Contribution of each source; of correlations with the sign of what they add."""
-    row = rows.names.index(name)
     budget = {source: float(np.linalg.norm(column[row])) for source, column in columns.items()}
     variance = float(covariance[row, row])
     excess = variance - sum(u**2 for u in budget.values())
@@ -308,57 +328,93 @@ def _budget(
     return budget
 
 
-def _input_column(rows: _Rows, effect: InputEffect) -> FloatArray:
-    column = rows.by_voltage @ effect.voltage
-    scales = np.array([name.startswith("conversion_constant") for name in rows.names])
-    column[: scales.size] += np.where(scales, rows.values, 0.0) * effect.scaling
-    return np.asarray(column[:, None])
-
-
-def _rows(solution: Solution, deconvolution: Deconvolution, wavenumbers: FloatArray) -> _Rows:
-    """Derivatives of the results of either route."""
-    estimate, smoothed = solution.estimate, solution.smoothed
-    a, g = deconvolution.conversion_constant, deconvolution.g
-    functionals = kernel_functionals(g, deconvolution.gaussian_sigma)
-    if deconvolution.divided and smoothed is not None:
-        division = _division_map(solution, smoothed, deconvolution, wavenumbers)
-        kernel = _divided_kernel(estimate, division)
-    else:
-        kernel = _posterior_kernel(estimate, deconvolution, wavenumbers)
-    read = np.stack([functional.row for functional in functionals])
-    of_kernel = ("conversion_constant", *(functional.name for functional in functionals))
-    values = dict(zip(of_kernel, (a, *(f.value for f in functionals)), strict=True))
-    blocks = {
-        name: np.vstack([block[:1], read @ block[1 : 1 + g.r.size]])
-        for name, block in kernel.items()
+def _numbers(
+    estimate: ProfileEstimate, deconvolution: Deconvolution, kernel: _Derivatives
+) -> dict[str, tuple[float, _Derivatives]]:
+    """Value and derivatives of each parameter, in the order in which they are reported."""
+    of_g = kernel[1 : 1 + deconvolution.g.r.size]
+    functionals = kernel_functionals(deconvolution.g, deconvolution.gaussian_sigma)
+    hidden = kernel.hidden.shape[1]
+    return {
+        "conversion_constant": (deconvolution.conversion_constant, kernel[:1]),
+        **_gaussian_numbers(estimate, hidden),
+        **{f.name: (f.value, of_g.combined(f.row)) for f in functionals},
+        **_nuisances(estimate, hidden),
     }
-    fitted = _fitted_rows(estimate)
-    names = _order(of_kernel, tuple(fitted))
-    shapes = {"by_voltage": estimate.points.u.size, "by_state": estimate.basis.integrals.size}
-    stacked = {}
-    for block, of_numbers in blocks.items():
-        rows = dict(zip(of_kernel, of_numbers, strict=True))
-        for name, (value, by_voltage, by_state) in fitted.items():
-            values[name] = value
-            rows[name] = {"by_voltage": by_voltage, "by_state": by_state}.get(
-                block, np.zeros(of_numbers.shape[1])
-            )
-        stacked[block] = np.vstack([*(rows[name] for name in names), kernel[block][1:]])
-    assert all(stacked[block].shape[1] == size for block, size in shapes.items())
-    return _Rows(names, np.array([values[name] for name in names]), **stacked)
 
 
-def _order(of_kernel: tuple[str, ...], fitted: tuple[str, ...]) -> tuple[str, ...]:
-    """Parameters in the order in which they are reported."""
-    first, *others = of_kernel
-    sigma, *ellipse = (name for name in fitted if name.startswith(("gaussian_sigma", "ellip")))
-    nuisances = [name for name in fitted if name not in (sigma, *ellipse)]
-    return (first, sigma, *ellipse, *others, *nuisances)
+def _fitted(
+    estimate: ProfileEstimate, row: FloatArray, state: FloatArray | None, hidden: int
+) -> _Derivatives:
+    """Derivatives of a parameter that no regularisation touches."""
+    states = np.zeros(estimate.basis.integrals.size) if state is None else state
+    return _Derivatives(row[None, :], states[None, :], np.zeros((1, hidden)))
+
+
+def _gaussian_numbers(
+    estimate: ProfileEstimate, hidden: int
+) -> dict[str, tuple[float, _Derivatives]]:
+    """Width and ellipticity: a round departure beside an ellipse would be read as less of both."""
+    gaussian, gain = estimate.gaussian, estimate.gaussian_gain
+    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1], None, hidden))}
+    first = estimate.basis.flat - estimate.points.ellipse
+    for i, name in enumerate(("ellipticity", "ellipticity_diagonal")[: estimate.points.ellipse]):
+        derivatives = _fitted(estimate, gain[first + i], None, hidden)
+        numbers[name] = (float(gaussian.ellipticity[i]), derivatives)
+    return numbers
+
+
+def _nuisances(estimate: ProfileEstimate, hidden: int) -> dict[str, tuple[float, _Derivatives]]:
+    """Centre, baseline and drift of each scan (of the second ``_2``), and the Gaussian's A."""
+    free, states = estimate.points.free, estimate.basis.integrals.size
+    entries = [
+        (("centre", "centre_y")[axis] + _number(scan), 1.0) for scan, axis in np.argwhere(free)
+    ]
+    for scan, directions in enumerate(free):
+        # The drift is stated across the whole range; its coefficient spans half of it.
+        along = [("drift", "drift_y")[axis] for axis in np.flatnonzero(directions)]
+        entries += [("baseline" + _number(scan), 1.0), *((n + _number(scan), 2.0) for n in along)]
+    values = np.concatenate([estimate.centres[free], estimate.drifts])
+    gain = estimate.weighed.gain
+    numbers = {
+        name: (
+            scale * float(values[i]),
+            _fitted(estimate, scale * gain[2 + i], scale * _unit(states, 2 + i), hidden),
+        )
+        for i, (name, scale) in enumerate(entries)
+    }
+    gaussian = _fitted(estimate, estimate.gaussian_gain[0], None, hidden)
+    numbers["conversion_constant_gaussian"] = (estimate.gaussian.conversion_constant, gaussian)
+    return numbers
+
+
+def _number(scan: int) -> str:
+    return "" if scan == 0 else f"_{scan + 1}"
+
+
+def _kernel_derivatives(
+    solution: Solution, deconvolution: Deconvolution, wavenumbers: FloatArray
+) -> _Derivatives:
+    """Derivatives of A, G at its radii and its transfer function by either route."""
+    estimate, smoothed = solution.estimate, solution.smoothed
+    if not deconvolution.divided or smoothed is None:
+        return _posterior_kernel(estimate, deconvolution, wavenumbers)
+    division = _division_map(solution, smoothed, deconvolution, wavenumbers)
+    # Centre, baseline and drift are parameters of the estimate.
+    by_nuisance = -division.direct @ division.nuisance
+    by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
+    by_state[:, division.places] = by_nuisance
+    spread = division.lost[:, 1:] @ _root(estimate.covariance)
+    return _Derivatives(
+        by_voltage=division.direct + by_nuisance @ estimate.weighed.gain[division.places],
+        by_state=by_state,
+        hidden=np.hstack([division.lost[:, :1], spread]),
+    )
 
 
 def _posterior_kernel(
     estimate: ProfileEstimate, deconvolution: Deconvolution, wavenumbers: FloatArray
-) -> dict[str, FloatArray]:
+) -> _Derivatives:
     """Derivatives of A, G and its transfer function, by the posterior's parameters."""
     basis, k = estimate.basis, estimate.model.k
     a, r = deconvolution.conversion_constant, deconvolution.g.r
@@ -367,7 +423,7 @@ def _posterior_kernel(
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
     transfer = _interpolated(wavenumbers, k, normalised)
     rows = np.vstack([basis.integrals, radial, transfer])
-    return {"by_voltage": rows @ estimate.weighed.gain, "by_state": rows}
+    return _Derivatives(rows @ estimate.weighed.gain, rows, np.zeros((len(rows), 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -423,20 +479,6 @@ def _division_map(
     )
 
 
-def _divided_kernel(estimate: ProfileEstimate, division: _DivisionMap) -> dict[str, FloatArray]:
-    """Derivatives of A, G and its transfer function by division, and what it hides of them."""
-    # Centre, baseline and drift are parameters of the estimate.
-    by_nuisance = -division.direct @ division.nuisance
-    by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
-    by_state[:, division.places] = by_nuisance
-    spread = division.lost[:, 1:] @ _root(estimate.covariance)
-    return {
-        "by_voltage": division.direct + by_nuisance @ estimate.weighed.gain[division.places],
-        "by_state": by_state,
-        "hidden": np.hstack([division.lost[:, :1], spread]),
-    }
-
-
 def route_difference(solution: Solution) -> float | None:
     r"""Difference of division and Bayesian estimate beyond what the division hides, over its size.
 
@@ -470,46 +512,6 @@ def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) ->
     left = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
     share = np.clip((places - nodes[left]) / (nodes[left + 1] - nodes[left]), 0.0, 1.0)[:, None]
     return np.asarray((1 - share) * columns[left] + share * columns[left + 1])
-
-
-def _fitted_rows(
-    estimate: ProfileEstimate,
-) -> dict[str, tuple[float, FloatArray, FloatArray]]:
-    """Value and derivatives (by voltages, by the posterior's parameters) of what is fitted."""
-    gaussian, states = estimate.gaussian, estimate.basis.integrals.size
-    none, fit, gain = np.zeros(states), estimate.gaussian_gain, estimate.weighed.gain
-    rows: dict[str, tuple[float, FloatArray, FloatArray]] = {
-        "gaussian_sigma": (gaussian.sigma, fit[1], none)
-    }
-    # The Gaussian's ellipticity: a round departure beside it would be read as less of both.
-    first = estimate.basis.flat - estimate.points.ellipse
-    for i, name in enumerate(("ellipticity", "ellipticity_diagonal")[: estimate.points.ellipse]):
-        rows[name] = (float(gaussian.ellipticity[i]), fit[first + i], none)
-    for i, (name, value, scale) in enumerate(_nuisances(estimate), start=2):
-        rows[name] = (value, scale * gain[i], scale * _unit(states, i))
-    rows["conversion_constant_gaussian"] = (gaussian.conversion_constant, fit[0], none)
-    return rows
-
-
-def _nuisances(estimate: ProfileEstimate) -> list[tuple[str, float, float]]:
-    """Centre, baseline and drift of each scan, with their scale; of the second ending in ``_2``."""
-    free = estimate.points.free
-    centres = [("centre", "centre_y")[axis] + _number(scan) for scan, axis in np.argwhere(free)]
-    entries = [
-        (name, float(value), 1.0)
-        for name, value in zip(centres, estimate.centres[free], strict=True)
-    ]
-    drifts: list[tuple[str, float]] = []
-    for scan, directions in enumerate(free):
-        # The drift is stated across the whole range; its coefficient spans half of it.
-        along = [("drift", "drift_y")[axis] for axis in np.flatnonzero(directions)]
-        drifts += [("baseline" + _number(scan), 1.0), *((n + _number(scan), 2.0) for n in along)]
-    pairs = zip(drifts, estimate.drifts, strict=True)
-    return entries + [(name, scale * float(value), scale) for (name, scale), value in pairs]
-
-
-def _number(scan: int) -> str:
-    return "" if scan == 0 else f"_{scan + 1}"
 
 
 def _unit(count: int, index: int) -> FloatArray:

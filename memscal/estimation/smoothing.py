@@ -194,7 +194,7 @@ class _RadialSpline:
         bessel = 2 * np.pi * j0(np.multiply.outer(reference.wavenumbers.k, nodes)) * weights * nodes
         beyond = (reference.values - bessel @ stress[:-2]) / end
         transform = (bessel @ basis(nodes, 0) + np.outer(beyond, ending)) @ free
-        return cls(basis(radius, 0) @ free, np.linalg.qr(rows, mode="r"), transform)
+        return cls(basis(radius, 0) @ free, np.asarray(np.linalg.qr(rows)[1]), transform)
 
     def gain(self, y: FloatArray, weight: FloatArray) -> FloatArray:
         """Return derivatives of the coefficients by values y, shape (m, n)."""
