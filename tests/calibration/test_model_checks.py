@@ -81,7 +81,7 @@ def test_the_bayes_factor_favours_a_gaussian_that_is_one() -> None:
 def test_meanings_speak_of_the_method_that_was_used(method: str) -> None:
     found = checks(simulated(), method=method)
     text = " ".join(check.meaning for check in found.values())
-    assert ("division of the fields" in text) == (method == "white-noise")
+    assert ("width of G by division of the fields" in text) == (method == "white-noise")
     assert ("posterior mean" in text) == (method == "bayesian")
     assert all("failure means" in check.meaning for check in found.values())
 
