@@ -421,8 +421,11 @@ def calibrate(
         ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
         by method ``"bayesian"``; see docs/tangential.md.
     method : str or Regulariser, default "white-noise"
-        How the fields are divided; see :func:`memscal.deconvolution.division.regulariser_names`.
-        ``"bayesian"`` divides none: it takes G from the scan's points, and is the most accurate.
+        Whose A and G the result has.  ``"white-noise"``, the paper's, divides the field of the
+        smoothed voltages, and follows all that the resolved band shows;
+        :func:`memscal.deconvolution.division.regulariser_names` lists other divisions.
+        ``"bayesian"`` takes A and G from the scan's points: the smaller error, for friction.
+        Both routes are computed: ``.apparatus.other`` is the estimate by the other one.
     correlations : mapping of (str, str) to float, optional
         Correlation coefficients of the inputs' errors, such as
         ``{("thickness", "poisson_ratio"): 0.5}``.

@@ -234,7 +234,7 @@ class BudgetComparison:
     symmetric: tuple[float, float]  # coverage intervals of 95 %
     shortest: tuple[float, float]
     first_order: float  # the budget's standard uncertainty by noise and inputs
-    stated: float  # the same with what regularisation hides
+    stated: float  # the same with what regularisation and window hide
     reason: str = ""  # why draws and budget do not agree, or empty
 
     @property
@@ -493,9 +493,9 @@ def _messages(
     if hidden:
         yield Message(
             "regularisation",
-            "Not all of the stated uncertainty scatters: of its square, what regularisation hides "
-            f"makes up {', '.join(hidden)}. It is the same error in every draw, so it is counted, "
-            "but not drawn; the comparison is with the rest.",
+            "Not all of the stated uncertainty scatters: of its square, what regularisation or "
+            f"window hides makes up {', '.join(hidden)}. It is the same error in every draw, so it "
+            "is counted, but not drawn; the comparison is with the rest.",
         )
     if (calibration.solution.estimate.outlier_weight < OUTLIER_WEIGHT).any():
         yield Message("outlier", "Outliers keep their distance from the prediction in every draw.")

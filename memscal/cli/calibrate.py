@@ -191,10 +191,11 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "SCAN.xz.apparatus.h5."
 )
 @option("--method", metavar="NAME", shell_complete=_complete_method)(
-    "How G is found: bayesian (from the scan's points, the most accurate), or by a division "
-    "of fields: white-noise (its exact expectation), white-noise-draw (one "
-    "seeded draw, as published), tikhonov, wiener, unsupervised-wiener, richardson-lucy, or a "
-    "plug-in's.  [default: white-noise]"
+    "Whose A and G are written: bayesian (from the scan's points: the more precise, for "
+    "friction), or a division of the smoothed voltages by the stress: white-noise (the paper's, "
+    "as its exact expectation), white-noise-draw (one seeded draw, as published), tikhonov, "
+    "wiener, unsupervised-wiener, richardson-lucy, or a plug-in's. The other of bayesian and "
+    "division is computed, too, and stands beside it.  [default: white-noise]"
 )
 @option("--option options", multiple=True, metavar="NAME=VALUE")(
     "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
@@ -242,9 +243,10 @@ def command(
 ) -> int:
     """Find a sensor's apparatus function from a rod scan, or from several of one sensor.
 
-    Divides the scan's field by the stress that the rod makes at the base of the film, and writes
-    the conversion constant A (mV/Pa), the apparatus function G (1/mm^2, unit integral), both
-    Gaussian widths (mm), their standard uncertainties, and quality checks to an artifact.
+    Smooths the scan's voltages, divides their field by the stress that the rod makes at the base
+    of the film, and writes the conversion constant A (mV/Pa), the apparatus function G (1/mm^2,
+    unit integral), both Gaussian widths (mm), their standard uncertainties, and quality checks to
+    an artifact. A and G are those of the method; the first line states which to use.
 
     Several scans, at other loads, with other rods or films, are fitted together: A and G are
     shared, and each scan has its own centre and baseline.

@@ -3,7 +3,8 @@ r"""Methods of division, for the paper's :math:`A\hat G = \hat U_{zz}/\hat\sigma
 Both transforms vanish at large wavenumbers, and methods differ in their quotient there: by a
 window on the spectra (the paper's white noise, Tikhonov's), or by the restoration of an image
 (:mod:`memscal.deconvolution.scikit_image`).  Other packages add methods under an entry point.
-Method ``bayesian`` divides nothing (:mod:`memscal.estimation.bayesian`).
+The voltage is the measured one, smoothed (:mod:`memscal.estimation.smoothing`).  Method
+``bayesian`` divides nothing (:mod:`memscal.estimation.bayesian`).
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class DivisionProblem:
     grid: FieldGrid
     voltage: FloatArray  # lifted voltage per newton, in V/N
     reference: FloatArray  # lifted base stress per newton, in 1/m^2
-    # Moduli of the fields' transforms where the voltage's is ten times its noise, V m^2/N and 1.
+    # Moduli of the fields' transforms where the voltage's is 15 times its noise, V m^2/N and 1.
     weakest_voltage: float
     weakest_reference: float
 
