@@ -14,6 +14,7 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
+from memscal.calibration.drawn_scatter import draw_count, drawn_scatter, is_linear
 from memscal.calibration.stages import Solution, field_noise, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
@@ -157,8 +158,6 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     )
 
 
-#: Methods that are a fixed window or none: their uncertainties are complete to first order.
-_WINDOWS = ("white-noise", "tikhonov", "bayesian")
 #: Relative difference below which two lengths or ratios are the same.
 _SAME = 1e-6
 
@@ -220,13 +219,14 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
 
 
 def _method(solution: Solution) -> list[Message]:
-    """Return what the uncertainty leaves out where the method is no fixed window."""
+    """Return where the uncertainty comes from if the method is no window of the stress alone."""
     regulariser = solution.regulariser
-    if regulariser.name in _WINDOWS:
+    if is_linear(regulariser):
         return []
     text = (
-        f"Method {regulariser.name}: uncertainties are first-order through its effective window, "
-        f"without its own scatter. {regulariser.fails}"
+        f"Method {regulariser.name}: what noise adds to the uncertainties is the scatter of "
+        f"{draw_count(solution)} repeated draws, its own random numbers included. "
+        f"{regulariser.fails}"
     )
     return [Message("method", text)]
 
@@ -499,6 +499,7 @@ def uncertainties(
 ) -> Results:
     """Propagate noise and inputs through a calibration's steps."""
     wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
+    drawn = drawn_scatter(solution)
     return propagate(
         solution.estimate,
         solution.deconvolution,
@@ -506,5 +507,6 @@ def uncertainties(
         wavenumbers,
         effects,
         correlations,
-        field_noise(solution, wavenumbers),
+        field_noise(solution, wavenumbers) if drawn is None else None,
+        drawn,
     )

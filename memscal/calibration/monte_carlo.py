@@ -15,8 +15,9 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from memscal.axisymmetry.hankel import RadialSpectrum, radial_spline
+from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.calibration.calibrate import Calibration, uncertainties
+from memscal.calibration.drawn_scatter import on_radii
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import (
     BUDGETED,
@@ -171,9 +172,8 @@ class DrawnScans:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
         first = self.solution
         solution = solve(scans, first.stresses, first.regulariser, first.estimate.points.channel)
-        result, radii = solution.deconvolution, first.deconvolution.g.r
-        r, g = result.g.r, result.g.radial
-        g = np.where(radii <= r[-1], radial_spline(r, g)(np.minimum(radii, r[-1])), 0.0)
+        result = solution.deconvolution
+        g = on_radii(result.g, first.deconvolution.g.r)
         numbers = (f.value for f in kernel_functionals(result.g, result.gaussian_sigma))
         sigma = solution.estimate.gaussian.sigma
         return np.array([result.conversion_constant, sigma, *numbers, *g])

@@ -236,6 +236,16 @@ class Results:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnScatter:
+    """Columns of m draws less their mean over sqrt(m - 1): their squares add up to variances."""
+
+    voltages: FloatArray  # (n, m): of the measured points, in V
+    parameters: Mapping[str, FloatArray]  # (m,): of each number that the division decides, in SI
+    radial: FloatArray  # (p, m): of G at its radii, in 1/m^2
+    transfer: FloatArray  # (q, m): of the transfer function at the grid's wavenumbers
+
+
+@dataclass(frozen=True, eq=False)
 class _Rows:
     """Derivatives by (w, f) of the parameters, G and the transfer function, and what is hidden."""
 
@@ -260,12 +270,14 @@ def propagate(
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
     raster: FieldNoise | None = None,
+    drawn: DrawnScatter | None = None,
 ) -> Results:
     """Propagate all stated uncertainties: ``window`` at the nodes, ``wavenumbers`` in rad/m."""
     rows = _rows(estimate, deconvolution, window, wavenumbers)
     random, fixed = _noise_roots(estimate)
+    noise = rows.matrix @ random
     columns = {
-        "noise": rows.matrix @ random,
+        "noise": noise if drawn is None else _drawn_columns(rows, estimate, noise, drawn),
         "regularisation": rows.matrix @ fixed,
         "window": rows.hidden[:, None],
     }
@@ -280,7 +292,7 @@ def propagate(
     everything = np.hstack(independent)
     stored = everything[: rows.stored] @ everything[: rows.stored].T
     count = len(rows.names)
-    scatter = [rows.opened @ random[: rows.opened.shape[1]]]
+    scatter = [rows.opened @ random[: rows.opened.shape[1]] if drawn is None else drawn.radial]
     if effects:
         moved = estimate.weighed.gain @ np.stack([e.voltage for e in effects.values()], axis=1)
         scatter.append(rows.opened @ moved @ joined)
@@ -423,6 +435,22 @@ def _raster_columns(rows: _Rows, deconvolution: Deconvolution, raster: FieldNois
     columns[count : rows.stored, inner] = raster.radial
     columns[rows.stored :, inner.stop :] = np.diag(raster.transfer)
     return columns
+
+
+def _drawn_columns(
+    rows: _Rows, estimate: ProfileEstimate, noise: FloatArray, drawn: DrawnScatter
+) -> FloatArray:
+    """Scatter of repeated draws in place of the first-order noise of what the division decides."""
+    gain = np.vstack([estimate.weighed.gain, estimate.gaussian_gain])
+    columns = rows.matrix @ (gain @ drawn.voltages)
+    # What no division decides keeps its size to first order, and is correlated as the draws are.
+    size = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
+    columns *= (np.linalg.norm(noise, axis=1) / size)[:, None]
+    for name, column in drawn.parameters.items():
+        columns[rows.names.index(name)] = column
+    columns[len(rows.names) : rows.stored] = drawn.radial
+    columns[rows.stored :] = drawn.transfer
+    return np.asarray(columns)
 
 
 def _unit(count: int, index: int) -> FloatArray:
