@@ -158,6 +158,8 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     )
 
 
+#: Methods whose window is that of the stress's transform: nothing is left to say of them.
+_WINDOWS = ("white-noise", "tikhonov", "bayesian")
 #: Relative difference below which two lengths or ratios are the same.
 _SAME = 1e-6
 
@@ -219,16 +221,17 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
 
 
 def _method(solution: Solution) -> list[Message]:
-    """Return where the uncertainty comes from if the method is no window of the stress alone."""
+    """Return where the uncertainty comes from if the method is no plain window."""
     regulariser = solution.regulariser
-    if is_linear(regulariser):
+    if regulariser.name in _WINDOWS:
         return []
-    text = (
-        f"Method {regulariser.name}: what noise adds to the uncertainties is the scatter of "
-        f"{draw_count(solution)} repeated draws, its own random numbers included. "
-        f"{regulariser.fails}"
-    )
-    return [Message("method", text)]
+    way = "uncertainties are first-order through its effective window"
+    if not is_linear(regulariser):
+        way = (
+            f"what noise adds to the uncertainties is the scatter of {draw_count(solution)} draws "
+            "of the voltages and of its own random numbers"
+        )
+    return [Message("method", f"Method {regulariser.name}: {way}. {regulariser.fails}")]
 
 
 def _reference(solution: Solution) -> list[Message]:

@@ -347,10 +347,7 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
     k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)) / a)
     power = k * modulus**2
     end = max(solution.band.resolved, solution.band.relevant, 2 / estimate.gaussian.sigma)
-    cause = (
-        "the method of division failed on this scan: take method white-noise or bayesian, or more "
-        "regularisation"
-    )
+    cure = "take method white-noise or bayesian, or more regularisation"
     return [
         check(
             "shape_width",
@@ -358,14 +355,14 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
             _SHAPE_WIDTH_LIMIT,
             "Full width at half maximum of the deconvolved G over that of a Gaussian, of the one "
             "fitted to the scan or the one nearest to G, or the inverse, whichever is largest. A "
-            f"failure means that G is a spike or has several lobes, as when {cause}.",
+            f"failure means that G is a spike, or has lobes far out: {cure}.",
         ),
         check(
             "shape_negative",
             float(-share[share < 0].sum() / np.abs(share).sum()),
             _NEGATIVE_LIMIT,
             "Share of the integral of |G| over its support where G is negative. A failure means "
-            f"that G consists of ripples, as when {cause}.",
+            f"that G consists of ripples: {cure}.",
         ),
         check(
             "shape_roughness",
@@ -373,7 +370,7 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
             _ROUGHNESS_LIMIT,
             f"Share of the power of G at wavenumbers beyond {_BEYOND * end * 1e-3:.3g} rad/mm, "
             f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
-            f"noise, as when {cause}.",
+            f"noise: {cure}.",
         ),
     ]
 

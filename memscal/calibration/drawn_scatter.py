@@ -34,9 +34,9 @@ from memscal.estimation.profile import ProfileEstimate
 from memscal.model.arrays import FloatArray
 
 #: Draws: their standard deviation is known to 1/sqrt(2 n), 10 % for 50.  Restorations of large
-#: images take fewer, by the number of pixels, so that they take 2 to 4 s: 16 of 361 by 361.
+#: images take fewer, by the number of pixels, so that they take 1 to 4 s: 12 of 361 by 361.
 _MOST, _FEWEST = 50, 12
-_PIXELS = 2.1e6
+_PIXELS = 1.6e6
 _LINEAR = (WhiteNoise, Tikhonov, Wiener, Bayesian)
 
 
