@@ -227,9 +227,10 @@ def _method(solution: Solution) -> list[Message]:
         return []
     way = "uncertainties are first-order through its effective window"
     if not is_linear(regulariser):
+        own = " and of its own random numbers" if hasattr(regulariser, "seed") else ""
         way = (
             f"what noise adds to the uncertainties is the scatter of {draw_count(solution)} draws "
-            "of the voltages and of its own random numbers"
+            f"of the voltages{own}"
         )
     return [Message("method", f"Method {regulariser.name}: {way}. {regulariser.fails}")]
 

@@ -359,7 +359,7 @@ def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
         ),
         check(
             "shape_negative",
-            float(-share[share < 0].sum() / np.abs(share).sum()),
+            float(np.maximum(-share, 0.0).sum() / np.abs(share).sum()),
             _NEGATIVE_LIMIT,
             "Share of the integral of |G| over its support where G is negative. A failure means "
             f"that G consists of ripples: {cure}.",

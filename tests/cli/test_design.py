@@ -58,7 +58,7 @@ def test_wrong_use_is_told_before_anything_is_computed(run: Run, arguments, told
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
-    (["--want", "colour=1%", "--vary", "step"], "no target that is known"),
+    (["--want", "colour=1%", "--vary", "step"], "no known target"),
     (["--step", 4], "positions"),
     (["--half-range", 2, "--centre", 3], "not passed over"),
     (["--half-range", 0.8, "--step", 0.1, "--noise", 1], "not distinct from zero"),
