@@ -14,6 +14,7 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
+from memscal.calibration.drawn_scatter import draw_count, drawn_scatter, is_linear
 from memscal.calibration.stages import Deconvolution, Solution, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
@@ -183,7 +184,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     )
 
 
-#: Methods that are a fixed window or none: their uncertainties are complete to first order.
+#: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
 #: Relative difference below which two lengths or ratios are the same.
 _SAME = 1e-6
@@ -246,15 +247,18 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
 
 
 def _method(solution: Solution) -> list[Message]:
-    """Return what the uncertainty leaves out where the method is no fixed window."""
+    """Return where the uncertainty comes from if the method is no plain window."""
     method = solution.method
     if method.name in _WINDOWS:
         return []
-    text = (
-        f"Method {method.name}: uncertainties are first-order through its effective window, "
-        f"without its own scatter. {method.fails}"
-    )
-    return [Message("method", text)]
+    way = "uncertainties are first-order through its effective window"
+    if not is_linear(method):
+        own = " and of its own random numbers" if hasattr(method, "seed") else ""
+        way = (
+            f"what noise adds to the uncertainties is the scatter of {draw_count(solution)} draws "
+            f"of the voltages{own}"
+        )
+    return [Message("method", f"Method {method.name}: {way}. {method.fails}")]
 
 
 def _reference(solution: Solution) -> list[Message]:
@@ -532,4 +536,5 @@ def uncertainties(
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
-    return propagate(solution, deconvolution, wavenumbers, effects, correlations)
+    drawn = drawn_scatter(solution) if deconvolution is solution.deconvolution else None
+    return propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)

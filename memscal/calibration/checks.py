@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Misfit, Solution
 from memscal.calibration.uncertainty import route_difference
@@ -240,6 +241,13 @@ _FORCE_LIMIT = 0.01
 _WIDTH_LIMIT = 3.0
 #: Exceeded once in a thousand simulated scans (tests/accuracy/test_division.py).
 _ROUTES_LIMIT = 3.5
+#: Full width of a Gaussian at half of its maximum, over its standard deviation.
+_HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
+#: By simulation, docs/quality.md: beyond sound results, in which G may be a disc or a ring.
+_SHAPE_WIDTH_LIMIT = 2.5
+_NEGATIVE_LIMIT = 0.4
+_ROUGHNESS_LIMIT = 0.1
+_BEYOND = 1.5
 _NEGLIGIBLE_DIFFERENCE = 0.002
 
 
@@ -249,6 +257,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
         *_reconvolutions(solution),
         *_constraint(solution),
         *_agreements(solution, parameters),
+        *_shape(solution, parameters),
         *_set_up(solution),
         *_reference_and_outliers(solution),
         *model_checks(solution.estimate),
@@ -326,6 +335,44 @@ def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityChe
         "it is read off. Look at both reconvolutions.",
     )
     return [*routes, width]
+
+
+def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
+    """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
+    estimate, deconvolution = solution.estimate, solution.deconvolution
+    a, g, fields = deconvolution.conversion_constant, deconvolution.g, solution.fields
+    widths = ("gaussian_sigma", "gaussian_sigma_deconvolved")
+    ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in widths]
+    share = ring_areas(g.r) * g.radial
+    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)) / a)
+    power = k * modulus**2
+    end = max(solution.band.resolved, solution.band.relevant, 2 / estimate.gaussian.sigma)
+    cure = "take method white-noise or bayesian, or more regularisation"
+    return [
+        check(
+            "shape_width",
+            max(max(ratio, 1 / ratio) for ratio in ratios),
+            _SHAPE_WIDTH_LIMIT,
+            "Full width at half maximum of the deconvolved G over that of a Gaussian, of the one "
+            "fitted to the scan or the one nearest to G, or the inverse, whichever is largest. A "
+            f"failure means that G is a spike, or has lobes far out: {cure}.",
+        ),
+        check(
+            "shape_negative",
+            float(np.maximum(-share, 0.0).sum() / np.abs(share).sum()),
+            _NEGATIVE_LIMIT,
+            "Share of the integral of |G| over its support where G is negative. A failure means "
+            f"that G consists of ripples: {cure}.",
+        ),
+        check(
+            "shape_roughness",
+            float(power[k > _BEYOND * end].sum() / power.sum()),
+            _ROUGHNESS_LIMIT,
+            f"Share of the power of G at wavenumbers beyond {_BEYOND * end * 1e-3:.3g} rad/mm, "
+            f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
+            f"noise: {cure}.",
+        ),
+    ]
 
 
 def _set_up(solution: Solution) -> list[QualityCheck]:

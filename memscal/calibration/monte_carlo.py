@@ -15,8 +15,9 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from memscal.axisymmetry.hankel import RadialSpectrum, radial_spline
+from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.calibration.calibrate import Calibration, uncertainties
+from memscal.calibration.drawn_scatter import on_radii
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import (
     BUDGETED,
@@ -172,9 +173,8 @@ class DrawnScans:
         first = self.solution
         channel = first.estimate.points.channel
         solution = solve(scans, first.stresses, first.method, channel, both=False)
-        result, radii = solution.deconvolution, first.deconvolution.g.r
-        r, g = result.g.r, result.g.radial
-        g = np.where(radii <= r[-1], radial_spline(r, g)(np.minimum(radii, r[-1])), 0.0)
+        result = solution.deconvolution
+        g = on_radii(result.g, first.deconvolution.g.r)
         numbers = (f.value for f in kernel_functionals(result.g, result.gaussian_sigma))
         sigma = solution.estimate.gaussian.sigma
         return np.array([result.conversion_constant, sigma, *numbers, *g])

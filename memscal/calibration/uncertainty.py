@@ -246,6 +246,16 @@ class Results:
 
 
 @dataclass(frozen=True, eq=False)
+class DrawnScatter:
+    """Columns of m draws less their mean over sqrt(m - 1): their squares add up to variances."""
+
+    voltages: FloatArray  # (n, m): of the measured points, in V
+    parameters: Mapping[str, FloatArray]  # (m,): of each number that the division decides, in SI
+    radial: FloatArray  # (p, m): of G at its radii, in 1/m^2
+    transfer: FloatArray  # (q, m): of the transfer function at the grid's wavenumbers
+
+
+@dataclass(frozen=True, eq=False)
 class _Derivatives:
     """Derivatives of results, one row each, and what the regularisation hides of them."""
 
@@ -284,6 +294,7 @@ def propagate(
     wavenumbers: FloatArray,
     effects: Mapping[str, InputEffect],
     correlations: Mapping[tuple[str, str], float],
+    drawn: DrawnScatter | None = None,
 ) -> Results:
     """Propagate all stated uncertainties to a deconvolution, with its transfer at wavenumbers."""
     estimate, radii = solution.estimate, deconvolution.g.r.size
@@ -293,6 +304,8 @@ def propagate(
     values = np.array([value for value, _ in numbers.values()])
     rows = _stacked([*(derivatives for _, derivatives in numbers.values()), kernel[1:]])
     columns = rows.columns(estimate)
+    if drawn is not None:
+        columns["noise"] = _drawn_columns(rows, names, columns["noise"], drawn)
     independent = list(columns.values())
     scaled = [name.startswith("conversion_constant") for name in names]
     for source, effect in effects.items():
@@ -512,6 +525,21 @@ def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) ->
     left = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
     share = np.clip((places - nodes[left]) / (nodes[left + 1] - nodes[left]), 0.0, 1.0)[:, None]
     return np.asarray((1 - share) * columns[left] + share * columns[left + 1])
+
+
+def _drawn_columns(
+    rows: _Derivatives, names: tuple[str, ...], noise: FloatArray, drawn: DrawnScatter
+) -> FloatArray:
+    """Scatter of repeated draws in place of the first-order noise of what the division decides."""
+    columns = rows.by_voltage @ drawn.voltages
+    # What no division decides keeps its size to first order, and is correlated as the draws are.
+    size = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
+    columns *= (np.linalg.norm(noise, axis=1) / size)[:, None]
+    for name, column in drawn.parameters.items():
+        columns[names.index(name)] = column
+    stop = len(names) + len(drawn.radial)
+    columns[len(names) : stop], columns[stop:] = drawn.radial, drawn.transfer
+    return np.asarray(columns)
 
 
 def _unit(count: int, index: int) -> FloatArray:

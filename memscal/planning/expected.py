@@ -13,6 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from memscal.calibration.drawn_scatter import drawn_scatter
 from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import Results, input_effects, propagate
@@ -99,7 +100,8 @@ def _propagated(solution: Solution) -> Results:
     estimate, deconvolution = solution.estimate, solution.deconvolution
     effects = input_effects(solution.scans, solution.stresses, estimate)
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
-    return propagate(solution, deconvolution, wavenumbers, effects, {})
+    drawn = drawn_scatter(solution)
+    return propagate(solution, deconvolution, wavenumbers, effects, {}, drawn)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

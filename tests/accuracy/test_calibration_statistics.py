@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL, cramer_rao, root_mean_square_limit
 from helpers.peers import tuned_wiener
-from helpers.scans import CONVERSION, SIGMA, plane_error, simulated
-from scipy.stats import chi2
+from helpers.scans import CONVERSION, RING, SIGMA, TAILS, plane_error, simulated
+from scipy.stats import binom, chi2
 
 import memscal
+from memscal.model.checks import FALSE_ALARM
 
 pytestmark = pytest.mark.accuracy
 
@@ -118,3 +119,35 @@ def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
         deviates.append([(p[n] - truth) / p.uncertainty(n) for n, truth in truths.items()])
     scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
     assert (scatter < root_mean_square_limit(1.15, len(seeds), CHANCE)).all()
+
+
+@pytest.mark.parametrize("method", ["white-noise", "bayesian", "tikhonov", "wiener"])
+def test_the_shape_of_a_sound_g_passes(method: str) -> None:
+    kernels = [RING, TAILS, memscal.SmoothedDisc(radius=0.6e-3, sigma=0.25e-3)]
+    failures = 0
+    for seed in range(SEEDS):
+        scan = simulated(kernel=kernels[seed % 3], noise=NOISES[seed % 2 + 1], seed=seed)
+        checks = memscal.calibrate(scan, method=method).apparatus.checks
+        failures += not all(check.passed for check in checks if check.name.startswith("shape_"))
+    assert failures <= binom.isf(CHANCE, SEEDS, FALSE_ALARM)
+
+
+@pytest.mark.parametrize("method", ["white-noise-draw", "unsupervised-wiener", "richardson-lucy"])
+def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated(method: str) -> None:
+    count, radii, values, stated = 20 if FULL else 8, np.linspace(0, 2e-3, 9), [], []
+    kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
+    for seed in range(count):
+        scan = simulated(kernel=kernel, noise=0.01, points=33, seed=seed)
+        apparatus = memscal.calibrate(scan, method=method, seed=seed).apparatus
+        names = ("conversion_constant", "noise_equivalent_area")
+        values.append([*(apparatus.parameters[n] for n in names), *apparatus.radial(radii)])
+        u_g = apparatus.radial_uncertainty(radii)
+        stated.append([*(apparatus.budget[n]["noise"] for n in names), *u_g])
+        # Half or twice the truth is never stated as if it were right.
+        off = abs(np.log2(apparatus.parameters["fwhm"] / (2.355 * 0.9e-3))) > 1
+        assert not (off and apparatus.passed)
+    ratio = np.std(values, axis=0, ddof=1) / np.median(stated, axis=0)
+    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count - 1) / (count - 1))
+    # What is stated of G counts what every scan hides, too.
+    assert (ratio[:2] > low / 2).all()
+    assert (ratio < 2 * high).all()

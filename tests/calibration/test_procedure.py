@@ -206,8 +206,6 @@ def test_a_method_may_be_an_object_and_options_reach_it() -> None:
     assert named.process.configuration["options"] == {"amplitude": 2.0}
     with pytest.raises(InputError, match="set up already"):
         memscal.calibrate(scan, method=Tikhonov(), amplitude=2.0)
-    with pytest.raises(InputError, match="no method named magic"):
-        memscal.calibrate(scan, method="magic")
 
 
 def test_a_failed_check_marks_the_result_and_is_said_first() -> None:
@@ -257,9 +255,6 @@ def test_the_result_is_the_same_however_often_and_whatever_the_global_random_sta
     ({"method": 3}, "cannot divide"),
     ({"method": Tikhonov}, "that is set up"),
     ({"amplitude": "abc"}, "must be a positive number"),
-    ({"amplitude": -1.0}, "must be a positive number"),
-    ({"amplitude": float("nan")}, "must be a positive number"),
-    ({"method": "richardson-lucy", "iterations": 2.5}, "whole number"),
     ({"method": "white-noise-draw", "seed": -1}, "whole number"),
 ])  # fmt: skip
 def test_what_cannot_be_used_is_refused_in_words(arguments, words: str) -> None:
@@ -272,13 +267,26 @@ def test_positions_in_the_wrong_unit_fail_a_check() -> None:
     assert not check(memscal.calibrate(replace(scan, x=10 * scan.x)), "width_over_thickness").passed
 
 
-def test_a_draw_whose_width_went_astray_does_not_pass_for_good() -> None:
-    scan = simulated(noise=0.005)
-    for seed in range(12):
-        calibration = memscal.calibrate(scan, method="white-noise-draw", seed=seed)
-        parameters = calibration.apparatus.parameters
-        astray = abs(parameters["gaussian_sigma_deconvolved"] / SIGMA - 1) > 0.2
-        assert not (astray and calibration.passed)
+def shapely(scan: memscal.Scan, method: str, seed: int = 0) -> bool:
+    checks = memscal.calibrate(scan, method=method, seed=seed).apparatus.checks
+    passed = [c.passed for c in checks if c.name.startswith("shape_")]
+    assert len(passed) == 3
+    return all(passed)
+
+
+@pytest.mark.parametrize("kernel", [memscal.SmoothedDisc(radius=1e-3, sigma=0.3e-3), TAILS, RING])
+@pytest.mark.parametrize("method", ["white-noise", "bayesian", "tikhonov", "wiener"])
+def test_discs_tails_and_rings_have_a_sound_shape(method: str, kernel: memscal.RadialKernel):
+    # None of 3000 simulated scans failed; see docs/quality.md.
+    assert shapely(simulated(kernel=kernel, noise=0.01), method)
+
+
+@pytest.mark.parametrize("method", ["white-noise-draw", "unsupervised-wiener"])
+def test_ripples_and_spikes_are_no_sound_shape(method: str) -> None:
+    # All of 450 and 225 simulated scans failed, while A and the reconvolution were right.
+    kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
+    for seed in range(3):
+        assert not shapely(simulated(kernel=kernel, seed=seed), method, seed)
 
 
 def test_a_reference_for_another_film_or_rod_is_noticed() -> None:

@@ -1,6 +1,7 @@
 """Uncertainties against brute force, the budget's own sums, and the functionals of G(r)."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from helpers.scans import RING, SIGMA, TAILS, simulated
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.uncertainty import kernel_functionals
+from memscal.deconvolution.division import Division, DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
@@ -74,6 +76,25 @@ def test_noise_counts_in_proportion_and_the_window_closes_with_it() -> None:
 
 
 R = np.linspace(0.0, 8e-3, 97)
+
+
+class PlugIn:
+    """The division of method white-noise, as a plug-in of which nothing is known."""
+
+    name, assumes, fails = "plug-in", "", ""
+
+    def divide(self, problem: DivisionProblem) -> Division:
+        return WhiteNoise().divide(problem)
+
+
+def test_draws_of_a_linear_division_scatter_by_its_first_order_uncertainty() -> None:
+    scan = simulated(noise=0.01, kernel=memscal.GaussianMixture((1.0,), (0.9e-3,)))
+    drawn, linear = (memscal.calibrate(scan, method=m).apparatus for m in (PlugIn(), "white-noise"))
+    assert "the scatter of 34 draws" in "\n".join(map(str, drawn.process.messages))
+    alike = partial(np.testing.assert_allclose, rtol=4 / np.sqrt(2 * 34))
+    for name in (*PARAMETERS, "fwhm", "noise_equivalent_area"):
+        alike(drawn.budget[name]["noise"], linear.budget[name]["noise"])
+    alike(*(a.radial_uncertainty(R[R < 3e-3]) for a in (drawn, linear)))
 
 
 def functionals(g: FloatArray):

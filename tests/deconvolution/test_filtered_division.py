@@ -37,14 +37,6 @@ def random_problem(seed: int, grid: FieldGrid) -> tuple[DivisionProblem, FloatAr
 
 @pytest.mark.parametrize("grid", [EvenGrid(9, 0.5), small_lattice()], ids=["quarter", "lattice"])
 @given(seed=SEEDS)
-def test_an_open_window_undoes_a_convolution(grid: FieldGrid, seed: int) -> None:
-    problem, kernel = random_problem(seed, grid)
-    division = filtered_division(problem, np.ones_like(grid.wavenumber))
-    np.testing.assert_allclose(division.field, kernel, atol=1e-9)
-
-
-@pytest.mark.parametrize("grid", [EvenGrid(9, 0.5), small_lattice()], ids=["quarter", "lattice"])
-@given(seed=SEEDS)
 def test_a_window_scales_each_component_of_the_quotient(grid: FieldGrid, seed: int) -> None:
     problem, kernel = random_problem(seed, grid)
     window = np.exp(-grid.wavenumber / 5)
@@ -52,6 +44,8 @@ def test_a_window_scales_each_component_of_the_quotient(grid: FieldGrid, seed: i
     expected = window * grid.transfer(kernel)
     np.testing.assert_allclose(grid.transfer(division.field), expected, atol=1e-9)
     np.testing.assert_array_equal(division.window, window)
+    opened = filtered_division(problem, np.ones_like(window))
+    np.testing.assert_allclose(opened.field, kernel, atol=1e-9)
 
 
 def test_components_behind_a_closed_window_are_left_out_even_if_nothing_is_there() -> None:

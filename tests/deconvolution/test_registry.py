@@ -119,6 +119,7 @@ def test_a_calibration_runs_with_a_plug_in() -> None:
     ("wiener", {"amplitude": -1.0}),
     ("unsupervised-wiener", {"seed": -1}),
     ("richardson-lucy", {"iterations": 0}),
+    ("richardson-lucy", {"iterations": 2.5}),
     ("tikhonov", {"name": "x"}),
 ])  # fmt: skip
 def test_senseless_options_are_refused(name: str, options: dict[str, object]):

@@ -90,15 +90,6 @@ def test_more_steps_of_richardson_and_lucy_resolve_more(gaussians: Callable) -> 
     assert errors == sorted(errors, reverse=True)
 
 
-def test_the_unsupervised_sampler_repeats_with_its_seed(gaussians: Callable, seed: int) -> None:
-    problem = gaussians().problem
-    first, second, other = (
-        UnsupervisedWiener(seed=value).divide(problem).field for value in (seed, seed, seed + 1)
-    )
-    np.testing.assert_array_equal(first, second)
-    assert not np.array_equal(first, other)
-
-
 @pytest.mark.parametrize("regulariser", CLASSICAL, ids=named)
 def test_windows_lie_between_nothing_and_all(regulariser, on_each_grid) -> None:
     problem = on_each_grid().problem

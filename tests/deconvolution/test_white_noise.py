@@ -8,6 +8,7 @@ from scipy.stats import chi2, gamma
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice
 from memscal.deconvolution.division import DivisionProblem, WhiteNoise, WhiteNoiseDraw
+from memscal.deconvolution.scikit_image import UnsupervisedWiener
 
 RARE = 1e-9
 """Probability with which a correct program would fail one of the random tests here."""
@@ -136,13 +137,12 @@ def test_a_draw_on_a_quarter_plane_convolves_back_as_its_quotient_says(seed: int
     assert np.abs(back - problem.voltage).max() < 5e-4 * problem.voltage.max()
 
 
-def test_a_seed_gives_the_same_draw_and_another_seed_another(
-    gaussians: Callable, seed: int
-) -> None:
+@pytest.mark.parametrize("method", [WhiteNoiseDraw, UnsupervisedWiener])
+def test_a_seed_gives_the_same_draw_and_another_seed_another(method, gaussians, seed: int) -> None:
     problem = gaussians().problem
     before = np.random.get_state()[1].copy()  # noqa: NPY002
-    first = WhiteNoiseDraw(seed=seed).divide(problem).field
+    first = method(seed=seed).divide(problem).field
     np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
     np.random.seed(seed % 1000)  # noqa: NPY002  # the global state is what must not matter
-    np.testing.assert_array_equal(first, WhiteNoiseDraw(seed=seed).divide(problem).field)
-    assert not np.array_equal(first, WhiteNoiseDraw(seed=seed + 1).divide(problem).field)
+    np.testing.assert_array_equal(first, method(seed=seed).divide(problem).field)
+    assert not np.array_equal(first, method(seed=seed + 1).divide(problem).field)

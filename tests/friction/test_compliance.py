@@ -76,12 +76,16 @@ def test_more_freedom_is_charged_by_occams_factor() -> None:
     assert each.log_occam < one.log_occam < 0
 
 
-def test_a_rigid_interface_at_full_stick_gives_an_upper_bound_of_the_slip_length() -> None:
-    found = weighed("rigid", math.inf)
+@pytest.mark.parametrize(("compared", "bound"), [
+    (lambda: weighed("rigid", math.inf), 5e-6),
+    (lambda: normal(yielding(), 0.0), math.inf),
+])  # fmt: skip
+def test_a_rigid_interface_gives_an_upper_bound_of_the_length(compared, bound) -> None:
+    found = compared()
     assert not found.yielding_preferred
     assert found.length.value is None
     assert found.length.interval.low == 0
-    assert 0 < found.length.interval.high < 5e-6
+    assert 0 < found.length.interval.high < bound
     assert "upper bound" in found.length.reason
 
 
@@ -175,15 +179,6 @@ def test_the_bayes_factor_depends_on_the_prior_as_its_density_does() -> None:
 
 def normal(truth: ProfileFamily, value: float) -> LawComparison:
     return weigh_normal_compliance(measured(read_without_error(truth, value, PRECISE), yielding()))
-
-
-def test_a_rigid_lubricated_interface_gives_an_upper_bound() -> None:
-    found = normal(yielding(), 0.0)
-    assert not found.yielding_preferred
-    assert found.length.value is None
-    assert found.length.interval.low == 0
-    assert found.length.interval.high is not None
-    assert "upper bound" in found.length.reason
 
 
 def test_a_normal_compliance_is_found_where_it_is_the_truth() -> None:

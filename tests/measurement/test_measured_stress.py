@@ -217,14 +217,13 @@ def spoilt(row: int, columns: slice) -> Scan:
     return replace(scan, u_zz=u, source=SourceFile("gaps.h5", ""))
 
 
-def test_a_load_without_voltages_is_refused_by_its_name() -> None:
-    with pytest.raises(InputError, match=r"gaps\.h5, 0\.69 N, dry: all 33 points are missing"):
-        memscal.measure_stress(spoilt(1, slice(None)), SENSOR)
-
-
-def test_a_gap_of_a_contact_s_radius_is_refused_with_its_size_and_place() -> None:
-    with pytest.raises(InputError, match=r"1\.37 N, dry: 9 neighbouring points .* -2 to 2 mm"):
-        memscal.measure_stress(spoilt(2, slice(12, 21)), SENSOR)
+@pytest.mark.parametrize(("row", "columns", "words"), [
+    (1, slice(None), r"gaps\.h5, 0\.69 N, dry: all 33 points are missing"),
+    (2, slice(12, 21), r"1\.37 N, dry: 9 neighbouring points .* -2 to 2 mm"),
+])  # fmt: skip
+def test_a_gap_of_a_contact_s_radius_is_refused_with_its_place(row, columns, words) -> None:
+    with pytest.raises(InputError, match=words):
+        memscal.measure_stress(spoilt(row, columns), SENSOR)
 
 
 def test_a_few_missing_points_are_no_gap() -> None:

@@ -70,12 +70,9 @@ def test_a_film_that_ends_near_the_contact_is_softer() -> None:
     assert cut.depth > 1.005 * whole.depth
 
 
-def test_a_film_smaller_than_the_contact_is_refused() -> None:
+def test_a_film_ends_beyond_the_contact_and_by_hankel_transforms_nowhere() -> None:
     with pytest.raises(DomainError):
         indent(film(0.5), SPHERE, load=1.37, backend="fem", film_radius=1e-3)
-
-
-def test_by_hankel_transforms_a_film_has_no_end() -> None:
     with pytest.raises(InputError, match="a film has no end"):
         indent(film(0.5), SPHERE, load=1.37, film_radius=25e-3)
 

@@ -137,18 +137,15 @@ def test_loads_and_depths_that_are_not_positive_are_refused(name: str, value: fl
         indent(FILM, ROD, load=asked[0], depth=asked[1])
 
 
-def test_load_and_depth_together_or_neither_are_refused() -> None:
-    with pytest.raises(InputError, match="either a load or a depth, not both"):
-        indent(FILM, ROD, load=1.0, depth=1e-4)
-    with pytest.raises(InputError, match="either a load or a depth"):
-        indent(FILM, ROD)
-
-
-def test_a_rod_pushed_through_the_film_is_refused() -> None:
-    with pytest.raises(DomainError, match="sink"):
-        indent(FILM, ROD, depth=2e-3)
-    with pytest.raises(DomainError, match="sink"):
-        indent(FILM, ROD, load=10.0)
+@pytest.mark.parametrize(("asked", "error", "words"), [
+    ({"load": 1.0, "depth": 1e-4}, InputError, "either a load or a depth, not both"),
+    ({}, InputError, "either a load or a depth"),
+    ({"depth": 2e-3}, DomainError, "sink"),
+    ({"load": 10.0}, DomainError, "sink"),
+])  # fmt: skip
+def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words) -> None:
+    with pytest.raises(error, match=words):
+        indent(FILM, ROD, **asked)
 
 
 @pytest.mark.parametrize(("wrong", "message"), [

@@ -152,10 +152,7 @@ def test_a_path_through_a_compliant_interface_loses_work_in_every_cycle() -> Non
     (lambda: Interface(slip_length=math.nan), "slip length"),
     (lambda: ExponentialCompliance(decay_length=-1.0, reference_pressure=1.0), "decay length"),
     (lambda: ExponentialCompliance(decay_length=1.0, reference_pressure=0.0), "reference"),
-    (
-        lambda: GreenwoodTripp(roughness=1e-6, asperity_density=0.0, asperity_radius=1e-6),
-        "density",
-    ),
+    (lambda: GreenwoodTripp(roughness=1e-6, asperity_density=0.0, asperity_radius=1e-6), "density"),
 ])  # fmt: skip
 def test_laws_that_make_no_sense_are_refused(make: object, message: str) -> None:
     with pytest.raises(InputError, match=message):

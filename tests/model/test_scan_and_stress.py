@@ -53,11 +53,7 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
     ("line", {"normal_load_errors": np.ones(3)}, "normal_load_errors has shape"),
     ("line", {"normal_load_errors": np.full(33, -0.01)}, "negative or infinite"),
     ("line", {"normal_load_errors": np.full(33, np.inf)}, "negative or infinite"),
-    (
-        "line",
-        {"normal_load": None, "normal_load_errors": np.full(33, 0.02)},
-        "without normal_load",
-    ),
+    ("line", {"normal_load": None, "normal_load_errors": np.full(33, 0.02)}, "without normal_load"),
     ("line", {"lubrication": "wet"}, "lubrication of the scan is 'wet'"),
     ("line", {"lubrication": "dry", "lubricant": "glycerol"}, "'glycerol'.*is dry"),
     ("line", {"lubricant": "glycerol"}, "'glycerol'.*is not stated"),

@@ -29,12 +29,8 @@ def refused(check, *arguments) -> bool:
 
 
 @given(NUMBERS)
-def test_positive_means_finite_and_above_zero(value: float) -> None:
+def test_positive_means_above_zero_and_not_negative_zero_too_and_both_finite(value: float) -> None:
     assert refused(require_positive, "thickness", value) == (not 0 < value < math.inf)
-
-
-@given(NUMBERS)
-def test_not_negative_means_finite_and_zero_or_above(value: float) -> None:
     assert refused(require_non_negative, "roughness", value) == (not 0 <= value < math.inf)
 
 

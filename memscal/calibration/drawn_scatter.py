@@ -1,0 +1,151 @@
+"""Scatter of a calibration by repeated draws, for methods of division that are no linear window.
+
+The derivative of such a method's result by the voltages does not describe it: a restoration that
+is iterated or sampled, or one draw of the paper's noise.  The voltages are drawn anew about the
+estimate's prediction, at the adopted noise, and divided by the same method, with new random
+numbers of its own.  Profile, centre, baseline and width follow the voltages to first order, as they
+do for every method; band, grid and fields are made anew; the weights of the points are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import radial_spline
+from memscal.calibration.fields import choose_grid
+from memscal.calibration.stages import Solution, deconvolve, prepare_fields
+from memscal.calibration.uncertainty import DrawnScatter, kernel_functionals
+from memscal.deconvolution.division import (
+    Method,
+    Tikhonov,
+    WhiteNoise,
+    WhiteNoiseDraw,
+)
+from memscal.deconvolution.fourier_ratio import Field
+from memscal.deconvolution.scikit_image import Wiener
+from memscal.errors import FitError
+from memscal.estimation.band import find_band
+from memscal.estimation.bayesian import Bayesian
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.smoothing import smooth_profile
+from memscal.model.arrays import FloatArray
+
+#: Draws: their standard deviation is known to 1/sqrt(2 n), 10 % for 50.  Restorations of large
+#: images take fewer, by the number of pixels, so that they take 1 to 4 s: 12 of 361 by 361.
+_MOST, _FEWEST = 50, 12
+_PIXELS = 1.6e6
+_LINEAR = (WhiteNoise, Tikhonov, Wiener, Bayesian)
+
+
+def is_linear(method: Method) -> bool:
+    """Whether a method multiplies the quotient of the spectra by a window of the stress alone."""
+    return isinstance(method, _LINEAR)
+
+
+def drawn_scatter(
+    solution: Solution, draws: int | None = None, seed: int = 0
+) -> DrawnScatter | None:
+    """Repeat the division on drawn voltages; ``None`` for a linear method, which needs none."""
+    if is_linear(solution.method):
+        return None
+    count = draw_count(solution) if draws is None else draws
+    rng = np.random.default_rng([seed, count])
+    errors, results, failure = [], [], ""
+    for error, estimate, sigma in _drawn_estimates(solution.estimate, rng, count):
+        method = _reseeded(solution.method, int(rng.integers(2**32)))
+        try:
+            results.append(_divided(solution, estimate, sigma, method))
+        except FitError as problem:
+            failure = problem.problem
+            continue
+        errors.append(error)
+    if len(results) <= count // 2:
+        raise FitError(
+            f"Method {solution.method.name} fails on {count - len(results)} of {count} scans "
+            f"like this one. The last time: {failure}",
+            why="Its uncertainty is the scatter of repeated draws of the voltages.",
+            cure='Use method "white-noise" or "bayesian".',
+        )
+    parameters, radial, transfer = zip(*results, strict=True)
+    return DrawnScatter(
+        voltages=_columns(errors),
+        parameters={name: _columns([row[name] for row in parameters]) for name in parameters[0]},
+        radial=_columns(radial),
+        transfer=_columns(transfer),
+    )
+
+
+def draw_count(solution: Solution) -> int:
+    """Return how many draws the scatter of a solution is taken from."""
+    if isinstance(solution.method, WhiteNoiseDraw):
+        return _MOST
+    pixels = solution.fields.voltage.image.size
+    return int(np.clip(round(_PIXELS / pixels), _FEWEST, _MOST))
+
+
+def _columns(rows: Any) -> FloatArray:
+    """Draws (m, ...) less their mean over sqrt(m - 1), the draw as the last axis."""
+    values = np.array(rows)
+    return np.asarray(np.moveaxis(values - values.mean(axis=0), 0, -1) / np.sqrt(len(values) - 1))
+
+
+def _drawn_estimates(
+    estimate: ProfileEstimate, rng: np.random.Generator, count: int
+) -> Iterator[tuple[FloatArray, ProfileEstimate, float]]:
+    """Draw noise of the voltages (n,), in V; move estimate and width (m) with it to first order."""
+    model, fit, basis = estimate.model, estimate.gaussian, estimate.basis
+    kernels = basis.kernels(model.k)[:, basis.flat :]
+    design = np.hstack([fit.jacobian, model.signal(fit.geometry, kernels)])
+    predicted, root = estimate.predicted, estimate.noise_root
+    width_gain = estimate.gaussian_gain[1]
+    for _ in range(count):
+        error = root @ rng.standard_normal(predicted.size)
+        change = estimate.weighed.gain @ error
+        points = replace(model.points, u=predicted + error)
+        mean, residual = estimate.weighed.mean + change, error - design @ change
+        yield (
+            error,
+            replace(
+                estimate,
+                model=replace(model, points=points),
+                weighed=replace(estimate.weighed, mean=mean, residual=residual),
+            ),
+            fit.sigma + float(width_gain @ error),
+        )
+
+
+def _reseeded(method: Any, seed: int) -> Method:
+    """Return the method with other random numbers, if it draws any."""
+    seeded = is_dataclass(method) and hasattr(method, "seed")
+    drawn: Method = replace(method, seed=seed) if seeded else method
+    return drawn
+
+
+def _divided(
+    solution: Solution, estimate: ProfileEstimate, sigma: float, method: Method
+) -> tuple[dict[str, float], FloatArray, FloatArray]:
+    """Divide a draw: A and the numbers read off G, G at the solution's radii, and its transfer."""
+    smoothed = smooth_profile(estimate)
+    band = find_band(estimate, smoothed)
+    wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
+    fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
+    drawn = deconvolve(estimate, band, fields, method)
+    a = drawn.conversion_constant
+    parameters = {f.name: f.value for f in kernel_functionals(drawn.g, drawn.gaussian_sigma)}
+    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(drawn.quotient.values)) / a)
+    wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
+    return (
+        parameters | {"conversion_constant": a},
+        on_radii(drawn.g, solution.deconvolution.g.r),
+        np.interp(wavenumbers, k, modulus, right=0.0),
+    )
+
+
+def on_radii(g: Field, radii: FloatArray) -> FloatArray:
+    """Profile of a field at other radii (m), zero beyond its support."""
+    inside = np.minimum(radii, g.r[-1])
+    return np.where(radii <= g.r[-1], radial_spline(g.r, g.radial)(inside), 0.0)
