@@ -24,6 +24,8 @@ from memscal.calibration.uncertainty import (
     NOT_RANDOM,
     InputEffect,
     correlation_matrix,
+    drawn_about,
+    expected_values,
     kernel_functionals,
 )
 from memscal.errors import FitError, InputError, MemscalError
@@ -105,7 +107,7 @@ class DrawnScans:
         noise: FloatArray = rng.standard_normal(points.u.size)
         if points.decorrelation is not None:
             noise = np.asarray(np.linalg.solve(points.decorrelation, noise), dtype=float)
-        residual = points.u - self.solution.deconvolution.predicted
+        residual = points.u - drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise
         return [
@@ -125,7 +127,7 @@ class DrawnScans:
 
     def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
         """Voltages without noise (n,), in V: A G convolved with the stress of the true inputs."""
-        estimate, voltages = self.solution.estimate, self.solution.deconvolution.predicted
+        estimate, voltages = self.solution.estimate, drawn_about(self.solution)
         signal = voltages - estimate.background
         exact = {item.source for item in self.solved}
         for source, effect in self.effects.items():
@@ -228,6 +230,7 @@ class BudgetComparison:
 
     name: str
     value: float  # the calibration's
+    expected: float  # of the draws' mean, to first order
     mean: float  # of the draws, like the next four
     uncertainty: float  # standard deviation
     sampling_error: float  # standard uncertainty of ``uncertainty`` for the number of draws
@@ -383,8 +386,9 @@ def monte_carlo(
             cure="The scan is close to failing, too; measure with less noise.",
         )
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
+    expected = expected_values(solution)
     comparisons = tuple(
-        _compared(calibration, name, column, model.solved)
+        _compared(calibration, name, expected[name], column, model.solved)
         for name, column in zip(BUDGETED, samples.T, strict=True)
     )
     return MonteCarlo(
@@ -406,21 +410,26 @@ def monte_carlo(
 
 
 def _compared(
-    calibration: Calibration, name: str, column: FloatArray, solved: Sequence[SolvedInput]
+    calibration: Calibration,
+    name: str,
+    expected: float,
+    column: FloatArray,
+    solved: Sequence[SolvedInput],
 ) -> BudgetComparison:
     """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
     value, mean, spread = parameters[name], float(column.mean()), float(column.std(ddof=1))
     error, u = spread * _sampling_error(column), _random_part(budget)
     same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
-    same_mean = abs(mean - value) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
+    same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
     low, high = np.quantile(column, _TAILS)
     first, last = shortest_interval(column)
     agrees = same_spread and same_mean
-    reason = "" if agrees else _reason(spread, mean - value, u, budget, solved)
+    reason = "" if agrees else _reason(spread, mean - expected, u, budget, solved)
     return BudgetComparison(
         name=name,
         value=value,
+        expected=expected,
         mean=mean,
         uncertainty=spread,
         sampling_error=error,

@@ -329,6 +329,26 @@ def propagate(
     )
 
 
+def expected_values(solution: Solution) -> dict[str, float]:
+    """Parameters that scans about the posterior mean give on average, to first order.
+
+    A division follows the noise of its scan, of which scans drawn about the mean know nothing.
+    """
+    estimate, deconvolution = solution.estimate, solution.deconvolution
+    kernel = _kernel_derivatives(solution, deconvolution, np.zeros(0))
+    residual = estimate.points.u - drawn_about(solution)
+    return {
+        name: value - float(derivatives.by_voltage[0] @ residual)
+        for name, (value, derivatives) in _numbers(estimate, deconvolution, kernel).items()
+    }
+
+
+def drawn_about(solution: Solution) -> FloatArray:
+    """Voltages (n,), in V, about which scans are drawn: the prediction of the best estimate."""
+    divided = solution.deconvolution.divided
+    return solution.estimate.predicted if divided else solution.deconvolution.predicted
+
+
 def _budget(
     row: int, columns: Mapping[str, FloatArray], covariance: FloatArray
 ) -> dict[str, float]:

@@ -399,6 +399,7 @@ IMPLIED = (
 
 DRAWN = (
     Quantity("value", _COUNT, "value of the calibration"),
+    Quantity("expected", _COUNT, "expectation of the draws to first order"),
     Quantity("mean", _COUNT, "mean of the draws"),
     Quantity("uncertainty", _COUNT, "u of the draws", label="standard_uncertainty"),
     Quantity("sampling_error", _COUNT, "standard uncertainty of that"),
