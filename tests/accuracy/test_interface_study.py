@@ -38,12 +38,9 @@ SLIP_LENGTH = 16e-6
 _REACH = 12e-3
 
 PRECISE: dict[str, Any] = {
-    "noise": 0.001,
-    "record_loads": True,
-    "load_reading": 0.002,
-    "position_error": 2e-6,
+    "noise": 0.001, "record_loads": True, "load_reading": 0.002, "position_error": 2e-6,
     "repeats": 9,
-}
+}  # fmt: skip
 KINDS: dict[str, dict[str, Any]] = {
     "paper": {"noise": 0.003, "repeats": 3},
     "precise": PRECISE,

@@ -4,16 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import (
-    CENTRE,
-    CONVERSION,
-    EXACT_ROD,
-    RING,
-    TAILS,
-    added_ring,
-    estimated,
-    simulated,
-)
+from helpers.scans import RING, TAILS, added_ring, estimated, simulated
 
 import memscal
 from memscal.calibration.fields import LineFields, choose_grid
@@ -103,15 +94,3 @@ def test_repeats_and_both_sides_count_by_their_weights() -> None:
     unequal = replace(repeats, u_zz_errors=repeats.u_zz_errors * np.array([[1.0], [2.0]]))
     gain = smooth_profile(estimated(unequal)).gain
     np.testing.assert_allclose(gain[:, 65:], gain[:, :65] / 4, atol=1e-6 * np.abs(gain).max())
-
-
-def test_scans_with_rods_of_other_radii_are_joined() -> None:
-    rods = (EXACT_ROD, replace(EXACT_ROD, radius=0.5e-3))
-    scans = [simulated(rod=rod, noise=0.005, seed=i) for i, rod in enumerate(rods)]
-    together = memscal.calibrate(scans).apparatus
-    alone = [memscal.calibrate(scan).apparatus for scan in scans]
-    u = together.parameters.uncertainty("conversion_constant")
-    assert abs(together.conversion_constant - CONVERSION) < 3 * u
-    assert u < min(a.parameters.uncertainty("conversion_constant") for a in alone)
-    assert together.process.configuration["method"] == "white-noise"
-    assert pytest.approx(together.parameters["centre"], abs=0.02e-3) == CENTRE

@@ -44,17 +44,13 @@ def normal(law: str) -> Build:
     )
 
 
-@pytest.mark.parametrize(
-    ("build", "grid", "between"),
-    [
-        (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
-        (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
-        (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
-        (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
-        (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
-    ],
-    ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"],
-)
+@pytest.mark.parametrize(("build", "grid", "between"), [
+    (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
+    (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
+    (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
+    (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+    (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+], ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"])  # fmt: skip
 def test_interpolated_profiles_are_those_of_contacts_solved_between(build, grid, between) -> None:
     family = build(FILM, SPHERE, list(LOADS), list(grid))
     solved = build(FILM, SPHERE, list(LOADS), between)
