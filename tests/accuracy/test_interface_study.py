@@ -47,11 +47,9 @@ KINDS: dict[str, dict[str, Any]] = {
     "known": {**PRECISE, "load_uncertainty": 0.003},
 }
 KNOWN_FILM = replace(
-    PAPER_FILM,
-    young_modulus_uncertainty=0.005 * PAPER_FILM.young_modulus,
-    thickness_uncertainty=0.0025 * PAPER_FILM.thickness,
-    poisson_ratio_uncertainty=0.001,
-)
+    PAPER_FILM, young_modulus_uncertainty=0.005 * PAPER_FILM.young_modulus,
+    thickness_uncertainty=0.0025 * PAPER_FILM.thickness, poisson_ratio_uncertainty=0.001,
+)  # fmt: skip
 
 
 @lru_cache

@@ -51,11 +51,9 @@ def mixture(kernel: memscal.GaussianMixture) -> Callable[[float, int], Scan]:
 
 
 SENSORS = {
-    "Gaussian": mixture(memscal.GaussianMixture()),
-    "tails": mixture(TAILS),
-    "ring": mixture(RING),
+    "Gaussian": mixture(memscal.GaussianMixture()), "tails": mixture(TAILS), "ring": mixture(RING),
     "disc": disc,
-}
+}  # fmt: skip
 
 
 @lru_cache
@@ -68,15 +66,13 @@ def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
         runs = runs_test(residuals)
         same = int(np.sum(np.diff(residuals.sequence[residuals.independent[1]]) == 0))
         changes = round(same * (1 - runs.value))
-        rows.append(
-            {
-                "size": chi_square_test(residuals).p_value,
-                "runs": runs.p_value,
-                # A count's p-value moves in steps: spread evenly over its own, it is uniform.
-                "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
-                "neighbours": neighbour_correlation_test(residuals).p_value,
-            }
-        )
+        rows.append({
+            "size": chi_square_test(residuals).p_value,
+            "runs": runs.p_value,
+            # A count's p-value moves in steps: spread evenly over its own, it is uniform.
+            "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
+            "neighbours": neighbour_correlation_test(residuals).p_value,
+        })  # fmt: skip
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -113,12 +113,9 @@ def test_a_calibration_runs_with_a_plug_in() -> None:
 
 
 @pytest.mark.parametrize(("name", "options"), [
-    ("white-noise", {"amplitude": 0.0}),
-    ("white-noise-draw", {"amplitude": float("nan")}),
-    ("tikhonov", {"amplitude": "x"}),
-    ("wiener", {"amplitude": -1.0}),
-    ("unsupervised-wiener", {"seed": -1}),
-    ("richardson-lucy", {"iterations": 0}),
+    ("white-noise", {"amplitude": 0.0}), ("white-noise-draw", {"amplitude": float("nan")}),
+    ("tikhonov", {"amplitude": "x"}), ("wiener", {"amplitude": -1.0}),
+    ("unsupervised-wiener", {"seed": -1}), ("richardson-lucy", {"iterations": 0}),
     ("tikhonov", {"name": "x"}),
 ])  # fmt: skip
 def test_senseless_options_are_refused(name: str, options: dict[str, object]):

@@ -152,12 +152,9 @@ def test_a_rod_pushed_through_the_film_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("wrong", "message"), [
-    ({"friction": -0.1}, "friction is -0.1"),
-    ({"friction": math.nan}, "friction is nan"),
-    ({"backend": "magic"}, "backend is 'magic'"),
-    ({"loading": "sudden"}, "loading is 'sudden'"),
-    ({"strain": "huge"}, "strain is 'huge'"),
-    ({"rings": 3}, "at least 16"),
+    ({"friction": -0.1}, "friction is -0.1"), ({"friction": math.nan}, "friction is nan"),
+    ({"backend": "magic"}, "backend is 'magic'"), ({"loading": "sudden"}, "loading is 'sudden'"),
+    ({"strain": "huge"}, "strain is 'huge'"), ({"rings": 3}, "at least 16"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_plain_words(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
