@@ -99,7 +99,7 @@ def test_expectations_are_the_means_over_draws_of_the_noise() -> None:
     error = 3.9 * weights.std(axis=0, ddof=1) / np.sqrt(len(drawn))
     off = np.abs(expected.estimate.weighed.probability - weights.mean(axis=0))
     assert np.all(off < 0.03 + error)
-    bands = np.array([find_band(estimate).resolved for estimate in drawn])
+    bands = np.array([find_band(estimate, None).resolved for estimate in drawn])
     assert abs(expected.band.resolved / bands.mean() - 1) < 0.02 + 3.9 * bands.std() / (
         bands.mean() * np.sqrt(len(drawn))
     )
@@ -156,7 +156,7 @@ def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design
     other = memscal.design(method="white-noise")
     assert other.method == "white-noise"
     assert other.budget["fwhm"]["window"] > 0
-    assert paper.budget["fwhm"]["window"] == 0
+    assert "window" not in paper.budget["fwhm"]
     with pytest.raises(InputError, match="no parameter colour"):
         paper.relative_uncertainty("colour")
 
