@@ -25,15 +25,9 @@ FLOW = [
 USERS_OF_FORMATS = {"apparatus", "calibration", "figures", "cli", "friction", "measurement"}
 
 ONLY_IN = {
-    "h5py": {"formats"},
-    "pint": {"formats"},
-    "meshio": {"formats"},
-    "matplotlib": {"figures"},
-    "click": {"cli"},
-    "rich": {"cli"},
-    "skimage": {"deconvolution"},
-    "skfem": {"mechanics"},
-}
+    "h5py": {"formats"}, "pint": {"formats"}, "meshio": {"formats"}, "matplotlib": {"figures"},
+    "click": {"cli"}, "rich": {"cli"}, "skimage": {"deconvolution"}, "skfem": {"mechanics"},
+}  # fmt: skip
 
 SLOW = {
     "matplotlib", "meshio", "pint", "skfem", "skimage",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.scans import contact_scan
 
 import memscal
 from memscal.cli import main
@@ -69,10 +70,49 @@ def test_an_artifact_from_a_file_shows_what_it_holds(calibration, loaded) -> Non
             assert value["value"] == pytest.approx(expected, rel=1e-9)
     for name, value in shown.items():
         if isinstance(value, dict):
-            assert value["unit"] == values[name]["unit"]
-            assert value["value"] == pytest.approx(values[name]["value"], rel=1e-9)
+            assert_same_numbers(value, values[name])
         else:
             assert name == "checks" or value == values[name]
+
+
+def assert_same_numbers(ours: object, theirs: object) -> None:
+    """The same keys, texts and numbers, to 1e-9, at every depth."""
+    if isinstance(theirs, dict):
+        assert list(ours) == list(theirs)
+        for name, value in theirs.items():
+            assert_same_numbers(ours[name], value)
+    else:
+        assert ours == (pytest.approx(theirs, rel=1e-9) if isinstance(theirs, float) else theirs)
+
+
+@pytest.mark.parametrize("methods", [("white-noise", "bayesian"), ("bayesian", "white-noise")])
+def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan: Path, methods) -> None:
+    apparatus = memscal.calibrate(scan, method=methods[0]).apparatus
+    apparatus.save(scan.with_name("both.h5"), overwrite=True)
+    loaded = memscal.load_apparatus(scan.with_name("both.h5"))
+    for ours, theirs in ((loaded, apparatus), (loaded.other, apparatus.other)):
+        assert ours.parameters.names == theirs.parameters.names
+        for record in ("parameters", "radial_profile"):
+            for name, stored in vars(getattr(theirs, record)).items():
+                if isinstance(stored, np.ndarray):
+                    found = getattr(getattr(ours, record), name)
+                    np.testing.assert_allclose(found, stored, atol=1e-9 * np.abs(stored).max())
+    a, values = loaded.conversion_constant, loaded.to_dict()
+    assert a == pytest.approx(apparatus.parameters["conversion_constant"], rel=1e-12)
+    assert list(values["estimates"]) == [*methods, "gaussian"]
+    assert loaded.other.method == methods[1]
+    first, other = (values["estimates"][method]["conversion_constant"] for method in methods)
+    assert_same_numbers(first, values["conversion_constant"])
+    in_volts = [a, loaded.other.parameters["conversion_constant"]]
+    assert [first["value"], other["value"]] == pytest.approx(1e3 * np.array(in_volts), rel=1e-9)
+    assert first["value"] != pytest.approx(other["value"], rel=1e-6)
+    line, *rows = str(loaded).splitlines()
+    shown = next(row for row in rows if row.startswith("  conversion constant ")).split(" A ")[1]
+    assert line.startswith(f"Use A = {shown.strip()} (method {methods[0]}); its Gaussian of σ = ")
+    r = np.linspace(0.0, 12e-3, 200)
+    stress = np.exp(-((r / 1e-3) ** 2))
+    np.testing.assert_allclose(loaded.predict(r, stress), a * loaded.convolve(r, stress))
+    assert memscal.measure_stress(contact_scan(load=(1.0,)), loaded).conversion_constant == a
 
 
 def test_html_holds_values_and_checks(calibration: memscal.Calibration) -> None:

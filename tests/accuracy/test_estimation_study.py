@@ -34,11 +34,9 @@ DOCS = Path(__file__).parent.parent.parent / "docs"
 NAMES = list(CASES) if FULL else REDUCED
 
 ADMITTED = {
-    "Gaussian": {"worst"},
-    "disc": {"error of G", "worst"},
-    "mixture": {"worst", "bias of A", "band of A"},
-    "ring": set(),
-}
+    "Gaussian": {"worst"}, "disc": {"error of G", "worst"},
+    "mixture": {"worst", "bias of A", "band of A"}, "ring": set(),
+}  # fmt: skip
 """What the table may say that a kind of kernel does not keep."""
 
 

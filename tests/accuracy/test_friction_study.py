@@ -98,12 +98,10 @@ def test_no_coefficient_is_left_out(friction: float) -> None:
 
 def test_the_intervals_of_single_loads_hold_the_truth() -> None:
     # Loads of one experiment share their systematic errors: the experiment is the unit.
-    held = np.array(
-        [
-            [reading.interval.holds(one.truth) for reading in one.readings]
-            for one in outcomes(*FRICTIONS)
-        ]
-    )
+    held = np.array([
+        [reading.interval.holds(one.truth) for reading in one.readings]
+        for one in outcomes(*FRICTIONS)
+    ])  # fmt: skip
     assert held.mean() > 0.92 - 4 * held.mean(axis=1).std() / math.sqrt(len(held))
 
 

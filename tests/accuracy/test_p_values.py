@@ -51,11 +51,9 @@ def mixture(kernel: memscal.GaussianMixture) -> Callable[[float, int], Scan]:
 
 
 SENSORS = {
-    "Gaussian": mixture(memscal.GaussianMixture()),
-    "tails": mixture(TAILS),
-    "ring": mixture(RING),
+    "Gaussian": mixture(memscal.GaussianMixture()), "tails": mixture(TAILS), "ring": mixture(RING),
     "disc": disc,
-}
+}  # fmt: skip
 
 
 @lru_cache
@@ -68,15 +66,13 @@ def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
         runs = runs_test(residuals)
         same = int(np.sum(np.diff(residuals.sequence[residuals.independent[1]]) == 0))
         changes = round(same * (1 - runs.value))
-        rows.append(
-            {
-                "size": chi_square_test(residuals).p_value,
-                "runs": runs.p_value,
-                # A count's p-value moves in steps: spread evenly over its own, it is uniform.
-                "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
-                "neighbours": neighbour_correlation_test(residuals).p_value,
-            }
-        )
+        rows.append({
+            "size": chi_square_test(residuals).p_value,
+            "runs": runs.p_value,
+            # A count's p-value moves in steps: spread evenly over its own, it is uniform.
+            "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
+            "neighbours": neighbour_correlation_test(residuals).p_value,
+        })  # fmt: skip
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
@@ -105,13 +101,9 @@ def test_runs_are_rejected_no_more_often_than_their_level() -> None:
 
 def test_clean_scans_hardly_ever_fail_a_check() -> None:
     settings = [
-        {},
-        {"noise": 0.02},
-        {"noise": 0.001},
-        {"state_noise": False},
-        {"repeats": 3, "points": 33},
+        {}, {"noise": 0.02}, {"noise": 0.001}, {"state_noise": False}, {"repeats": 3, "points": 33},
         {"load": [0.5, 1.0, 1.5], "points": 33},
-    ]
+    ]  # fmt: skip
     failed = run = 0
     for seed in range(SEEDS):
         scan = simulated(seed=seed, **settings[seed % len(settings)])

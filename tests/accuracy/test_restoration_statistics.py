@@ -33,17 +33,14 @@ CHANCE = 1e-4
 REACH = 6e-3
 
 CASES = {
-    "light": (pressed(0.34), GAUSSIAN),
-    "middle": (pressed(1.0), GAUSSIAN),
-    "heavy": (pressed(2.75), GAUSSIAN),
-    "sticking, light": (pressed(0.34, np.inf), GAUSSIAN),
+    "light": (pressed(0.34), GAUSSIAN), "middle": (pressed(1.0), GAUSSIAN),
+    "heavy": (pressed(2.75), GAUSSIAN), "sticking, light": (pressed(0.34, np.inf), GAUSSIAN),
     "sticking, heavy": (pressed(2.75, np.inf), GAUSSIAN),
     "compressible": (pressed(film=replace(EXACT_FILM, poisson_ratio=0.3)), GAUSSIAN),
-    "ring": (pressed(), RING),
-    "tails": (pressed(), TAILS),
+    "ring": (pressed(), RING), "tails": (pressed(), TAILS),
     "thin rod": (pressed(indenter=memscal.Rod(radius=0.25e-3)), GAUSSIAN),
     "wide rod": (pressed(indenter=memscal.Rod(radius=2.5e-3)), GAUSSIAN),
-}
+}  # fmt: skip
 
 
 @lru_cache

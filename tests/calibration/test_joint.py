@@ -15,8 +15,8 @@ SEEDS = 60
 CHANCE = 1e-5
 
 
-def joint(scans: list[Scan], **options):
-    return memscal.calibrate(scans, method="bayesian", **options).apparatus
+def joint(scans: list[Scan], method: str = "bayesian", **options):
+    return memscal.calibrate(scans, method=method, **options).apparatus
 
 
 def several(noise: float, seed: int = 0, **options) -> list[Scan]:
@@ -49,6 +49,13 @@ def test_a_joint_fit_is_surer_than_each_of_its_scans_and_between_them() -> None:
         combined = weights.sum() ** -0.5
         assert together.parameters.uncertainty(name) < 1.1 * min(weights**-0.5)
         assert abs(together.parameters[name] - weights @ values / weights.sum()) < combined
+
+
+def test_the_division_joins_scans_of_other_loads_rods_and_films() -> None:
+    scans, name = several(0.005), "conversion_constant"
+    together, *alone = (joint(s, "white-noise").parameters for s in (scans, *([s] for s in scans)))
+    assert abs(together[name] - CONVERSION) < 3 * together.uncertainty(name)
+    assert together.uncertainty(name) < min(parameters.uncertainty(name) for parameters in alone)
 
 
 def test_a_scan_along_y_says_what_one_along_x_says() -> None:

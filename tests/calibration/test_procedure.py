@@ -18,12 +18,8 @@ from memscal.model.checks import QualityCheck
 
 R = np.linspace(0, 3e-3, 121)
 MAIN_PARAMETERS = {
-    "conversion_constant",
-    "gaussian_sigma",
-    "gaussian_sigma_deconvolved",
-    "centre",
-    "baseline",
-}
+    "conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "centre", "baseline",
+}  # fmt: skip
 
 
 def check(calibration: memscal.Calibration, name: str) -> QualityCheck:
@@ -214,6 +210,7 @@ def test_a_failed_check_marks_the_result_and_is_said_first() -> None:
     assert not check(calibration, "gaussian_misfit").passed
     assert check(calibration, "reconvolution").passed
     assert "gaussian_misfit failed" in calibration.apparatus.process.messages[0].text
+    assert "use G(r), for the Gaussian fails the check gaussian" in str(calibration).splitlines()[0]
 
 
 def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:

@@ -40,11 +40,9 @@ def study(noise: float) -> dict[str, np.ndarray]:
         "load_uncertainty": None,
     }
     truth = {
-        "conversion_constant": SHEAR_CONVERSION,
-        "conversion_constant_gaussian": SHEAR_CONVERSION,
-        "gaussian_sigma": SHEAR_SIGMA,
-        "centre": CENTRE,
-    }
+        "conversion_constant": SHEAR_CONVERSION, "conversion_constant_gaussian": SHEAR_CONVERSION,
+        "gaussian_sigma": SHEAR_SIGMA, "centre": CENTRE,
+    }  # fmt: skip
     found = [
         calibrated(shear_scan(seed=seed, noise=noise, **exact)).apparatus.parameters
         for seed in range(SEEDS)

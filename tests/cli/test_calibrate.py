@@ -122,17 +122,14 @@ def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path):
 
 
 @pytest.mark.parametrize(("arguments", "hint"), [
-    (["--method", "magic"], "white-noise"),
-    (["--option", "amplitude"], "NAME=VALUE"),
-    (["--option", "amplitudes=1"], "amplitude"),
-    (["--option", "seed=1"], "--seed"),
+    (["--method", "magic"], "white-noise"), (["--option", "amplitude"], "NAME=VALUE"),
+    (["--option", "amplitudes=1"], "amplitude"), (["--option", "seed=1"], "--seed"),
     (["--option", "amplitude=much"], "amplitude is a number"),
     (["--option", "amplitude=NaN"], "amplitude is a number"),
     (["--method", "richardson-lucy", "--option", "iterations=2.5"], "whole number"),
     (["--figure", "a.jpg"], ".png"),
     (["--figure", "a.png", "--sweep-figure", "./a.png"], "Two outputs"),
-    (["--report", "scan.apparatus.h5"], "Two outputs"),
-    (["--seed", "x"], "--seed"),
+    (["--report", "scan.apparatus.h5"], "Two outputs"), (["--seed", "x"], "--seed"),
     (["--colour"], "--colour"),
 ])  # fmt: skip
 def test_wrong_use_is_exit_code_2_with_a_hint(run: Run, scan: Path, folder: Path, arguments, hint):

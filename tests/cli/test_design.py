@@ -39,17 +39,14 @@ def test_a_wish_out_of_reach_is_an_error_with_the_best(run: Run):
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
-    (["--step", -1], "--step"),
-    (["--noise", 0], "--noise"),
-    (["--repeats", 0], "--repeats"),
+    (["--step", -1], "--step"), (["--noise", 0], "--noise"), (["--repeats", 0], "--repeats"),
     (["--want", "sigma=1%"], "--want and --vary go together"),
     (["--vary", "step"], "--want and --vary go together"),
     (["--want", "sigma", "--vary", "step"], "is no target"),
     (["--want", "sigma=much%", "--vary", "step"], "is no target"),
     (["--want", "sigma=0.01", "--vary", "step"], "write the %"),
     (["--want", "resolved=4%", "--vary", "step"], "without %"),
-    (["--weight", 0.5, "--weight", 0.5], "--weight"),
-    (["--figure", "design.gif"], ".png"),
+    (["--weight", 0.5, "--weight", 0.5], "--weight"), (["--figure", "design.gif"], ".png"),
 ])  # fmt: skip
 def test_wrong_use_is_told_before_anything_is_computed(run: Run, arguments, told):
     failed = run("design", *arguments)

@@ -62,14 +62,11 @@ def test_version_is_that_of_the_package(run: Run):
 @pytest.mark.parametrize(("arguments", "hint"), [
     (["calibrat", "scan.h5"], "Did you mean calibrate?"),
     (["import", "t.csv", "-o", "a.h5", "--x-units", "mm"], "--x-unit"),
-    (["reference", "cone"], "rod"),
-    (["reference", "rod", "--load", "0"], "above 0"),
+    (["reference", "cone"], "rod"), (["reference", "rod", "--load", "0"], "above 0"),
     (["reference", "rod", "--load", "nan"], "(in N)"),
     (["reference", "rod", "--radius", "a quarter"], "(in mm)"),
-    (["reference", "rod", "--poisson-ratio", "0.7"], "at most 0.5"),
-    (["calibrate"], "SCAN"),
-    (["completion", "tcsh"], "fish"),
-    (["--verbose"], "--version"),
+    (["reference", "rod", "--poisson-ratio", "0.7"], "at most 0.5"), (["calibrate"], "SCAN"),
+    (["completion", "tcsh"], "fish"), (["--verbose"], "--version"),
 ])  # fmt: skip
 def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments, hint):
     refused = run(*arguments).exits(2, hint)

@@ -85,11 +85,8 @@ def test_noise_may_be_left_unstated(run: Run, folder: Path):
 @pytest.mark.parametrize(("arguments", "code"), [
     (["--sigma", 700, "--sigma", 400], 2),
     (["--disc-radius", 800, "--sigma", 300, "--sigma", 200], 2),
-    (["--disc-radius", 800, "--sigma", 300, "--weight", 1], 2),
-    (["--disc-radius", 0], 2),
-    (["--raster", "--repeats", 2], 2),
-    (["--points", 1], 2),
-    (["--noise", -1], 2),
+    (["--disc-radius", 800, "--sigma", 300, "--weight", 1], 2), (["--disc-radius", 0], 2),
+    (["--raster", "--repeats", 2], 2), (["--points", 1], 2), (["--noise", -1], 2),
     (["--sigma", 700, "--weight", 0.5], 3),
 ])  # fmt: skip
 def test_what_makes_no_scan_is_refused(run: Run, folder: Path, arguments, code):

@@ -130,12 +130,9 @@ def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path):
     (["--load", 1, "--load", 1], 2, "given twice"),
     (["--lubricated-load", 1, "--lubricated-load", 1], 2, "given twice"),
     (["--greenwood-tripp", 1, 1, 1, "--exponential", 1, 1], 2, "one normal law"),
-    (["--load-scatter", 11], 2, "(in percent)"),
-    (["--friction", -1], 2, "of at least 0"),
-    (["--contacts", 1], 2, "2<=x<=4096"),
-    (["--load", 1e7], 3, "film"),
-    (["-o", "no/such/folder"], 4, "Create the folder first"),
-    (["-o", "file"], 4, "not a folder"),
+    (["--load-scatter", 11], 2, "(in percent)"), (["--friction", -1], 2, "of at least 0"),
+    (["--contacts", 1], 2, "2<=x<=4096"), (["--load", 1e7], 3, "film"),
+    (["-o", "no/such/folder"], 4, "Create the folder first"), (["-o", "file"], 4, "not a folder"),
 ])  # fmt: skip
 def test_what_makes_no_experiment_is_refused(run: Run, folder: Path, arguments, code, hint):
     (folder / "file").write_text("mine")

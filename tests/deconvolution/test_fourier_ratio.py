@@ -85,14 +85,11 @@ def test_fields_on_different_grids_are_not_divided() -> None:
         memscal.reconvolve(1.0, gaussian(WIDTH), stress)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"weakest": 0.0}, "weakest relevant component"),
-        ({"weakest": float("nan")}, "weakest relevant component"),
-        ({"weakest": 1e-3, "method": Tikhonov(), "amplitude": 2.0}, "set up already"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    ({"weakest": 0.0}, "weakest relevant component"),
+    ({"weakest": float("nan")}, "weakest relevant component"),
+    ({"weakest": 1e-3, "method": Tikhonov(), "amplitude": 2.0}, "set up already"),
+])  # fmt: skip
 def test_a_division_without_a_noise_or_with_idle_options_is_refused(options, message) -> None:
     with pytest.raises(InputError, match=message):
         memscal.divide(*voltage_and_stress(), **options)

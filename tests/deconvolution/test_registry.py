@@ -113,12 +113,9 @@ def test_a_calibration_runs_with_a_plug_in() -> None:
 
 
 @pytest.mark.parametrize(("name", "options"), [
-    ("white-noise", {"amplitude": 0.0}),
-    ("white-noise-draw", {"amplitude": float("nan")}),
-    ("tikhonov", {"amplitude": "x"}),
-    ("wiener", {"amplitude": -1.0}),
-    ("unsupervised-wiener", {"seed": -1}),
-    ("richardson-lucy", {"iterations": 0}),
+    ("white-noise", {"amplitude": 0.0}), ("white-noise-draw", {"amplitude": float("nan")}),
+    ("tikhonov", {"amplitude": "x"}), ("wiener", {"amplitude": -1.0}),
+    ("unsupervised-wiener", {"seed": -1}), ("richardson-lucy", {"iterations": 0}),
     ("richardson-lucy", {"iterations": 2.5}),
     ("tikhonov", {"name": "x"}),
 ])  # fmt: skip

@@ -29,15 +29,12 @@ def test_the_fall_of_the_residual_sum_is_the_distance_in_the_predictive_covarian
     assert found.limit == pytest.approx(chi2.isf(5e-4, 30) / 30, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"repeats": 3, "points": 33},
-        {"repeats": 3, "points": 33, "state_noise": False},
-        {"load": [0.5, 1.0, 1.5], "points": 33},
-        {"repeats": 14, "points": 21},
-    ],
-)
+@pytest.mark.parametrize("options", [
+    {"repeats": 3, "points": 33},
+    {"repeats": 3, "points": 33, "state_noise": False},
+    {"load": [0.5, 1.0, 1.5], "points": 33},
+    {"repeats": 14, "points": 21},
+])  # fmt: skip
 def test_groups_of_good_scans_are_rejected_no_more_often_than_is_said(options) -> None:
     scans, level = 60, 0.1
     p_values = []

@@ -84,11 +84,8 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     change[30] = 1e-3 * estimate.weighed.noise
     again = weigh_departures(
         replace(estimate.model, points=replace(estimate.points, u=estimate.points.u + change)),
-        estimate.gaussian,
-        estimate.basis,
-        estimate.weights,
-        float(estimate.outlier_weight.sum()),
-    )
+        estimate.gaussian, estimate.basis, estimate.weights, float(estimate.outlier_weight.sum()),
+    )  # fmt: skip
     profile = estimate.basis.radial(np.linspace(0.0, 3e-3, 31))
     expected = profile @ (estimate.weighed.gain @ change)
     found = profile @ (again.mean - estimate.weighed.mean)

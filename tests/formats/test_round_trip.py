@@ -286,14 +286,11 @@ def test_a_missing_part_is_named_by_its_path(tmp_path: Path, path):
 
 
 @pytest.mark.parametrize(("path", "units", "wanted"), [
-    ("/entry/data/x", "mV", "length"),
-    ("/entry/data/x", "parsnip", "unknown"),
-    ("/entry/data/u_zz", "T", "voltage"),
-    ("/entry/indenter/load", "kg", "force"),
+    ("/entry/data/x", "mV", "length"), ("/entry/data/x", "parsnip", "unknown"),
+    ("/entry/data/u_zz", "T", "voltage"), ("/entry/indenter/load", "kg", "force"),
     ("/entry/sample/film/young_modulus", "N", "stress"),
     ("/entry/sample/film/poisson_ratio", "mm", "dimensionless"),
-    ("/entry/data/x", None, "has no unit"),
-    ("/entry/indenter/load", None, "has no unit"),
+    ("/entry/data/x", None, "has no unit"), ("/entry/indenter/load", None, "has no unit"),
 ])  # fmt: skip
 def test_a_wrong_unit_is_named_with_its_path_and_the_right_one(tmp_path: Path, path, units, wanted):
     other_program(tmp_path / "scan.h5")

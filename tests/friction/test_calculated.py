@@ -44,17 +44,13 @@ def normal(law: str) -> Build:
     )
 
 
-@pytest.mark.parametrize(
-    ("build", "grid", "between"),
-    [
-        (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
-        (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
-        (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
-        (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
-        (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
-    ],
-    ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"],
-)
+@pytest.mark.parametrize(("build", "grid", "between"), [
+    (amontons(), FRICTIONS, [0.02, 0.175, 0.35, 0.75]),
+    (amontons("total"), FRICTIONS, [0.02, 0.175, 0.5, 3.0]),
+    (elasto_plastic(1.6), SLIP_LENGTHS, [0.3e-6, 2.5e-6, 6e-6, 6e-5, 2e-4]),
+    (normal("exponential"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+    (normal("greenwood-tripp"), LENGTHS, [0.2e-6, 1.3e-6, 5.5e-6, 11e-6]),
+], ids=["incremental", "total", "elasto-plastic", "exponential", "greenwood-tripp"])  # fmt: skip
 def test_interpolated_profiles_are_those_of_contacts_solved_between(build, grid, between) -> None:
     family = build(FILM, SPHERE, list(LOADS), list(grid))
     solved = build(FILM, SPHERE, list(LOADS), between)
@@ -83,11 +79,9 @@ CASES = {
     "greenwood-tripp": (normal("greenwood-tripp"), list(LENGTHS), 3.64e-6),
 }
 UNCERTAIN_FILM = replace(
-    FILM,
-    young_modulus_uncertainty=0.01 * FILM.young_modulus,
-    thickness_uncertainty=0.01 * FILM.thickness,
-    poisson_ratio_uncertainty=0.01,
-)
+    FILM, young_modulus_uncertainty=0.01 * FILM.young_modulus,
+    thickness_uncertainty=0.01 * FILM.thickness, poisson_ratio_uncertainty=0.01,
+)  # fmt: skip
 UNCERTAIN_SPHERE = replace(SPHERE, radius_uncertainty=0.01 * SPHERE.radius)
 
 
@@ -208,15 +202,11 @@ def test_a_load_beyond_the_model_is_named() -> None:
 
 
 @pytest.mark.parametrize(("changed", "said"), [
-    ({"indenter": Rod(radius=1e-3)}, "sphere is needed"),
-    ({"loads": [0.34, -1.0]}, "load is -1 N"),
-    ({"loads": []}, "loads"),
-    ({"friction": [0.3, 0.1]}, "do not increase"),
+    ({"indenter": Rod(radius=1e-3)}, "sphere is needed"), ({"loads": [0.34, -1.0]}, "load is -1 N"),
+    ({"loads": []}, "loads"), ({"friction": [0.3, 0.1]}, "do not increase"),
     ({"friction": [-0.1, 0.1]}, "none of them negative"),
-    ({"friction": []}, "none of them negative"),
-    ({"loading": "sudden"}, "loading is 'sudden'"),
-    ({"reach": 0.0}, "reach"),
-    ({"workers": 0}, "workers"),
+    ({"friction": []}, "none of them negative"), ({"loading": "sudden"}, "loading is 'sudden'"),
+    ({"reach": 0.0}, "reach"), ({"workers": 0}, "workers"),
 ])  # fmt: skip
 def test_a_request_that_makes_no_sense_is_refused(changed: dict[str, object], said: str) -> None:
     request = {"indenter": SPHERE, "loads": [0.34], "friction": [0.1], "reach": REACH} | changed

@@ -126,10 +126,7 @@ def test_the_stiffness_is_friction_times_mean_pressure_over_the_slip_length() ->
 
 
 @pytest.mark.parametrize(("length", "precision", "expected"), [
-    (4e-6, PAPER, 0.63),
-    (16e-6, PAPER, 0.47),
-    (4e-6, PRECISE, 0.20),
-    (16e-6, PRECISE, 0.095),
+    (4e-6, PAPER, 0.63), (16e-6, PAPER, 0.47), (4e-6, PRECISE, 0.20), (16e-6, PRECISE, 0.095),
     (40e-6, PRECISE, 0.083),
 ])  # fmt: skip
 def test_how_well_a_slip_length_can_be_known_is_what_the_documentation_says(

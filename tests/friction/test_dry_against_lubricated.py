@@ -43,13 +43,9 @@ def compared(
         )
         wet = replace(there, u=wet.u + moved[0])
     return dry_against_lubricated(
-        (profile(dry, "dry"), profile(wet, "lubricated")),
-        (dry, wet),
-        laboratory.sensor,
-        laboratory.family.at(0.0),
-        (LOAD, LOAD),
-        conversion_share=0.01,
-    )
+        (profile(dry, "dry"), profile(wet, "lubricated")), (dry, wet), laboratory.sensor,
+        laboratory.family.at(0.0), (LOAD, LOAD), conversion_share=0.01,
+    )  # fmt: skip
 
 
 def every(friction: float, **options: float) -> list[DryAgainstLubricated]:
@@ -89,9 +85,7 @@ def test_scans_without_common_places_are_not_compared() -> None:
 def test_pairs_are_of_one_load_dry_and_lubricated() -> None:
     points = bare_points()
     profiles = [
-        profile(points, "dry", 0.5),
-        profile(points, "dry", 2.0),
-        profile(points, "lubricated", 2.02),
-        profile(points, "", 0.5),
-    ]
+        profile(points, "dry", 0.5), profile(points, "dry", 2.0),
+        profile(points, "lubricated", 2.02), profile(points, "", 0.5),
+    ]  # fmt: skip
     assert lubricated_pairs(profiles) == [(1, 2)]

@@ -150,12 +150,8 @@ def test_a_prior_is_shared_out_among_cells_and_adds_up_to_one(prior: Prior) -> N
 
 
 @pytest.mark.parametrize(("factor", "words"), [
-    (2.5, "not worth more than a bare mention"),
-    (3.0, "positive"),
-    (19.0, "positive"),
-    (21.0, "strong"),
-    (140.0, "strong"),
-    (151.0, "very strong"),
+    (2.5, "not worth more than a bare mention"), (3.0, "positive"), (19.0, "positive"),
+    (21.0, "strong"), (140.0, "strong"), (151.0, "very strong"),
 ])  # fmt: skip
 def test_words_for_a_bayes_factor_are_those_of_kass_and_raftery(factor: float, words: str) -> None:
     # Their table: 1 to 3, 3 to 20, 20 to 150, above 150.

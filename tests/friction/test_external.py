@@ -27,11 +27,9 @@ def tables(loading: str = "incremental") -> list[StressProfile]:
 def bare(profile: StressProfile) -> StressProfile:
     """The table as another program may give it: numbers, load and friction."""
     return StressProfile(
-        r=profile.r,
-        sigma_zz=profile.sigma_zz,
-        load=profile.load,
+        r=profile.r, sigma_zz=profile.sigma_zz, load=profile.load,
         friction_coefficient=profile.friction_coefficient,
-    )
+    )  # fmt: skip
 
 
 def test_tables_of_our_own_contacts_give_our_own_family() -> None:

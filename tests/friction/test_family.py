@@ -103,11 +103,8 @@ def test_some_of_the_loads_are_picked_in_the_order_given() -> None:
 
 @pytest.mark.parametrize(("name", "value"), [
     ("values", np.array([0.0, 0.3, 0.1, 1.0, 2.0])),
-    ("values", np.array([-0.1, 0.0, 0.1, 1.0, 2.0])),
-    ("spectra", np.ones((5, 2, 3))),
-    ("changes", {"thickness": np.ones((5, 1, 3))}),
-    ("depths", np.ones((2, 5))),
-    ("scale", 0.0),
+    ("values", np.array([-0.1, 0.0, 0.1, 1.0, 2.0])), ("spectra", np.ones((5, 2, 3))),
+    ("changes", {"thickness": np.ones((5, 1, 3))}), ("depths", np.ones((2, 5))), ("scale", 0.0),
 ])  # fmt: skip
 def test_what_does_not_fit_together_is_refused(name: str, value: object) -> None:
     with pytest.raises(InputError):

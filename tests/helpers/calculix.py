@@ -93,18 +93,10 @@ def press_rod(
     mesh = rod_mesh(radius, film.thickness, halvings)
     deck = [
         *_film_deck(film, mesh),
-        *_node_set("ROD", mesh.nodes[:, -1][mesh.r[:, -1] < radius * (1 + 1e-9)]),
-        "*STEP",
-        "*STATIC",
-        "*BOUNDARY",
-        f"ROD, 2, 2, {-depth}",
-        *(["ROD, 1, 1"] if sticking else []),
-        "*NODE PRINT, NSET=ROD",
-        "RF",
-        "*NODE PRINT, NSET=BASE",
-        "RF",
-        "*END STEP",
-    ]
+        *_node_set("ROD", mesh.nodes[:, -1][mesh.r[:, -1] < radius * (1 + 1e-9)]), "*STEP",
+        "*STATIC", "*BOUNDARY", f"ROD, 2, 2, {-depth}", *(["ROD, 1, 1"] if sticking else []),
+        "*NODE PRINT, NSET=ROD", "RF", "*NODE PRINT, NSET=BASE", "RF", "*END STEP",
+    ]  # fmt: skip
     tables = run(deck, folder)
     load = -SECTORS * sum(force[1] for force in tables["ROD", 1.0].values())
     return PressedRod(load / depth, mesh.r[:, 0], _base_stress(mesh, tables["BASE", 1.0]) / load)
@@ -200,13 +192,9 @@ def run(deck: list[str], folder: Path) -> dict[tuple[str, float], dict[int, Floa
     program = shutil.which("ccx")
     assert program is not None
     done = subprocess.run(
-        [program, "film"],
-        cwd=folder,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        [program, "film"], cwd=folder, env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert "Job finished" in done.stdout, done.stdout[-2000:]
     return parse((folder / "film.dat").read_text(encoding="ascii"))
 
@@ -237,20 +225,13 @@ def _film_deck(film: Film, mesh: Mesh) -> list[str]:
     nodes, exists = mesh.nodes, mesh.nodes > 0
     points = zip(nodes[exists], mesh.r[exists], mesh.z[exists], strict=True)
     return [
-        "*NODE",
-        *(f"{node}, {r:.13g}, {z:.13g}, 0" for node, r, z in points),
+        "*NODE", *(f"{node}, {r:.13g}, {z:.13g}, 0" for node, r, z in points),
         "*ELEMENT, TYPE=CAX8R, ELSET=FILM",
         *(f"{i}, {', '.join(map(str, e))}" for i, e in enumerate(mesh.elements, start=1)),
-        "*MATERIAL, NAME=ELASTIC",
-        "*ELASTIC",
-        f"{film.young_modulus}, {film.poisson_ratio}",
-        "*SOLID SECTION, ELSET=FILM, MATERIAL=ELASTIC",
-        *_node_set("BASE", nodes[:, 0]),
-        *_node_set("AXIS", nodes[0]),
-        "*BOUNDARY",
-        "BASE, 1, 2",
-        "AXIS, 1, 1",
-    ]
+        "*MATERIAL, NAME=ELASTIC", "*ELASTIC", f"{film.young_modulus}, {film.poisson_ratio}",
+        "*SOLID SECTION, ELSET=FILM, MATERIAL=ELASTIC", *_node_set("BASE", nodes[:, 0]),
+        *_node_set("AXIS", nodes[0]), "*BOUNDARY", "BASE, 1, 2", "AXIS, 1, 1",
+    ]  # fmt: skip
 
 
 def _node_set(name: str, nodes: NDArray[np.int64]) -> list[str]:
@@ -267,16 +248,10 @@ def _to_make_it_iterate(node: int, element: int) -> list[str]:
         "*NODE, NSET=HELD",
         *(f"{node + i}, {100 + x}, {y}, {z}" for i, (x, y, z) in enumerate(corners)),
         "*ELEMENT, TYPE=C3D8, ELSET=BRICK",
-        f"{element}, {', '.join(str(node + i) for i in range(8))}",
-        "*MATERIAL, NAME=YIELDING",
-        "*ELASTIC",
-        "1., 0.",
-        "*PLASTIC",
-        "1e6, 0.",
-        "*SOLID SECTION, ELSET=BRICK, MATERIAL=YIELDING",
-        "*BOUNDARY",
-        "HELD, 1, 3",
-    ]
+        f"{element}, {', '.join(str(node + i) for i in range(8))}", "*MATERIAL, NAME=YIELDING",
+        "*ELASTIC", "1., 0.", "*PLASTIC", "1e6, 0.",
+        "*SOLID SECTION, ELSET=BRICK, MATERIAL=YIELDING", "*BOUNDARY", "HELD, 1, 3",
+    ]  # fmt: skip
 
 
 def _base_stress(mesh: Mesh, base: dict[int, FloatArray]) -> FloatArray:

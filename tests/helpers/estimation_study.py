@@ -226,7 +226,7 @@ class Outcome:
     def _limits(self) -> Iterator[tuple[str, bool]]:
         seeds, luck = self.g.size, chance(self.g.size)
         if (limit := self.case.limit) is not None:
-            yield "error of G", _least_median(self.g) <= limit
+            yield "error of G", least_median(self.g) <= limit
             yield "worst", self.beyond == 0
         if (bound := self.case.bound) is not None:
             yield "RMS of A", self.rms <= root_mean_square_limit(EFFICIENCY, seeds, luck) * bound
@@ -238,7 +238,7 @@ class Outcome:
             yield f"band of {band}", bool(binom.cdf(held, seeds, LEAST_COVERAGE) >= luck)
 
 
-def _least_median(errors: FloatArray) -> float:
+def least_median(errors: FloatArray) -> float:
     """Median of all seeds; of few, the smallest that the true median may well be.
 
     The count of seeds below the true median is binomial, whatever their distribution.

@@ -212,11 +212,9 @@ def main():
         if number in reached:
             states.append(film.state(iterations))
     solution = {
-        "states": states,
-        "steps": len(path),
-        "unknowns": int(film.model.nbdof()),
+        "states": states, "steps": len(path), "unknowns": int(film.model.nbdof()),
         "seconds": time.perf_counter() - begin,
-    }
+    }  # fmt: skip
     json.dump(solution, sys.stdout)
 
 

@@ -184,9 +184,6 @@ def pypher(scan: Scan, truth: Kernel) -> FloatArray:
 
 
 PEERS: dict[str, Peer] = {
-    "deerlab": deerlab,
-    "skimage": scikit_image,
-    "photutils": photutils,
-    "pypher": pypher,
-}
+    "deerlab": deerlab, "skimage": scikit_image, "photutils": photutils, "pypher": pypher,
+}  # fmt: skip
 """By the name that is imported."""

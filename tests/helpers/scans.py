@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from helpers.builders import make_artifact
+from scipy.special import i0e
 
 import memscal
 from memscal import MeasuredStress, Process, RadialKernel, Scan, StressSensor
@@ -25,11 +26,9 @@ TAILS = memscal.GaussianMixture((0.75, 0.25), (0.5e-3, 1.0e-3))
 
 # Inputs without uncertainty, so that what is left in a budget is noise alone.
 EXACT_FILM = replace(
-    PAPER_FILM,
-    young_modulus_uncertainty=None,
-    poisson_ratio_uncertainty=None,
+    PAPER_FILM, young_modulus_uncertainty=None, poisson_ratio_uncertainty=None,
     thickness_uncertainty=None,
-)
+)  # fmt: skip
 EXACT_ROD = replace(PAPER_ROD, radius_uncertainty=None)
 
 
@@ -70,6 +69,16 @@ def as_points(scan: Scan, seed: int = 0) -> Scan:
 def plane_error(r: np.ndarray, found: np.ndarray, truth: np.ndarray) -> float:
     """Relative L2 error over the plane, for a radial function on even radii."""
     return float(np.sqrt(np.sum(r * (found - truth) ** 2) / np.sum(r * truth**2)))
+
+
+def added_ring(scan: Scan, share: float, radius: float, width: float) -> Scan:
+    """Add a ring of this share of the largest voltage, with the transform J0(kq) exp(-(kb)^2/2).
+
+    q is the radius and b the width, in m.
+    """
+    r = np.abs(scan.x - CENTRE)
+    ring = np.exp(-(((r - radius) / width) ** 2) / 2) * i0e(r * radius / width**2)
+    return replace(scan, u_zz=scan.u_zz + share * scan.u_zz.max() * ring / ring.max())
 
 
 SPHERE = memscal.Sphere(radius=0.1288)

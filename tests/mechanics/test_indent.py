@@ -149,12 +149,9 @@ def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words) -> Non
 
 
 @pytest.mark.parametrize(("wrong", "message"), [
-    ({"friction": -0.1}, "friction is -0.1"),
-    ({"friction": math.nan}, "friction is nan"),
-    ({"backend": "magic"}, "backend is 'magic'"),
-    ({"loading": "sudden"}, "loading is 'sudden'"),
-    ({"strain": "huge"}, "strain is 'huge'"),
-    ({"rings": 3}, "at least 16"),
+    ({"friction": -0.1}, "friction is -0.1"), ({"friction": math.nan}, "friction is nan"),
+    ({"backend": "magic"}, "backend is 'magic'"), ({"loading": "sudden"}, "loading is 'sudden'"),
+    ({"strain": "huge"}, "strain is 'huge'"), ({"rings": 3}, "at least 16"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_plain_words(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):

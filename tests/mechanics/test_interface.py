@@ -59,14 +59,10 @@ def test_a_law_its_inverse_and_its_slope_belong_together(law) -> None:
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
-@pytest.mark.parametrize(
-    "rough",
-    [
-        GreenwoodTripp(roughness=1e-10, asperity_density=1e16, asperity_radius=1e-9),
-        ExponentialCompliance(decay_length=1e-10, reference_pressure=1e5),
-    ],
-    ids=["GT", "exponential"],
-)
+@pytest.mark.parametrize("rough", [
+    GreenwoodTripp(roughness=1e-10, asperity_density=1e16, asperity_radius=1e-9),
+    ExponentialCompliance(decay_length=1e-10, reference_pressure=1e5),
+], ids=["GT", "exponential"])  # fmt: skip
 def test_the_rigid_contact_returns_as_the_roughness_vanishes(rough, mu) -> None:
     smooth, nearly = press(mu=mu), press(Interface(normal=rough), mu=mu)
     assert nearly.depth == pytest.approx(smooth.depth, rel=5e-4)

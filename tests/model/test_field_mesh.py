@@ -11,12 +11,9 @@ from memscal.model.field_mesh import FieldMesh
 
 def parts(**changes: Any) -> dict[str, Any]:
     return {
-        "points": [[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]],
-        "triangles": [[0, 1, 2]],
-        "displacement": np.zeros((3, 2)),
-        "stress": np.zeros((3, 4)),
-        **changes,
-    }
+        "points": [[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]], "triangles": [[0, 1, 2]],
+        "displacement": np.zeros((3, 2)), "stress": np.zeros((3, 4)), **changes,
+    }  # fmt: skip
 
 
 def test_a_field_mesh_keeps_its_own_read_only_copy() -> None:

@@ -48,11 +48,8 @@ def test_a_refusal_names_quantity_value_and_unit() -> None:
 
 
 @pytest.mark.parametrize(("values", "problem"), [
-    ([], r"shape \(0,\)"),
-    (1.0, r"shape \(\)"),
-    ([[1.0, 2.0]], r"shape \(1, 2\)"),
-    ([0.0, math.nan], "not finite"),
-    ([0.0, -math.inf], "not finite"),
+    ([], r"shape \(0,\)"), (1.0, r"shape \(\)"), ([[1.0, 2.0]], r"shape \(1, 2\)"),
+    ([0.0, math.nan], "not finite"), ([0.0, -math.inf], "not finite"),
 ])  # fmt: skip
 def test_what_is_no_finite_vector_is_refused(values: object, problem: str) -> None:
     with pytest.raises(InputError, match=f"r of the profile .*{problem}"):

@@ -157,7 +157,7 @@ def test_another_method_is_expected_to_hide_more_behind_its_window(paper: Design
     other = memscal.design(method="white-noise")
     assert other.method == "white-noise"
     assert other.budget["fwhm"]["window"] > 0
-    assert paper.budget["fwhm"]["window"] == 0
+    assert "window" not in paper.budget["fwhm"]
     with pytest.raises(InputError, match="no parameter colour"):
         paper.relative_uncertainty("colour")
 
@@ -177,11 +177,8 @@ def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
 
 
 @pytest.mark.parametrize(("want", "vary"), [
-    ({"A": 0.016}, "step"),
-    ({"sigma": 0.027}, "repeats"),
-    ({"A": 0.02}, "half_range"),
-    ({"resolved": 3.8e3}, "repeats"),
-    ({"A": 0.018, "sigma": 0.028}, "repeats"),
+    ({"A": 0.016}, "step"), ({"sigma": 0.027}, "repeats"), ({"A": 0.02}, "half_range"),
+    ({"resolved": 3.8e3}, "repeats"), ({"A": 0.018, "sigma": 0.028}, "repeats"),
 ])  # fmt: skip
 def test_what_is_found_reaches_the_target_and_one_less_does_not(want, vary) -> None:
     found = memscal.design(noise=0.01, want=want, vary=vary)
@@ -232,20 +229,12 @@ def test_a_target_that_is_none_is_refused(want, vary, told) -> None:
 
 
 @pytest.mark.parametrize(("given", "told"), [
-    ({"step": -0.1e-3}, "step"),
-    ({"step": 0.0}, "step"),
-    ({"step": float("nan")}, "step"),
-    ({"half_range": -1e-3}, "half range"),
-    ({"load": 0.0}, "load"),
-    ({"conversion_constant": -1e-7}, "conversion constant"),
-    ({"load_uncertainty": -0.01}, "load"),
-    ({"repeats": 0}, "repeated 0 times"),
-    ({"repeats": 1.5}, "repeated 1.5 times"),
-    ({"noise": 0.0}, "noise"),
-    ({"noise": -0.01}, "noise"),
-    ({"noise_voltage": 0.0}, "noise"),
-    ({"half_range": 2e-3, "centre": 3e-3}, "2 mm to either side"),
-    ({"step": 1e-6}, "positions"),
+    ({"step": -0.1e-3}, "step"), ({"step": 0.0}, "step"), ({"step": float("nan")}, "step"),
+    ({"half_range": -1e-3}, "half range"), ({"load": 0.0}, "load"),
+    ({"conversion_constant": -1e-7}, "conversion constant"), ({"load_uncertainty": -0.01}, "load"),
+    ({"repeats": 0}, "repeated 0 times"), ({"repeats": 1.5}, "repeated 1.5 times"),
+    ({"noise": 0.0}, "noise"), ({"noise": -0.01}, "noise"), ({"noise_voltage": 0.0}, "noise"),
+    ({"half_range": 2e-3, "centre": 3e-3}, "2 mm to either side"), ({"step": 1e-6}, "positions"),
     ({"half_range": 8.0}, "positions"),
 ])  # fmt: skip
 def test_a_plan_that_makes_no_scan_is_refused(given: dict[str, Any], told: str) -> None:

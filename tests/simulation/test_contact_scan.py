@@ -167,12 +167,9 @@ def test_the_defaults_are_the_papers_scan() -> None:
 @pytest.mark.parametrize(("options", "error", "problem"), [
     ({"load": []}, InputError, "list of loads is empty"),
     ({"load": [0.3, 0.3]}, InputError, "given twice"),
-    ({"load": [-1.0]}, InputError, "load is -1 N"),
-    ({"load": 1e7}, DomainError, "load|film"),
-    ({"points": 1}, InputError, "two contacts"),
-    ({"repeats": 0}, InputError, "one row"),
-    ({"seed": -1}, InputError, "seed"),
-    ({"spacing": 0.0}, InputError, "spacing"),
+    ({"load": [-1.0]}, InputError, "load is -1 N"), ({"load": 1e7}, DomainError, "load|film"),
+    ({"points": 1}, InputError, "two contacts"), ({"repeats": 0}, InputError, "one row"),
+    ({"seed": -1}, InputError, "seed"), ({"spacing": 0.0}, InputError, "spacing"),
     ({"load_scatter": 0.5}, InputError, "load_scatter is 0.5"),
     ({"load_reading": -0.1}, InputError, "load_reading"),
     ({"load_scale": 0.0}, InputError, "load_scale"),
@@ -306,12 +303,9 @@ def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> No
 
 
 @pytest.mark.parametrize(("options", "problem"), [
-    ({"gain": 0.0}, "gain is 0"),
-    ({"thickness_factor": -1.0}, "thickness_factor"),
-    ({"load_uncertainty": -0.1}, "uncertainty of the load"),
-    ({"seed": -1}, "seed is -1"),
-    ({"loads": []}, "list of loads is empty"),
-    ({"rod_load": 0.0}, "load"),
+    ({"gain": 0.0}, "gain is 0"), ({"thickness_factor": -1.0}, "thickness_factor"),
+    ({"load_uncertainty": -0.1}, "uncertainty of the load"), ({"seed": -1}, "seed is -1"),
+    ({"loads": []}, "list of loads is empty"), ({"rod_load": 0.0}, "load"),
     ({"repeats": 0}, "one row"),
 ])  # fmt: skip
 def test_an_experiment_that_cannot_be_made_is_refused(options, problem) -> None:

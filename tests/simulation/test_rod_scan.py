@@ -164,20 +164,14 @@ def test_another_film_and_rod_are_simulated_as_they_are() -> None:
 
 
 @pytest.mark.parametrize(("options", "problem"), [
-    ({"points": 1}, "two positions"),
-    ({"repeats": 0}, "one repeat"),
+    ({"points": 1}, "two positions"), ({"repeats": 0}, "one repeat"),
     ({"raster": True, "repeats": 2}, "A raster has one repeat at one load"),
     ({"raster": True, "load": [1.0, 2.0]}, "A raster has one repeat at one load"),
-    ({"load": 0.0}, "load"),
-    ({"load": float("nan")}, "load"),
+    ({"load": 0.0}, "load"), ({"load": float("nan")}, "load"),
     ({"load_uncertainty": -0.1}, "uncertainty of the load"),
-    ({"conversion_constant": -1e-7}, "conversion_constant"),
-    ({"noise": float("nan")}, "noise"),
-    ({"half_range": 8.0}, "8"),
-    ({"load": []}, "load"),
-    ({"load": [-1.0, 3.0]}, "load"),
-    ({"seed": -1}, "seed"),
-    ({"centre": (float("nan"), 0.0)}, "centre"),
+    ({"conversion_constant": -1e-7}, "conversion_constant"), ({"noise": float("nan")}, "noise"),
+    ({"half_range": 8.0}, "8"), ({"load": []}, "load"), ({"load": [-1.0, 3.0]}, "load"),
+    ({"seed": -1}, "seed"), ({"centre": (float("nan"), 0.0)}, "centre"),
 ])  # fmt: skip
 def test_what_cannot_be_simulated_is_refused(options: dict[str, Any], problem: str) -> None:
     with pytest.raises(InputError, match=problem):

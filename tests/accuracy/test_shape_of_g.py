@@ -1,0 +1,51 @@
+"""Checks of G's shape, and uncertainties from draws where no window divides.
+
+Set MEMSCAL_FULL_STUDY for 200 seeds in place of 24.
+"""
+
+import numpy as np
+import pytest
+from helpers.bounds import FULL
+from helpers.scans import RING, TAILS, simulated
+from scipy.stats import binom, chi2
+
+import memscal
+from memscal.model.checks import FALSE_ALARM
+
+pytestmark = pytest.mark.accuracy
+
+SEEDS = 200 if FULL else 24
+CHANCE = 1e-5 if FULL else 1e-3  # of fewer seeds, so that what is wrong by much is still found
+NOISES = (0.001, 0.005, 0.02)
+
+
+@pytest.mark.parametrize("method", ["white-noise", "bayesian", "tikhonov", "wiener"])
+def test_the_shape_of_a_sound_g_passes(method: str) -> None:
+    kernels = [RING, TAILS, memscal.SmoothedDisc(radius=0.6e-3, sigma=0.25e-3)]
+    failures = 0
+    for seed in range(SEEDS):
+        scan = simulated(kernel=kernels[seed % 3], noise=NOISES[seed % 2 + 1], seed=seed)
+        checks = memscal.calibrate(scan, method=method).apparatus.checks
+        failures += not all(check.passed for check in checks if check.name.startswith("shape_"))
+    assert failures <= binom.isf(CHANCE, SEEDS, FALSE_ALARM)
+
+
+@pytest.mark.parametrize("method", ["white-noise-draw", "unsupervised-wiener", "richardson-lucy"])
+def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated(method: str) -> None:
+    count, radii, values, stated = 20 if FULL else 8, np.linspace(0, 2e-3, 9), [], []
+    kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
+    for seed in range(count):
+        scan = simulated(kernel=kernel, noise=0.01, points=33, seed=seed)
+        apparatus = memscal.calibrate(scan, method=method, seed=seed).apparatus
+        names = ("conversion_constant", "noise_equivalent_area")
+        values.append([*(apparatus.parameters[n] for n in names), *apparatus.radial(radii)])
+        u_g = apparatus.radial_uncertainty(radii)
+        stated.append([*(apparatus.budget[n]["noise"] for n in names), *u_g])
+        # Half or twice the truth is never stated as if it were right.
+        off = abs(np.log2(apparatus.parameters["fwhm"] / (2.355 * 0.9e-3))) > 1
+        assert not (off and apparatus.passed)
+    ratio = np.std(values, axis=0, ddof=1) / np.median(stated, axis=0)
+    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count - 1) / (count - 1))
+    # What is stated of G counts what every scan hides, too.
+    assert (ratio[:2] > low / 2).all()
+    assert (ratio < 2 * high).all()
