@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import j0, j1
 
+from memscal.calibration.diagnosis import require_profile
 from memscal.calibration.fields import (
     Fields,
     GridChoice,
@@ -31,8 +32,8 @@ from memscal.deconvolution.fourier_ratio import (
 )
 from memscal.errors import InputError
 from memscal.estimation.band import Band, find_band
-from memscal.estimation.points import channel_order, joined_points, measured_points
-from memscal.estimation.profile import ProfileEstimate, estimate_profile
+from memscal.estimation.points import channel_order, measured_points
+from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import reference_spectra
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
@@ -54,7 +55,7 @@ def solve(
     require_channel_method(channel, regulariser)
     points = [measured_points(scan, channel) for scan in scans]
     references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
-    estimate = estimate_profile(joined_points(points), *references)
+    estimate = require_profile(scans, stresses, points, references)
     band = find_band(estimate)
     choice = choose_grid(estimate, band)
     fields = prepare_fields(estimate, choice, divided=not isinstance(regulariser, Bayesian))

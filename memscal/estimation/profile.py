@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
@@ -218,14 +219,54 @@ def _require_determined(estimate: ProfileEstimate) -> None:
     # Rounding makes the variance of a scan without noise negative.
     variance = float(integrals @ estimate.covariance @ integrals)
     uncertainty = float(np.sqrt(max(variance, 0.0)))
-    if not estimate.conversion_constant > LEAST_SIGNIFICANCE * uncertainty:
+    a = estimate.conversion_constant
+    if not a > LEAST_SIGNIFICANCE * uncertainty:
+        negative = a < -LEAST_SIGNIFICANCE * uncertainty
         raise FitError(
-            f"The conversion constant would be ({estimate.conversion_constant * 1e3:.2g} ± "
-            f"{uncertainty * 1e3:.2g}) mV/Pa: it is not distinct from zero.",
-            why="The voltage does not rise above its noise as the rod passes, or the scan is too "
-            "short to separate the profile's tail from the baseline.",
-            cure="Check channel and positions; scan farther; raise the load or average repeats.",
+            f"The conversion constant would be ({a * 1e3:.2g} ± {uncertainty * 1e3:.2g}) mV/Pa: "
+            f"it is {'negative' if negative else 'not distinct from zero'}.",
+            why=why_undetermined(estimate),
+            cure="Check channel, positions, film and rod; scan farther; raise the load or average "
+            "repeats.",
         )
+
+
+#: A voltage that varies by less than this many times its noise is lost in it.
+_LEAST_RISE = 6.0
+
+
+def why_undetermined(estimate: ProfileEstimate) -> str:
+    """Say what keeps A from being determined: the noise, or the parameter it is confused with."""
+    base = np.linalg.qr(estimate.model.drift_columns)[0]
+    rise = float(np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted)))
+    ratio = rise / float(np.median(estimate.noise))
+    varies = f"Beside a straight line the voltage varies by {rise * 1e3:.3g} mV, "
+    varies += f"{ratio:.3g} times its noise"
+    if ratio < _LEAST_RISE:
+        return f"{varies}: it does not rise above its noise as the indenter passes."
+    centres, flat = 2 + int(estimate.points.free.sum()), estimate.basis.flat
+    everything = np.arange(len(estimate.covariance))
+    shape = np.concatenate([[1], everything[flat:]])
+    baseline = everything[centres : flat - estimate.points.ellipse]
+    reach = float(estimate.distance.max()) * 1e3
+    blocks = [
+        (baseline, "the baseline: the scan is too short or off centre to show the profile's tail, "
+         f"it ends {reach:.3g} mm from the sensor's centre"),
+        (shape, "the width and shape of the apparatus function: the reference is too wide, the "
+         "step too coarse, or the scan too short to determine them"),
+        (everything[2:centres], "the sensor's centre: the scan is too far off centre"),
+    ]  # fmt: skip
+    _, confused = max(blocks, key=lambda block: _share(estimate, block[0]))
+    return f"{varies}, but the conversion constant cannot be told from {confused}."
+
+
+def _share(estimate: ProfileEstimate, block: NDArray[np.intp]) -> float:
+    """Share of the variance of A that would go if the parameters of a block were known."""
+    covariance, integrals = estimate.covariance, estimate.basis.integrals
+    deviation = np.sqrt(np.maximum(np.diag(covariance)[block], np.finfo(float).tiny))
+    with_a = (integrals @ covariance)[block] / deviation
+    correlation = covariance[np.ix_(block, block)] / np.outer(deviation, deviation)
+    return float(with_a @ np.linalg.pinv(correlation, hermitian=True) @ with_a)
 
 
 def _outlier_weight(standardised: FloatArray, threshold: float) -> FloatArray:

@@ -68,7 +68,8 @@ def require_calibration_rod(scan: Scan) -> None:
             f"{thickness * 1e3:g} mm thick.",
             why="The stress at the base then depends on friction under the rod, and carries too "
             "little fine detail to resolve the apparatus function.",
-            cure="Use a rod narrower than the film is thick; check /entry/indenter/radius.",
+            cure="Use a rod narrower than the film is thick; or check the values and the units of "
+            "/entry/indenter/radius and /entry/sample/film/thickness.",
         )
 
 

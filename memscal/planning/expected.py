@@ -85,7 +85,7 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
             f"The scan as planned would find a conversion constant of "
             f"({estimate.conversion_constant * 1e3:.2g} ± {np.sqrt(variance) * 1e3:.2g}) mV/Pa: "
             "not distinct from zero.",
-            why="It is too short to tell the profile's tail from the baseline, or too noisy.",
+            why=why_undetermined(estimate),
             cure="Plan a larger half range, more repeats, or a larger load.",
         )
     return estimate

@@ -1,0 +1,346 @@
+"""Cause of a scan that determines no width: the stated length that has to be another.
+
+Film and rod blur the sensor, so no voltage is narrower than the reference.  Where one is, the
+Gaussian's width goes to zero, and A and G lose their meaning.  Each stated length in turn is then
+scaled, the rod solved again, and a Gaussian fitted, to find the value at which the scan fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.errors import FitError, MemscalError
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
+from memscal.estimation.plausibility import mistaken_unit
+from memscal.estimation.points import ScanPoints, joined_points
+from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, estimate_profile
+from memscal.estimation.reference import reference_contact, reference_spectra
+from memscal.mechanics.contact import Contact
+from memscal.model.arrays import FloatArray
+from memscal.model.indenter import Rod
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
+
+#: A width below this share of its standard uncertainty is zero: its best square is none, or
+#: negative.  Of a sensor that the film hides entirely, half of the scans give such a width.
+_NO_WIDTH = 0.1
+#: A length is at fault if another value lowers chi-square by this much: five standard deviations.
+_CLEARLY = 25.0
+#: Residuals beyond this many standard deviations count linearly.
+_KNEE = 3.0
+#: The search needs no more points than this.
+_MOST_POINTS = 400
+#: Factors are tried by this ratio: a minimum of chi-square is wider.  Beyond one it rises by this.
+_RATIO = 1.4
+_RISEN = 1.05
+#: A length is followed up if a factor leaves less than this share of the misfit.
+_PROMISING = 0.7
+#: Values fit as well as the best one up to this rise of chi-square: two standard deviations.
+_AS_GOOD = 4.0
+_HALVINGS = 7
+#: Lengths are scaled until the scan spans this many thicknesses of the film, ...
+_LONGEST_SPAN = 60.0
+#: ... and a rod until its radius is this share of the thickness: a narrower one acts as a point.
+_THINNEST = 0.02
+#: Load of the rods that are tried, in N: the reference per newton does not depend on it.
+_LOAD = 1e-6
+
+
+def require_profile(
+    scans: Sequence[Scan],
+    stresses: Sequence[StressProfile | Contact],
+    points: Sequence[ScanPoints],
+    references: Sequence[RadialSpectrum],
+) -> ProfileEstimate:
+    """Estimate the profile of scans; refuse one that is as narrow as its reference."""
+    search = _Search(tuple(scans), tuple(stresses), tuple(map(_thinned, points)))
+    try:
+        estimate = estimate_profile(joined_points(points), *references)
+    except FitError as failure:
+        narrow = search.error()
+        if narrow is None:
+            raise
+        raise narrow from failure
+    if not _has_width(estimate.gaussian, estimate.weights, estimate.noise_scale):
+        raise search.error() or _hidden(estimate, search)
+    return estimate
+
+
+def _has_width(fit: GaussianFit, weights: FloatArray, noise: float) -> bool:
+    # The slope by the width vanishes with the width, so its uncertainty grows without bound.
+    with np.errstate(all="ignore"):
+        try:
+            uncertainty = float(np.sqrt(fit.covariance(weights, noise)[1, 1]))
+        except np.linalg.LinAlgError:
+            return False
+    return fit.sigma >= _NO_WIDTH * uncertainty
+
+
+def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
+    """Return the error for a sensor too narrow for its film: no stated length is at fault."""
+    model, fit = estimate.model, estimate.gaussian
+    # Near zero the voltage changes with the square of the width, whose uncertainty is finite.
+    column = model.signal(fit.geometry, -0.5 * fit.conversion_constant * model.k**2)
+    others = np.delete(fit.jacobian, 1, axis=1)
+    weights = estimate.weights / estimate.noise_scale**2
+    scaled, base = (
+        estimate.points.standardised(values, weights)
+        for values in (column, others / np.abs(others).max(axis=0))
+    )
+    base = np.linalg.qr(base)[0]
+    widest = np.sqrt(2 / np.linalg.norm(scaled - base @ (base.T @ scaled)))
+    return FitError(
+        "The scan is as narrow as its reference, the stress at the base of the film: the width of "
+        "the apparatus function would be zero.",
+        why="Film and rod blur the sensor's image. A sensor of a Gaussian width below "
+        f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined.",
+        cure=f"Check {search.request}. If they are right, use a thinner film or a narrower rod, or "
+        "average more repeats.",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Gaussian fitted to the scans with one length scaled; none where the fit fails."""
+
+    factor: float
+    fit: GaussianFit | None
+    residual: FloatArray  # (n,): over the stated noise; in V where none is stated
+    weights: FloatArray
+
+    def loss(self, noise: float) -> float:
+        """Chi-square of the residuals, linear beyond the knee."""
+        if self.fit is None:
+            return np.inf
+        root = np.sqrt(1 + (self.residual / (noise * _KNEE)) ** 2)
+        return float(np.sum(2 * _KNEE**2 * (root - 1)))
+
+    @property
+    def scatter(self) -> float:
+        """Robust standard deviation of the residuals."""
+        return 1.4826 * float(np.median(np.abs(self.residual)))
+
+    def explains(self, noise: float) -> bool:
+        """Whether a sensor of some width fits, with a signal."""
+        if self.fit is None or not _has_width(self.fit, self.weights, noise):
+            return False
+        uncertainty = np.sqrt(self.fit.covariance(self.weights, noise)[0, 0])
+        return bool(self.fit.conversion_constant > LEAST_SIGNIFICANCE * uncertainty)
+
+
+@dataclass(frozen=True, eq=False)
+class _Length:
+    """One stated length that can be scaled."""
+
+    name: str
+    path: str
+    stated: float  # in m, of the first scan; 1 where the length is no single value
+    factors: FloatArray  # (m,): the factors to try, the first of them 1
+
+    @property
+    def place(self) -> str:
+        """The name, and the path in the file."""
+        return f"{self.name} (/entry/{self.path})"
+
+    def scaled(self, factor: float) -> str:
+        """Name the length and the value that the factor gives."""
+        words = mistaken_unit(factor)
+        unit = f" ({words}?)" if words else ""
+        if self.stated == 1.0:
+            return f"{self.place} {factor:.3g} times as large{unit}"
+        value, stated = factor * self.stated * 1e3, self.stated * 1e3
+        return f"{self.place} of {value:.3g} mm in place of {stated:.4g} mm{unit}"
+
+    def limited(self, factor: float) -> str:
+        """Name the length and its limit, which the factor gives."""
+        if self.stated == 1.0:
+            side = "most" if factor < 1 else "least"
+            return f"{self.place} at {side} {factor:.3g} times as large"
+        value, stated = factor * self.stated * 1e3, self.stated * 1e3
+        return f"{self.place} of at most {value:.3g} mm in place of {stated:.4g} mm"
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Scans whose stated lengths are scaled, one at a time."""
+
+    scans: tuple[Scan, ...]
+    stresses: tuple[StressProfile | Contact, ...]
+    points: tuple[ScanPoints, ...]
+
+    @cached_property
+    def lengths(self) -> tuple[_Length, ...]:
+        """Lengths that make the reference narrower than the scan."""
+        h = min(scan.film.thickness for scan in self.scans)
+        span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
+        stretch = _grid(_LONGEST_SPAN * h / span)
+        positions = _Length("positions", "data/x", 1.0, stretch)
+        if not self._solved:
+            return _Length("radii of the reference", "reference/r", 1.0, 1 / stretch), positions
+        a = self.scans[0].indenter.radius
+        # A calibration asks for a rod no wider than its film is thick.
+        thinner = _grid(min(_LONGEST_SPAN * h / span, h / (2 * a)))
+        return (
+            _Length("a film thickness", "sample/film/thickness", h, 1 / thinner),
+            _Length("a rod radius", "indenter/radius", a, 1 / _grid(a / (_THINNEST * h))),
+            positions,
+        )
+
+    @property
+    def _solved(self) -> bool:
+        """Whether every reference is a solved rod, whose film and radius can be changed."""
+        return all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses)
+
+    @property
+    def request(self) -> str:
+        """The lengths to check."""
+        return f"{', '.join(length.place for length in self.lengths)}, and their units"
+
+    def error(self) -> FitError | None:
+        """Return the error that names the lengths at fault; ``None`` if none is."""
+        trials = [self._coarse(length) for length in self.lengths]
+        fitted = [trial for several in trials for trial in several if trial.fit is not None]
+        if not fitted:
+            return None
+        # Where no noise is stated, it is that of the best fit.
+        stated = self.points[0].u_errors is not None
+        noise = max(1.0 if stated else min(t.scatter for t in fitted), np.finfo(float).tiny)
+        pairs = list(zip(self.lengths, trials, strict=True))
+        best = [self._refined(length, several, noise) for length, several in pairs]
+        least = min(trial.loss(noise) for trial in best)
+        per_degree = max(1.0, least / fitted[0].residual.size)
+        most = min(trials[0][0].loss(noise) - _CLEARLY * per_degree, 2 * least + _CLEARLY)
+        good = [
+            trial.loss(noise) <= most and trial.explains(noise * np.sqrt(per_degree))
+            for trial in best
+        ]
+        if not any(good):
+            return None
+        causes = "; or with ".join(
+            self._cause(length, several, trial, noise)
+            for (length, several), trial, fits in zip(pairs, best, good, strict=True)
+            if fits
+        )
+        others = [length.place for length, fits in zip(self.lengths, good, strict=True) if not fits]
+        beyond = f" No other value of {' or '.join(others)} makes it fit." if others else ""
+        source = self.scans[0].source
+        return FitError(
+            f"{f'{source.file_name}: the' if source else 'The'} scan is narrower than its "
+            "reference, the stress at the base of the film as stated.",
+            why="Film and rod blur the sensor's image, so that no voltage is narrower than the "
+            "reference: the width of the apparatus function would be zero, and A any number.",
+            cure=f"Check the stated lengths. The scan would fit with {causes}.{beyond}",
+        )
+
+    def _coarse(self, length: _Length) -> list[_Trial]:
+        """Try the factors of a length until the misfit has risen twice."""
+        trials: list[_Trial] = []
+        for factor in length.factors:
+            trials.append(self._trial(length, float(factor)))
+            losses = [trial.loss(1.0) for trial in trials]
+            if len(losses) > 2 and min(losses[-2:]) > _RISEN * min(losses):
+                break
+        return trials
+
+    def _refined(self, length: _Length, trials: list[_Trial], noise: float) -> _Trial:
+        """Return the best trial of a length, between the neighbours of the best factor."""
+        from scipy.optimize import minimize_scalar
+
+        tried = [min(trials, key=lambda trial: trial.loss(noise))]
+        if not tried[0].loss(noise) < _PROMISING * trials[0].loss(noise):
+            return tried[0]
+
+        def loss(exponent: float) -> float:
+            tried.append(self._trial(length, float(np.exp(exponent))))
+            return min(tried[-1].loss(noise), 1e300)
+
+        middle, reach = np.log(tried[0].factor), np.log(_RATIO)
+        minimize_scalar(
+            loss, bounds=(middle - reach, middle + reach), method="bounded",
+            options={"xatol": 5e-3, "maxiter": 15},
+        )  # fmt: skip
+        return min(tried, key=lambda trial: trial.loss(noise))
+
+    def _cause(self, length: _Length, trials: list[_Trial], best: _Trial, noise: float) -> str:
+        """Name a length with its best value, or with its limit if any value beyond fits too."""
+        enough = best.loss(noise) + _AS_GOOD
+        if trials[-1].loss(noise) > enough or len(trials) < length.factors.size:
+            return length.scaled(best.factor)
+        near, far = 1.0, best.factor
+        for _ in range(_HALVINGS):
+            middle = float(np.sqrt(near * far))
+            if self._trial(length, middle).loss(noise) <= enough:
+                far = middle
+            else:
+                near = middle
+        return length.limited(far)
+
+    def _trial(self, length: _Length, factor: float) -> _Trial:
+        """Fit a Gaussian with one length scaled."""
+        points, stresses = self.points, self.stresses
+        thicknesses = [scan.film.thickness for scan in self.scans]
+        if length.path == "data/x":
+            points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
+        elif self._solved:
+            stresses = tuple(_pressed(stress, length.path, factor) for stress in stresses)
+            if length.path != "indenter/radius":
+                thicknesses = [h * factor for h in thicknesses]
+        else:
+            stresses = tuple(_squeezed(stress, factor) for stress in stresses)
+            thicknesses = [h * factor for h in thicknesses]
+        joined = joined_points(points)
+        weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
+        nothing = _Trial(factor, None, np.zeros(0), weights)
+        with np.errstate(all="ignore"):
+            try:
+                model = ForwardModel(joined, reference_spectra(stresses, points, thicknesses))
+                fit = fit_gaussian_to_points(model, weights)
+            except (MemscalError, np.linalg.LinAlgError):
+                return nothing
+        residual = (joined.u - fit.predicted) * np.sqrt(weights)
+        return _Trial(factor, fit, residual, weights) if np.isfinite(residual).all() else nothing
+
+
+def _pressed(stress: StressProfile | Contact, path: str, factor: float) -> Contact:
+    """Solve a linear rod on a film with its radius or the film's thickness scaled."""
+    assert isinstance(stress, Contact)
+    assert isinstance(stress.indenter, Rod)
+    film, rod = stress.film, stress.indenter
+    if path == "indenter/radius":
+        rod = replace(rod, radius=rod.radius * factor)
+    else:
+        film = replace(film, thickness=film.thickness * factor)
+    return reference_contact(film, rod, _LOAD)
+
+
+def _squeezed(stress: StressProfile | Contact, factor: float) -> StressProfile:
+    """Return a profile at radii scaled by a factor, under the same load."""
+    profile = stress.profile() if isinstance(stress, Contact) else stress
+    shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
+    return replace(
+        profile, r=profile.r * factor, sigma_zz=profile.sigma_zz / factor**2, sigma_rz=shear
+    )
+
+
+def _grid(most: float) -> FloatArray:
+    """Factors from 1 to at most ``most``."""
+    steps = max(int(np.log(max(most, 1.0)) / np.log(_RATIO)), 0)
+    return np.asarray(_RATIO ** np.arange(steps + 1.0))
+
+
+def _thinned(points: ScanPoints) -> ScanPoints:
+    """Return every so manieth point of a scan, without correlations."""
+    every = -(-points.u.size // _MOST_POINTS)
+    columns = {
+        item.name: value[::every]
+        for item in fields(points)
+        if item.name not in ("free", "decorrelation")
+        and isinstance(value := getattr(points, item.name), np.ndarray)
+    }
+    return replace(points, **columns, decorrelation=None)
