@@ -19,7 +19,6 @@ from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Regulariser, chosen_method
 from memscal.errors import InputError
-from memscal.estimation.plausibility import require_plausible
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
     reference_profile,
@@ -427,7 +426,6 @@ def calibrate(
     """
     scans = require_one_sensor(opened_scans(scan))
     for rod_scan in scans:
-        require_plausible(rod_scan, channel)
         require_calibration_rod(rod_scan)
     references = _references(reference, scans)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]

@@ -12,6 +12,7 @@ from memscal.deconvolution.division import Bayesian
 from memscal.estimation.assumptions import (
     ExtraColumns,
     axisymmetry_test,
+    clipped_points,
     departure_test,
     hold_out,
     linearity_test,
@@ -238,6 +239,8 @@ _BAND_LIMIT = 0.5
 _FORCE_LIMIT = 0.01
 _WIDTH_LIMIT = 3.0
 _NEGLIGIBLE_DIFFERENCE = 0.002
+#: Positions that a check names.
+_MOST_NAMED = 12
 
 
 def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
@@ -385,7 +388,31 @@ def _reference_and_outliers(solution: Solution) -> list[QualityCheck]:
             "Share of points whose weight was more than halved. A failure means that the noise is "
             "not what the uncertainties take it for: look at the points that the messages name.",
         ),
+        *_saturation(estimate),
     ]
+
+
+def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:
+    """Count the points that were held at a ceiling, and name them."""
+    points = estimate.points
+    if estimate.model.order:
+        return []
+    clipped = np.flatnonzero(clipped_points(estimate))
+    places = []
+    for i in clipped[:_MOST_NAMED]:
+        x = points.x[i] if points.free[points.scan[i], 0] else points.y[i]
+        y = f", {points.y[i] * 1e3:.4g}" if points.free[points.scan[i]].all() else ""
+        places.append(f"{x * 1e3:.4g}{y}")
+    if clipped.size > _MOST_NAMED:
+        places.append(f"and {clipped.size - _MOST_NAMED} more")
+    where = f", here at {'; '.join(places)} mm" if places else ""
+    meaning = (
+        f"Number of points at a ceiling{where}: neighbours at the largest voltage, equal to the "
+        "last digit, or within the noise and below the profile through the other points. A failure "
+        "means that amplifier or converter is saturated: lower its gain or the load, and scan "
+        "again; A and G are wrong."
+    )
+    return [check("saturation", float(clipped.size), 0.0, meaning)]
 
 
 def _chi_square(name: str, misfit: Misfit, meaning: str, *, exact: bool = False) -> QualityCheck:

@@ -8,7 +8,7 @@ scaled, the rod solved again, and a Gaussian fitted, to find the value at which 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,8 @@ from memscal.model.stress import StressProfile
 #: A width below this share of its standard uncertainty is zero: its best square is none, or
 #: negative.  Of a sensor that the film hides entirely, half of the scans give such a width.
 _NO_WIDTH = 0.1
+#: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
+_MISFIT = 0.03
 #: A length is at fault if another value lowers chi-square by this much: five standard deviations.
 _CLEARLY = 25.0
 #: Residuals beyond this many standard deviations count linearly.
@@ -40,7 +42,7 @@ _MOST_POINTS = 400
 _RATIO = 1.4
 _RISEN = 1.05
 #: A length is followed up if a factor leaves less than this share of the misfit.
-_PROMISING = 0.7
+_PROMISING = 0.9
 #: Values fit as well as the best one up to this rise of chi-square: two standard deviations.
 _AS_GOOD = 4.0
 _HALVINGS = 7
@@ -63,10 +65,7 @@ def require_profile(
     try:
         estimate = estimate_profile(joined_points(points), *references)
     except FitError as failure:
-        narrow = search.error()
-        if narrow is None:
-            raise
-        raise narrow from failure
+        raise search.error() or failure from None
     if not _has_width(estimate.gaussian, estimate.weights, estimate.noise_scale):
         raise search.error() or _hidden(estimate, search)
     return estimate
@@ -74,27 +73,33 @@ def require_profile(
 
 def _has_width(fit: GaussianFit, weights: FloatArray, noise: float) -> bool:
     # The slope by the width vanishes with the width, so its uncertainty grows without bound.
-    with np.errstate(all="ignore"):
-        try:
-            uncertainty = float(np.sqrt(fit.covariance(weights, noise)[1, 1]))
-        except np.linalg.LinAlgError:
-            return False
-    return fit.sigma >= _NO_WIDTH * uncertainty
+    try:
+        variance = float(fit.covariance(weights, noise)[1, 1])
+    except np.linalg.LinAlgError:
+        return False
+    return fit.sigma >= _NO_WIDTH * float(np.sqrt(variance))
 
 
 def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     """Return the error for a sensor too narrow for its film: no stated length is at fault."""
     model, fit = estimate.model, estimate.gaussian
     # Near zero the voltage changes with the square of the width, whose uncertainty is finite.
-    column = model.signal(fit.geometry, -0.5 * fit.conversion_constant * model.k**2)
-    others = np.delete(fit.jacobian, 1, axis=1)
-    weights = estimate.weights / estimate.noise_scale**2
-    scaled, base = (
-        estimate.points.standardised(values, weights)
-        for values in (column, others / np.abs(others).max(axis=0))
-    )
-    base = np.linalg.qr(base)[0]
-    widest = np.sqrt(2 / np.linalg.norm(scaled - base @ (base.T @ scaled)))
+    slope = fit.jacobian.copy()
+    slope[:, 1] = model.signal(fit.geometry, -0.5 * fit.conversion_constant * model.k**2)
+    squared = replace(fit, jacobian=slope).covariance(estimate.weights, estimate.noise_scale)
+    widest = np.sqrt(2 * np.sqrt(squared[1, 1]))
+    stated = estimate.points.u_errors
+    noise = 0.0 if stated is None else float(np.median(stated)) / estimate.largest_signal
+    residual = float(np.median(estimate.noise)) / estimate.largest_signal
+    if residual > max(_MISFIT, 2 * noise):
+        return FitError(
+            "No apparatus function fits the scan: the nearest one has no width, and leaves "
+            f"residuals of {residual:.1%} of the largest signal.",
+            why="The voltage does not rise and fall with the distance from one centre as the "
+            "reference does.",
+            cure="Look at the scan for a second peak, a step or a wrong channel; check "
+            f"{search.request}.",
+        )
     return FitError(
         "The scan is as narrow as its reference, the stress at the base of the film: the width of "
         "the apparatus function would be zero.",
@@ -130,8 +135,8 @@ class _Trial:
         """Whether a sensor of some width fits, with a signal."""
         if self.fit is None or not _has_width(self.fit, self.weights, noise):
             return False
-        uncertainty = np.sqrt(self.fit.covariance(self.weights, noise)[0, 0])
-        return bool(self.fit.conversion_constant > LEAST_SIGNIFICANCE * uncertainty)
+        variance = self.fit.covariance(self.weights, noise)[0, 0]
+        return self.fit.conversion_constant > LEAST_SIGNIFICANCE * float(np.sqrt(variance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,22 +153,14 @@ class _Length:
         """The name, and the path in the file."""
         return f"{self.name} (/entry/{self.path})"
 
-    def scaled(self, factor: float) -> str:
+    def scaled(self, factor: float, limit: str = "") -> str:
         """Name the length and the value that the factor gives."""
-        words = mistaken_unit(factor)
+        words = "" if limit else mistaken_unit(factor)
         unit = f" ({words}?)" if words else ""
         if self.stated == 1.0:
-            return f"{self.place} {factor:.3g} times as large{unit}"
+            return f"{self.place} {limit}{factor:.3g} times as large{unit}"
         value, stated = factor * self.stated * 1e3, self.stated * 1e3
-        return f"{self.place} of {value:.3g} mm in place of {stated:.4g} mm{unit}"
-
-    def limited(self, factor: float) -> str:
-        """Name the length and its limit, which the factor gives."""
-        if self.stated == 1.0:
-            side = "most" if factor < 1 else "least"
-            return f"{self.place} at {side} {factor:.3g} times as large"
-        value, stated = factor * self.stated * 1e3, self.stated * 1e3
-        return f"{self.place} of at most {value:.3g} mm in place of {stated:.4g} mm"
+        return f"{self.place} of {limit}{value:.3g} mm in place of {stated:.4g} mm{unit}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +178,7 @@ class _Search:
         span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
         stretch = _grid(_LONGEST_SPAN * h / span)
         positions = _Length("positions", "data/x", 1.0, stretch)
-        if not self._solved:
+        if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
             return _Length("radii of the reference", "reference/r", 1.0, 1 / stretch), positions
         a = self.scans[0].indenter.radius
         # A calibration asks for a rod no wider than its film is thick.
@@ -191,11 +188,6 @@ class _Search:
             _Length("a rod radius", "indenter/radius", a, 1 / _grid(a / (_THINNEST * h))),
             positions,
         )
-
-    @property
-    def _solved(self) -> bool:
-        """Whether every reference is a solved rod, whose film and radius can be changed."""
-        return all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses)
 
     @property
     def request(self) -> str:
@@ -275,11 +267,9 @@ class _Search:
         near, far = 1.0, best.factor
         for _ in range(_HALVINGS):
             middle = float(np.sqrt(near * far))
-            if self._trial(length, middle).loss(noise) <= enough:
-                far = middle
-            else:
-                near = middle
-        return length.limited(far)
+            fits = self._trial(length, middle).loss(noise) <= enough
+            near, far = (near, middle) if fits else (middle, far)
+        return length.scaled(far, "at most " if far < 1 else "at least ")
 
     def _trial(self, length: _Length, factor: float) -> _Trial:
         """Fit a Gaussian with one length scaled."""
@@ -287,13 +277,10 @@ class _Search:
         thicknesses = [scan.film.thickness for scan in self.scans]
         if length.path == "data/x":
             points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
-        elif self._solved:
-            stresses = tuple(_pressed(stress, length.path, factor) for stress in stresses)
-            if length.path != "indenter/radius":
-                thicknesses = [h * factor for h in thicknesses]
         else:
-            stresses = tuple(_squeezed(stress, factor) for stress in stresses)
-            thicknesses = [h * factor for h in thicknesses]
+            stresses = tuple(_scaled(stress, length.path, factor) for stress in stresses)
+            thinner = min(factor, 1.0) if length.path != "indenter/radius" else 1.0
+            thicknesses = [h * thinner for h in thicknesses]
         joined = joined_points(points)
         weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
         nothing = _Trial(factor, None, np.zeros(0), weights)
@@ -307,40 +294,28 @@ class _Search:
         return _Trial(factor, fit, residual, weights) if np.isfinite(residual).all() else nothing
 
 
-def _pressed(stress: StressProfile | Contact, path: str, factor: float) -> Contact:
-    """Solve a linear rod on a film with its radius or the film's thickness scaled."""
-    assert isinstance(stress, Contact)
-    assert isinstance(stress.indenter, Rod)
-    film, rod = stress.film, stress.indenter
-    if path == "indenter/radius":
-        rod = replace(rod, radius=rod.radius * factor)
-    else:
-        film = replace(film, thickness=film.thickness * factor)
-    return reference_contact(film, rod, _LOAD)
-
-
-def _squeezed(stress: StressProfile | Contact, factor: float) -> StressProfile:
-    """Return a profile at radii scaled by a factor, under the same load."""
+def _scaled(stress: StressProfile | Contact, path: str, factor: float) -> StressProfile | Contact:
+    """Return the linear rod with one length scaled, or a profile at scaled radii."""
+    if isinstance(stress, Contact) and isinstance(stress.indenter, Rod) and path != "reference/r":
+        radius, thickness = stress.indenter.radius, stress.film.thickness
+        if path == "indenter/radius":
+            radius *= factor
+        else:
+            thickness *= factor
+        film = replace(stress.film, thickness=thickness)
+        return reference_contact(film, replace(stress.indenter, radius=radius), _LOAD)
     profile = stress.profile() if isinstance(stress, Contact) else stress
     shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
-    return replace(
-        profile, r=profile.r * factor, sigma_zz=profile.sigma_zz / factor**2, sigma_rz=shear
-    )
+    pressure = profile.sigma_zz / factor**2
+    return replace(profile, r=profile.r * factor, sigma_zz=pressure, sigma_rz=shear)
 
 
 def _grid(most: float) -> FloatArray:
     """Factors from 1 to at most ``most``."""
-    steps = max(int(np.log(max(most, 1.0)) / np.log(_RATIO)), 0)
-    return np.asarray(_RATIO ** np.arange(steps + 1.0))
+    return np.asarray(_RATIO ** np.arange(int(np.log(max(most, 1.0)) / np.log(_RATIO)) + 1.0))
 
 
 def _thinned(points: ScanPoints) -> ScanPoints:
-    """Return every so manieth point of a scan, without correlations."""
+    """Return some of a scan's points, evenly, without correlations."""
     every = -(-points.u.size // _MOST_POINTS)
-    columns = {
-        item.name: value[::every]
-        for item in fields(points)
-        if item.name not in ("free", "decorrelation")
-        and isinstance(value := getattr(points, item.name), np.ndarray)
-    }
-    return replace(points, **columns, decorrelation=None)
+    return points.selected(np.arange(0, points.u.size, every))

@@ -294,13 +294,11 @@ def _read(
     paths: tuple[Path, ...], reference: Path | None
 ) -> tuple[list[Scan], StressProfile | None]:
     """Read the inputs, and refuse an indenter that cannot calibrate."""
-    from memscal.estimation.plausibility import require_plausible
     from memscal.estimation.reference import require_calibration_rod
     from memscal.formats.scan import read_scan
 
     scans = [read_scan(path) for path in paths]
     for scan, path in zip(scans, paths, strict=True):
-        require_plausible(scan)
         require_calibration_rod(scan)
         if reference is not None and scan.reference is not None:
             note(f"{reference.name} is used in place of the reference in {path.name}.")

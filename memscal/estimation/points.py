@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,22 +157,18 @@ class ScanPoints:
         """Return one of the scans."""
         if self.scans == 1:
             return self
-        keep = self.scan == scan
-        columns = {
-            item.name: value[keep]
+        single = self.selected(np.flatnonzero(self.scan == scan))
+        return replace(single, scan=np.zeros_like(single.scan), free=self.free[scan : scan + 1])
+
+    def selected(self, chosen: NDArray[np.intp]) -> ScanPoints:
+        """Return some of the points, without their correlations."""
+        columns: dict[str, Any] = {
+            item.name: value[chosen]
             for item in fields(self)
             if item.name not in ("free", "decorrelation")
             and isinstance(value := getattr(self, item.name), np.ndarray)
         }
-        return replace(
-            self,
-            **columns
-            | {
-                "scan": np.zeros(int(keep.sum()), dtype=np.intp),
-                "free": self.free[scan : scan + 1],
-                "decorrelation": None,
-            },
-        )
+        return replace(self, **columns, decorrelation=None)
 
     def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""

@@ -233,6 +233,8 @@ def _require_determined(estimate: ProfileEstimate) -> None:
 
 #: A voltage that varies by less than this many times its noise is lost in it.
 _LEAST_RISE = 6.0
+#: A scan that ends with more than this share of its largest signal shows no baseline.
+_LEFT = 0.1
 
 
 def why_undetermined(estimate: ProfileEstimate) -> str:
@@ -244,19 +246,24 @@ def why_undetermined(estimate: ProfileEstimate) -> str:
     varies += f"{ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
+    signal = np.abs(estimate.predicted - estimate.background)
+    farthest, reach = int(np.argmax(estimate.distance)), float(estimate.distance.max()) * 1e3
+    if (left := signal[farthest] / signal.max()) > _LEFT:
+        return (
+            f"{varies}, but the scan is too short or off centre to show the baseline: {reach:.3g} "
+            f"mm from the sensor's centre, where it ends, {left:.0%} of the largest signal is left."
+        )
     centres, flat = 2 + int(estimate.points.free.sum()), estimate.basis.flat
     everything = np.arange(len(estimate.covariance))
     shape = np.concatenate([[1], everything[flat:]])
     baseline = everything[centres : flat - estimate.points.ellipse]
-    reach = float(estimate.distance.max()) * 1e3
-    blocks = [
-        (baseline, "the baseline: the scan is too short or off centre to show the profile's tail, "
-         f"it ends {reach:.3g} mm from the sensor's centre"),
-        (shape, "the width and shape of the apparatus function: the reference is too wide, the "
-         "step too coarse, or the scan too short to determine them"),
-        (everything[2:centres], "the sensor's centre: the scan is too far off centre"),
-    ]  # fmt: skip
-    _, confused = max(blocks, key=lambda block: _share(estimate, block[0]))
+    blocks = {
+        "the baseline, as the scan is too short to show the profile's tail": baseline,
+        "the width and shape of the apparatus function, as the reference is too wide or the step "
+        "too coarse to determine them": shape,
+        "the sensor's centre, as the scan is too far off centre": everything[2:centres],
+    }
+    confused = max(blocks, key=lambda name: _share(estimate, blocks[name]))
     return f"{varies}, but the conversion constant cannot be told from {confused}."
 
 

@@ -23,7 +23,7 @@ from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
-from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
+from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, why_undetermined
 from memscal.estimation.reference import (
     reference_contact,
     reference_spectra,
