@@ -252,6 +252,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
         *_set_up(solution),
         *_reference_and_outliers(solution),
         *model_checks(solution.estimate),
+        *_saturation(solution.estimate),
     )
 
 
@@ -388,7 +389,6 @@ def _reference_and_outliers(solution: Solution) -> list[QualityCheck]:
             "Share of points whose weight was more than halved. A failure means that the noise is "
             "not what the uncertainties take it for: look at the points that the messages name.",
         ),
-        *_saturation(estimate),
     ]
 
 
@@ -398,14 +398,10 @@ def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:
     if estimate.model.order:
         return []
     clipped = np.flatnonzero(clipped_points(estimate))
-    places = []
-    for i in clipped[:_MOST_NAMED]:
-        x = points.x[i] if points.free[points.scan[i], 0] else points.y[i]
-        y = f", {points.y[i] * 1e3:.4g}" if points.free[points.scan[i]].all() else ""
-        places.append(f"{x * 1e3:.4g}{y}")
-    if clipped.size > _MOST_NAMED:
-        places.append(f"and {clipped.size - _MOST_NAMED} more")
-    where = f", here at {'; '.join(places)} mm" if places else ""
+    axes = np.stack([points.x, points.y], axis=1)[:, points.free.any(axis=0)] * 1e3
+    places = [", ".join(f"{p:.4g}" for p in place) for place in axes[clipped[:_MOST_NAMED]]]
+    more = f" and {clipped.size - _MOST_NAMED} more" if clipped.size > _MOST_NAMED else ""
+    where = f", here at {'; '.join(places)} mm{more}" if places else ""
     meaning = (
         f"Number of points at a ceiling{where}: neighbours at the largest voltage, equal to the "
         "last digit, or within the noise and below the profile through the other points. A failure "

@@ -16,7 +16,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.errors import FitError, MemscalError
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.plausibility import mistaken_unit
 from memscal.estimation.points import ScanPoints, joined_points
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, estimate_profile
@@ -39,13 +39,11 @@ _KNEE = 3.0
 #: The search needs no more points than this.
 _MOST_POINTS = 400
 #: Factors are tried by this ratio: a minimum of chi-square is wider.  Beyond one it rises by this.
-_RATIO = 1.4
-_RISEN = 1.05
+_RATIO, _RISEN = 1.4, 1.05
 #: A length is followed up if a factor leaves less than this share of the misfit.
 _PROMISING = 0.9
 #: Values fit as well as the best one up to this rise of chi-square: two standard deviations.
-_AS_GOOD = 4.0
-_HALVINGS = 7
+_AS_GOOD, _HALVINGS = 4.0, 7
 #: Lengths are scaled until the scan spans this many thicknesses of the film, ...
 _LONGEST_SPAN = 60.0
 #: ... and a rod until its radius is this share of the thickness: a narrower one acts as a point.
@@ -91,22 +89,20 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     stated = estimate.points.u_errors
     noise = 0.0 if stated is None else float(np.median(stated)) / estimate.largest_signal
     residual = float(np.median(estimate.noise)) / estimate.largest_signal
-    if residual > max(_MISFIT, 2 * noise):
-        return FitError(
-            "No apparatus function fits the scan: the nearest one has no width, and leaves "
-            f"residuals of {residual:.1%} of the largest signal.",
-            why="The voltage does not rise and fall with the distance from one centre as the "
-            "reference does.",
-            cure="Look at the scan for a second peak, a step or a wrong channel; check "
-            f"{search.request}.",
-        )
+    why = (
+        f"The nearest fit leaves residuals of {residual:.1%} of the largest signal: the voltage "
+        "does not rise and fall with the distance from one centre."
+        if residual > max(_MISFIT, 2 * noise)
+        else "Film and rod blur the sensor's image. A sensor of a Gaussian width below "
+        f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined."
+    )
     return FitError(
         "The scan is as narrow as its reference, the stress at the base of the film: the width of "
         "the apparatus function would be zero.",
-        why="Film and rod blur the sensor's image. A sensor of a Gaussian width below "
-        f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined.",
-        cure=f"Check {search.request}. If they are right, use a thinner film or a narrower rod, or "
-        "average more repeats.",
+        why=why,
+        cure="Look at the scan for a second peak; check the values and units of "
+        f"{', '.join(length.place for length in search.lengths)}. If they are right, use a thinner "
+        "film or a narrower rod, or average more repeats.",
     )
 
 
@@ -125,11 +121,6 @@ class _Trial:
             return np.inf
         root = np.sqrt(1 + (self.residual / (noise * _KNEE)) ** 2)
         return float(np.sum(2 * _KNEE**2 * (root - 1)))
-
-    @property
-    def scatter(self) -> float:
-        """Robust standard deviation of the residuals."""
-        return 1.4826 * float(np.median(np.abs(self.residual)))
 
     def explains(self, noise: float) -> bool:
         """Whether a sensor of some width fits, with a signal."""
@@ -189,11 +180,6 @@ class _Search:
             positions,
         )
 
-    @property
-    def request(self) -> str:
-        """The lengths to check."""
-        return f"{', '.join(length.place for length in self.lengths)}, and their units"
-
     def error(self) -> FitError | None:
         """Return the error that names the lengths at fault; ``None`` if none is."""
         trials = [self._coarse(length) for length in self.lengths]
@@ -202,24 +188,20 @@ class _Search:
             return None
         # Where no noise is stated, it is that of the best fit.
         stated = self.points[0].u_errors is not None
-        noise = max(1.0 if stated else min(t.scatter for t in fitted), np.finfo(float).tiny)
+        noise = 1.0 if stated else min(robust_scale(trial.residual) for trial in fitted)
         pairs = list(zip(self.lengths, trials, strict=True))
         best = [self._refined(length, several, noise) for length, several in pairs]
         least = min(trial.loss(noise) for trial in best)
         per_degree = max(1.0, least / fitted[0].residual.size)
         most = min(trials[0][0].loss(noise) - _CLEARLY * per_degree, 2 * least + _CLEARLY)
-        good = [
-            trial.loss(noise) <= most and trial.explains(noise * np.sqrt(per_degree))
-            for trial in best
-        ]
-        if not any(good):
+        causes, others = [], []
+        for (length, several), trial in zip(pairs, best, strict=True):
+            if trial.loss(noise) <= most and trial.explains(noise * float(np.sqrt(per_degree))):
+                causes.append(self._cause(length, several, trial, noise))
+            else:
+                others.append(length.place)
+        if not causes:
             return None
-        causes = "; or with ".join(
-            self._cause(length, several, trial, noise)
-            for (length, several), trial, fits in zip(pairs, best, good, strict=True)
-            if fits
-        )
-        others = [length.place for length, fits in zip(self.lengths, good, strict=True) if not fits]
         beyond = f" No other value of {' or '.join(others)} makes it fit." if others else ""
         source = self.scans[0].source
         return FitError(
@@ -227,7 +209,8 @@ class _Search:
             "reference, the stress at the base of the film as stated.",
             why="Film and rod blur the sensor's image, so that no voltage is narrower than the "
             "reference: the width of the apparatus function would be zero, and A any number.",
-            cure=f"Check the stated lengths. The scan would fit with {causes}.{beyond}",
+            cure=f"Check the stated lengths. The scan would fit with {'; or with '.join(causes)}."
+            f"{beyond}",
         )
 
     def _coarse(self, length: _Length) -> list[_Trial]:

@@ -17,13 +17,7 @@ from memscal.errors import FitError
 from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_departures
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.estimation.residuals import (
-    FEWEST_RESIDUALS,
-    FreeModel,
-    free_model,
-    orthonormal,
-    passes_of,
-)
+from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model, orthonormal
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
@@ -208,14 +202,11 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     )
 
 
-#: Voltages are equal within this share of their range, ...
-_EQUAL = 1e-9
-#: ... and so many equal ones at the top are clipped ...
-_FEWEST = 3
+#: So many voltages at the top, equal within a share of their range, are clipped ...
+_FEWEST, _EQUAL = 3, 1e-9
 #: ... if voltages are read this many times more finely than their noise, or if the fitted profile
 #: changes by this many times the noise among them: else they may be equal by chance or rounding.
-_FINE = 30.0
-_CURVED = 3.0
+_FINE, _CURVED = 30.0, 3.0
 #: Points are a plateau while their scatter has at least this p-value.
 _ALIKE = 0.05
 #: Weight of points that are left out of a fit, relative to that of the others.
@@ -233,17 +224,13 @@ def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:
 
 
 def _equal_at_top(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Points of a scan that share its largest voltage to the last digit, neighbours among them."""
+    """Points of a scan that share its largest voltage to the last digit."""
     u, noise = estimate.points.u, float(np.median(estimate.noise[inside]))
     top: NDArray[np.bool_] = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
-    place, sequence = passes_of(estimate)
-    order = np.argsort(place)
-    neighbours = top[order][1:] & top[order][:-1] & (np.diff(sequence[order]) == 0)
     finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
     curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
-    if top.sum() >= _FEWEST and neighbours.any() and (curved or finest < noise / _FINE):
-        return top
-    return np.zeros_like(top)
+    clipped = top.sum() >= _FEWEST and (curved or finest < noise / _FINE)
+    return top if clipped else np.zeros_like(top)
 
 
 def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -34,8 +34,7 @@ _MISTAKES = {
     1 / 25.4: "mm stated as inches",
     1e-3: "mm stated as m, or um as mm",
 }
-_NEAR = 0.15
-_FEWEST = 6
+_NEAR, _FEWEST = 0.15, 6
 #: Share of points within a peak's width that lie above its half.
 _CROWDED = 0.7
 
@@ -73,14 +72,19 @@ def require_plausible(scan: Scan) -> None:
             )
 
 
+def rise_of(x: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
+    """Rise of a voltage above its median over the outer quarter of the positions, shape (n,)."""
+    distance = np.hypot(x - np.median(x), y - np.median(y))
+    return np.asarray(u - np.median(u[distance >= np.quantile(distance, 0.75)]))
+
+
 def _voltage_width(x: FloatArray, y: FloatArray, u: FloatArray) -> float:
     """Full width of the voltage at half its rise above the outer quarter, in m; 0 if unknown."""
     measured = np.isfinite(u)
     x, y, u = x[measured], y[measured], u[measured]
     if u.size < _FEWEST:
         return 0.0
-    distance = np.hypot(x - np.median(x), y - np.median(y))
-    rise = u - np.median(u[distance >= np.quantile(distance, 0.75)])
+    rise = rise_of(x, y, u)
     # The median of three points does not follow a single outlier.
     above = rise > 0.5 * np.median(np.sort(rise)[-3:])
     if not above.any():

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
+from memscal.estimation.plausibility import rise_of
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Places, Scan, places_of
 
@@ -304,11 +305,8 @@ def _require_usable(points: ScanPoints) -> None:
 
 def _require_positive_peak(points: ScanPoints) -> None:
     """Refuse a voltage that does not rise where the indenter is above the sensor."""
-    u = points.u / points.load
-    distance = np.hypot(points.x - np.median(points.x), points.y - np.median(points.y))
-    baseline = np.median(u[distance >= np.quantile(distance, 0.75)])
     # The median of three points does not follow a single outlier.
-    ordered = np.sort(u - baseline)
+    ordered = np.sort(rise_of(points.x, points.y, points.u / points.load))
     rise, fall = np.median(ordered[-3:]), -np.median(ordered[:3])
     if fall > 1.5 * rise:
         raise InputError(

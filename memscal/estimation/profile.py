@@ -205,7 +205,7 @@ def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
 
 def _require_determined(estimate: ProfileEstimate) -> None:
     """Refuse scans that do not cross their sensor, or whose signal is lost in noise."""
-    points, integrals = estimate.points, estimate.basis.integrals
+    points = estimate.points
     for scan, axis in np.argwhere(points.free):
         name, centre = "xy"[axis], estimate.centres[scan, axis]
         positions = (points.x, points.y)[axis][points.scan == scan]
@@ -216,18 +216,25 @@ def _require_determined(estimate: ProfileEstimate) -> None:
                 why="A centre that was not crossed is not determined, nor are A and G.",
                 cure="Scan across the sensor.",
             )
+    require_significant(
+        estimate,
+        "Check channel, positions, film and rod; scan farther; raise the load or average repeats.",
+    )
+
+
+def require_significant(estimate: ProfileEstimate, cure: str) -> None:
+    """Refuse a conversion constant that is not distinct from zero, and say why."""
+    a, integrals = estimate.conversion_constant, estimate.basis.integrals
     # Rounding makes the variance of a scan without noise negative.
     variance = float(integrals @ estimate.covariance @ integrals)
     uncertainty = float(np.sqrt(max(variance, 0.0)))
-    a = estimate.conversion_constant
     if not a > LEAST_SIGNIFICANCE * uncertainty:
-        negative = a < -LEAST_SIGNIFICANCE * uncertainty
+        wrong = "negative" if a < -LEAST_SIGNIFICANCE * uncertainty else "not distinct from zero"
         raise FitError(
             f"The conversion constant would be ({a * 1e3:.2g} ± {uncertainty * 1e3:.2g}) mV/Pa: "
-            f"it is {'negative' if negative else 'not distinct from zero'}.",
-            why=why_undetermined(estimate),
-            cure="Check channel, positions, film and rod; scan farther; raise the load or average "
-            "repeats.",
+            f"it is {wrong}.",
+            why=_why_undetermined(estimate),
+            cure=cure,
         )
 
 
@@ -237,13 +244,12 @@ _LEAST_RISE = 6.0
 _LEFT = 0.1
 
 
-def why_undetermined(estimate: ProfileEstimate) -> str:
+def _why_undetermined(estimate: ProfileEstimate) -> str:
     """Say what keeps A from being determined: the noise, or the parameter it is confused with."""
     base = np.linalg.qr(estimate.model.drift_columns)[0]
     rise = float(np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted)))
     ratio = rise / float(np.median(estimate.noise))
-    varies = f"Beside a straight line the voltage varies by {rise * 1e3:.3g} mV, "
-    varies += f"{ratio:.3g} times its noise"
+    varies = f"Beside a line the voltage varies by {rise * 1e3:.3g} mV, {ratio:.3g} times its noise"
     if ratio < _LEAST_RISE:
         return f"{varies}: it does not rise above its noise as the indenter passes."
     signal = np.abs(estimate.predicted - estimate.background)
@@ -255,13 +261,10 @@ def why_undetermined(estimate: ProfileEstimate) -> str:
         )
     centres, flat = 2 + int(estimate.points.free.sum()), estimate.basis.flat
     everything = np.arange(len(estimate.covariance))
-    shape = np.concatenate([[1], everything[flat:]])
-    baseline = everything[centres : flat - estimate.points.ellipse]
     blocks = {
-        "the baseline, as the scan is too short to show the profile's tail": baseline,
-        "the width and shape of the apparatus function, as the reference is too wide or the step "
-        "too coarse to determine them": shape,
-        "the sensor's centre, as the scan is too far off centre": everything[2:centres],
+        "the baseline: the scan is too short to show the profile's tail": everything[centres:flat],
+        "the width and shape of the apparatus function: the reference is too wide, or the step too "
+        "coarse, to determine them": np.concatenate([[1], everything[flat:]]),
     }
     confused = max(blocks, key=lambda name: _share(estimate, blocks[name]))
     return f"{varies}, but the conversion constant cannot be told from {confused}."

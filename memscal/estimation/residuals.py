@@ -134,7 +134,7 @@ class Residuals:
 def residuals_of(estimate: ProfileEstimate) -> Residuals:
     """Project a scan off all voltages that an apparatus function can make."""
     model = free_model(estimate)
-    place, sequence = passes_of(estimate)
+    place, sequence = _passes(estimate)
     order = np.argsort(place[model.point])
     point = model.point[order]
     basis, data = orthonormal(model.design[order]), model.data[order]
@@ -270,7 +270,7 @@ def _whitened(basis: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(values + left @ (growth * (left.T @ values)))
 
 
-def passes_of(estimate: ProfileEstimate) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _passes(estimate: ProfileEstimate) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Place of each point along the scan, and which pass over the sensor it belongs to."""
     points = estimate.points
     runs_along_x = points.free[points.scan, 0]
