@@ -208,7 +208,7 @@ _FEWEST, _EQUAL = 3, 1e-9
 #: changes by this many times the noise among them: else they may be equal by chance or rounding.
 _FINE, _CURVED = 30.0, 3.0
 #: Points are a plateau while their scatter has at least this p-value.
-_ALIKE = 0.05
+_ALIKE = 1e-3
 #: Weight of points that are left out of a fit, relative to that of the others.
 _LITTLE = 1e-9
 
@@ -225,7 +225,7 @@ def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:
 
 def _equal_at_top(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Points of a scan that share its largest voltage to the last digit."""
-    u, noise = estimate.points.u, float(np.median(estimate.noise[inside]))
+    u, noise = estimate.points.u, float(np.median(_ordinary_noise(estimate)[inside]))
     top: NDArray[np.bool_] = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
     finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
     curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
@@ -253,15 +253,20 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
     overshoot = -float(share @ others.residual)
     rings = model.signal(fit.geometry, basis.kernels(model.k)[:, basis.flat :])
     slope = share @ np.hstack([fit.jacobian, rings])
-    variance = share**2 @ estimate.noise**2 + slope @ others.covariance @ slope
+    variance = share**2 @ _ordinary_noise(estimate) ** 2 + slope @ others.covariance @ slope
     return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
 
 
+def _ordinary_noise(estimate: ProfileEstimate) -> FloatArray:
+    """Noise of each point, shape (n,), in V, as if none were an outlier."""
+    stated = estimate.points.u_errors
+    return estimate.noise_scale * (np.ones_like(estimate.points.u) if stated is None else stated)
+
+
 def _plateau(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Points about a scan's largest signal that are equal within the noise."""
-    signal = estimate.predicted - estimate.background
-    order = np.argsort(np.where(inside, -signal, np.inf), kind="stable")
-    u, noise = estimate.points.u[order], estimate.noise[order]
+    """Points of a scan about its centre that are equal within the noise."""
+    order = np.argsort(np.where(inside, estimate.distance, np.inf), kind="stable")
+    u, noise = estimate.points.u[order], _ordinary_noise(estimate)[order]
     plateau = np.zeros_like(inside)
     for count in range(_FEWEST, int(inside.sum()) // 2):
         top, weight = u[:count], noise[:count] ** -2

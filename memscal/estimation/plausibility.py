@@ -54,11 +54,13 @@ def require_plausible(scan: Scan) -> None:
     width = _voltage_width(x, y, scan.u_zz.ravel())
     short = "So short a scan shows neither the flanks of the stress nor the baseline."
     wide = "The stress at the base of a film is little wider than the film is thick: "
+    friction = "Under a rod wider than the film is thick, the stress depends on friction."
     for wrong, name, value, why in (
         (span < _SHORTEST_SPAN * h, "The positions span", span, short),
         (2 * a > span, f"The positions span {span * 1e3:.4g} mm; the rod's width is", 2 * a, short),
         (step > _LONGEST_STEP * h, "The positions' step is", step, f"{wide}the scan misses it."),
         (span > _LONGEST_SPAN * h, "The positions span", span, f"{wide}no scan is so long."),
+        (2 * a > h, "The rod's width is", 2 * a, friction),
         (width > _WIDEST_VOLTAGE * h, "The voltage's full width at half its height is", width,
          f"{wide}no sensor that it serves is so much wider."),
     ):  # fmt: skip

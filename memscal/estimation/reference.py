@@ -63,16 +63,6 @@ def require_calibration_rod(scan: Scan) -> None:
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
     require_plausible(scan)
-    diameter, thickness = 2 * scan.indenter.radius, scan.film.thickness
-    if diameter > thickness:
-        raise InputError(
-            f"The rod is {diameter * 1e3:g} mm wide, but the film is only "
-            f"{thickness * 1e3:g} mm thick.",
-            why="The stress at the base then depends on friction under the rod, and carries too "
-            "little fine detail to resolve the apparatus function.",
-            cure="Use a rod narrower than the film is thick; or check the values and the units of "
-            "/entry/indenter/radius and /entry/sample/film/thickness.",
-        )
 
 
 @lru_cache(maxsize=64)
