@@ -41,12 +41,9 @@ def with_kernel(kernel: Callable[[FloatArray], FloatArray]) -> ApparatusFunction
         r=r, g=g, g_errors=errors, g_gaussian=g, g_covariance=np.diag(errors**2)
     )
     transfer = TransferFunction(
-        k=k,
-        modulus=np.exp(-((k * SIGMA) ** 2) / 2),
-        modulus_errors=np.zeros(101),
-        window=np.ones(101),
-        resolved_wavenumber=3.7e3,
-    )
+        k=k, modulus=np.exp(-((k * SIGMA) ** 2) / 2), modulus_errors=np.zeros(101),
+        window=np.ones(101), resolved_wavenumber=3.7e3,
+    )  # fmt: skip
     return as_function(replace(make_artifact(), radial_profile=radial, transfer=transfer))
 
 

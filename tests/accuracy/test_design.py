@@ -32,12 +32,9 @@ def random_plan(number: int) -> Plan:
     return Plan(
         film=replace(PAPER_FILM, thickness=thickness),
         kernel=memscal.GaussianMixture((1.0,), (rng.uniform(0.3, 0.6) * thickness,)),
-        step=rng.uniform(0.1, 0.25) * thickness,
-        half_range=rng.uniform(3.5, 5.0) * thickness,
-        repeats=int(rng.integers(1, 5)),
-        noise=rng.uniform(0.002, 0.01),
-        load_uncertainty=0.005,
-    )
+        step=rng.uniform(0.1, 0.25) * thickness, half_range=rng.uniform(3.5, 5.0) * thickness,
+        repeats=int(rng.integers(1, 5)), noise=rng.uniform(0.002, 0.01), load_uncertainty=0.005,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

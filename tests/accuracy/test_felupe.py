@@ -87,13 +87,9 @@ def press_with_felupe(state: Contact, refinement: float) -> Answer:
     whole[moved, 1] = state.inside.outward(r[moved] * 1e-3) * 1e3
     for share in np.linspace(0, 1, STEPS + 1)[1:]:
         found = felupe.newtonraphson(
-            items=[solid],
-            dof0=fixed,
-            dof1=free,
-            ext0=share * whole.ravel()[fixed],
-            verbose=0,
+            items=[solid], dof0=fixed, dof1=free, ext0=share * whole.ravel()[fixed], verbose=0,
             tol=1e-7,
-        )
+        )  # fmt: skip
         assert found.success
     reactions = np.asarray(solid.assemble.vector(field).todense()).ravel()
     upward, outward = reactions[: 2 * z.size].reshape(-1, 2).T

@@ -54,13 +54,10 @@ def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> l
         "step": step, "layers": LAYERS, "first_depth": 2e-3,
     }  # fmt: skip
     done = subprocess.run(
-        [python, str(PROGRAM)],
-        input=json.dumps(case),
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
+        [python, str(PROGRAM)], input=json.dumps(case),
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"}, capture_output=True, text=True,
         check=False,
-    )
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     states = json.loads(done.stdout)["states"]
     return [

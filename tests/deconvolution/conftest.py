@@ -61,12 +61,9 @@ def _make(grid_name: str = "quarter plane", weakest: float = 1e-3) -> Gaussians:
     k = np.sqrt(-2 * np.log(weakest)) / STRESS_WIDTH
     both = float(np.hypot(STRESS_WIDTH, KERNEL_WIDTH))
     problem = DivisionProblem(
-        grid,
-        A * _gaussian(grid.radius, both),
-        _gaussian(grid.radius, STRESS_WIDTH),
-        A * float(np.exp(-((k * both) ** 2) / 2)),
-        weakest,
-    )
+        grid, A * _gaussian(grid.radius, both), _gaussian(grid.radius, STRESS_WIDTH),
+        A * float(np.exp(-((k * both) ** 2) / 2)), weakest,
+    )  # fmt: skip
     return Gaussians(
         problem,
         _gaussian(centred.radius, KERNEL_WIDTH),

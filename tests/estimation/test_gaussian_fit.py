@@ -37,12 +37,9 @@ def fit(scan: Scan):
 )
 def test_without_noise_every_parameter_is_recovered(sigma, centre, baseline, drift) -> None:
     scan = simulated(
-        kernel=memscal.GaussianMixture((1.0,), (sigma,)),
-        centre=(centre, 0.0),
-        baseline=baseline,
-        drift=drift,
-        noise=0.0,
-    )
+        kernel=memscal.GaussianMixture((1.0,), (sigma,)), centre=(centre, 0.0), baseline=baseline,
+        drift=drift, noise=0.0,
+    )  # fmt: skip
     found = fit(scan)
     # The film passes no more than exp(-kh): a width is known to what the fit converges to.
     assert found.sigma == pytest.approx(sigma, rel=1e-5)

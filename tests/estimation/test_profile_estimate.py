@@ -69,14 +69,6 @@ def test_a_scan_beside_the_sensor_is_refused() -> None:
         estimated(simulated(centre=(8.4e-3, 0.0)))
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_noise_alone_is_no_calibration(seed: int) -> None:
-    scan = simulated()
-    noise = np.random.default_rng(seed).normal(0, 1e-4, scan.u_zz.shape)
-    with pytest.raises(FitError):
-        estimated(replace(scan, u_zz=noise, u_zz_errors=None))
-
-
 def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     scan = simulated(kernel=RING, noise=0.002, state_noise=False)
     estimate = estimated(scan)
@@ -84,11 +76,8 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     change[30] = 1e-3 * estimate.weighed.noise
     again = weigh_departures(
         replace(estimate.model, points=replace(estimate.points, u=estimate.points.u + change)),
-        estimate.gaussian,
-        estimate.basis,
-        estimate.weights,
-        float(estimate.outlier_weight.sum()),
-    )
+        estimate.gaussian, estimate.basis, estimate.weights, float(estimate.outlier_weight.sum()),
+    )  # fmt: skip
     profile = estimate.basis.radial(np.linspace(0.0, 3e-3, 31))
     expected = profile @ (estimate.weighed.gain @ change)
     found = profile @ (again.mean - estimate.weighed.mean)

@@ -330,22 +330,17 @@ def test_a_value_that_the_model_refuses_is_reported_with_the_file(tmp_path: Path
             read_scan(path)
 
 
-def test_a_raster_with_its_axes_swapped_is_refused(tmp_path: Path):
-    path = tmp_path / "scan.h5"
-    write_scan(make_scan("raster"), path)
-    with h5py.File(path, "r+") as file:
-        file["/entry/data"].attrs["axes"] = ["x", "y"]
-    with pytest.raises(FormatError, match=r"axes(.|\n)*Transpose"):
-        read_scan(path)
-
-
-def test_a_raster_without_its_second_axis_is_not_taken_for_repeats(tmp_path: Path):
-    path = tmp_path / "scan.h5"
-    write_scan(make_scan("raster"), path)
-    with h5py.File(path, "r+") as file:
-        del file["/entry/data/y"]
-    with pytest.raises(FormatError, match="there is no /entry/data/y"):
-        read_scan(path)
+def test_a_raster_with_its_axes_swapped_or_without_one_is_refused(tmp_path: Path):
+    for name, words in (("swapped", r"axes(.|\n)*Transpose"), ("one", "there is no /entry/data/y")):
+        path = tmp_path / f"{name}.h5"
+        write_scan(make_scan("raster"), path)
+        with h5py.File(path, "r+") as file:
+            if name == "swapped":
+                file["/entry/data"].attrs["axes"] = ["x", "y"]
+            else:
+                del file["/entry/data/y"]
+        with pytest.raises(FormatError, match=words):
+            read_scan(path)
 
 
 def test_an_unknown_shape_of_indenter_is_refused(tmp_path: Path):

@@ -39,13 +39,9 @@ def found(
     made: Experiment, apparatus: memscal.ApparatusFunction, kept: Path
 ) -> memscal.FrictionComparison:
     return memscal.compare(
-        [made.dry, made.lubricated],
-        apparatus,
-        friction=FRICTION,
-        macroscopic=1.6,
-        macroscopic_uncertainty=0.1,
-        cache=kept,
-    )
+        [made.dry, made.lubricated], apparatus, friction=FRICTION, macroscopic=1.6,
+        macroscopic_uncertainty=0.1, cache=kept,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

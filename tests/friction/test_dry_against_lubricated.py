@@ -43,13 +43,9 @@ def compared(
         )
         wet = replace(there, u=wet.u + moved[0])
     return dry_against_lubricated(
-        (profile(dry, "dry"), profile(wet, "lubricated")),
-        (dry, wet),
-        laboratory.sensor,
-        laboratory.family.at(0.0),
-        (LOAD, LOAD),
-        conversion_share=0.01,
-    )
+        (profile(dry, "dry"), profile(wet, "lubricated")), (dry, wet), laboratory.sensor,
+        laboratory.family.at(0.0), (LOAD, LOAD), conversion_share=0.01,
+    )  # fmt: skip
 
 
 def every(friction: float, **options: float) -> list[DryAgainstLubricated]:

@@ -16,13 +16,9 @@ def value_at(t: float) -> float:
 
 def estimate(chi_square: FloatArray, last: float = np.inf, level: float = 0.95) -> BoundedEstimate:
     return profile_estimate(
-        np.array([value_at(t) for t in COORDINATES]),
-        COORDINATES,
-        chi_square,
-        value_at,
-        reason=lambda interval: friction_reason(interval, last),
-        level=level,
-    )
+        np.array([value_at(t) for t in COORDINATES]), COORDINATES, chi_square, value_at,
+        reason=lambda interval: friction_reason(interval, last), level=level,
+    )  # fmt: skip
 
 
 def parabola(best: float, sigma: float, last: float = np.inf) -> BoundedEstimate:

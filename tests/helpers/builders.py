@@ -23,13 +23,9 @@ CONVERSION = 3.0e-8
 def make_film(**changes: Any) -> ElasticFilm:
     """The paper's film."""
     film = ElasticFilm(
-        young_modulus=2.2e6,
-        poisson_ratio=0.5,
-        thickness=2e-3,
-        roughness_rms=1.82e-6,
-        young_modulus_uncertainty=0.1e6,
-        thickness_uncertainty=20e-6,
-    )
+        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, roughness_rms=1.82e-6,
+        young_modulus_uncertainty=0.1e6, thickness_uncertainty=20e-6,
+    )  # fmt: skip
     return replace(film, **changes)
 
 

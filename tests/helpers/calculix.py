@@ -200,13 +200,9 @@ def run(deck: list[str], folder: Path) -> dict[tuple[str, float], dict[int, Floa
     program = shutil.which("ccx")
     assert program is not None
     done = subprocess.run(
-        [program, "film"],
-        cwd=folder,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        [program, "film"], cwd=folder, env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert "Job finished" in done.stdout, done.stdout[-2000:]
     return parse((folder / "film.dat").read_text(encoding="ascii"))
 

@@ -131,12 +131,9 @@ def comparison(
         for name, bad in (("restored_force", False), ("bracketing", failed))
     )
     measured = SimpleNamespace(
-        profiles=tuple(profiles),
-        scans=tuple(_scan(lubrication) for lubrication in lubrications),
-        checks=(),
-        messages=(),
-        overridden=(),
-    )
+        profiles=tuple(profiles), scans=tuple(_scan(lubrication) for lubrication in lubrications),
+        checks=(), messages=(), overridden=(),
+    )  # fmt: skip
     given: dict[str, Any] = {
         "measured": measured, "friction": friction_grid, "loads": by_loading, "joint": joint,
         "dry_against_lubricated": _differences(profiles), "macroscopic": macroscopic,

@@ -20,13 +20,9 @@ from memscal.friction.likelihood import LoadPoints, Sensor
 LOADS = (0.34, 0.69, 1.37, 2.75)
 MACROSCOPIC = 1.6
 FILM = ElasticFilm(
-    young_modulus=2.2e6,
-    poisson_ratio=0.5,
-    thickness=2e-3,
-    young_modulus_uncertainty=0.1e6,
-    thickness_uncertainty=0.02e-3,
-    poisson_ratio_uncertainty=0.005,
-)
+    young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, young_modulus_uncertainty=0.1e6,
+    thickness_uncertainty=0.02e-3, poisson_ratio_uncertainty=0.005,
+)  # fmt: skip
 SPHERE = Sphere(radius=128.8e-3)
 _REACH = 9e-3
 _SIGMA = 561e-6
@@ -49,12 +45,9 @@ PRECISE = Precision(0.001, 0.002)
 def amontons() -> ProfileFamily:
     """Return contacts of a rigid interface along the friction coefficient."""
     return amontons_family(
-        FILM,
-        SPHERE,
-        LOADS,
-        reach=_REACH,
+        FILM, SPHERE, LOADS, reach=_REACH,
         friction=(0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, math.inf),
-    )
+    )  # fmt: skip
 
 
 @lru_cache

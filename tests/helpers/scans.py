@@ -25,11 +25,9 @@ TAILS = memscal.GaussianMixture((0.75, 0.25), (0.5e-3, 1.0e-3))
 
 # Inputs without uncertainty, so that what is left in a budget is noise alone.
 EXACT_FILM = replace(
-    PAPER_FILM,
-    young_modulus_uncertainty=None,
-    poisson_ratio_uncertainty=None,
+    PAPER_FILM, young_modulus_uncertainty=None, poisson_ratio_uncertainty=None,
     thickness_uncertainty=None,
-)
+)  # fmt: skip
 EXACT_ROD = replace(PAPER_ROD, radius_uncertainty=None)
 
 

@@ -15,12 +15,9 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
     scan = make_scan("repeats")
     one = slice(0, 1)
     single = replace(
-        scan,
-        u_zz=scan.u_zz[one],
-        u_zz_errors=scan.u_zz_errors[one],
-        normal_load=scan.normal_load[one],
-        channels={},
-    )
+        scan, u_zz=scan.u_zz[one], u_zz_errors=scan.u_zz_errors[one],
+        normal_load=scan.normal_load[one], channels={},
+    )  # fmt: skip
     assert single.kind == "repeats"
 
 
