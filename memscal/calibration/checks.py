@@ -239,7 +239,6 @@ _BAND_LIMIT = 0.5
 _FORCE_LIMIT = 0.01
 _WIDTH_LIMIT = 3.0
 _NEGLIGIBLE_DIFFERENCE = 0.002
-#: Positions that a check names.
 _MOST_NAMED = 12
 
 

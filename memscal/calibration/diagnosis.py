@@ -32,22 +32,19 @@ from memscal.model.stress import StressProfile
 _NO_WIDTH = 0.1
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
 _MISFIT = 0.03
-#: A length is at fault if another value lowers chi-square by this much: five standard deviations.
-_CLEARLY = 25.0
-#: Residuals beyond this many standard deviations count linearly.
-_KNEE = 3.0
-#: The search needs no more points than this.
-_MOST_POINTS = 400
+#: A length is at fault if another value lowers chi-square by this much, in which residuals beyond
+#: so many standard deviations count linearly.
+_CLEARLY, _KNEE = 25.0, 3.0
+#: The search needs no more points of a scan than this.
+_MOST_POINTS = 200
 #: Factors are tried by this ratio: a minimum of chi-square is wider.  Beyond one it rises by this.
 _RATIO, _RISEN = 1.4, 1.05
-#: A length is followed up if a factor leaves less than this share of the misfit.
-_PROMISING = 0.9
-#: Values fit as well as the best one up to this rise of chi-square: two standard deviations.
-_AS_GOOD, _HALVINGS = 4.0, 7
-#: Lengths are scaled until the scan spans this many thicknesses of the film, ...
-_LONGEST_SPAN = 60.0
-#: ... and a rod until its radius is this share of the thickness: a narrower one acts as a point.
-_THINNEST = 0.02
+#: A length is followed up if a factor leaves less than this share of the misfit; values fit as well
+#: as the best one up to this rise of chi-square, two standard deviations.
+_PROMISING, _AS_GOOD, _HALVINGS = 0.9, 4.0, 7
+#: Lengths are scaled until the scan spans so many thicknesses of the film, and a rod until its
+#: radius is so small a share of the thickness that it acts as a point.
+_LONGEST_SPAN, _THINNEST = 60.0, 0.02
 #: Load of the rods that are tried, in N: the reference per newton does not depend on it.
 _LOAD = 1e-6
 
@@ -61,9 +58,13 @@ def require_profile(
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
     search = _Search(tuple(scans), tuple(stresses), tuple(map(_thinned, points)))
     try:
-        estimate = estimate_profile(joined_points(points), *references)
-    except FitError as failure:
-        raise search.error() or failure from None
+        # At a width of zero the slopes by the width vanish, and no later step is defined.
+        with np.errstate(all="ignore"):
+            estimate = estimate_profile(joined_points(points), *references)
+    except (FitError, np.linalg.LinAlgError) as failure:
+        cure = "Look at the scan; check the values and units of positions, film and rod."
+        singular = FitError("No apparatus function of any width fits the scan.", cure=cure)
+        raise search.error() or (failure if isinstance(failure, FitError) else singular) from None
     if not _has_width(estimate.gaussian, estimate.weights, estimate.noise_scale):
         raise search.error() or _hidden(estimate, search)
     return estimate

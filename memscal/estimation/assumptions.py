@@ -207,10 +207,8 @@ _FEWEST, _EQUAL = 3, 1e-9
 #: ... if voltages are read this many times more finely than their noise, or if the fitted profile
 #: changes by this many times the noise among them: else they may be equal by chance or rounding.
 _FINE, _CURVED = 30.0, 3.0
-#: Points are a plateau while their scatter has at least this p-value.
-_ALIKE = 1e-3
-#: Weight of points that are left out of a fit, relative to that of the others.
-_LITTLE = 1e-9
+#: Points are a plateau while their scatter has at least this p-value; this weight leaves them out.
+_ALIKE, _LITTLE = 1e-3, 1e-9
 
 
 def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:

@@ -41,8 +41,7 @@ _CROWDED = 0.7
 
 def mistaken_unit(factor: float) -> str:
     """Name the mistake of a unit that a stated value needs this factor for; or nothing."""
-    near = [words for mistake, words in _MISTAKES.items() if abs(factor / mistake - 1) < _NEAR]
-    return near[0] if near else ""
+    return next((words for m, words in _MISTAKES.items() if abs(factor / m - 1) < _NEAR), "")
 
 
 def require_plausible(scan: Scan) -> None:

@@ -238,10 +238,9 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
         )
 
 
-#: A voltage that varies by less than this many times its noise is lost in it.
-_LEAST_RISE = 6.0
-#: A scan that ends with more than this share of its largest signal shows no baseline.
-_LEFT = 0.1
+#: A voltage that varies by less than this many times its noise is lost in it, and a scan that ends
+#: with more than this share of its largest signal shows no baseline.
+_LEAST_RISE, _LEFT = 6.0, 0.1
 
 
 def _why_undetermined(estimate: ProfileEstimate) -> str:
