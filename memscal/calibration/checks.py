@@ -13,6 +13,7 @@ from memscal.calibration.uncertainty import route_difference
 from memscal.estimation.assumptions import (
     ExtraColumns,
     axisymmetry_test,
+    clipped_points,
     departure_test,
     hold_out,
     linearity_test,
@@ -250,6 +251,7 @@ _NEGATIVE_LIMIT = 0.4
 _ROUGHNESS_LIMIT = 0.1
 _BEYOND = 1.5
 _NEGLIGIBLE_DIFFERENCE = 0.002
+_MOST_NAMED = 12
 
 
 def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
@@ -262,6 +264,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
         *_set_up(solution),
         *_reference_and_outliers(solution),
         *model_checks(solution.estimate),
+        *_saturation(solution.estimate),
     )
 
 
@@ -434,6 +437,25 @@ def _reference_and_outliers(solution: Solution) -> list[QualityCheck]:
             "not what the uncertainties take it for: look at the points that the messages name.",
         ),
     ]
+
+
+def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:
+    """Count the points that were held at a ceiling, and name them."""
+    points = estimate.points
+    if estimate.model.order:
+        return []
+    clipped = np.flatnonzero(clipped_points(estimate))
+    axes = np.stack([points.x, points.y], axis=1)[:, points.free.any(axis=0)] * 1e3
+    places = [", ".join(f"{p:.4g}" for p in place) for place in axes[clipped[:_MOST_NAMED]]]
+    more = f" and {clipped.size - _MOST_NAMED} more" if clipped.size > _MOST_NAMED else ""
+    where = f", here at {'; '.join(places)} mm{more}" if places else ""
+    meaning = (
+        f"Number of points at a ceiling{where}: neighbours at the largest voltage, equal to the "
+        "last digit, or within the noise and below the profile through the other points. A failure "
+        "means that amplifier or converter is saturated: lower its gain or the load, and scan "
+        "again; A and G are wrong."
+    )
+    return [check("saturation", float(clipped.size), 0.0, meaning)]
 
 
 def _chi_square(name: str, misfit: Misfit, meaning: str, *, exact: bool = False) -> QualityCheck:

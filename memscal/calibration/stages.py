@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import j1
 
+from memscal.calibration.diagnosis import require_profile
 from memscal.calibration.fields import (
     Fields,
     GridChoice,
@@ -31,12 +32,8 @@ from memscal.deconvolution.fourier_ratio import (
 from memscal.errors import InputError
 from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.points import channel_order, joined_points, measured_points
-from memscal.estimation.profile import (
-    ProfileEstimate,
-    constrained_profile,
-    estimate_profile,
-)
+from memscal.estimation.points import channel_order, measured_points
+from memscal.estimation.profile import ProfileEstimate, constrained_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import Contact
@@ -65,7 +62,7 @@ def solve(
     require_channel_method(channel, method)
     points = [measured_points(scan, channel) for scan in scans]
     references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
-    estimate = estimate_profile(joined_points(points), *references)
+    estimate = require_profile(scans, stresses, points, references)
     smoothed = None if estimate.model.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)

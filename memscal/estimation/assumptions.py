@@ -1,7 +1,7 @@
 """Tests of the model's assumptions: symmetry, linearity in load, a round and Gaussian sensor.
 
 Some add m columns to the fitted model: chi-square falls by a chi-square variable of m degrees
-of freedom.  Others predict a group of points from the rest.
+of freedom.  Others predict a group of points from the rest, or look for a ceiling of the voltage.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, chdtri, fdtrc, fdtri
+from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
 
 from memscal.axisymmetry.kernels import gaussian_transfer
-from memscal.estimation.bayesian import HYPOTHESES
-from memscal.estimation.profile import ProfileEstimate
+from memscal.errors import FitError
+from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_departures
+from memscal.estimation.gaussian import fit_gaussian_to_points
+from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
 from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model, orthonormal
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
@@ -198,3 +200,76 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
         errors=np.sqrt(np.diag(information)) / scale,
         size=float(np.abs(columns @ coefficients).max() / estimate.largest_signal),
     )
+
+
+#: So many voltages at the top, equal within a share of their range, are clipped ...
+_FEWEST, _EQUAL = 3, 1e-9
+#: ... if voltages are read this many times more finely than their noise, or if the fitted profile
+#: changes by this many times the noise among them: else they may be equal by chance or rounding.
+_FINE, _CURVED = 30.0, 3.0
+#: Points are a plateau while their scatter has at least this p-value; this weight leaves them out.
+_ALIKE, _LITTLE = 1e-3, 1e-9
+
+
+def clipped_points(estimate: ProfileEstimate) -> NDArray[np.bool_]:
+    """Say which points were held at a ceiling, shape (n,); of a shear none is told."""
+    clipped = np.zeros(estimate.points.u.size, dtype=np.bool_)
+    for scan in range(estimate.points.scans if estimate.model.order == 0 else 0):
+        inside = estimate.points.scan == scan
+        equal = _equal_at_top(estimate, inside)
+        clipped |= equal if equal.any() else _flattened(estimate, inside)
+    return clipped
+
+
+def _equal_at_top(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Points of a scan that share its largest voltage to the last digit."""
+    u, noise = estimate.points.u, float(np.median(_ordinary_noise(estimate)[inside]))
+    top: NDArray[np.bool_] = inside & (u >= u[inside].max() - _EQUAL * np.ptp(u[inside]))
+    finest = np.diff(np.unique(u[inside])).min(initial=np.inf)
+    curved = np.ptp(estimate.predicted[top]) > _CURVED * noise
+    clipped = top.sum() >= _FEWEST and (curved or finest < noise / _FINE)
+    return top if clipped else np.zeros_like(top)
+
+
+def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Plateau of a scan that the profile through all other points rises above."""
+    plateau, none = _plateau(estimate, inside), np.zeros_like(inside)
+    if plateau.sum() < _FEWEST:
+        return none
+    model, points = estimate.model, estimate.points
+    weights = np.where(plateau, _LITTLE, 1.0) * estimate.weights
+    try:
+        fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
+    except FitError:
+        return none
+    basis = departure_basis(model, fit)
+    count = float(estimate.outlier_weight[~plateau].sum())
+    least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
+    others = weigh_departures(model, fit, basis, weights, count, least_noise=least)
+    # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
+    share = plateau / plateau.sum()
+    overshoot = -float(share @ others.residual)
+    rings = model.signal(fit.geometry, basis.kernels(model.k)[:, basis.flat :])
+    slope = share @ np.hstack([fit.jacobian, rings])
+    variance = share**2 @ _ordinary_noise(estimate) ** 2 + slope @ others.covariance @ slope
+    return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
+
+
+def _ordinary_noise(estimate: ProfileEstimate) -> FloatArray:
+    """Noise of each point, shape (n,), in V, as if none were an outlier."""
+    stated = estimate.points.u_errors
+    return estimate.noise_scale * (np.ones_like(estimate.points.u) if stated is None else stated)
+
+
+def _plateau(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Points of a scan about its centre that are equal within the noise."""
+    order = np.argsort(np.where(inside, estimate.distance, np.inf), kind="stable")
+    u, noise = estimate.points.u[order], _ordinary_noise(estimate)[order]
+    plateau = np.zeros_like(inside)
+    for count in range(_FEWEST, int(inside.sum()) // 2):
+        top, weight = u[:count], noise[:count] ** -2
+        scatter = weight @ (top - np.average(top, weights=weight)) ** 2
+        if scatter > chdtri(count - 1, _ALIKE):
+            break
+        plateau[order[:count]] = True
+    return plateau

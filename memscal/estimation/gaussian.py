@@ -263,7 +263,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
 
     scale = _typical(model, start)
     unexplained = model.points.u - evaluate(start / scale).predicted
-    noise = _robust_scale(standardised(unexplained, weights))
+    noise = robust_scale(standardised(unexplained, weights))
 
     def residual(scaled: FloatArray) -> FloatArray:
         return standardised(evaluate(scaled).predicted - model.points.u, weights) / noise
@@ -338,7 +338,7 @@ def _positive_width(fit: GaussianFit) -> GaussianFit:
     return replace(fit, sigma=-fit.sigma, jacobian=jacobian)
 
 
-def _robust_scale(residual: FloatArray) -> float:
+def robust_scale(residual: FloatArray) -> float:
     """Median absolute deviation as a standard deviation, never zero."""
     scale = 1.4826 * float(np.median(np.abs(residual)))
     return max(scale, 1e-12 * float(np.abs(residual).max()), np.finfo(float).tiny)

@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
+from memscal.estimation.plausibility import rise_of
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Places, Scan, places_of
 
@@ -156,22 +158,18 @@ class ScanPoints:
         """Return one of the scans."""
         if self.scans == 1:
             return self
-        keep = self.scan == scan
-        columns = {
-            item.name: value[keep]
+        single = self.selected(np.flatnonzero(self.scan == scan))
+        return replace(single, scan=np.zeros_like(single.scan), free=self.free[scan : scan + 1])
+
+    def selected(self, chosen: NDArray[np.intp]) -> ScanPoints:
+        """Return some of the points, without their correlations."""
+        columns: dict[str, Any] = {
+            item.name: value[chosen]
             for item in fields(self)
             if item.name not in ("free", "decorrelation")
             and isinstance(value := getattr(self, item.name), np.ndarray)
         }
-        return replace(
-            self,
-            **columns
-            | {
-                "scan": np.zeros(int(keep.sum()), dtype=np.intp),
-                "free": self.free[scan : scan + 1],
-                "decorrelation": None,
-            },
-        )
+        return replace(self, **columns, decorrelation=None)
 
     def standardised(self, values: FloatArray, weights: FloatArray) -> FloatArray:
         """Scale rows, (n,) or (n, m), by the root of their weights, and decorrelate them."""
@@ -307,11 +305,8 @@ def _require_usable(points: ScanPoints) -> None:
 
 def _require_positive_peak(points: ScanPoints) -> None:
     """Refuse a voltage that does not rise where the indenter is above the sensor."""
-    u = points.u / points.load
-    distance = np.hypot(points.x - np.median(points.x), points.y - np.median(points.y))
-    baseline = np.median(u[distance >= np.quantile(distance, 0.75)])
     # The median of three points does not follow a single outlier.
-    ordered = np.sort(u - baseline)
+    ordered = np.sort(rise_of(points.x, points.y, points.u / points.load))
     rise, fall = np.median(ordered[-3:]), -np.median(ordered[:3])
     if fall > 1.5 * rise:
         raise InputError(

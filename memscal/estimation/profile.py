@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
@@ -204,7 +205,7 @@ def _position_noise(model: ForwardModel, fit: GaussianFit) -> FloatArray:
 
 def _require_determined(estimate: ProfileEstimate) -> None:
     """Refuse scans that do not cross their sensor, or whose signal is lost in noise."""
-    points, integrals = estimate.points, estimate.basis.integrals
+    points = estimate.points
     for scan, axis in np.argwhere(points.free):
         name, centre = "xy"[axis], estimate.centres[scan, axis]
         positions = (points.x, points.y)[axis][points.scan == scan]
@@ -215,17 +216,66 @@ def _require_determined(estimate: ProfileEstimate) -> None:
                 why="A centre that was not crossed is not determined, nor are A and G.",
                 cure="Scan across the sensor.",
             )
+    require_significant(
+        estimate,
+        "Check channel, positions, film and rod; scan farther; raise the load or average repeats.",
+    )
+
+
+def require_significant(estimate: ProfileEstimate, cure: str) -> None:
+    """Refuse a conversion constant that is not distinct from zero, and say why."""
+    a, integrals = estimate.conversion_constant, estimate.basis.integrals
     # Rounding makes the variance of a scan without noise negative.
     variance = float(integrals @ estimate.covariance @ integrals)
     uncertainty = float(np.sqrt(max(variance, 0.0)))
-    if not estimate.conversion_constant > LEAST_SIGNIFICANCE * uncertainty:
+    if not a > LEAST_SIGNIFICANCE * uncertainty:
+        wrong = "negative" if a < -LEAST_SIGNIFICANCE * uncertainty else "not distinct from zero"
         raise FitError(
-            f"The conversion constant would be ({estimate.conversion_constant * 1e3:.2g} ± "
-            f"{uncertainty * 1e3:.2g}) mV/Pa: it is not distinct from zero.",
-            why="The voltage does not rise above its noise as the rod passes, or the scan is too "
-            "short to separate the profile's tail from the baseline.",
-            cure="Check channel and positions; scan farther; raise the load or average repeats.",
+            f"The conversion constant would be ({a * 1e3:.2g} ± {uncertainty * 1e3:.2g}) mV/Pa: "
+            f"it is {wrong}.",
+            why=_why_undetermined(estimate),
+            cure=cure,
         )
+
+
+#: A voltage that varies by less than this many times its noise is lost in it, and a scan that ends
+#: with more than this share of its largest signal shows no baseline.
+_LEAST_RISE, _LEFT = 6.0, 0.1
+
+
+def _why_undetermined(estimate: ProfileEstimate) -> str:
+    """Say what keeps A from being determined: the noise, or the parameter it is confused with."""
+    base = np.linalg.qr(estimate.model.drift_columns)[0]
+    rise = float(np.ptp(estimate.predicted - base @ (base.T @ estimate.predicted)))
+    ratio = rise / float(np.median(estimate.noise))
+    varies = f"Beside a line the voltage varies by {rise * 1e3:.3g} mV, {ratio:.3g} times its noise"
+    if ratio < _LEAST_RISE:
+        return f"{varies}: it does not rise above its noise as the indenter passes."
+    signal = np.abs(estimate.predicted - estimate.background)
+    farthest, reach = int(np.argmax(estimate.distance)), float(estimate.distance.max()) * 1e3
+    if (left := signal[farthest] / signal.max()) > _LEFT:
+        return (
+            f"{varies}, but the scan is too short or off centre to show the baseline: {reach:.3g} "
+            f"mm from the sensor's centre, where it ends, {left:.0%} of the largest signal is left."
+        )
+    centres, flat = 2 + int(estimate.points.free.sum()), estimate.basis.flat
+    everything = np.arange(len(estimate.covariance))
+    blocks = {
+        "the baseline: the scan is too short to show the profile's tail": everything[centres:flat],
+        "the width and shape of the apparatus function: the reference is too wide, or the step too "
+        "coarse, to determine them": np.concatenate([[1], everything[flat:]]),
+    }
+    confused = max(blocks, key=lambda name: _share(estimate, blocks[name]))
+    return f"{varies}, but the conversion constant cannot be told from {confused}."
+
+
+def _share(estimate: ProfileEstimate, block: NDArray[np.intp]) -> float:
+    """Share of the variance of A that would go if the parameters of a block were known."""
+    covariance, integrals = estimate.covariance, estimate.basis.integrals
+    deviation = np.sqrt(np.maximum(np.diag(covariance)[block], np.finfo(float).tiny))
+    with_a = (integrals @ covariance)[block] / deviation
+    correlation = covariance[np.ix_(block, block)] / np.outer(deviation, deviation)
+    return float(with_a @ np.linalg.pinv(correlation, hermitian=True) @ with_a)
 
 
 def outlier_weights(

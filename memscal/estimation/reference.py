@@ -10,6 +10,7 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import InputError
+from memscal.estimation.plausibility import require_plausible
 from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
@@ -53,7 +54,7 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
 
 
 def require_calibration_rod(scan: Scan) -> None:
-    """Refuse an indenter that cannot calibrate."""
+    """Refuse an indenter that cannot calibrate, and lengths that no set-up has."""
     if not isinstance(scan.indenter, Rod):
         raise InputError(
             f"The scan was made with a {scan.indenter.shape}, but a calibration needs a rod.",
@@ -61,15 +62,7 @@ def require_calibration_rod(scan: Scan) -> None:
             "linear in load.",
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
-    diameter, thickness = 2 * scan.indenter.radius, scan.film.thickness
-    if diameter > thickness:
-        raise InputError(
-            f"The rod is {diameter * 1e3:g} mm wide, but the film is only "
-            f"{thickness * 1e3:g} mm thick.",
-            why="The stress at the base then depends on friction under the rod, and carries too "
-            "little fine detail to resolve the apparatus function.",
-            cure="Use a rod narrower than the film is thick; check /entry/indenter/radius.",
-        )
+    require_plausible(scan)
 
 
 @lru_cache(maxsize=64)

@@ -407,7 +407,6 @@ def gaussian_pressure(
     except FitError as failure:
         raise FitError(
             "The scan determines no stress at the base of the film.",
-            why="Its voltage does not rise clear of noise and baseline as the indenter passes one "
-            "centre, or the scan is too short to tell the profile's tail from the baseline.",
+            why=failure.why,
             cure="Check channel and positions; scan farther; raise the load or average repeats.",
         ) from failure

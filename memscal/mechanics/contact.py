@@ -233,7 +233,8 @@ def too_deep(film: ElasticFilm, indenter: Indenter, load: float, depth: float) -
         f"Under {load:g} N the {indenter.shape} would sink {depth * 1e6:.4g} um into a film of "
         f"{film.thickness * 1e6:.4g} um.",
         why="A film cannot be compressed by its whole thickness or more.",
-        cure="Lower the load or the depth, or check the film's modulus and thickness.",
+        cure="Lower the load or the depth, or check the film's modulus and thickness and the size "
+        f"of the {indenter.shape}.",
     )
 
 

@@ -32,34 +32,20 @@ _SAME = 1e-6
 
 @overload
 def indent(
-    film: ElasticFilm,
-    indenter: Indenter,
-    *,
-    load: float | None = None,
-    depth: float | None = None,
-    friction: float = 0.0,
-    loading: str = "incremental",
-    backend: str = "hankel",
-    interface: Interface | None = None,
-    strain: str = "linear",
-    film_radius: float | None = None,
-    rings: int | None = None,
-) -> Contact: ...
+    film: ElasticFilm, indenter: Indenter, *,
+    load: float | None = None, depth: float | None = None,
+    friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
+    interface: Interface | None = None, strain: str = "linear",
+    film_radius: float | None = None, rings: int | None = None,
+) -> Contact: ...  # fmt: skip
 @overload
 def indent(
-    film: ElasticFilm,
-    indenter: Indenter,
-    *,
-    load: _Several | None = None,
-    depth: _Several | None = None,
-    friction: float = 0.0,
-    loading: str = "incremental",
-    backend: str = "hankel",
-    interface: Interface | None = None,
-    strain: str = "linear",
-    film_radius: float | None = None,
-    rings: int | None = None,
-) -> list[Contact]: ...
+    film: ElasticFilm, indenter: Indenter, *,
+    load: _Several | None = None, depth: _Several | None = None,
+    friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
+    interface: Interface | None = None, strain: str = "linear",
+    film_radius: float | None = None, rings: int | None = None,
+) -> list[Contact]: ...  # fmt: skip
 @single_threaded()
 def indent(
     film: ElasticFilm,

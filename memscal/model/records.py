@@ -296,10 +296,7 @@ PLAN = (
 )
 """A planned scan."""
 
-EXPECTED = (
-    *measured(Quantity("g_at_axis", _PER_AREA, "G at the axis")),
-    TRANSFER.quantities[-1],
-)
+EXPECTED = (*measured(Quantity("g_at_axis", _PER_AREA, "G at the axis")), TRANSFER.quantities[-1])
 """What a planned scan is expected to give beside its parameters."""
 
 FORCE_BUDGET = Quantity("force_budget", _COUNT, "uncertainty of the force by source, in N")

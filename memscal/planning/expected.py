@@ -18,13 +18,12 @@ from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
-from memscal.errors import FitError
 from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
-from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
+from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.estimation.reference import (
     reference_contact,
     reference_spectra,
@@ -84,15 +83,7 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
     count = float(repeats * weights.size)
     weighed = weigh_departures(model, fit, basis, weights, count, expected_noise=1.0)
     estimate = ProfileEstimate(model, fit, basis, weighed, weights, np.ones_like(weights))
-    variance = float(basis.integrals @ estimate.covariance @ basis.integrals)
-    if not estimate.conversion_constant > LEAST_SIGNIFICANCE * np.sqrt(variance):
-        raise FitError(
-            f"The scan as planned would find a conversion constant of "
-            f"({estimate.conversion_constant * 1e3:.2g} ± {np.sqrt(variance) * 1e3:.2g}) mV/Pa: "
-            "not distinct from zero.",
-            why="It is too short to tell the profile's tail from the baseline, or too noisy.",
-            cure="Plan a larger half range, more repeats, or a larger load.",
-        )
+    require_significant(estimate, "Plan a larger half range, more repeats, or a larger load.")
     return estimate
 
 

@@ -16,12 +16,7 @@ from memscal.model.checks import Message
 from memscal.model.indenter import Cone, RoundIndenter
 from memscal.model.quantities import MM, Quantity, by_name
 from memscal.model.records import PROFILE, SOLUTION
-from memscal.summaries.declared import (
-    correlated_numbers,
-    data_frame,
-    labelled_dataset,
-    members,
-)
+from memscal.summaries.declared import correlated_numbers, data_frame, labelled_dataset, members
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:

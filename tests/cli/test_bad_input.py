@@ -56,7 +56,7 @@ def test_a_hostile_file_is_refused_unread(refused: Refused, scan: Path):
 
 @pytest.mark.parametrize(("scan", "words"), [
     (memscal.simulate(points=5, seed=1), ("5 measured positions", "Scan more positions")),
-    (replace(SCAN, indenter=memscal.Rod(radius=1.2e-3)), ("2.4 mm wide", "2 mm thick")),
+    (replace(SCAN, indenter=memscal.Rod(radius=1.2e-3)), ("rod's width is 2.4 mm", "of 2 mm")),
     (replace(SCAN, u_zz=-SCAN.u_zz), ("falls by", "sign of u_zz", "--u-sign -1")),
     (replace(SCAN, indenter=memscal.Sphere(radius=0.1288)), ("made with a sphere", "needs a rod")),
 ], ids=["few points", "wide rod", "wrong sign", "sphere"])  # fmt: skip

@@ -69,14 +69,6 @@ def test_a_scan_beside_the_sensor_is_refused() -> None:
         estimated(simulated(centre=(8.4e-3, 0.0)))
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_noise_alone_is_no_calibration(seed: int) -> None:
-    scan = simulated()
-    noise = np.random.default_rng(seed).normal(0, 1e-4, scan.u_zz.shape)
-    with pytest.raises(FitError):
-        estimated(replace(scan, u_zz=noise, u_zz_errors=None))
-
-
 def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
     scan = simulated(kernel=RING, noise=0.002, state_noise=False)
     estimate = estimated(scan)

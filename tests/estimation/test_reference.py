@@ -69,7 +69,7 @@ def test_a_table_in_tension_is_refused_with_its_cure() -> None:
 def test_a_sphere_and_a_rod_wider_than_the_film_cannot_calibrate() -> None:
     with pytest.raises(InputError, match="needs a rod"):
         require_calibration_rod(replace(SCAN, indenter=memscal.Sphere(radius=0.1)))
-    with pytest.raises(InputError, match="only 2 mm thick"):
+    with pytest.raises(InputError, match="times the film's thickness of 2 mm"):
         require_calibration_rod(replace(SCAN, indenter=memscal.Rod(radius=1.1e-3)))
 
 

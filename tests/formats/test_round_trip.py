@@ -327,12 +327,12 @@ def test_a_value_that_the_model_refuses_is_reported_with_the_file(tmp_path: Path
             read_scan(path)
 
 
-def test_a_raster_needs_its_axes_in_their_order(tmp_path: Path):
-    path = tmp_path / "scan.h5"
-    for words in (r"axes(.|\n)*Transpose", "there is no /entry/data/y"):
-        write_scan(make_scan("raster"), path, overwrite=True)
+def test_a_raster_with_its_axes_swapped_or_without_one_is_refused(tmp_path: Path):
+    for name, words in (("swapped", r"axes(.|\n)*Transpose"), ("one", "there is no /entry/data/y")):
+        path = tmp_path / f"{name}.h5"
+        write_scan(make_scan("raster"), path)
         with h5py.File(path, "r+") as file:
-            if "Transpose" in words:
+            if name == "swapped":
                 file["/entry/data"].attrs["axes"] = ["x", "y"]
             else:
                 del file["/entry/data/y"]

@@ -1,0 +1,305 @@
+"""Cause of a scan that determines no width: the stated length that has to be another.
+
+Film and rod blur the sensor, so no voltage is narrower than the reference.  Where one is, the
+Gaussian's width goes to zero, and A and G lose their meaning.  Each stated length in turn is then
+scaled, the rod solved again, and a Gaussian fitted, to find the value at which the scan fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.errors import FitError, MemscalError
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
+from memscal.estimation.plausibility import mistaken_unit
+from memscal.estimation.points import ScanPoints, joined_points
+from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, estimate_profile
+from memscal.estimation.reference import reference_contact, reference_spectra
+from memscal.mechanics.contact import Contact
+from memscal.model.arrays import FloatArray
+from memscal.model.indenter import Rod
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
+
+#: A width below this share of its standard uncertainty is zero: its best square is none, or
+#: negative.  Of a sensor that the film hides entirely, half of the scans give such a width.
+_NO_WIDTH = 0.1
+#: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
+_MISFIT = 0.03
+#: A length is at fault if another value lowers chi-square by this much, in which residuals beyond
+#: so many standard deviations count linearly.
+_CLEARLY, _KNEE = 25.0, 3.0
+#: The search needs no more points of a scan than this.
+_MOST_POINTS = 200
+#: Factors are tried by this ratio: a minimum of chi-square is wider.  Beyond one it rises by this.
+_RATIO, _RISEN = 1.4, 1.05
+#: A length is followed up if a factor leaves less than this share of the misfit; values fit as well
+#: as the best one up to this rise of chi-square, two standard deviations.
+_PROMISING, _AS_GOOD, _HALVINGS = 0.9, 4.0, 7
+#: Lengths are scaled until the scan spans so many thicknesses of the film, and a rod until its
+#: radius is so small a share of the thickness that it acts as a point.
+_LONGEST_SPAN, _THINNEST = 60.0, 0.02
+#: Load of the rods that are tried, in N: the reference per newton does not depend on it.
+_LOAD = 1e-6
+
+
+def require_profile(
+    scans: Sequence[Scan],
+    stresses: Sequence[StressProfile | Contact],
+    points: Sequence[ScanPoints],
+    references: Sequence[RadialSpectrum],
+) -> ProfileEstimate:
+    """Estimate the profile of scans; refuse one that is as narrow as its reference."""
+    search = _Search(tuple(scans), tuple(stresses), tuple(map(_thinned, points)))
+    try:
+        # At a width of zero the slopes by the width vanish, and no later step is defined.
+        with np.errstate(all="ignore"):
+            estimate = estimate_profile(joined_points(points), *references)
+    except (FitError, np.linalg.LinAlgError) as failure:
+        cure = "Look at the scan; check the values and units of positions, film and rod."
+        singular = FitError("No apparatus function of any width fits the scan.", cure=cure)
+        raise search.error() or (failure if isinstance(failure, FitError) else singular) from None
+    if not _has_width(estimate.gaussian, estimate.weights, estimate.noise_scale):
+        raise search.error() or _hidden(estimate, search)
+    return estimate
+
+
+def _has_width(fit: GaussianFit, weights: FloatArray, noise: float) -> bool:
+    # The slope by the width vanishes with the width, so its uncertainty grows without bound.
+    try:
+        variance = float(fit.covariance(weights, noise)[1, 1])
+    except np.linalg.LinAlgError:
+        return False
+    return fit.sigma >= _NO_WIDTH * float(np.sqrt(variance))
+
+
+def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
+    """Return the error for a sensor too narrow for its film: no stated length is at fault."""
+    model, fit = estimate.model, estimate.gaussian
+    # Near zero the voltage changes with the square of the width, whose uncertainty is finite.
+    slope = fit.jacobian.copy()
+    slope[:, 1] = model.signal(fit.geometry, -0.5 * fit.conversion_constant * model.k**2)
+    squared = replace(fit, jacobian=slope).covariance(estimate.weights, estimate.noise_scale)
+    widest = np.sqrt(2 * np.sqrt(squared[1, 1]))
+    stated = estimate.points.u_errors
+    noise = 0.0 if stated is None else float(np.median(stated)) / estimate.largest_signal
+    residual = float(np.median(estimate.noise)) / estimate.largest_signal
+    why = (
+        f"The nearest fit leaves residuals of {residual:.1%} of the largest signal: the voltage "
+        "does not rise and fall with the distance from one centre."
+        if residual > max(_MISFIT, 2 * noise)
+        else "Film and rod blur the sensor's image. A sensor of a Gaussian width below "
+        f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined."
+    )
+    return FitError(
+        "The scan is as narrow as its reference, the stress at the base of the film: the width of "
+        "the apparatus function would be zero.",
+        why=why,
+        cure="Look at the scan for a second peak; check the values and units of "
+        f"{', '.join(length.place for length in search.lengths)}. If they are right, use a thinner "
+        "film or a narrower rod, or average more repeats.",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Gaussian fitted to the scans with one length scaled; none where the fit fails."""
+
+    factor: float
+    fit: GaussianFit | None
+    residual: FloatArray  # (n,): over the stated noise; in V where none is stated
+    weights: FloatArray
+
+    def loss(self, noise: float) -> float:
+        """Chi-square of the residuals, linear beyond the knee."""
+        if self.fit is None:
+            return np.inf
+        root = np.sqrt(1 + (self.residual / (noise * _KNEE)) ** 2)
+        return float(np.sum(2 * _KNEE**2 * (root - 1)))
+
+    def explains(self, noise: float) -> bool:
+        """Whether a sensor of some width fits, with a signal."""
+        if self.fit is None or not _has_width(self.fit, self.weights, noise):
+            return False
+        variance = self.fit.covariance(self.weights, noise)[0, 0]
+        return self.fit.conversion_constant > LEAST_SIGNIFICANCE * float(np.sqrt(variance))
+
+
+@dataclass(frozen=True, eq=False)
+class _Length:
+    """One stated length that can be scaled."""
+
+    name: str
+    path: str
+    stated: float  # in m, of the first scan; 1 where the length is no single value
+    factors: FloatArray  # (m,): the factors to try, the first of them 1
+
+    @property
+    def place(self) -> str:
+        """The name, and the path in the file."""
+        return f"{self.name} (/entry/{self.path})"
+
+    def scaled(self, factor: float, limit: str = "") -> str:
+        """Name the length and the value that the factor gives."""
+        words = "" if limit else mistaken_unit(factor)
+        unit = f" ({words}?)" if words else ""
+        if self.stated == 1.0:
+            return f"{self.place} {limit}{factor:.3g} times as large{unit}"
+        value, stated = factor * self.stated * 1e3, self.stated * 1e3
+        return f"{self.place} of {limit}{value:.3g} mm in place of {stated:.4g} mm{unit}"
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Scans whose stated lengths are scaled, one at a time."""
+
+    scans: tuple[Scan, ...]
+    stresses: tuple[StressProfile | Contact, ...]
+    points: tuple[ScanPoints, ...]
+
+    @cached_property
+    def lengths(self) -> tuple[_Length, ...]:
+        """Lengths that make the reference narrower than the scan."""
+        h = min(scan.film.thickness for scan in self.scans)
+        span = max(max(np.ptp(p.x), np.ptp(p.y)) for p in self.points)
+        stretch = _grid(_LONGEST_SPAN * h / span)
+        positions = _Length("positions", "data/x", 1.0, stretch)
+        if not all(isinstance(s, Contact) and isinstance(s.indenter, Rod) for s in self.stresses):
+            return _Length("radii of the reference", "reference/r", 1.0, 1 / stretch), positions
+        a = self.scans[0].indenter.radius
+        # A calibration asks for a rod no wider than its film is thick.
+        thinner = _grid(min(_LONGEST_SPAN * h / span, h / (2 * a)))
+        return (
+            _Length("a film thickness", "sample/film/thickness", h, 1 / thinner),
+            _Length("a rod radius", "indenter/radius", a, 1 / _grid(a / (_THINNEST * h))),
+            positions,
+        )
+
+    def error(self) -> FitError | None:
+        """Return the error that names the lengths at fault; ``None`` if none is."""
+        trials = [self._coarse(length) for length in self.lengths]
+        fitted = [trial for several in trials for trial in several if trial.fit is not None]
+        if not fitted:
+            return None
+        # Where no noise is stated, it is that of the best fit.
+        stated = self.points[0].u_errors is not None
+        noise = 1.0 if stated else min(robust_scale(trial.residual) for trial in fitted)
+        pairs = list(zip(self.lengths, trials, strict=True))
+        best = [self._refined(length, several, noise) for length, several in pairs]
+        least = min(trial.loss(noise) for trial in best)
+        per_degree = max(1.0, least / fitted[0].residual.size)
+        most = min(trials[0][0].loss(noise) - _CLEARLY * per_degree, 2 * least + _CLEARLY)
+        causes, others = [], []
+        for (length, several), trial in zip(pairs, best, strict=True):
+            if trial.loss(noise) <= most and trial.explains(noise * float(np.sqrt(per_degree))):
+                causes.append(self._cause(length, several, trial, noise))
+            else:
+                others.append(length.place)
+        if not causes:
+            return None
+        beyond = f" No other value of {' or '.join(others)} makes it fit." if others else ""
+        source = self.scans[0].source
+        return FitError(
+            f"{f'{source.file_name}: the' if source else 'The'} scan is narrower than its "
+            "reference, the stress at the base of the film as stated.",
+            why="Film and rod blur the sensor's image, so that no voltage is narrower than the "
+            "reference: the width of the apparatus function would be zero, and A any number.",
+            cure=f"Check the stated lengths. The scan would fit with {'; or with '.join(causes)}."
+            f"{beyond}",
+        )
+
+    def _coarse(self, length: _Length) -> list[_Trial]:
+        """Try the factors of a length until the misfit has risen twice."""
+        trials: list[_Trial] = []
+        for factor in length.factors:
+            trials.append(self._trial(length, float(factor)))
+            losses = [trial.loss(1.0) for trial in trials]
+            if len(losses) > 2 and min(losses[-2:]) > _RISEN * min(losses):
+                break
+        return trials
+
+    def _refined(self, length: _Length, trials: list[_Trial], noise: float) -> _Trial:
+        """Return the best trial of a length, between the neighbours of the best factor."""
+        from scipy.optimize import minimize_scalar
+
+        tried = [min(trials, key=lambda trial: trial.loss(noise))]
+        if not tried[0].loss(noise) < _PROMISING * trials[0].loss(noise):
+            return tried[0]
+
+        def loss(exponent: float) -> float:
+            tried.append(self._trial(length, float(np.exp(exponent))))
+            return min(tried[-1].loss(noise), 1e300)
+
+        middle, reach = np.log(tried[0].factor), np.log(_RATIO)
+        minimize_scalar(
+            loss, bounds=(middle - reach, middle + reach), method="bounded",
+            options={"xatol": 5e-3, "maxiter": 15},
+        )  # fmt: skip
+        return min(tried, key=lambda trial: trial.loss(noise))
+
+    def _cause(self, length: _Length, trials: list[_Trial], best: _Trial, noise: float) -> str:
+        """Name a length with its best value, or with its limit if any value beyond fits too."""
+        enough = best.loss(noise) + _AS_GOOD
+        if trials[-1].loss(noise) > enough or len(trials) < length.factors.size:
+            return length.scaled(best.factor)
+        near, far = 1.0, best.factor
+        for _ in range(_HALVINGS):
+            middle = float(np.sqrt(near * far))
+            fits = self._trial(length, middle).loss(noise) <= enough
+            near, far = (near, middle) if fits else (middle, far)
+        return length.scaled(far, "at most " if far < 1 else "at least ")
+
+    def _trial(self, length: _Length, factor: float) -> _Trial:
+        """Fit a Gaussian with one length scaled."""
+        points, stresses = self.points, self.stresses
+        thicknesses = [scan.film.thickness for scan in self.scans]
+        if length.path == "data/x":
+            points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
+        else:
+            stresses = tuple(_scaled(stress, length.path, factor) for stress in stresses)
+            thinner = min(factor, 1.0) if length.path != "indenter/radius" else 1.0
+            thicknesses = [h * thinner for h in thicknesses]
+        joined = joined_points(points)
+        weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
+        nothing = _Trial(factor, None, np.zeros(0), weights)
+        with np.errstate(all="ignore"):
+            try:
+                model = ForwardModel(joined, reference_spectra(stresses, points, thicknesses))
+                fit = fit_gaussian_to_points(model, weights)
+            except (MemscalError, np.linalg.LinAlgError):
+                return nothing
+        residual = (joined.u - fit.predicted) * np.sqrt(weights)
+        return _Trial(factor, fit, residual, weights) if np.isfinite(residual).all() else nothing
+
+
+def _scaled(stress: StressProfile | Contact, path: str, factor: float) -> StressProfile | Contact:
+    """Return the linear rod with one length scaled, or a profile at scaled radii."""
+    if isinstance(stress, Contact) and isinstance(stress.indenter, Rod) and path != "reference/r":
+        radius, thickness = stress.indenter.radius, stress.film.thickness
+        if path == "indenter/radius":
+            radius *= factor
+        else:
+            thickness *= factor
+        film = replace(stress.film, thickness=thickness)
+        return reference_contact(film, replace(stress.indenter, radius=radius), _LOAD)
+    profile = stress.profile() if isinstance(stress, Contact) else stress
+    shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
+    pressure = profile.sigma_zz / factor**2
+    return replace(profile, r=profile.r * factor, sigma_zz=pressure, sigma_rz=shear)
+
+
+def _grid(most: float) -> FloatArray:
+    """Factors from 1 to at most ``most``."""
+    return np.asarray(_RATIO ** np.arange(int(np.log(max(most, 1.0)) / np.log(_RATIO)) + 1.0))
+
+
+def _thinned(points: ScanPoints) -> ScanPoints:
+    """Return some of a scan's points, evenly, without correlations."""
+    every = -(-points.u.size // _MOST_POINTS)
+    return points.selected(np.arange(0, points.u.size, every))

@@ -1,0 +1,109 @@
+"""Scans that cannot be right: refused by every method with their cause, and saturated peaks."""
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from helpers.scans import RING, TAILS, simulated
+
+import memscal
+from memscal import Scan
+from memscal.cli import main
+from memscal.deconvolution.division import regulariser_names
+from memscal.model.checks import QualityCheck
+
+SHIPPED = Path(__file__).parents[2] / "calibration_data" / "rod_scan_65.h5"
+SCAN = memscal.read_scan(SHIPPED)
+
+
+def altered(scan: Scan = SCAN, film: float = 1.0, x: float = 1.0, rod: float = 0.0) -> Scan:
+    """Return a scan with thickness and positions times a factor, and a rod of another radius."""
+    film_ = replace(scan.film, thickness=film * scan.film.thickness)
+    rod_ = memscal.Rod(radius=rod or scan.indenter.radius)
+    return replace(scan, film=film_, x=x * scan.x, indenter=rod_)
+
+
+def refused(scan: Scan, **options: Any) -> str:
+    with pytest.raises(memscal.MemscalError) as caught:
+        memscal.calibrate(scan, **options)
+    return str(caught.value)
+
+
+def saturation(scan: Scan) -> QualityCheck:
+    checks = memscal.calibrate(scan).apparatus.checks
+    return next(check for check in checks if check.name == "saturation")
+
+
+SMALL, POINT = (memscal.GaussianMixture((1.0,), (sigma,)) for sigma in (0.3e-3, 1e-6))
+THICK_ROD = simulated(rod=memscal.Rod(radius=0.7e-3), kernel=SMALL, noise=1e-4, seed=1)
+ELSEWHERE = memscal.indent(altered(film=1.5).film, SCAN.indenter, load=SCAN.load).profile()
+
+
+@pytest.mark.parametrize(("scan", "options", "words", "truth", "within"), [
+    (altered(film=1.25), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
+    (altered(film=2), {}, r"thickness\) of NUMBER mm", 2.0, 0.1),
+    (altered(film=10), {}, r"thickness\) of NUMBER mm .*mm stated as cm", 2.0, 0.1),
+    (altered(x=0.8), {}, r"data/x\) NUMBER times", 1.25, 0.1),
+    (altered(x=0.5), {}, r"data/x\) NUMBER times", 2.0, 0.1),
+    (altered(x=0.1), {}, r"data/x\) NUMBER times .*cm stated as mm", 10.0, 0.1),
+    (altered(THICK_ROD, rod=1e-3), {}, r"radius\) of NUMBER mm", 0.7, 0.1),
+    # A rod much narrower than the film is thick leaves no trace: a limit is all that can be told.
+    (altered(rod=1e-3), {}, r"radius\) of at most NUMBER mm", 0.6, 0.5),
+    (SCAN, {"reference": ELSEWHERE}, r"reference/r\) NUMBER times", 1 / 1.5, 0.1),
+    # Nothing stated is wrong, but the film hides the sensor.
+    (simulated(kernel=POINT, noise=0.02, seed=1), {}, "width below NUMBER mm", 0.2, 0.6),
+])  # fmt: skip
+def test_a_narrow_scan_is_refused_with_the_value_at_which_it_fits(
+    scan: Scan, options: dict[str, Any], words: str, truth: float, within: float
+) -> None:
+    value = re.search(words.replace("NUMBER", r"([\d.]+)"), refused(scan, **options))
+    assert float(value[1]) == pytest.approx(truth, rel=within)
+
+
+@pytest.mark.parametrize("method", regulariser_names())
+def test_no_method_writes_nonsense(method: str, tmp_path: Path, capsys) -> None:
+    path = Path(shutil.copy(SHIPPED, tmp_path / "scan.h5"))
+    with h5py.File(path, "r+") as file:
+        file["entry/sample/film/thickness"][...] = 2.5
+    assert main(["calibrate", str(path), "--method", method]) == 3
+    assert "scan.h5: the scan is narrower" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(("scan", "words"), [
+    (altered(x=1e3), r"data/x\).*mm stated as m,"),
+    (altered(x=1e-3), r"data/x\).*\(m stated as mm"),
+    (altered(x=1 / 25.4), r"data/x\).*inches stated as mm"),
+    (altered(x=25.4), r"data/x\).*mm stated as inches"),
+    (altered(film=0.01), r"thickness\) of 0.63 to 3.6 mm"),
+    (altered(film=1e3), r"thickness\).*mm stated as m,"),
+    (altered(rod=2.5e-3), r"radius\).*mm stated as cm"),
+    (simulated(half_range=0.8e-3, points=33, seed=1), r"\d times its noise, but .* too short"),
+    (simulated(noise=0.6, seed=1), "does not rise above its noise"),
+    (replace(SCAN, u_zz=SCAN.u_zz + np.interp(SCAN.x - 5e-3, SCAN.x, SCAN.u_zz)), "second peak"),
+])  # fmt: skip
+def test_what_cannot_be_is_refused_with_its_reason(scan: Scan, words: str) -> None:
+    assert re.search(words, refused(scan))
+
+
+@pytest.mark.parametrize("kernel", [memscal.GaussianMixture(), RING, TAILS])
+@pytest.mark.parametrize("noise", [0.001, 0.005])
+def test_a_clipped_peak_fails_and_names_its_points(kernel, noise: float) -> None:
+    clean = simulated(kernel=kernel, noise=0.0, seed=1)
+    u, top = clean.u_zz, float(clean.u_zz.max())
+    clean = replace(clean, u_zz_errors=np.full(u.size, noise * top))
+    scatter = np.random.default_rng(1).normal(0.0, noise * top, u.size)
+    assert saturation(replace(clean, u_zz=u + scatter)).passed
+    # Readings of a coarse converter may be equal at the top.
+    rounded = np.round((u + scatter) / top * 200) * top / 200
+    assert saturation(replace(clean, u_zz=rounded, u_zz_errors=None)).passed
+    # The converter clips after the noise, the amplifier before it.
+    assert saturation(replace(clean, u_zz=np.minimum(u, 0.75 * top) + scatter)).value >= 3
+    check = saturation(replace(clean, u_zz=np.minimum(u + scatter, 0.75 * top)))
+    places = "; ".join(f"{x * 1e3:.4g}" for x in clean.x[u + scatter > 0.75 * top])
+    assert f"here at {places} mm" in check.meaning
