@@ -54,12 +54,7 @@ from memscal.parallel import single_threaded
 from memscal.version import __version__
 
 #: Parameters that differ between a division and the Bayesian estimate.
-_OF_A_ROUTE = (
-    "conversion_constant",
-    "gaussian_sigma_deconvolved",
-    "fwhm",
-    "noise_equivalent_area",
-)
+_OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm", "noise_equivalent_area")
 
 
 def assemble(

@@ -19,12 +19,7 @@ from memscal.axisymmetry.hankel import radial_spline
 from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import DrawnScatter, kernel_functionals
-from memscal.deconvolution.division import (
-    Method,
-    Tikhonov,
-    WhiteNoise,
-    WhiteNoiseDraw,
-)
+from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.deconvolution.scikit_image import Wiener
 from memscal.errors import FitError

@@ -13,13 +13,7 @@ import numpy as np
 from scipy.special import j1
 
 from memscal.calibration.diagnosis import require_profile
-from memscal.calibration.fields import (
-    Fields,
-    GridChoice,
-    LineFields,
-    RasterFields,
-    choose_grid,
-)
+from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
 from memscal.deconvolution.division import Method, WhiteNoise
 from memscal.deconvolution.fourier_ratio import (
     Field,

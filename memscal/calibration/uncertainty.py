@@ -527,10 +527,7 @@ def route_difference(solution: Solution) -> float | None:
     changes = linear.signals[:, 1:].copy()
     changes[:, linear.places] += linear.nuisance
     fitted = changes @ estimate.weighed.gain
-    roots = [
-        estimate.noise_root - fitted @ estimate.noise_root,
-        changes @ _fixed_root(estimate),
-    ]
+    roots = [estimate.noise_root - fitted @ estimate.noise_root, changes @ _fixed_root(estimate)]
     residual = estimate.points.u - estimate.predicted
     difference = linear.direct @ (residual + estimate.oval)
     variance = np.sum((linear.direct @ np.hstack(roots)) ** 2, axis=1)

@@ -21,11 +21,7 @@ import numpy as np
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, on_grid
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.axisymmetry.kernels import unit_gaussian, unit_gaussian_slope
-from memscal.deconvolution.division import (
-    DivisionProblem,
-    Regulariser,
-    chosen_method,
-)
+from memscal.deconvolution.division import DivisionProblem, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.gaussian import gauss_newton

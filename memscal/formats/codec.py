@@ -11,16 +11,7 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import (
-    Attribute,
-    Group,
-    Node,
-    count,
-    index_axis,
-    note,
-    si,
-    to_json,
-)
+from memscal.formats.hdf5.writer import Attribute, Group, Node, count, index_axis, note, si, to_json
 from memscal.formats.values import json_value, require_array, require_scalar, require_text
 from memscal.model.checks import messages_from_json, messages_to_json
 from memscal.model.provenance import SourceFile
