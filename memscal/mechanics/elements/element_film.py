@@ -46,8 +46,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     gradient, squeeze = _at_local_points(system, solution, local)
     r, depth = system.displacement.doflocs[:, nodes]
     displacement = np.empty((nodes.size, 2))
-    displacement[index, 0] = solution[outward]
-    displacement[index, 1] = -solution[inward]
+    displacement[index, 0], displacement[index, 1] = solution[outward], -solution[inward]
 
     def averaged(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel()))
@@ -62,11 +61,8 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
         triangles=_quadratic_triangles(index, local, system),
         displacement=film.thickness * displacement,
         stress=film.shear_modulus * np.stack([*stress, -slip], axis=1),
-        notes=(
-            f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
-            f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. "
-            "Stress positive in tension."
-        ),
+        notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
+        f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. Stress positive in tension.",
     )
 
 
@@ -126,10 +122,8 @@ class ElementFilm:
     @cached_property
     def system(self) -> MixedSystem:
         """The finite-element equations, in film thicknesses and shear moduli."""
-        h = self.film.thickness
-        mesh = film_triangles(
-            self.r / h, radius=self.radius / h, thickness=1.0, refinement=self.refinement
-        )
+        rings, radius = self.r / self.film.thickness, self.radius / self.film.thickness
+        mesh = film_triangles(rings, radius=radius, thickness=1.0, refinement=self.refinement)
         return MixedSystem(mesh, self.film.poisson_ratio)
 
     @cached_property
@@ -196,11 +190,11 @@ class ElementField:
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""
-        return self._at_surface(2, r)
+        return self._at_surface(1, r)
 
     def outward(self, r: FloatArray) -> FloatArray:
         """Return the radial displacement of the surface in m; see :meth:`depression`."""
-        return self._at_surface(1, r)
+        return self._at_surface(0, r)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and stress inside the film, on quadratic triangles."""
@@ -231,14 +225,14 @@ class ElementField:
         values = self._base[component](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
-    def _at_surface(self, direction: int, r: FloatArray) -> FloatArray:
-        """Return the displacement outward (1) or inward (2) at ``r``, in m."""
+    def _at_surface(self, component: int, r: FloatArray) -> FloatArray:
+        """Return the displacement outward (0) or inward (1) at ``r``, in m."""
         flat = np.ravel(np.asarray(r, dtype=np.float64))
         if np.any(flat > self.radius):
             raise DomainError(
                 f"There is no surface at {flat.max():g} m: the film ends at {self.radius:g} m.",
                 cure="Ask for smaller radii, or give a wider film.",
             )
-        side = self.system.side(0.0)
-        values = side[0].at(flat / self.film.thickness) @ self.solution[side[direction]]
+        line, *unknowns = self.system.side(0.0)
+        values = line.at(flat / self.film.thickness) @ self.solution[unknowns[component]]
         return np.asarray(self.film.thickness * values).reshape(np.shape(r))

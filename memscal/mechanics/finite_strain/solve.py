@@ -144,20 +144,15 @@ class _Request:
 
     def _pressing(self, refinement: float, coarse: list[Contact] | None) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
-        thickness = self.film.thickness * _MM
+        size = (self.film.thickness * _MM, self.radius, refinement)
         face: RodFace | SphereFace
         if isinstance(self.indenter, Rod):
             rod = self.indenter.radius * _MM
             face = RodFace(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
             fold = _FOLD_STICKING if self.sticking else _FOLD_SLIDING
-            mesh = mesh_below_a_rod(
-                rod=rod,
-                thickness=thickness,
-                radius=self.radius,
-                refinement=refinement,
-                fold=(fold[0] * rod, fold[1] * rod),
-                finest=face.edge * (_FINEST_STICKING if self.sticking else _FINEST_SLIDING),
-            )
+            finest = face.edge * (_FINEST_STICKING if self.sticking else _FINEST_SLIDING)
+            fold = (fold[0] * rod, fold[1] * rod)
+            mesh = mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest)
         else:
             face = SphereFace(self.indenter.radius * _MM)
             widest = max(map(self._hertz_radius, self.goals))
@@ -169,9 +164,7 @@ class _Request:
                     f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
                     why="It must end well within both.",
                 )
-            mesh = mesh_below_a_sphere(
-                contact=widest, thickness=thickness, radius=self.radius, refinement=refinement
-            )
+            mesh = mesh_below_a_sphere(size, contact=widest)
         elements = FilmElements(mesh, NeoHookean.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)

@@ -150,7 +150,7 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    status = _first_statuses(problem, start, goal)
+    status = _first_status(problem, start, goal)
     held = goal.ring if isinstance(goal, Touch) else None
     for iteration in range(1, _MOST_ITERATIONS + 1):
         tractions = _solve_system(problem, status, goal)
@@ -169,7 +169,7 @@ def take_step(
     )
 
 
-def _first_statuses(problem: ContactProblem, start: ContactState, goal: Goal) -> _Status:
+def _first_status(problem: ContactProblem, start: ContactState, goal: Goal) -> _Status:
     """Begin with the status of the state before."""
     law, separation = problem.normal_law, problem.separations(start)
     pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
