@@ -67,8 +67,7 @@ def rod_integrals(
     w_by_q = np.sum(d_s * legendre.legval(t, odd) * reciprocal, axis=1)
     beyond = np.sum(d_s * legendre.legval(t, even), axis=1)
     whole = legendre.legval(1.0, legendre.legint(even, lbnd=0))
-    u_by_p = (whole - beyond) * inverse
-    return w_by_p, w_by_q, u_by_p, u_by_q
+    return w_by_p, w_by_q, (whole - beyond) * inverse, u_by_q
 
 
 def _series(terms: FloatArray, first: int) -> FloatArray:
@@ -107,8 +106,7 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
     return np.asarray(rows / np.sqrt(norm), dtype=np.float64)
 
 
-_FEWEST_TERMS = 8
-_MOST_TERMS = 128
+_FEWEST_TERMS, _MOST_TERMS = 8, 128
 # Doubling of the terms stops when the stress at the base changes by less than this ...
 _SETTLED = 1e-9
 # ... and a solution that changes by more than this in the last doubling is refused.

@@ -267,10 +267,8 @@ class _Path:
     """The state reached, the one before it, and the length of the next step."""
 
     def __init__(self, pressing: Pressing, start: Pressed) -> None:
-        self.pressing, self.start = pressing, start
+        self.pressing, self.start, self.length = pressing, start, np.inf
         self.states: list[Pressed] = []
-        # Stepping is by load or by depth, whatever the goals are given in.
-        self.length = np.inf
 
     @property
     def step(self) -> Step:

@@ -114,9 +114,8 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
         dragged[0] = 0.0
     side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))
     left, right = r[:-2:2], r[2::2]
-    area = np.zeros(r[::2].size)
-    area[:-1] += np.pi / 3 * side * (2 * left + right)
-    area[1:] += np.pi / 3 * side * (left + 2 * right)
+    falling, rising = side * (2 * left + right), side * (left + 2 * right)
+    area = np.pi / 3 * (np.append(falling, 0.0) + np.append(0.0, rising))
 
     chosen = np.flatnonzero(touching[::2] & (along[::2] > 1e-6))
     chosen = chosen[np.argsort(r[::2][chosen], kind="stable")]
@@ -126,10 +125,8 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
 
 def _on_corners(forces: FloatArray) -> FloatArray:
     """Return the forces on hats between corners; nodes are corners and middles by turns."""
-    sums = forces[::2].copy()
-    sums[:-1] += forces[1::2] / 2
-    sums[1:] += forces[1::2] / 2
-    return sums
+    halves = forces[1::2] / 2
+    return np.asarray(forces[::2] + np.append(halves, 0.0) + np.append(0.0, halves))
 
 
 def _without_axis(rows: FloatArray) -> FloatArray:

@@ -50,8 +50,7 @@ def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: in
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
-_FEWEST_RINGS = 48
-_MOST_RINGS = 384
+_FEWEST_RINGS, _MOST_RINGS = 48, 384
 # Rings are doubled until base stress, load and depth change by less than this ...
 _SETTLED = 1e-4
 # ... and a solution that changes by more than this is refused.
@@ -165,7 +164,7 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
         from memscal.mechanics.elements.element_film import ElementFilm
 
         radius = request.film_radius or rings[-1] + _FREE_EDGE * request.film.thickness
-        model = ElementFilm(request.film, rings, radius=radius)
+        model = ElementFilm(request.film, rings, radius)
     else:
         model = HankelFilm(request.film, rings)
     try:
@@ -237,9 +236,9 @@ def _stick_radius(
 ) -> float:
     """Return the radius in m within which the film sticks."""
     sticking = np.flatnonzero(state.sticking(request.friction) & (state.pressure > 0))
-    if sticking.size == 0 or (sticking.size == 1 and sticking[0] == 0):
+    last = int(sticking.max(initial=0))
+    if last == 0:
         return 0.0
-    last = int(sticking[-1])
     if last + 1 >= rings.size or not state.touching[last + 1]:
         return contact_radius
     return min(contact_radius, float(rings[last] + rings[last + 1]) / 2)
