@@ -1,8 +1,7 @@
 r"""Grids on which fields are transformed, and the field of a radial profile on them.
 
-A field lifted from a radial profile is real and even in x and in y: a quarter of the plane
-holds it all, and its Fourier transform is a type-I cosine transform
-(:class:`EvenGrid`).  A measured raster is neither; its grid is a :class:`Lattice`.
+A field lifted from a radial profile is real and even in x and in y: a quarter of the plane holds it
+all, by type-I cosine transforms (:class:`EvenGrid`).  A raster's grid is a :class:`Lattice`.
 Both scale their transforms to approximate :math:`\hat f(k) = \int f e^{-ikx} dx\,dy`.
 """
 
@@ -54,8 +53,7 @@ class EvenGrid:
     @cached_property
     def wavenumber(self) -> FloatArray:
         """Modulus of each wave vector, shape (count, count), in rad/m."""
-        axis = self.wavenumber_axis
-        return np.asarray(np.hypot.outer(axis, axis), dtype=np.float64)
+        return np.asarray(np.hypot.outer(self.wavenumber_axis, self.wavenumber_axis))
 
     @property
     def cell_area(self) -> float:
@@ -80,8 +78,7 @@ class EvenGrid:
 
     def integrate(self, field: FloatArray) -> float:
         """Integral of an even field over the whole plane that the quarter stands for."""
-        sides = np.full(field.shape[0], 2.0)
-        sides[0] = 1.0
+        sides = np.append(1.0, np.full(field.shape[0] - 1, 2.0))
         return float(sides @ field @ sides * self.cell_area)
 
     def radial(self, field: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -97,8 +94,7 @@ class EvenGrid:
         """Return the even part of a period, as a quarter plane."""
         # Flipped about its first point, which a plain flip would carry to the last.
         even = (period + np.roll(period[::-1], 1, axis=0)) / 2
-        even = (even + np.roll(even[:, ::-1], 1, axis=1)) / 2
-        return even[: self.count, : self.count]
+        return ((even + np.roll(even[:, ::-1], 1, axis=1)) / 2)[: self.count, : self.count]
 
     def to_image(self, field: FloatArray) -> FloatArray:
         """Mirror the quarter to the whole plane: odd size, axis at the central pixel."""
@@ -107,10 +103,8 @@ class EvenGrid:
 
     def from_image(self, image: FloatArray) -> FloatArray:
         """Return the even part of an image, as a quarter plane."""
-        c = self.count - 1
         even = (image + image[::-1]) / 2
-        even = (even + even[:, ::-1]) / 2
-        return even[c:, c:]
+        return ((even + even[:, ::-1]) / 2)[self.count - 1 :, self.count - 1 :]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +146,7 @@ class Lattice:
     @property
     def cell_area(self) -> float:
         """Area of one cell, in m^2."""
-        dy, dx = self.spacing
-        return dx * dy
+        return self.spacing[0] * self.spacing[1]
 
     def forward(self, field: FloatArray) -> FloatArray:
         """Fourier transform about the first lattice point: complex, shape (m, n // 2 + 1)."""

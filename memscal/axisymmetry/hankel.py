@@ -58,8 +58,7 @@ def ring_areas(r: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _legendre(order: int) -> tuple[FloatArray, FloatArray]:
-    nodes, weights = np.polynomial.legendre.leggauss(order)
-    return nodes, weights
+    return np.polynomial.legendre.leggauss(order)
 
 
 # Panels of many nodes are nearly as good as one Gauss rule for all (pi nodes an oscillation),
@@ -128,10 +127,9 @@ def radial_spline(
         raise InputError(
             f"A radial table of {r.size} radii cannot be interpolated.", cure="Give four or more."
         )
-    inner = slice(1, 4) if r[0] == 0 else slice(0, 3)
-    mirrored_r = np.concatenate([-r[inner][::-1], r])
-    mirrored_f = np.concatenate([-f[inner][::-1] if order else f[inner][::-1], f])
-    spline = CubicSpline(mirrored_r, mirrored_f)
+    inner = slice(3, 0, -1) if r[0] == 0 else slice(2, None, -1)
+    sign = -1 if order else 1
+    spline = CubicSpline(np.append(-r[inner], r), np.concatenate([sign * f[inner], f]))
     return lambda radius: np.asarray(spline(radius))
 
 

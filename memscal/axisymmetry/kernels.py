@@ -1,8 +1,4 @@
-r"""Radial apparatus functions whose transform has a closed form.
-
-With the transforms of :mod:`memscal.axisymmetry.hankel`, a kernel :math:`G` of unit integral has
-:math:`\hat G(0) = 1`.
-"""
+"""Radial apparatus functions of unit integral whose transform has a closed form."""
 
 from __future__ import annotations
 
@@ -120,11 +116,6 @@ class SmoothedDisc:
         Radius a of the disc, in m.
     sigma : float
         Standard deviation s of the Gaussian, in m.
-
-    Raises
-    ------
-    InputError
-        If one of them is not finite and above zero.
 
     Examples
     --------

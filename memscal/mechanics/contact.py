@@ -21,18 +21,14 @@ from memscal.model.indenter import Indenter, Rod
 from memscal.model.result import Result
 from memscal.model.stress import StressProfile
 
-# Default radii of a profile, in film thicknesses: near the contact and far from it, a cubic spline
-# with these steps is good to 1e-6 of the maximum.
-_NEAR_STEP = 0.02
-_FAR_STEP = 0.05
-_NEAR_REACH = 6.0
-_FAR_REACH = 26.0
+# Steps and reach of a profile's default radii near the contact and far from it, in film
+# thicknesses: a cubic spline through them is good to 1e-6 of the maximum.
+_NEAR_STEP, _FAR_STEP = 0.02, 0.05
+_NEAR_REACH, _FAR_REACH = 6.0, 26.0
 # The profile ends where the stress stays below this fraction of its maximum.
 _PROFILE_FLOOR = 1e-9
-# Radii at which the largest interface pressure is sought.
-_PRESSURE_SAMPLES = 2001
-# Radii at which the largest base stress is sought: it is smooth over a film's thickness.
-_BASE_SAMPLES = 128
+# Radii at which the largest interface pressure and base stress are sought; the latter is smooth.
+_PRESSURE_SAMPLES, _BASE_SAMPLES = 2001, 128
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -196,7 +192,10 @@ class Contact(Result):
 
     @cached_property
     def _default_profile(self) -> StressProfile:
-        radii = self._default_radii()
+        edge = self.contact_radius / self.film.thickness
+        near = np.arange(0.0, edge + _NEAR_REACH, _NEAR_STEP)
+        far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
+        radii = np.concatenate([near, far]) * self.film.thickness
         sigma_zz = np.abs(self.base_stress(radii))
         last = np.flatnonzero(sigma_zz >= _PROFILE_FLOOR * sigma_zz.max())[-1] + 2
         return self._tabulated(radii[:last])
@@ -219,12 +218,6 @@ class Contact(Result):
             convergence=self.convergence,
             notes=f"Interface: {self.interface.description}." if not self.interface.rigid else "",
         )
-
-    def _default_radii(self) -> FloatArray:
-        edge = self.contact_radius / self.film.thickness
-        near = np.arange(0.0, edge + _NEAR_REACH, _NEAR_STEP)
-        far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
-        return np.concatenate([near, far]) * self.film.thickness
 
 
 def too_deep(film: ElasticFilm, indenter: Indenter, load: float, depth: float) -> DomainError:

@@ -26,11 +26,10 @@ base.  With :math:`\kappa = 3 - 4\nu`, :math:`c = \cosh x`, :math:`s = \sinh x`,
     X &= (x^2 - \kappa(1-2\nu)s^2)/((1-\nu)D),
 
 which tend to those of the half-space, :math:`W = Y = 1` and :math:`X = -(1-2\nu)/2(1-\nu)`, for
-large :math:`x`; a ``correction`` is the difference, free of cancellation.
-They are evaluated with decaying exponentials, so that nothing overflows, and by a series where the
-closed form would cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's
-ratio from 0 up to and including 0.5.  (For :math:`W` and :math:`T` see also Frétigny and
-Chateauminois, J. Phys. D 40 (2007) 5418.)
+large :math:`x`; a ``correction`` is the difference, free of cancellation.  They are evaluated with
+decaying exponentials, so that nothing overflows, and by a series where the closed form would
+cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's ratio from 0 to 0.5.
+(For :math:`W` and :math:`T` see also Frétigny and Chateauminois, J. Phys. D 40 (2007) 5418.)
 """
 
 from __future__ import annotations
@@ -55,71 +54,61 @@ _SERIES_BELOW = 0.5
 _TERMS = 9
 
 
-def half_space_coupling(poisson_ratio: float) -> float:
+def half_space_coupling(nu: float) -> float:
     r"""Coupling X of the half-space, :math:`-(1-2\nu)/2(1-\nu)`."""
-    return -(1 - 2 * poisson_ratio) / (2 * (1 - poisson_ratio))
+    return -(1 - 2 * nu) / (2 * (1 - nu))
 
 
-def normal_correction(x: ArrayLike, poisson_ratio: float) -> FloatArray:
+def normal_correction(x: ArrayLike, nu: float) -> FloatArray:
     """What the base takes from the half-space, :math:`W - 1`; decays as :math:`x^2 e^{-2x}`."""
-    x, decay, denominator, kappa = _prepare(x, poisson_ratio)
-    rest = kappa * decay + 2 * x + 2 * x**2 + (kappa**2 + 1) / 2
-    return -2 * decay * rest / denominator
+    x, decay, denominator, kappa = _prepare(x, nu)
+    return -decay * (2 * kappa * decay + 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
 
 
-def radial_correction(x: ArrayLike, poisson_ratio: float) -> FloatArray:
+def radial_correction(x: ArrayLike, nu: float) -> FloatArray:
     r"""What the base takes from the half-space's compliance, :math:`Y - 1`."""
-    x, decay, denominator, kappa = _prepare(x, poisson_ratio)
-    rest = kappa * decay - 2 * x + 2 * x**2 + (kappa**2 + 1) / 2
-    return -2 * decay * rest / denominator
+    x, decay, denominator, kappa = _prepare(x, nu)
+    return -decay * (2 * kappa * decay - 4 * x + 4 * x**2 + kappa**2 + 1) / denominator
 
 
-def coupling_correction(x: ArrayLike, poisson_ratio: float) -> FloatArray:
+def coupling_correction(x: ArrayLike, nu: float) -> FloatArray:
     r"""What the base adds to the half-space's coupling, :math:`X + (1-2\nu)/2(1-\nu)`."""
-    nu = poisson_ratio
     x, decay, denominator, _ = _prepare(x, nu)
     return 2 * decay * (2 * x**2 + 4 * (1 - 2 * nu) * (1 - nu)) / denominator
 
 
-def base_normal_from_pressure(x: ArrayLike, poisson_ratio: float) -> FloatArray:
+def base_normal_from_pressure(x: ArrayLike, nu: float) -> FloatArray:
     r"""Base stress under a pressure, :math:`T = 4(1-\nu)(2(1-\nu)c + xs)/D`; 1 at x = 0."""
-    nu = poisson_ratio
     x, decay, denominator, _ = _prepare(x, nu)
     numerator = 2 * (1 - nu) * (1 + decay) - x * np.expm1(-2 * x)
     return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
 
 
-def base_shear_from_pressure(x: ArrayLike, poisson_ratio: float) -> FloatArray:
+def base_shear_from_pressure(x: ArrayLike, nu: float) -> FloatArray:
     r"""Shear stress at the base under a pressure, :math:`S = 4(1-\nu)(xc - (1-2\nu)s)/D`."""
-    nu = poisson_ratio
     x, decay, denominator, _ = _prepare(x, nu)
     numerator = (1 - 2 * nu) * _x_cosh_minus_sinh(x, decay) + 2 * nu * x * (1 + decay)
     return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
 
 
-def base_normal_from_shear(x: ArrayLike, poisson_ratio: float) -> FloatArray:
+def base_normal_from_shear(x: ArrayLike, nu: float) -> FloatArray:
     r"""Base tension under an outward traction, :math:`N = 4(1-\nu)(xc + (1-2\nu)s)/D`."""
-    nu = poisson_ratio
     x, decay, denominator, _ = _prepare(x, nu)
     numerator = x * (1 + decay) - (1 - 2 * nu) * np.expm1(-2 * x)
     return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
 
 
-def base_shear_from_shear(x: ArrayLike, poisson_ratio: float) -> FloatArray:
+def base_shear_from_shear(x: ArrayLike, nu: float) -> FloatArray:
     r"""Base shear under a radial traction, :math:`R = 4(1-\nu)(2(1-\nu)c - xs)/D`."""
-    nu = poisson_ratio
     x, decay, denominator, _ = _prepare(x, nu)
     numerator = 2 * (1 - nu) * (1 + decay) + x * np.expm1(-2 * x)
     return 4 * (1 - nu) * np.exp(-x) * numerator / denominator
 
 
-def _prepare(
-    x: ArrayLike, poisson_ratio: float
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return x, exp(-2x), 2 exp(-2x) D and kappa."""
     x = np.minimum(np.asarray(x, dtype=np.float64), _LARGEST_X)
-    kappa = 3 - 4 * poisson_ratio
-    decay = np.exp(-2 * x)
+    kappa, decay = 3 - 4 * nu, np.exp(-2 * x)
     denominator = kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1)
     return x, decay, denominator, kappa
 
@@ -193,9 +182,7 @@ def base_stress(
 
     Compression and outward traction are positive; accurate to 1e-13 of the maximum.
     """
-    bessel = j1 if order else j0
-    h = film.thickness
-    flat = np.ravel(r)
+    h, flat = film.thickness, np.ravel(r)
     inside = np.flatnonzero(flat <= traction.radius + _DECAYED * h)
     sorting = inside[np.argsort(flat[inside], kind="stable")]
     stress = np.zeros_like(flat)
@@ -205,8 +192,8 @@ def base_stress(
         # 1.5/h keeps the panels short beside the distance of the transfer functions' poles.
         rate = flat[chunk[-1]] + traction.radius
         k, weights = gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / rate))
-        spectrum = base_spectrum(film, traction, k, order=order)
-        stress[chunk] = bessel(np.outer(flat[chunk], k)) @ (weights * k * spectrum)
+        density = weights * k * base_spectrum(film, traction, k, order=order)
+        stress[chunk] = (j0, j1)[order](np.outer(flat[chunk], k)) @ density
     return stress.reshape(np.shape(r))
 
 
@@ -226,8 +213,7 @@ class RingTraction:
     def radius(self) -> float:
         """Radius outside which there is no traction, in m."""
         loaded = np.flatnonzero((self.pressures != 0) | (self.shears != 0))
-        last = loaded[-1] + 1 if loaded.size else 0
-        return float(self.rings[min(last, self.rings.size - 1)])
+        return float(self.rings[min(loaded.max(initial=-1) + 1, self.rings.size - 1)])
 
     def pressure(self, r: FloatArray) -> FloatArray:
         """Return the pressure at ``r`` (m), in Pa."""
@@ -247,14 +233,9 @@ class RingTraction:
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
-        singular = singular_integrals(r, self.rings)
+        p, q, singular = self.pressures, self.shears, singular_integrals(r, self.rings)
         beyond, within = coupling_integrals(r, self.rings)
-        return (
-            singular[0] @ self.pressures,
-            beyond @ self.shears,
-            within @ self.pressures,
-            singular[1] @ self.shears,
-        )
+        return singular[0] @ p, beyond @ q, within @ p, singular[1] @ q
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
         flat = np.ravel(np.asarray(k, dtype=np.float64))
@@ -263,8 +244,7 @@ class RingTraction:
             used = self.rings <= self.radius
             rings = self.rings[used]
             s, weights = _nodes(rings, float(flat.max()))
-            density = weights * s * np.interp(s, rings, values[used])
-            bessel = (j0, j1)[order]
+            density, bessel = weights * s * np.interp(s, rings, values[used]), (j0, j1)[order]
             size = max(1, _RINGS_CHUNK // s.size)
             for start in range(0, flat.size, size):
                 chunk = slice(start, start + size)
@@ -275,18 +255,17 @@ class RingTraction:
 def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
     r"""Return :math:`\int\phi_j\,J_n(kr)\,r\,dr` n = 0 and 1, shapes (k, rings), in m^2."""
     s, weights = _nodes(rings, float(k.max()))
-    elements = rings.size - 1
-    rising = ((s.reshape(elements, -1) - rings[:-1, None]) / np.diff(rings)[:, None]).ravel()
+    nodes = s.reshape(rings.size - 1, -1)
+    rising = ((nodes - rings[:-1, None]) / np.diff(rings)[:, None]).ravel()
+    starts = np.arange(0, s.size, nodes.shape[1])
     transforms = []
     for bessel in (j0, j1):
         waves = bessel(np.multiply.outer(k, s)) * (weights * s)
-        right = np.add.reduceat(waves * rising, np.arange(0, s.size, s.size // elements), axis=1)
-        both = np.add.reduceat(waves, np.arange(0, s.size, s.size // elements), axis=1)
-        transforms.append(on_hats(both - right, right))
+        right = np.add.reduceat(waves * rising, starts, axis=1)
+        transforms.append(on_hats(np.add.reduceat(waves, starts, axis=1) - right, right))
     return transforms[0], transforms[1]
 
 
 def _nodes(rings: FloatArray, fastest: float) -> tuple[FloatArray, FloatArray]:
     """Return Gauss nodes between the rings, enough for ``fastest`` rad/m in the widest gap."""
-    phase = fastest * float(np.diff(rings).max())
-    return gauss_between(rings, order=4 + math.ceil(0.7 * phase))
+    return gauss_between(rings, order=4 + math.ceil(0.7 * fastest * float(np.diff(rings).max())))

@@ -61,19 +61,14 @@ def coupling_integrals(x: FloatArray, rings: FloatArray) -> tuple[FloatArray, Fl
     # Integrals of 1 - v and v, and of their products with s = start + length v, up to ``reach``.
     falling, rising = reach - reach**2 / 2, reach**2 / 2
     beyond = on_hats(lengths * (0.5 - falling), lengths * (0.5 - rising))
-    within = on_hats(
-        lengths * (starts * falling + lengths * (reach**2 / 2 - reach**3 / 3)),
-        lengths * (starts * rising + lengths * reach**3 / 3),
-    )
+    left = lengths * (starts * falling + lengths * (rising - reach**3 / 3))
+    within = on_hats(left, lengths * (starts * rising + lengths * reach**3 / 3))
     return beyond, within * np.where(x > 0, 1 / np.where(x > 0, x, 1.0), 0.0)[:, None]
 
 
 def on_hats(left: FloatArray, right: FloatArray) -> FloatArray:
     """Add the integrals of elements (last axis) with their falling and rising hats up to rings."""
-    total = np.zeros((left.shape[0], left.shape[1] + 1))
-    total[:, :-1] += left
-    total[:, 1:] += right
-    return total
+    return np.pad(left, ((0, 0), (0, 1))) + np.pad(right, ((0, 0), (1, 0)))
 
 
 def _kernels(x: FloatArray, s: FloatArray, distance: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -44,14 +44,11 @@ class HankelFilm:
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
-        singular = singular_integrals(self.r, self.r)
-        coupled = coupling_integrals(self.r, self.r)
-        k, weights = _wavenumbers(self.film, 2 * self.r[-1])
-        layer = _layer_integrals(self.film, self.r, (k, weights), *hat_transforms(self.r, k))
-        return SurfaceCompliance(
-            self.r,
-            *_displacements(self.film, (singular[0], coupled[0], coupled[1], singular[1]), layer),
-        )
+        film, r = self.film, self.r
+        (w_by_p, u_by_q), (w_by_q, u_by_p) = singular_integrals(r, r), coupling_integrals(r, r)
+        k, weights = _wavenumbers(film, 2 * r[-1])
+        layer = _layer_integrals(film, r, (k, weights), hat_transforms(r, k))
+        return SurfaceCompliance(r, *_displacements(film, (w_by_p, w_by_q, u_by_p, u_by_q), layer))
 
     @property
     def discretisation(self) -> str:
@@ -100,36 +97,31 @@ class HankelField:
         x = np.ravel(np.asarray(r, dtype=np.float64))
         traction = self.traction
         k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
-        layer = _layer_integrals(
-            self.film, x, (k, weights), traction.pressure_transform(k), traction.shear_transform(k)
-        )
+        transforms = traction.pressure_transform(k), traction.shear_transform(k)
+        layer = _layer_integrals(self.film, x, (k, weights), transforms)
         return _displacements(self.film, traction.half_space_integrals(x), layer)
 
 
-def _wavenumbers(film: ElasticFilm, reach: float) -> tuple[FloatArray, FloatArray]:
+_Pair = tuple[FloatArray, FloatArray]
+
+
+def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
     """Return quadrature nodes for the layer's share, seen at distances up to ``reach``."""
     h = film.thickness
     return gauss_panels(_LARGEST_KH / h, min(1.5 / h, _PHASE / max(reach, h)))
 
 
 def _layer_integrals(
-    film: ElasticFilm,
-    x: FloatArray,
-    wavenumbers: tuple[FloatArray, FloatArray],
-    pressure_transform: FloatArray,
-    shear_transform: FloatArray,
+    film: ElasticFilm, x: FloatArray, wavenumbers: _Pair, transforms: _Pair
 ) -> HalfSpaceIntegrals:
     """Return what the base takes from the surface's displacements at ``x``, times G/(1 - nu)."""
-    k, weights = wavenumbers
+    (k, weights), (p, q) = wavenumbers, transforms
     kh, nu = k * film.thickness, film.poisson_ratio
     normal, radial = j0(np.multiply.outer(x, k)) * weights, j1(np.multiply.outer(x, k)) * weights
     coupling = film_response.coupling_correction(kh, nu)
-    return (
-        (normal * film_response.normal_correction(kh, nu)) @ pressure_transform,
-        (normal * coupling) @ shear_transform,
-        (radial * coupling) @ pressure_transform,
-        (radial * film_response.radial_correction(kh, nu)) @ shear_transform,
-    )
+    w_by_p = (normal * film_response.normal_correction(kh, nu)) @ p
+    u_by_q = (radial * film_response.radial_correction(kh, nu)) @ q
+    return w_by_p, (normal * coupling) @ q, (radial * coupling) @ p, u_by_q
 
 
 def _displacements(

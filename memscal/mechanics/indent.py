@@ -141,31 +141,15 @@ def indent(
                 cure='Use backend="fem" for a film with a free edge.',
             )
     targets, several = _targets(load, depth)
-    interface = interface or Interface()
+    interface, friction = interface or Interface(), float(friction)
+    request = RingRequest(
+        film, indenter, interface, targets, friction, loading, backend, film_radius, rings
+    )
     if strain == "finite":
-        contacts = press_at_finite_strain(
-            film,
-            indenter,
-            targets,
-            friction=float(friction),
-            loading=loading,
-            interface=interface,
-            film_radius=film_radius,
-        )
+        contacts = press_at_finite_strain(request)
     elif _is_plain_rod(indenter, friction, backend, interface):
         contacts = tuple(_rod_contact(film, indenter, target, friction) for target in targets)
     else:
-        request = RingRequest(
-            film=film,
-            indenter=indenter,
-            interface=interface,
-            targets=targets,
-            friction=float(friction),
-            loading=loading,
-            backend=backend,
-            film_radius=film_radius,
-            rings=rings,
-        )
         contacts = solve_on_rings(request)
     return list(contacts) if several else contacts[0]
 
@@ -247,8 +231,7 @@ def _rod_contact(film: ElasticFilm, rod: Indenter, target: Target, friction: flo
     depth = target.value if isinstance(target, Depth) else target.value / stiffness
     if depth >= film.thickness:
         raise too_deep(film, rod, load, depth)
-    terms = solution.pressure_terms.size
-    traction = solution.traction(rod.radius, load)
+    terms, traction = solution.pressure_terms.size, solution.traction(rod.radius, load)
     return Contact(
         film=film,
         indenter=rod,

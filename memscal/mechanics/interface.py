@@ -75,13 +75,11 @@ class GreenwoodTripp:
 
     def pressure(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return the pressure in Pa at a ``separation`` in m."""
-        log_moment, _ = _splines()
-        return np.asarray(self._scale(film) * np.exp(log_moment(self._height(separation))))
+        return np.asarray(self._scale(film) * np.exp(_splines()[0](self._height(separation))))
 
     def stiffness(self, separation: FloatArray, film: ElasticFilm) -> FloatArray:
         """Return minus the derivative of the pressure by the separation, in Pa/m."""
-        log_moment, _ = _splines()
-        slope = log_moment(self._height(separation), 1)
+        slope = _splines()[0](self._height(separation), 1)
         return np.asarray(-self.pressure(separation, film) * slope / self.roughness)
 
     def separation(self, pressure: FloatArray, film: ElasticFilm) -> FloatArray:
@@ -159,11 +157,6 @@ class Interface:
     slip_length : float
         Elastic tangential displacement :math:`\ell` at which the interface slips, in m.
 
-    Raises
-    ------
-    InputError
-        If the slip length is negative or not finite.
-
     Examples
     --------
     >>> Interface(slip_length=1.82e-6).rigid, Interface().rigid
@@ -184,17 +177,17 @@ class Interface:
     @property
     def description(self) -> str:
         """What yields, in words; empty for a rigid interface."""
-        compliances = []
-        if isinstance(self.normal, GreenwoodTripp) and self.normal.roughness > 0:
+        compliances, law = [], self.normal_law
+        if isinstance(law, GreenwoodTripp):
             compliances.append(
-                f"Greenwood-Tripp law (roughness {self.normal.roughness * 1e6:.4g} um, "
-                f"{self.normal.asperity_density * 1e-6:.4g} asperities per mm^2 of radius "
-                f"{self.normal.asperity_radius * 1e6:.4g} um)"
+                f"Greenwood-Tripp law (roughness {law.roughness * 1e6:.4g} um, "
+                f"{law.asperity_density * 1e-6:.4g} asperities per mm^2 of radius "
+                f"{law.asperity_radius * 1e6:.4g} um)"
             )
-        if isinstance(self.normal, ExponentialCompliance) and self.normal.decay_length > 0:
+        elif law is not None:
             compliances.append(
-                f"exponential law (length {self.normal.decay_length * 1e6:.4g} um, "
-                f"{self.normal.reference_pressure * 1e-6:.4g} MPa where mean planes meet)"
+                f"exponential law (length {law.decay_length * 1e6:.4g} um, "
+                f"{law.reference_pressure * 1e-6:.4g} MPa where mean planes meet)"
             )
         if self.slip_length > 0:
             compliances.append(f"slip length {self.slip_length * 1e6:.4g} um")
@@ -225,5 +218,5 @@ def _gaussian_moment(order: float, t: FloatArray) -> FloatArray:
     # where the cylinder function overflows.
     deep = np.minimum(t, _DEEP)
     first = order * (order - 1) / (2 * deep**2)
-    second = order * (order - 1) * (order - 2) * (order - 3) / (8 * deep**4)
-    return np.where(t < _DEEP, (-deep) ** order * (1 + first + second), closed)
+    second = first * (order - 2) * (order - 3) / (4 * deep**2)
+    return np.asarray(np.where(t < _DEEP, (-deep) ** order * (1 + first + second), closed))

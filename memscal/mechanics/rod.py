@@ -67,8 +67,7 @@ def rod_integrals(
     w_by_q = np.sum(d_s * legendre.legval(t, odd) * reciprocal, axis=1)
     beyond = np.sum(d_s * legendre.legval(t, even), axis=1)
     whole = legendre.legval(1.0, legendre.legint(even, lbnd=0))
-    u_by_p = (whole - beyond) * inverse
-    return w_by_p, w_by_q, u_by_p, u_by_q
+    return w_by_p, w_by_q, (whole - beyond) * inverse, u_by_q
 
 
 def _series(terms: FloatArray, first: int) -> FloatArray:
@@ -107,8 +106,7 @@ def spherical_bessel(count: int, x: FloatArray) -> FloatArray:
     return np.asarray(rows / np.sqrt(norm), dtype=np.float64)
 
 
-_FEWEST_TERMS = 8
-_MOST_TERMS = 128
+_FEWEST_TERMS, _MOST_TERMS = 8, 128
 # Doubling of the terms stops when the stress at the base changes by less than this ...
 _SETTLED = 1e-9
 # ... and a solution that changes by more than this in the last doubling is refused.
@@ -132,22 +130,21 @@ class RodTraction:
 
     def pressure(self, r: FloatArray) -> FloatArray:
         """Return the pressure at ``r`` (m) in Pa; zero from the edge outward."""
-        _, m, under = self._inside(r)
+        _, m, under, scale = self._inside(r)
         # c_n = sqrt(pi) n! / Gamma(n + 1/2) gives each term the transform j_2n.
         series = np.zeros(2 * self.pressure_terms.size)
         series[::2] = self.pressure_terms * _term_scale(self.pressure_terms.size)
-        return np.where(under, (legendre.legval(m, series) / m) * self._mean_scale(), 0.0)
+        return np.where(under, (legendre.legval(m, series) / m) * scale, 0.0)
 
     def shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction at ``r`` (m) in Pa; zero from the edge outward."""
-        ratio, m, under = self._inside(r)
-        count = self.shear_terms.size
-        if count == 0:
+        ratio, m, under, scale = self._inside(r)
+        if (count := self.shear_terms.size) == 0:
             return np.zeros_like(m)
         series = np.zeros(2 * count)
         series[1::2] = self.shear_terms * _term_scale(count) / (2 * np.arange(count) + 1)
         values = ratio * legendre.legval(m, legendre.legder(series)) / m
-        return np.where(under, values * self._mean_scale(), 0.0)
+        return np.where(under, values * scale, 0.0)
 
     def pressure_transform(self, k: FloatArray) -> FloatArray:
         """Return the pressure's Hankel transform at ``k`` (rad/m), in N."""
@@ -176,14 +173,12 @@ class RodTraction:
         values = self.load / (2 * np.pi) * np.concatenate(sums) if sums else flat
         return values.reshape(np.shape(k))
 
-    def _mean_scale(self) -> float:
-        return self.load / (2 * np.pi * self.radius**2)
-
-    def _inside(self, r: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    def _inside(self, r: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], float]:
+        """Return r/a, m, whether ``r`` is under the rod, and half the mean pressure in Pa."""
         ratio = np.asarray(r, dtype=np.float64) / self.radius
         under = ratio < 1
         m = np.sqrt(np.where(under, (1 - ratio) * (1 + ratio), 1.0))
-        return ratio, np.asarray(m, dtype=np.float64), under
+        return ratio, np.asarray(m), under, self.load / (2 * np.pi * self.radius**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,8 +206,7 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
         )
     terms = _FEWEST_TERMS
     while True:
-        coarse = _solve(radius_ratio, poisson_ratio, sticking, terms, order=12)
-        terms *= 2
+        coarse, terms = _solve(radius_ratio, poisson_ratio, sticking, terms, order=12), 2 * terms
         fine = _solve(radius_ratio, poisson_ratio, sticking, terms, order=16)
         change = _largest_change(fine, coarse, radius_ratio, poisson_ratio)
         if change < _SETTLED or terms == _MOST_TERMS:
@@ -224,8 +218,7 @@ def solve_rod(radius_ratio: float, poisson_ratio: float, *, sticking: bool) -> R
             why=f"The largest change allowed is {_TOLERABLE:g}.",
             cure="Use a narrower rod, a thicker film, or a rod that slides freely (friction 0).",
         )
-    stiffness, pressure_terms, shear_terms = fine
-    return RodSolution(stiffness, pressure_terms, shear_terms, change)
+    return RodSolution(*fine, change)
 
 
 _Terms = tuple[float, FloatArray, FloatArray]
@@ -234,9 +227,7 @@ _Terms = tuple[float, FloatArray, FloatArray]
 def _solve(ratio: float, nu: float, sticking: bool, terms: int, order: int) -> _Terms:
     """Return stiffness factor, pressure terms and shear terms of the Galerkin solution."""
     matrix = _energy_matrix(ratio, nu, sticking, terms, order)
-    right = np.zeros(matrix.shape[0])
-    right[0] = 1.0
-    solution = np.linalg.solve(matrix, right)
+    solution = np.linalg.solve(matrix, np.eye(1, matrix.shape[0])[0])
     scaled = solution / solution[0]
     scaled.setflags(write=False)
     return float(np.pi / 2 * solution[0]), scaled[:terms], scaled[terms:]
@@ -246,29 +237,24 @@ def _energy_matrix(ratio: float, nu: float, sticking: bool, terms: int, order: i
     r"""Return :math:`\int j_m(\xi) j_n(\xi) \{W, X, Y\}(\xi h/a)\,d\xi`, even rows before odd."""
     # The integrand turns at the rate 2 a in k, and the poles lie 0.74/h off the axis.
     xi, weights = gauss_panels(_LARGEST_KH * ratio, min(1.5 * ratio, 6.0), order)
-    x = xi / ratio
-    orders = spherical_bessel(2 * terms, xi)
+    x, orders = xi / ratio, spherical_bessel(2 * terms, xi)
     even, odd = orders[::2], orders[1::2]
-    matrix = np.diag(_half_space_diagonal(0, terms))
+    # Of the half-space: the integral of j_l^2 is pi/2(2l + 1).
+    even_orders = 2 * np.arange(terms)
+    matrix = np.diag(np.pi / (4 * even_orders + 2))
     matrix += (even * (weights * film_response.normal_correction(x, nu))) @ even.T
     if not sticking:
         return matrix
-    radial = np.diag(_half_space_diagonal(1, terms))
+    radial = np.diag(np.pi / (4 * even_orders + 6))
     radial += (odd * (weights * film_response.radial_correction(x, nu))) @ odd.T
     coupling = film_response.half_space_coupling(nu) * _half_space_coupling_matrix(terms)
     coupling += (even * (weights * film_response.coupling_correction(x, nu))) @ odd.T
     return np.block([[matrix, coupling], [coupling.T, radial]])
 
 
-def _half_space_diagonal(first: int, terms: int) -> FloatArray:
-    r"""Return :math:`\int_0^\infty j_l^2\,d\xi = \pi/2(2l+1)` for ``l = first, first + 2, ...``."""
-    return np.asarray(np.pi / (2 * (2 * (first + 2 * np.arange(terms)) + 1)), dtype=np.float64)
-
-
 def _half_space_coupling_matrix(terms: int) -> FloatArray:
     r"""Return :math:`\int_0^\infty j_l j_{l'}\,d\xi = \sin((l-l')\pi/2)/((l-l')(l+l'+1))`."""
-    even = 2 * np.arange(terms)[:, None]
-    odd = 2 * np.arange(terms)[None, :] + 1
+    even, odd = 2 * np.arange(terms)[:, None], 2 * np.arange(terms)[None, :] + 1
     sign = np.where((even - odd) % 4 == 1, 1.0, -1.0)
     return np.asarray(sign / ((even - odd) * (even + odd + 1)), dtype=np.float64)
 
@@ -277,11 +263,9 @@ def _largest_change(fine: _Terms, coarse: _Terms, ratio: float, nu: float) -> fl
     """Return the relative change of stiffness and of the base stress under the same load."""
     film = ElasticFilm(young_modulus=1.0, poisson_ratio=nu, thickness=1.0)
     r = np.linspace(0.0, ratio + 4.0, 60)
-    stress = [
-        base_stress(film, RodTraction(ratio, 1.0, terms[1], terms[2]), r)
-        for terms in (fine, coarse)
-    ]
-    by_stress = np.max(np.abs(stress[0] - stress[1])) / np.max(np.abs(stress[0]))
+    tractions = (RodTraction(ratio, 1.0, *terms[1:]) for terms in (fine, coarse))
+    new, old = (base_stress(film, traction, r) for traction in tractions)
+    by_stress = np.max(np.abs(new - old)) / np.max(np.abs(new))
     return float(max(by_stress, abs(fine[0] / coarse[0] - 1)))
 
 

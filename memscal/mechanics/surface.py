@@ -31,12 +31,9 @@ class SurfaceCompliance:
     @property
     def areas(self) -> FloatArray:
         r"""Integrals of the hats over the surface, in m^2: the load is ``areas @ p``."""
-        r = self.r
-        widths = np.diff(r)
-        areas = np.zeros_like(r)
-        areas[:-1] += widths * (2 * r[:-1] + r[1:])
-        areas[1:] += widths * (r[:-1] + 2 * r[1:])
-        return areas * np.pi / 3
+        left, right = self.r[:-1], self.r[1:]
+        rising, falling = (right - left) * (left + 2 * right), (right - left) * (2 * left + right)
+        return np.asarray((np.append(0.0, rising) + np.append(falling, 0.0)) * np.pi / 3)
 
 
 class FilmField(Protocol):

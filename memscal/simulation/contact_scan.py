@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +52,6 @@ class LoadPath:
         kernel: RadialKernel,
         radius: FloatArray,
         ratio: FloatArray,
-        *,
         order: int = 0,
     ) -> FloatArray:
         r"""Return the blurred stress in Pa at ``radius`` (m) and ``ratio``, load over nominal load.
@@ -142,7 +142,12 @@ def simulate_contacts(
     require_non_negative("noise", noise)
     require_range("load_scatter", load_scatter, 0.0, _MOST_SCATTER)
     require_range("load_reading", load_reading, 0.0, _MOST_SCATTER)
-    _require_plausible(points, repeats, seed)
+    if points < 2 or repeats < 1 or seed < 0:
+        raise InputError(
+            f"There are {points} contacts in a row and {repeats} rows at each load, from the seed "
+            f"{seed}.",
+            cure="Give two contacts and one row at least, and a seed that is not negative.",
+        )
     require_positive("conversion_constant", conversion_constant, "V/Pa")
     require_positive("load_scale", load_scale)
     require_non_negative("position_error", position_error)
@@ -153,12 +158,9 @@ def simulate_contacts(
         )
     interface, truth = interface or Interface(), apparatus_function(kernel)
     shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
+    law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
     path = pressed_path(
-        lambda at: indent(
-            film, sphere, load=at, friction=friction, loading=loading, interface=interface
-        ),
-        load_scale * loads,
-        load_scatter,
+        lambda at: indent(film, sphere, load=at, **law), load_scale * loads, load_scatter
     )
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
     row = np.repeat(np.arange(loads.size), repeats)
@@ -166,18 +168,17 @@ def simulate_contacts(
     ratio = 1 + load_scatter * draws["load"]
     along = x + position_error * draws["position"] - centre[0]
     away = np.hypot(along, centre[1])
-    largest = conversion_constant * float(
-        path.at_nominal(truth, np.hypot(x - centre[0], centre[1])).max()
-    )
+    nominal = path.at_nominal(truth, np.hypot(x - centre[0], centre[1]))
+    largest = conversion_constant * float(nominal.max())
     signal = np.stack([path.near(int(j), truth, away[i], ratio[i]) for i, j in enumerate(row)])
-    u = conversion_constant * signal + largest * (
-        disturbance(x, baseline, drift) + noise * draws["noise"]
-    )
+    added = disturbance(x, baseline, drift) + noise * draws["noise"]
+    u = conversion_constant * signal + largest * added
     stated = np.broadcast_to(loads[row, None], u.shape)
     unsure = load_scatter
     if record_loads:
         stated, unsure = stated * ratio * (1 + load_reading * draws["reading"]), load_reading
     shape = u.shape[1:] if len(u) == 1 else u.shape
+    disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
     channel_data: dict[str, FloatArray] = {}
     shear_truth: dict[str, float | str] = {}
     if shear is not None:
@@ -185,12 +186,11 @@ def simulate_contacts(
             path.near(int(j), shear.kernel, away[i], ratio[i], order=1) for i, j in enumerate(row)
         ]
         sheared = np.stack(blurred) * shear.side(along, away)
-        disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
         channel_data, shear_truth = shear.recorded(sheared.reshape(shape), x, disturbed)
     return Scan(
         x=x,
         u_zz=u.reshape(shape),
-        u_zz_errors=np.full(shape, noise * largest) if state_noise and noise > 0 else None,
+        u_zz_errors=disturbed.errors(shape, largest),
         x_errors=np.full(points, position_error) if position_error > 0 else None,
         normal_load=stated.reshape(shape),
         normal_load_errors=(unsure * stated).reshape(shape) if unsure > 0 else None,
@@ -218,9 +218,7 @@ def simulate_contacts(
             "position_error": position_error,
             "centre": centre[0],
             "centre_y": centre[1],
-            "baseline": baseline * largest,
-            "drift": drift * largest,
-            "noise": noise * largest,
+            **disturbed.in_volts(largest),
             "seed": float(seed),
             **shear_truth,
         },
@@ -251,12 +249,3 @@ def _described(interface: Interface) -> dict[str, float | str]:
     if interface.normal_law is not None and interface.normal is not None:
         law |= {name: float(value) for name, value in asdict(interface.normal).items()}
     return law | ({"interface": interface.description} if law else {})
-
-
-def _require_plausible(points: int, repeats: int, seed: int) -> None:
-    if points < 2 or repeats < 1 or seed < 0:
-        raise InputError(
-            f"There are {points} contacts in a row and {repeats} rows at each load, from the seed "
-            f"{seed}.",
-            cure="Give two contacts and one row at least, and a seed that is not negative.",
-        )

@@ -194,7 +194,9 @@ def simulate_experiment(
     require_non_negative("seed", seed)
     if load_uncertainty is not None:
         require_non_negative("relative standard uncertainty of the load", load_uncertainty)
-    seeds = _seeds(seed)
+    streams = np.random.SeedSequence(seed).spawn(len(_STREAMS))
+    states = (int(stream.generate_state(1)[0]) for stream in streams)
+    seeds = dict(zip(_STREAMS, states, strict=True))
     reality = Reality(film=film, rod=rod, sphere=sphere)
     if draw_inputs:
         reality = drawn(reality, load_uncertainty or 0.0, seeds["inputs"])
@@ -248,11 +250,7 @@ def simulate_experiment(
         seed=seeds["lubricated"],
         **contacts,
     )
-    common: dict[str, float | str] = {
-        "conversion_constant": conversion_constant,
-        "gain": gain,
-        "seed": float(seed),
-    }
+    common = {"conversion_constant": conversion_constant, "gain": gain, "seed": float(seed)}
     if len(channels) > 1:
         common["conversion_constant_xz"] = shear_conversion_constant
     calibration = _with_load(calibration, rod_load, reality)
@@ -261,13 +259,6 @@ def simulate_experiment(
         dry=_as_stated(dry, film, sphere, common),
         lubricated=_as_stated(lubricated, film, sphere, common),
     )
-
-
-def _seeds(seed: int) -> dict[str, int]:
-    """Return a seed for each part of the experiment, all of them from one."""
-    streams = np.random.SeedSequence(seed).spawn(len(_STREAMS))
-    states = (int(stream.generate_state(1)[0]) for stream in streams)
-    return dict(zip(_STREAMS, states, strict=True))
 
 
 def _with_load(scan: Scan, load: float, reality: Reality) -> Scan:

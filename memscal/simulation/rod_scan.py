@@ -112,7 +112,11 @@ def simulate(
     >>> scan.u_zz.shape, scan.synthetic["gaussian_sigma"]
     ((33,), 0.000561)
     """
-    _require_plausible(half_range, points, repeats, noise, conversion_constant)
+    require_range("half_range", half_range, 1e-9, 1.0, "m")
+    require_positive("conversion_constant", conversion_constant, "V/Pa")
+    require_non_negative("noise", noise)
+    if points < 2 or repeats < 1:
+        raise InputError("A scan needs two positions and one repeat at least.")
     if not np.isfinite(centre).all() or seed < 0:
         raise InputError(
             f"The centre is {centre} m and the seed {seed}; the one must be finite, the other not "
@@ -135,19 +139,19 @@ def simulate(
     u = clean + np.random.default_rng(seed).normal(0.0, noise * largest, clean.shape)
     if not raster and row_loads.size == 1:
         u = u[0]
+    disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
     channel_data: dict[str, FloatArray] = {}
     shear_truth: dict[str, float | str] = {}
     if shear is not None:
         blurred = blurred_stress([contact], shear.kernel, radius, order=1)[0] / contact.load
         sheared = blurred * shear.side(x - centre[0], radius)
         rows = sheared * (loads[0] if raster else row_loads[:, None])
-        disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
         channel_data, shear_truth = shear.recorded(rows.reshape(u.shape), x, disturbed)
     return Scan(
         x=x,
         y=x if raster else None,
         u_zz=u,
-        u_zz_errors=np.full(u.shape, noise * largest) if state_noise and noise > 0 else None,
+        u_zz_errors=disturbed.errors(u.shape, largest),
         normal_load=np.broadcast_to(row_loads[:, None], u.shape) if loads.size > 1 else None,
         channels=channel_data,
         load=float(loads.mean()),
@@ -162,23 +166,11 @@ def simulate(
             "conversion_constant": conversion_constant,
             "centre": centre[0],
             "centre_y": centre[1],
-            "baseline": baseline * largest,
-            "drift": drift * largest,
-            "noise": noise * largest,
+            **disturbed.in_volts(largest),
             "seed": float(seed),
             **shear_truth,
         },
     )
-
-
-def _require_plausible(
-    half_range: float, points: int, repeats: int, noise: float, conversion_constant: float
-) -> None:
-    require_range("half_range", half_range, 1e-9, 1.0, "m")
-    require_positive("conversion_constant", conversion_constant, "V/Pa")
-    require_non_negative("noise", noise)
-    if points < 2 or repeats < 1:
-        raise InputError("A scan needs two positions and one repeat at least.")
 
 
 def checked_loads(load: float | Sequence[float]) -> FloatArray:

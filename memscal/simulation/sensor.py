@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +71,14 @@ class Disturbances:
     state_noise: bool
     seed: int
 
+    def in_volts(self, largest: float) -> dict[str, float]:
+        """Return offset, drift and noise in V, by the names of a truth."""
+        return {name: getattr(self, name) * largest for name in ("baseline", "drift", "noise")}
+
+    def errors(self, shape: tuple[int, ...], largest: float) -> FloatArray | None:
+        """Return the standard deviations that a scan states, in V; None if it states none."""
+        return np.full(shape, self.noise * largest) if self.state_noise and self.noise > 0 else None
+
 
 @dataclass(frozen=True)
 class ShearChannel:
@@ -95,15 +103,10 @@ class ShearChannel:
         draws = np.random.default_rng([disturbed.seed, 1]).standard_normal(clean.shape)
         level = disturbance(x, disturbed.baseline, disturbed.drift)
         channels = {"u_xz": clean + largest * (level + disturbed.noise * draws)}
-        if disturbed.state_noise and disturbed.noise > 0:
-            channels["u_xz_errors"] = np.full(clean.shape, disturbed.noise * largest)
-        truth: Mapping[str, float | str] = {
-            **self.kernel.describe(),
-            "conversion_constant": self.conversion_constant,
-            "baseline": disturbed.baseline * largest,
-            "drift": disturbed.drift * largest,
-            "noise": disturbed.noise * largest,
-        }
+        if (errors := disturbed.errors(clean.shape, largest)) is not None:
+            channels["u_xz_errors"] = errors
+        volts = {"conversion_constant": self.conversion_constant, **disturbed.in_volts(largest)}
+        truth = {**self.kernel.describe(), **volts}
         return channels, {f"{name}_xz": value for name, value in truth.items()}
 
 

@@ -46,8 +46,7 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     gradient, squeeze = _at_local_points(system, solution, local)
     r, depth = system.displacement.doflocs[:, nodes]
     displacement = np.empty((nodes.size, 2))
-    displacement[index, 0] = solution[outward]
-    displacement[index, 1] = -solution[inward]
+    displacement[index, 0], displacement[index, 1] = solution[outward], -solution[inward]
 
     def averaged(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(index.ravel(), values.T.ravel()) / np.bincount(index.ravel()))
@@ -62,11 +61,8 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
         triangles=_quadratic_triangles(index, local, system),
         displacement=film.thickness * displacement,
         stress=film.shear_modulus * np.stack([*stress, -slip], axis=1),
-        notes=(
-            f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
-            f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. "
-            "Stress positive in tension."
-        ),
+        notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
+        f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. Stress positive in tension.",
     )
 
 
@@ -74,12 +70,9 @@ def _at_local_points(system: MixedSystem, solution: FloatArray, local: FloatArra
     """Return the displacement's gradient and the mean pressure at points of every triangle."""
     import skfem
 
-    at_nodes = skfem.Basis(
-        system.displacement.mesh,
-        system.displacement.elem,
-        quadrature=(local.T, np.ones(local.shape[0])),
-    )
-    moved, pressed = np.split(solution, [system.displacement.N])
+    basis, points = system.displacement, (local.T, np.ones(local.shape[0]))
+    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=points)
+    moved, pressed = np.split(solution, [basis.N])
     cubic = at_nodes.with_element(system.pressure.elem)
     return at_nodes.interpolate(moved).grad, np.asarray(cubic.interpolate(pressed))
 
@@ -129,10 +122,8 @@ class ElementFilm:
     @cached_property
     def system(self) -> MixedSystem:
         """The finite-element equations, in film thicknesses and shear moduli."""
-        h = self.film.thickness
-        mesh = film_triangles(
-            self.r / h, radius=self.radius / h, thickness=1.0, refinement=self.refinement
-        )
+        rings, radius = self.r / self.film.thickness, self.radius / self.film.thickness
+        mesh = film_triangles(rings, radius=radius, thickness=1.0, refinement=self.refinement)
         return MixedSystem(mesh, self.film.poisson_ratio)
 
     @cached_property
@@ -149,13 +140,7 @@ class ElementFilm:
                 solution = system.solve(unknowns, hats[:, batch].toarray())
                 moved[source, 0, :, batch] = scale * (seen @ solution[inward])
                 moved[source, 1, :, batch] = scale * (seen @ solution[outward])
-        return SurfaceCompliance(
-            r=self.r,
-            normal=moved[0, 0],
-            normal_by_shear=moved[1, 0],
-            radial_by_pressure=moved[0, 1],
-            radial=moved[1, 1],
-        )
+        return SurfaceCompliance(self.r, moved[0, 0], moved[1, 0], moved[0, 1], moved[1, 1])
 
     @property
     def discretisation(self) -> str:
@@ -205,13 +190,11 @@ class ElementField:
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""
-        _, _, inward = self.system.side(0.0)
-        return self._at_surface(inward, r)
+        return self._at_surface(1, r)
 
     def outward(self, r: FloatArray) -> FloatArray:
         """Return the radial displacement of the surface in m; see :meth:`depression`."""
-        _, outward, _ = self.system.side(0.0)
-        return self._at_surface(outward, r)
+        return self._at_surface(0, r)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and stress inside the film, on quadratic triangles."""
@@ -242,13 +225,14 @@ class ElementField:
         values = self._base[component](np.minimum(flat, self.radius) / self.film.thickness)
         return np.where(flat <= self.radius, values, 0.0).reshape(np.shape(r))
 
-    def _at_surface(self, unknowns: NDArray[np.int64], r: FloatArray) -> FloatArray:
+    def _at_surface(self, component: int, r: FloatArray) -> FloatArray:
+        """Return the displacement outward (0) or inward (1) at ``r``, in m."""
         flat = np.ravel(np.asarray(r, dtype=np.float64))
         if np.any(flat > self.radius):
             raise DomainError(
                 f"There is no surface at {flat.max():g} m: the film ends at {self.radius:g} m.",
                 cure="Ask for smaller radii, or give a wider film.",
             )
-        line, _, _ = self.system.side(0.0)
-        values = line.at(flat / self.film.thickness) @ self.solution[unknowns]
+        line, *unknowns = self.system.side(0.0)
+        values = line.at(flat / self.film.thickness) @ self.solution[unknowns[component]]
         return np.asarray(self.film.thickness * values).reshape(np.shape(r))

@@ -145,15 +145,13 @@ class _Front:
 
     def _kept(self, moving: NDArray[np.bool_], lower: FloatArray) -> NDArray[np.bool_]:
         """Return which nodes the next row has: never do two neighbours drop out."""
-        width = np.zeros_like(self.r)
-        width[1:-1] = self.r[2:] - self.r[:-2]
+        width = np.pad(self.r[2:] - self.r[:-2], 1)
         slope = _SLOPE / self.sizes.refinement
         longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(self.r))
         # The side that bridges a dropped node must pass well below it.
-        room = np.zeros_like(self.r)
         share = (self.r[1:-1] - self.r[:-2]) / np.maximum(width[1:-1], self.r[-1] * 1e-300)
         bridge = (1 - share) * lower[:-2] + share * lower[2:]
-        room[1:-1] = bridge - self.depth[1:-1]
+        room = np.pad(bridge - self.depth[1:-1], 1)
         droppable = moving & (width > 0) & (width <= longest) & (room >= _ROOM * width)
         kept = np.ones(self.r.size, dtype=bool)
         for i in np.flatnonzero(droppable):

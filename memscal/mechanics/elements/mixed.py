@@ -52,10 +52,7 @@ class QuarticLine:
         side = np.clip(np.searchsorted(corners, r, side="right") - 1, 0, corners.size - 2)
         along = (r - corners[side]) / (corners[side + 1] - corners[side])
         columns = _DEGREE * side[:, None] + np.arange(_DEGREE + 1)
-        rows = np.arange(0, columns.size + 1, _DEGREE + 1)
-        return csr_array(
-            (_quartics(along).ravel(), columns.ravel(), rows), shape=(r.size, self.r.size)
-        )
+        return _sparse(_quartics(along), columns, self.r.size)
 
     @cached_property
     def mass(self) -> csr_array:
@@ -77,9 +74,13 @@ def _hat_values(rings: FloatArray, r: FloatArray) -> csr_array:
     element = np.clip(np.searchsorted(rings, r, side="right") - 1, 0, rings.size - 2)
     rising = (r - rings[element]) / (rings[element + 1] - rings[element])
     values = np.stack([1 - rising, rising], axis=1)
-    columns = np.stack([element, element + 1], axis=1)
-    rows = np.arange(0, columns.size + 1, 2)
-    return csr_array((values.ravel(), columns.ravel(), rows), shape=(r.size, rings.size))
+    return _sparse(values, np.stack([element, element + 1], axis=1), rings.size)
+
+
+def _sparse(values: FloatArray, columns: NDArray[np.int64], count: int) -> csr_array:
+    """Return the matrix of ``count`` columns that has a row of ``values`` at ``columns`` a row."""
+    rows = np.arange(0, columns.size + 1, columns.shape[1])
+    return csr_array((values.ravel(), columns.ravel(), rows), shape=(len(values), count))
 
 
 def smooth(
@@ -89,20 +90,16 @@ def smooth(
     # Knots at the corners, nearest in the integral of (.)^2 r dr: that of (.) r dr stays.
     from scipy.interpolate import make_lsq_spline
 
-    corners = line.corners
-    r, weights = gauss_between(corners, _ORDER + 1)
+    r, weights = gauss_between(line.corners, _ORDER + 1)
     quartic, weights = line.at(r) @ values, np.sqrt(weights * r)
-    ends = np.full(_SMOOTH_DEGREE + 1, corners[-1])
-    halves = line.r[2:-1:2]
-    knots = np.concatenate([-ends, -halves[::-1], halves, ends])
+    knots = np.concatenate([line.r[2:-1:2], np.full(_SMOOTH_DEGREE + 1, line.r[-1])])
+
+    def mirrored(half: FloatArray, sign: int) -> FloatArray:
+        return np.concatenate([sign * half[::-1], half])
+
     # Mirrored about the axis, so that what is fitted has the right symmetry.
-    spline = make_lsq_spline(
-        np.concatenate([-r[::-1], r]),
-        np.concatenate([parity * quartic[::-1], quartic]),
-        knots,
-        k=_SMOOTH_DEGREE,
-        w=np.concatenate([weights[::-1], weights]),
-    )
+    table = mirrored(r, -1), mirrored(quartic, parity), mirrored(knots, -1)
+    spline = make_lsq_spline(*table, k=_SMOOTH_DEGREE, w=mirrored(weights, 1))
     return lambda radius: np.asarray(spline(radius))
 
 

@@ -110,20 +110,19 @@ _NEAR = 4.0
 _SLOPE = 0.7
 
 
+# Thickness and radius in mm, and how many times finer than by default the mesh is.
+FilmSize = tuple[float, float, float]
+
+
 def mesh_below_a_rod(
-    *,
-    rod: float,
-    thickness: float,
-    radius: float,
-    refinement: float,
-    fold: tuple[float, float],
-    finest: float,
+    size: FilmSize, *, rod: float, fold: tuple[float, float], finest: float
 ) -> Any:
     """Return a mesh (mm) that is finest where the rod's edge folds the surface."""
+    thickness, _, refinement = size
     near = _WIDEST_BELOW_A_ROD * thickness / refinement
     side = min(_SHARE_OF_ROD * rod / refinement, near)
     even = np.linspace(0.0, rod, max(2, round(rod / side)) + 1)
-    mesh = _tensor(even, (side, near), rod, thickness, radius, refinement)
+    mesh = _tensor(even, side, near, size)
     while True:
         r, z = mesh.p[:, mesh.t]
         longest = np.hypot(r - np.roll(r, 1, axis=0), z - np.roll(z, 1, axis=0)).max(axis=0)
@@ -136,29 +135,21 @@ def mesh_below_a_rod(
         mesh = mesh.refined(np.flatnonzero(long & (longest < 3 * side)))
 
 
-def mesh_below_a_sphere(
-    *, contact: float, thickness: float, radius: float, refinement: float
-) -> Any:
+def mesh_below_a_sphere(size: FilmSize, *, contact: float) -> Any:
     """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
+    thickness, _, refinement = size
     near = _WIDEST_BELOW_A_SPHERE * thickness / refinement
     side = min(_SHARE_OF_CONTACT * contact / refinement, near)
     even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
-    return _tensor(even, (side, near), contact, thickness, radius, refinement)
+    return _tensor(even, side, near, size)
 
 
-def _tensor(
-    even: FloatArray,
-    sides: tuple[float, float],
-    contact: float,
-    thickness: float,
-    radius: float,
-    refinement: float,
-) -> Any:
+def _tensor(even: FloatArray, side: float, near: float, size: FilmSize) -> Any:
     """Return triangles on a grid that grows away from the contact, outward and downward."""
     import skfem
 
-    grow = 1 + _GROWTH / refinement
-    (side, near), far = sides, _WIDEST_FAR * thickness / refinement
+    thickness, radius, refinement = size
+    contact, grow, far = even[-1], 1 + _GROWTH / refinement, _WIDEST_FAR * thickness / refinement
     r, step = [contact], side
     while r[-1] < radius:
         step = min(step * grow, near if r[-1] < contact + _NEAR * thickness else far)

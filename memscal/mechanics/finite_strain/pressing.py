@@ -125,8 +125,7 @@ class Pressing:
 
     def press(self, start: Pressed, goal: Goal) -> Pressed:
         """Return the equilibrium at a goal, from a state near it, or raise :class:`NewtonError`."""
-        state = start if goal.is_load else replace(start, depth=goal.value)
-        state = self.placed(state)
+        state = self.placed(start if goal.is_load else replace(start, depth=goal.value))
         seen: set[bytes] = set()
         loose = _LOOSE_STICKING if self.sticking and not self.upright else _LOOSE_SLIDING
         for iteration in range(1, _MOST_ITERATIONS + 1):
@@ -248,6 +247,10 @@ class Step:
     work: float
 
 
+def _value(state: Pressed, goal: Goal) -> float:
+    return state.load if goal.is_load else state.depth
+
+
 def follow(pressing: Pressing, start: Pressed, goals: list[Goal]) -> Iterator[Step]:
     """Yield the states at the goals, in order; the ``last`` of a NewtonError is the last step."""
     path = _Path(pressing, start)
@@ -264,10 +267,8 @@ class _Path:
     """The state reached, the one before it, and the length of the next step."""
 
     def __init__(self, pressing: Pressing, start: Pressed) -> None:
-        self.pressing, self.start = pressing, start
+        self.pressing, self.start, self.length = pressing, start, np.inf
         self.states: list[Pressed] = []
-        # Stepping is by load or by depth, whatever the goals are given in.
-        self.length = np.inf
 
     @property
     def step(self) -> Step:
@@ -290,16 +291,15 @@ class _Path:
 
     def reach(self, goal: Goal) -> None:
         """Go to a goal."""
-        begin = self._value(goal)
+        begin, halvings = _value(self.states[-1], goal) if self.states else 0.0, 0
         if not self.states:
             self.length = self._first(goal)
-        halvings = 0
         while begin != goal.value:
             left = goal.value - begin
             pieces = max(1.0, np.ceil(abs(left) / self.length - 1e-9))
             ahead = goal.value if pieces == 1 else begin + left / pieces
+            stage = Goal(ahead, goal.is_load)
             try:
-                stage = Goal(ahead, goal.is_load)
                 state = self.pressing.press(self._guess(stage), stage)
             except NewtonError:
                 self.length = abs(ahead - begin) / 2
@@ -321,11 +321,6 @@ class _Path:
         stiffness = 8 * self.pressing.elements.material.shear_modulus * face.radius
         return _FIRST * face.radius * (stiffness if goal.is_load else 1.0)
 
-    def _value(self, goal: Goal) -> float:
-        if not self.states:
-            return 0.0
-        return self.states[-1].load if goal.is_load else self.states[-1].depth
-
     def _guess(self, goal: Goal) -> Pressed:
         """Return the last state, carried on as it came."""
         if not self.states:
@@ -333,7 +328,7 @@ class _Path:
         if len(self.states) == 1:
             return self.states[-1]
         before, last = self.states[-2:]
-        old, new = (s.load if goal.is_load else s.depth for s in (before, last))
+        old, new = _value(before, goal), _value(last, goal)
         if new == old:
             return last
         ahead = (goal.value - new) / (new - old)
@@ -342,9 +337,5 @@ class _Path:
             was = np.isin(before.touching, last.touching)
             now = np.isin(last.touching, before.touching)
             place[now] += ahead * (place[now] - before.place[was])
-        return replace(
-            last,
-            x=last.x + ahead * (last.x - before.x),
-            depth=last.depth + ahead * (last.depth - before.depth),
-            place=place,
-        )
+        depth = last.depth + ahead * (last.depth - before.depth)
+        return replace(last, x=last.x + ahead * (last.x - before.x), depth=depth, place=place)

@@ -30,11 +30,10 @@ from memscal.mechanics.finite_strain.pressing import (
     follow,
 )
 from memscal.mechanics.finite_strain.state import FiniteStrainField, interface_traction, outermost
-from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.problem import Depth, Load, Target
-from memscal.mechanics.solver.refinement import relative_change
+from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter, Rod, Sphere
+from memscal.model.indenter import Rod, Sphere
 
 _MM = 1e3
 # The mesh that tells the convergence has sides longer by this factor.
@@ -55,18 +54,11 @@ _FOLD_SLIDING = (0.2, 1.1)
 _SAMPLES = np.linspace(0.0, 4.0, 41)
 
 
-def press_at_finite_strain(
-    film: ElasticFilm,
-    indenter: Indenter,
-    targets: tuple[Target, ...],
-    *,
-    friction: float,
-    loading: str,
-    interface: Interface,
-    film_radius: float | None,
-) -> tuple[Contact, ...]:
-    """Return the contacts at ``targets``, visited in their order."""
-    if not (friction == 0 or math.isinf(friction)) or not interface.rigid:
+def press_at_finite_strain(request: RingRequest) -> tuple[Contact, ...]:
+    """Return the contacts at the targets, visited in their order."""
+    film, indenter, targets = request.film, request.indenter, request.targets
+    friction = request.friction
+    if not (friction == 0 or math.isinf(friction)) or not request.interface.rigid:
         raise DomainError(
             "At finite strain a contact slides freely (friction 0) or sticks (inf), between "
             f"surfaces that do not yield; here the friction is {friction:g}.",
@@ -79,7 +71,7 @@ def press_at_finite_strain(
             why="Only a rod and a sphere are modelled there.",
             cure='Press it with strain="linear".',
         )
-    if math.isinf(friction) and loading == "incremental" and isinstance(indenter, Sphere):
+    if math.isinf(friction) and request.loading == "incremental" and isinstance(indenter, Sphere):
         raise DomainError(
             f'At finite strain a {indenter.shape} that sticks is solved for loading="total" only.',
             why="Its contact grows, and a point would have to stick where it first touched.",
@@ -92,7 +84,7 @@ def press_at_finite_strain(
             f"{film.thickness * 1e3:g} mm thick.",
             cure="Check the depth and its unit.",
         )
-    radius = film_radius if film_radius is not None else _FREE_EDGE * film.thickness
+    radius = request.film_radius or _FREE_EDGE * film.thickness
     return solve_finite_strain(film, indenter, targets, sticking=friction > 0, radius=radius)
 
 
@@ -136,9 +128,8 @@ class _Request:
             for step in follow(pressing, self._start(pressing), self.goals):
                 contact = self._contact(pressing, step)
                 if coarse is not None:
-                    r = _SAMPLES * self.film.thickness
-                    change = relative_change(contact, coarse[len(contacts)], r)
-                    contact = replace(contact, convergence=change)
+                    r, other = _SAMPLES * self.film.thickness, coarse[len(contacts)]
+                    contact = replace(contact, convergence=relative_change(contact, other, r))
                 contacts.append(contact)
         except NewtonError as problem:
             error = ConvergenceError(
@@ -153,20 +144,15 @@ class _Request:
 
     def _pressing(self, refinement: float, coarse: list[Contact] | None) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
-        thickness = self.film.thickness * _MM
+        size = (self.film.thickness * _MM, self.radius, refinement)
         face: RodFace | SphereFace
         if isinstance(self.indenter, Rod):
             rod = self.indenter.radius * _MM
             face = RodFace(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
             fold = _FOLD_STICKING if self.sticking else _FOLD_SLIDING
-            mesh = mesh_below_a_rod(
-                rod=rod,
-                thickness=thickness,
-                radius=self.radius,
-                refinement=refinement,
-                fold=(fold[0] * rod, fold[1] * rod),
-                finest=face.edge * (_FINEST_STICKING if self.sticking else _FINEST_SLIDING),
-            )
+            finest = face.edge * (_FINEST_STICKING if self.sticking else _FINEST_SLIDING)
+            fold = (fold[0] * rod, fold[1] * rod)
+            mesh = mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest)
         else:
             face = SphereFace(self.indenter.radius * _MM)
             widest = max(map(self._hertz_radius, self.goals))
@@ -178,9 +164,7 @@ class _Request:
                     f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
                     why="It must end well within both.",
                 )
-            mesh = mesh_below_a_sphere(
-                contact=widest, thickness=thickness, radius=self.radius, refinement=refinement
-            )
+            mesh = mesh_below_a_sphere(size, contact=widest)
         elements = FilmElements(mesh, NeoHookean.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
@@ -196,24 +180,20 @@ class _Request:
 
     def _start(self, pressing: Pressing) -> Pressed:
         """Return the untouched film, and the nodes that will touch first."""
-        elements = pressing.elements
-        nodes, goal = elements.surface, self.goals[0]
+        elements, nodes = pressing.elements, pressing.elements.surface
         r = elements.nodes[0][nodes]
         if isinstance(pressing.face, RodFace):
             reach, depth = pressing.face.flat, 0.0
         else:
-            reach = 0.8 * self._hertz_radius(goal)
+            reach = 0.8 * self._hertz_radius(self.goals[0])
             depth = reach**2 / (self.indenter.extent * _MM)
         chosen = r <= reach * (1 + 1e-9)
         return Pressed(np.zeros(elements.size), depth, nodes[chosen], pressing.place_at(r[chosen]))
 
     def _contact(self, pressing: Pressing, step: Step) -> Contact:
         """Return a state in SI units, of unknown convergence."""
-        pressed, elements = step.pressed, pressing.elements
-        rod = isinstance(self.indenter, Rod)
-        radius = outermost(pressing, pressed) / _MM
-        if rod:
-            radius = min(radius, self.indenter.extent)
+        pressed, elements, rod = step.pressed, pressing.elements, isinstance(self.indenter, Rod)
+        radius = min(outermost(pressing, pressed) / _MM, self.indenter.extent if rod else math.inf)
         # A sphere that sticks has no way: nothing moves radially wherever it touches.
         work = None if pressing.upright else step.work / _MM
         return Contact(

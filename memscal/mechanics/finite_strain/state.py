@@ -62,23 +62,20 @@ class FiniteStrainField:
 
     def base_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
-        flat = np.ravel(np.asarray(k, dtype=np.float64))
-        return hankel_transform(self.base[0], self.base[1], flat).reshape(np.shape(k))
+        return hankel_transform(self.base[0], self.base[1], np.ravel(k)).reshape(np.shape(k))
 
     def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        flat = np.ravel(np.asarray(k, dtype=np.float64))
-        return hankel_transform(self.base[0], self.base[2], flat, order=1).reshape(np.shape(k))
+        r, shear = self.base[0], self.base[2]
+        return hankel_transform(r, shear, np.ravel(k), order=1).reshape(np.shape(k))
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return how far the points at ``r`` before deformation (m) moved into the film, in m."""
-        radii, w, _ = self.surface
-        return _interpolated(radii, w, r, parity=0)
+        return _interpolated(self.surface[0], self.surface[1], r, parity=0)
 
     def outward(self, r: FloatArray) -> FloatArray:
         """Return how far the points at ``r`` before deformation (m) moved outward, in m."""
-        radii, _, u = self.surface
-        return _interpolated(radii, u, r, parity=0)
+        return _interpolated(self.surface[0], self.surface[2], r, parity=0)
 
     def mesh(self) -> FieldMesh:
         """Return displacement and Cauchy stress on the undeformed mesh."""
@@ -117,9 +114,8 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
         dragged[0] = 0.0
     side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))
     left, right = r[:-2:2], r[2::2]
-    area = np.zeros(r[::2].size)
-    area[:-1] += np.pi / 3 * side * (2 * left + right)
-    area[1:] += np.pi / 3 * side * (left + 2 * right)
+    falling, rising = side * (2 * left + right), side * (left + 2 * right)
+    area = np.pi / 3 * (np.append(falling, 0.0) + np.append(0.0, rising))
 
     chosen = np.flatnonzero(touching[::2] & (along[::2] > 1e-6))
     chosen = chosen[np.argsort(r[::2][chosen], kind="stable")]
@@ -129,10 +125,8 @@ def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
 
 def _on_corners(forces: FloatArray) -> FloatArray:
     """Return the forces on hats between corners; nodes are corners and middles by turns."""
-    sums = forces[::2].copy()
-    sums[:-1] += forces[1::2] / 2
-    sums[1:] += forces[1::2] / 2
-    return sums
+    halves = forces[1::2] / 2
+    return np.asarray(forces[::2] + np.append(halves, 0.0) + np.append(0.0, halves))
 
 
 def _without_axis(rows: FloatArray) -> FloatArray:
@@ -144,10 +138,8 @@ def _spline(r: FloatArray, values: FloatArray, parity: int) -> Callable[[FloatAr
     """Return an even (1) or odd (-1) cubic spline through a table that begins off the axis."""
     from scipy.interpolate import CubicSpline
 
-    mirror = slice(3, None, -1)
-    spline = CubicSpline(
-        np.concatenate([-r[mirror], r]), np.concatenate([parity * values[mirror], values])
-    )
+    mirrored = np.concatenate([parity * values[3::-1], values])
+    spline = CubicSpline(np.concatenate([-r[3::-1], r]), mirrored)
     return lambda radii: np.asarray(spline(radii))
 
 
@@ -160,9 +152,7 @@ def _spline_masses(r: FloatArray, parity: int) -> FloatArray:
     return _without_axis(hats @ (splines * (2 * np.pi * nodes * weights)[:, None]))
 
 
-def _interpolated(
-    nodes: FloatArray, values: FloatArray, r: ArrayLike, *, parity: int
-) -> FloatArray:
+def _interpolated(nodes: FloatArray, values: FloatArray, r: ArrayLike, parity: int) -> FloatArray:
     """Return a table's values at ``r``: by an even or odd spline, or without overshoot (0)."""
     from scipy.interpolate import PchipInterpolator
 

@@ -122,9 +122,8 @@ def follow(
     problem: ContactProblem, targets: Sequence[Target], loading: str, increments: int
 ) -> list[PathPoint]:
     """Return the states at ``targets``; the ``last`` of a ConvergenceError is a PathPoint."""
-    if problem.friction > 0 and loading == "total":
-        return list(_in_one_step(problem, targets, increments))
-    return list(_step_by_step(problem, targets, increments))
+    at_once = problem.friction > 0 and loading == "total"
+    return list((_in_one_step if at_once else _step_by_step)(problem, targets, increments))
 
 
 def _in_one_step(
@@ -212,10 +211,8 @@ def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
     # On a rigid interface the first loading is one step: everything grows in proportion.
     proportional = walk.state.load == 0 and walk.problem.interface.rigid
     count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
-    begin = _reached(walk.state, target)
-    for share in np.arange(1, count + 1) / count:
-        value = begin + (target.value - begin) * float(share)
-        goal = target if share == 1 else replace(target, value=value)
+    for value in np.linspace(_reached(walk.state, target), target.value, count + 1)[1:]:
+        goal = replace(target, value=float(value))
         walk.step_to(take_step(walk.problem, walk.state, goal, same_contact=True))
 
 
@@ -247,24 +244,18 @@ def _next_meeting(
     onset = replace(state, touching=touching)
     # A contact with a hole has two edges: what meets, or parts, first comes next.
     states = [_meet_at(problem, onset, int(ring)) for ring in np.flatnonzero(edge)]
-    if not states:
-        return None
     nearest = min if rising else max
-    return nearest(states, key=lambda following: _reached(following, target))
+    return nearest(states, key=lambda following: _reached(following, target), default=None)
 
 
 def _neighbours(rings: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    beside = np.zeros_like(rings)
-    beside[1:] |= rings[:-1]
-    beside[:-1] |= rings[1:]
-    return beside
+    return np.asarray(np.append(False, rings[:-1]) | np.append(rings[1:], False))
 
 
 def _elastic_energy(problem: ContactProblem, state: ContactState) -> float:
     r"""Return :math:`\frac12\int(p\,w + q\,u)\,dA`, in J (Clapeyron)."""
-    p, q = state.pressure, state.shear
-    w, u = problem.displacements(p, q)
-    return 0.5 * _surface_integral(problem.compliance.r, (p, w), (q, u))
+    w, u = problem.displacements(state.pressure, state.shear)
+    return 0.5 * _surface_integral(problem.compliance.r, (state.pressure, w), (state.shear, u))
 
 
 def _dissipation(problem: ContactProblem, before: ContactState, after: ContactState) -> float:
@@ -282,8 +273,7 @@ def _surface_integral(r: FloatArray, *products: tuple[FloatArray, FloatArray]) -
     left, right, width = r[:-1], r[1:], np.diff(r)
     total = 0.0
     for f, g in products:
-        f0, f1, g0, g1 = f[:-1], f[1:], g[:-1], g[1:]
         # Cubic integrand: Simpson's rule is exact.
-        middle = (left + right) / 2 * (f0 + f1) / 2 * (g0 + g1) / 2
-        total += float(np.sum(width / 6 * (left * f0 * g0 + 4 * middle + right * f1 * g1)))
+        middle = (left + right) * (f[:-1] + f[1:]) * (g[:-1] + g[1:]) / 2
+        total += float(np.sum(width / 6 * (left * (f * g)[:-1] + middle + right * (f * g)[1:])))
     return 2 * np.pi * total

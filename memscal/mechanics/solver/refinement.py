@@ -35,8 +35,11 @@ _CROWDING = 4.0
 _PLACING_SAMPLES = 100_001
 
 
-def _rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArray:
+def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: int) -> FloatArray:
     """Return ``count`` even rings up to ``reach`` (m), and more at the expected ``edges`` (m)."""
+    if isinstance(request.indenter, Rod):
+        # They crowd towards the edge; the last is on it.
+        return request.indenter.radius * (1.0 - np.linspace(1.0, 0.0, count) ** _CROWDING)
     spacing = reach / count
     r = np.linspace(0.0, reach + _MARGIN * spacing, _PLACING_SAMPLES)
     local = np.full(r.size, spacing)
@@ -47,8 +50,7 @@ def _rings_around(edges: Sequence[float], reach: float, count: int) -> FloatArra
     return np.interp(np.arange(math.floor(passed[-1]) + 1), passed, r)
 
 
-_FEWEST_RINGS = 48
-_MOST_RINGS = 384
+_FEWEST_RINGS, _MOST_RINGS = 48, 384
 # Rings are doubled until base stress, load and depth change by less than this ...
 _SETTLED = 1e-4
 # ... and a solution that changes by more than this is refused.
@@ -65,7 +67,7 @@ _REQUEST_SAMPLES = 24
 _FREE_EDGE = 12.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class RingRequest:
     """What is asked for; its content is the key under which a solution is remembered."""
 
@@ -106,13 +108,6 @@ def solve_on_rings(request: RingRequest) -> tuple[Contact, ...]:
     return tuple(contacts)
 
 
-def _rings(request: RingRequest, edges: Sequence[float], reach: float, count: int) -> FloatArray:
-    if isinstance(request.indenter, Rod):
-        # They crowd towards the edge; the last is on it.
-        return request.indenter.radius * (1.0 - np.linspace(1.0, 0.0, count) ** _CROWDING)
-    return _rings_around(edges, reach, count)
-
-
 def _expected(request: RingRequest) -> tuple[list[float], float]:
     """Return the contact radii to expect and how far pressure reaches (m), by a coarse contact."""
     if isinstance(request.indenter, Rod):
@@ -143,7 +138,6 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
                 why="Such a film responds like a column at every point, not like a layer.",
                 cure="Lower the load or the depth, or check the units of film and indenter.",
             )
-    edges = [_contact_radius(request, rings, state) for state in states]
     within = float(rings[filled + 1])
     if within > request.indenter.extent:
         raise DomainError(
@@ -152,15 +146,13 @@ def _expected(request: RingRequest) -> tuple[list[float], float]:
             why="Its face is not known beyond.",
             cure="Lower the load or the depth, or extend the profile.",
         )
-    return edges, within
+    return [_contact_radius(request, rings, state) for state in states], within
 
 
 def _follow(request: RingRequest, model: HankelFilm | ElementFilm) -> list[PathPoint]:
     rings = model.compliance.r
-    heights = request.indenter.height(rings)
-    problem = ContactProblem(
-        request.film, model.compliance, heights, request.friction, request.interface
-    )
+    film, heights = request.film, request.indenter.height(rings)
+    problem = ContactProblem(film, model.compliance, heights, request.friction, request.interface)
     # Between rigid surfaces a step is a ring; where nothing touches all at once, as many steps.
     return follow(problem, request.targets, request.loading, increments=rings.size)
 
@@ -172,7 +164,7 @@ def _solve(request: RingRequest, rings: FloatArray) -> list[Contact]:
         from memscal.mechanics.elements.element_film import ElementFilm
 
         radius = request.film_radius or rings[-1] + _FREE_EDGE * request.film.thickness
-        model = ElementFilm(request.film, rings, radius=radius)
+        model = ElementFilm(request.film, rings, radius)
     else:
         model = HankelFilm(request.film, rings)
     try:
@@ -244,9 +236,9 @@ def _stick_radius(
 ) -> float:
     """Return the radius in m within which the film sticks."""
     sticking = np.flatnonzero(state.sticking(request.friction) & (state.pressure > 0))
-    if sticking.size == 0 or (sticking.size == 1 and sticking[0] == 0):
+    last = int(sticking.max(initial=0))
+    if last == 0:
         return 0.0
-    last = int(sticking[-1])
     if last + 1 >= rings.size or not state.touching[last + 1]:
         return contact_radius
     return min(contact_radius, float(rings[last] + rings[last + 1]) / 2)
@@ -255,10 +247,9 @@ def _stick_radius(
 def _change(request: RingRequest, fine: Contact, coarse: Contact) -> float:
     """Return the change of a contact from one on fewer rings."""
     reach = fine.contact_radius + 3 * fine.film.thickness
-    if request.film_radius is not None:
+    if (radius := request.film_radius) is not None:
         # In the corner between the base and a free edge the stress is singular.
-        off_the_corner = request.film_radius - fine.film.thickness
-        reach = min(reach, max(off_the_corner, request.film_radius / 2))
+        reach = min(reach, max(radius - fine.film.thickness, radius / 2))
     return relative_change(fine, coarse, np.linspace(0.0, reach, _REQUEST_SAMPLES))
 
 

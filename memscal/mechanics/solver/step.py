@@ -17,12 +17,14 @@ from memscal.errors import ConvergenceError
 from memscal.mechanics.interface import NormalLaw
 from memscal.mechanics.solver.problem import ContactProblem, ContactState, Depth, Goal, Load, Touch
 from memscal.model.arrays import FloatArray
+from memscal.model.film import ElasticFilm
 
-_Indices = NDArray[np.intp]
+_Rings = NDArray[np.intp]
+_Pair = tuple[_Rings, _Rings]  # that press, and that stick
 
 
 @dataclass(frozen=True, eq=False)
-class _Statuses:
+class _Status:
     """Status and trial values of the n rings while the equations are solved."""
 
     pressing: NDArray[np.bool_]  # rings that bear a pressure
@@ -43,16 +45,16 @@ class _Tractions:
     depth: float
 
 
-def _solve_system(problem: ContactProblem, statuses: _Statuses, goal: Goal) -> _Tractions:
-    """Return the tractions and the depth that fulfil the equations of ``statuses`` and ``goal``."""
+def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Tractions:
+    """Return the tractions and the depth that fulfil the equations of ``status`` and ``goal``."""
     c, mu = problem.compliance, problem.friction
     off_axis = c.r > 0
-    rows = np.flatnonzero(statuses.pressing)
-    sticks = statuses.pressing & (statuses.slip == 0) & off_axis
+    rows = np.flatnonzero(status.pressing)
+    sticks = status.pressing & (status.slip == 0) & off_axis
     stuck = np.flatnonzero(sticks) if mu > 0 else rows[:0]
     # Shear of a slipping ring per pressure.  Nothing slips where friction has no bound.
     bounded = mu if math.isfinite(mu) else 0.0
-    ratio = bounded * np.where(off_axis, statuses.slip, 0)[rows]
+    ratio = bounded * np.where(off_axis, status.slip, 0)[rows]
 
     # In units of the film's own compliance, the matrix mixes pressures with pressures.
     unit = c.normal[0, 0]
@@ -63,10 +65,10 @@ def _solve_system(problem: ContactProblem, statuses: _Statuses, goal: Goal) -> _
     radial = np.hstack([by_rows, c.radial[np.ix_(stuck, stuck)], np.zeros((stuck.size, 1))])
     last, value = _goal_row(problem, goal, normal, rows, unit)
     matrix = np.vstack([normal[rows], radial, last])
-    right = np.concatenate([-problem.heights[rows], statuses.anchor[stuck], [value]])
-    _add_normal_compliance(problem, statuses, rows, matrix, right)
+    right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [value]])
+    _add_normal_compliance(problem, status, rows, matrix, right)
     if problem.interface.slip_length > 0 and math.isfinite(mu):
-        _add_tangential_compliance(problem, statuses, (rows, stuck), matrix, right)
+        _add_tangential_compliance(problem, status, (rows, stuck), matrix, right)
     try:
         solution = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
@@ -84,7 +86,7 @@ def _solve_system(problem: ContactProblem, statuses: _Statuses, goal: Goal) -> _
 
 
 def _goal_row(
-    problem: ContactProblem, goal: Goal, normal: FloatArray, rows: _Indices, unit: float
+    problem: ContactProblem, goal: Goal, normal: FloatArray, rows: _Rings, unit: float
 ) -> tuple[FloatArray, float]:
     """Return the equation that ends the step, of the size of the others."""
     row = np.zeros(normal.shape[1])
@@ -100,17 +102,12 @@ def _goal_row(
 
 
 def _add_normal_compliance(
-    problem: ContactProblem,
-    statuses: _Statuses,
-    rows: _Indices,
-    matrix: FloatArray,
-    right: FloatArray,
+    problem: ContactProblem, status: _Status, rows: _Rings, matrix: FloatArray, right: FloatArray
 ) -> None:
     """Replace g = 0 by g = F^-1(p), linearised at the trial's separation."""
-    law = problem.normal_law
-    if law is None:
+    if (law := problem.normal_law) is None:
         return
-    gap = statuses.separation[rows]
+    gap = status.separation[rows]
     stiffness = law.stiffness(gap, problem.film)
     diagonal = np.arange(rows.size)
     matrix[diagonal, diagonal] += 1 / stiffness
@@ -118,25 +115,21 @@ def _add_normal_compliance(
 
 
 def _add_tangential_compliance(
-    problem: ContactProblem,
-    statuses: _Statuses,
-    indices: tuple[_Indices, _Indices],
-    matrix: FloatArray,
-    right: FloatArray,
+    problem: ContactProblem, status: _Status, rings: _Pair, matrix: FloatArray, right: FloatArray
 ) -> None:
     r"""Replace :math:`u = u^0` by :math:`\mu p\,(u - u^0) + \ell q = 0`, linearised."""
-    rows, stuck = indices
+    rows, stuck = rings
     mu, length = problem.friction, problem.interface.slip_length
-    limit = mu * np.maximum(statuses.pressure[stuck], 0.0)
+    limit = mu * np.maximum(status.pressure[stuck], 0.0)
     # The equation is divided by what keeps it of the size of the others, also where p vanishes.
     size = limit + length / np.diagonal(problem.compliance.radial)[stuck]
     here = rows.size + np.arange(stuck.size)
     matrix[here] *= (limit / size)[:, None]
     right[here] *= limit / size
     matrix[here, here] += length / size
-    pull = mu * statuses.stretch[stuck] / size
+    pull = mu * status.stretch[stuck] / size
     matrix[here, np.searchsorted(rows, stuck)] += pull
-    right[here] += pull * statuses.pressure[stuck]
+    right[here] += pull * status.pressure[stuck]
 
 
 _MOST_ITERATIONS = 200
@@ -157,18 +150,18 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    statuses = _first_statuses(problem, start, goal)
+    status = _first_status(problem, start, goal)
     held = goal.ring if isinstance(goal, Touch) else None
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        tractions = _solve_system(problem, statuses, goal)
+        tractions = _solve_system(problem, status, goal)
         careful = iteration > _CAREFUL_AFTER
-        revised, settled = _revise(problem, statuses, tractions, held=held, careful=careful)
+        revised, settled = _revise(problem, status, tractions, held, careful)
         if same_contact:
-            changed = not np.array_equal(revised.slip, statuses.slip)
-            revised, settled = replace(revised, pressing=statuses.pressing), not changed
+            changed = not np.array_equal(revised.slip, status.slip)
+            revised, settled = replace(revised, pressing=status.pressing), not changed
         if settled:
-            return _accepted(problem, statuses, tractions, held, iteration)
-        statuses = revised
+            return _accepted(problem, status, tractions, held, iteration)
+        status = revised
     raise ConvergenceError(
         f"The contact did not settle within {_MOST_ITERATIONS} iterations on the way to {goal}.",
         why=f"Before it, {start.load:.6g} N were borne at a depth of {start.depth * 1e6:.6g} um.",
@@ -176,20 +169,14 @@ def take_step(
     )
 
 
-def _first_statuses(problem: ContactProblem, start: ContactState, goal: Goal) -> _Statuses:
-    """Begin with the statuses of the state before."""
+def _first_status(problem: ContactProblem, start: ContactState, goal: Goal) -> _Status:
+    """Begin with the status of the state before."""
     law, separation = problem.normal_law, problem.separations(start)
     pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
     if isinstance(goal, Touch):
         pressing[goal.ring] = False
-    return _Statuses(
-        pressing=pressing,
-        slip=start.slip,
-        anchor=start.anchor,
-        separation=separation,
-        pressure=start.pressure,
-        stretch=start.outward - start.anchor,
-    )
+    stretch = start.outward - start.anchor
+    return _Status(pressing, start.slip, start.anchor, separation, start.pressure, stretch)
 
 
 def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) -> NDArray[np.bool_]:
@@ -199,124 +186,97 @@ def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) ->
 
 
 def _revise(
-    problem: ContactProblem,
-    statuses: _Statuses,
-    tractions: _Tractions,
-    *,
-    held: int | None,
-    careful: bool,
-) -> tuple[_Statuses, bool]:
-    """Return statuses that the tractions do not contradict, and whether nothing changed."""
-    p, q = tractions.pressure, tractions.shear
-    w, u = problem.displacements(p, q)
+    problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None, careful: bool
+) -> tuple[_Status, bool]:
+    """Return a status that the tractions do not contradict, and whether nothing changed."""
+    p = tractions.pressure
+    w, u = problem.displacements(p, tractions.shear)
     gap = problem.heights - tractions.depth + w
-    slip, tangential = _revised_slip(problem, statuses, tractions, u, careful=careful)
+    slip, tangential = _revised_slip(problem, status, tractions, u, careful)
     law = problem.normal_law
     if law is None:
-        pressing = _revised_contact(statuses, tractions, gap, held, careful=careful)
-        separation, normal = gap, bool(np.any(pressing != statuses.pressing))
+        pressing = _revised_contact(status, tractions, gap, held, careful=careful)
+        separation, normal = gap, bool(np.any(pressing != status.pressing))
     else:
-        separation = _revised_separation(problem, law, statuses, tractions, gap)
+        separation = _revised_separation(problem.film, law, status, tractions, gap)
         pressing, normal = _bearing(problem, law, separation), False
-    moved = np.max(np.abs(p - statuses.pressure)) > _SETTLED * p.max()
+    moved = np.max(np.abs(p - status.pressure)) > _SETTLED * p.max()
     settled = not (normal or tangential or (moved and not problem.interface.rigid))
     length = problem.interface.slip_length
-    revised = _Statuses(
-        pressing=pressing,
-        slip=slip,
-        anchor=statuses.anchor,
-        separation=separation,
-        pressure=p,
-        stretch=np.clip(u - statuses.anchor, -length, length),
-    )
-    return revised, settled
+    stretch = np.clip(u - status.anchor, -length, length)
+    return _Status(pressing, slip, status.anchor, separation, p, stretch), settled
 
 
 def _revised_contact(
-    statuses: _Statuses, tractions: _Tractions, gap: FloatArray, held: int | None, *, careful: bool
+    status: _Status, tractions: _Tractions, gap: FloatArray, held: int | None, *, careful: bool
 ) -> NDArray[np.bool_]:
     """Let go of rings that pull, and catch rings that would pass through the indenter."""
     p, depth = tractions.pressure, tractions.depth
-    pulled = np.where(statuses.pressing, -p / np.abs(p).max(initial=1e-300), 0.0)
-    passed = np.where(statuses.pressing, 0.0, -gap / max(abs(depth), 1e-300))
+    pulled = np.where(status.pressing, -p / np.abs(p).max(initial=1e-300), 0.0)
+    passed = np.where(status.pressing, 0.0, -gap / max(abs(depth), 1e-300))
     if held is not None:
         passed[held] = 0.0
     wrong = np.maximum(pulled, passed)
     changing = wrong > _SLACK
     if careful and np.any(changing):
         changing = np.arange(wrong.size) == np.argmax(wrong)
-    return statuses.pressing ^ changing
+    return status.pressing ^ changing
 
 
 def _revised_slip(
-    problem: ContactProblem,
-    statuses: _Statuses,
-    tractions: _Tractions,
-    u: FloatArray,
-    *,
-    careful: bool,
+    problem: ContactProblem, status: _Status, tractions: _Tractions, u: FloatArray, careful: bool
 ) -> tuple[NDArray[np.int8], bool]:
     """Let rings slip whose shear is too large, and stick that would be pushed on by friction."""
     mu = problem.friction
     if mu == 0 or np.isinf(mu):
-        return statuses.slip, False
+        return status.slip, False
     p, q = tractions.pressure, tractions.shear
     largest = mu * np.abs(p).max()
-    sticks = statuses.pressing & (statuses.slip == 0)
-    slips = statuses.pressing & (statuses.slip != 0) & (problem.compliance.r > 0)
+    sticks = status.pressing & (status.slip == 0)
+    slips = status.pressing & (status.slip != 0) & (problem.compliance.r > 0)
     excess = np.where(sticks, (np.abs(q) - mu * np.maximum(p, 0.0)) / largest, 0.0)
     # A slipping ring stretches the interface by its slip length, against the shear.
-    short = statuses.slip * (u - statuses.anchor) + problem.interface.slip_length
+    short = status.slip * (u - status.anchor) + problem.interface.slip_length
     reach = np.max(np.abs(u)) + problem.interface.slip_length
     pushed = np.where(slips, short / reach, 0.0)
     wrong = np.maximum(excess, pushed)
     changing = wrong > _SLACK
     if not np.any(changing):
-        return statuses.slip, False
+        return status.slip, False
     if careful:
         changing = np.arange(wrong.size) == np.argmax(wrong)
     # A ring that friction would push on far enough to slip back does so at once (the trial shear
     # of Alart and Curnier); sticking first, it could go back and forth for ever.
-    stretch = u - statuses.anchor
+    stretch = u - status.anchor
     turn = 2 * mu * np.maximum(p, 0.0) * np.diagonal(problem.compliance.radial)
     turns = np.abs(stretch) > np.maximum(turn, problem.interface.slip_length)
     turned = np.where(turns, -np.sign(stretch), 0)
-    slip = np.where(changing, np.where(sticks, np.sign(q), turned), statuses.slip)
+    slip = np.where(changing, np.where(sticks, np.sign(q), turned), status.slip)
     return slip.astype(np.int8), True
 
 
 def _revised_separation(
-    problem: ContactProblem,
-    law: NormalLaw,
-    statuses: _Statuses,
-    tractions: _Tractions,
-    gap: FloatArray,
+    film: ElasticFilm, law: NormalLaw, status: _Status, tractions: _Tractions, gap: FloatArray
 ) -> FloatArray:
     """Return the next trial of the separations."""
     # Where the surfaces part, the linear equations' own; where they close, the one at which the
     # (convex) law bears the linear equations' pressure.
-    before, p = statuses.separation, tractions.pressure
+    before, p = status.separation, tractions.pressure
     after = np.maximum(gap, np.minimum(before, 0.0) - _PLUNGE * law.length)
-    closing = statuses.pressing & (gap < before) & (p > 0)
-    borne = law.separation(np.where(closing, p, 1.0), problem.film)
+    closing = status.pressing & (gap < before) & (p > 0)
+    borne = law.separation(np.where(closing, p, 1.0), film)
     return np.where(closing, np.clip(borne, gap, before), after)
 
 
 def _accepted(
-    problem: ContactProblem,
-    statuses: _Statuses,
-    tractions: _Tractions,
-    held: int | None,
-    iterations: int,
+    problem: ContactProblem, status: _Status, tractions: _Tractions, held: int | None, count: int
 ) -> ContactState:
     p, q = tractions.pressure, tractions.shear
     _, u = problem.displacements(p, q)
-    slip = np.where(statuses.pressing, statuses.slip, 0).astype(np.int8)
+    slip = np.where(status.pressing, status.slip, 0).astype(np.int8)
     # What slips drags its anchor along, a slip length behind; what is free has none.
-    moving = ~statuses.pressing | (slip != 0)
-    anchor = np.where(moving, u + slip * problem.interface.slip_length, statuses.anchor)
-    touching = statuses.pressing.copy()
-    if held is not None:
-        touching[held] = True
+    moving = ~status.pressing | (slip != 0)
+    anchor = np.where(moving, u + slip * problem.interface.slip_length, status.anchor)
+    touching = status.pressing | (np.arange(problem.size) == held)
     load = float(problem.compliance.areas @ p)
-    return ContactState(p, q, tractions.depth, load, touching, slip, anchor, u, iterations)
+    return ContactState(p, q, tractions.depth, load, touching, slip, anchor, u, count)
