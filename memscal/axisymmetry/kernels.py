@@ -117,6 +117,11 @@ class SmoothedDisc:
     sigma : float
         Standard deviation s of the Gaussian, in m.
 
+    Raises
+    ------
+    InputError
+        If one of them is not finite and above zero.
+
     Examples
     --------
     A wide disc is flat inside: its density there is one over its area.

@@ -157,6 +157,11 @@ class Interface:
     slip_length : float
         Elastic tangential displacement :math:`\ell` at which the interface slips, in m.
 
+    Raises
+    ------
+    InputError
+        If the slip length is negative or not finite.
+
     Examples
     --------
     >>> Interface(slip_length=1.82e-6).rigid, Interface().rigid
