@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     PAPER_FILM,
@@ -21,16 +22,6 @@ from memscal.cli.options import (
     radius_options,
     require_one_kernel,
     si,
-)
-from memscal.cli.output import (
-    FigurePath,
-    emit_json,
-    emit_tables,
-    message,
-    note,
-    prove_writable,
-    rendered,
-    write_files,
 )
 
 if TYPE_CHECKING:
@@ -116,7 +107,7 @@ class _Target(_TargetType):
 @option("--vary", click.Choice(_VARIED))(
     "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
 )
-@option("--figure figures", FigurePath(), multiple=True, metavar="FILE")(
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE")(
     "Figure of the expected result (.png, .svg or .pdf). May be repeated."
 )
 @output_options
@@ -137,19 +128,19 @@ def command(
     require_one_kernel(options)
     if bool(targets) != (vary is not None):
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
-    prove_writable(figures, force=force)
+    out.prove_writable(figures, force=force)
     planned = _designed(options, dict(targets), vary)
-    write_files(rendered(lambda: _figure(planned, vary), figures), force=force)
+    out.write_files(out.rendered(lambda: _figure(planned, vary), figures), force=force)
 
     if as_json:
-        emit_json({"schema_version": "1", **planned.to_dict()})
+        out.emit_json({"schema_version": "1", **planned.to_dict()})
     else:
         from memscal.summaries.design import tables
 
-        emit_tables(*tables(planned))
-    note(_HIDDEN)
+        out.emit_tables(*tables(planned))
+    out.note(_HIDDEN)
     for path in figures:
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     return DONE
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
@@ -22,16 +23,6 @@ from memscal.cli.options import (
     output_options,
     radius_options,
     si,
-)
-from memscal.cli.output import (
-    FigurePath,
-    emit_json,
-    emit_tables,
-    message,
-    prove_writable,
-    rendered,
-    show_messages,
-    write_files,
 )
 
 if TYPE_CHECKING:
@@ -168,7 +159,7 @@ Examples:
 @option("-o --output", FILE, metavar="OUT")(
     "Reference file to write (memscal-reference); for one load or depth."
 )
-@option("--figure figures", FigurePath(), multiple=True, metavar="FILE")(
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE")(
     "Figure of the contacts (.png, .svg or .pdf). May be repeated."
 )
 @option("--mesh", FILE, metavar="FILE.vtu")(
@@ -195,13 +186,13 @@ def command(
     _check_usage(loads, depths, output, mesh, options)
     files = [path for path in (output, mesh, *figures) if path is not None]
     table = options["profile_table"]
-    prove_writable(files, force=force, inputs=[table] if table else [])
+    out.prove_writable(files, force=force, inputs=[table] if table else [])
     contacts = _pressed(indenter, loads, depths, options)
     _write(contacts, output, figures, mesh, force=force)
 
     _print(contacts, options["loading"], output, as_json=as_json)
     for path in files:
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     return DONE
 
 
@@ -254,7 +245,7 @@ def _write(
     if figures:
         from memscal.figures.stress import contact_figure
 
-        drawn = rendered(lambda: contact_figure(contacts), figures)
+        drawn = out.rendered(lambda: contact_figure(contacts), figures)
     if mesh is not None:
         from memscal.formats.meshes.mesh_files import write_mesh
 
@@ -263,7 +254,7 @@ def _write(
         from memscal.formats.reference import write_reference
 
         write_reference(contacts[0].profile(), output, overwrite=force)
-    write_files(drawn, force=force)
+    out.write_files(drawn, force=force)
 
 
 def _print(
@@ -277,7 +268,7 @@ def _print(
         # A rod's contact does not depend on the loading that was asked for.
         solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
         head = {"schema_version": "1", "output": None if output is None else str(output)}
-        emit_json({**head, "solutions": solutions, "warnings": warnings})
+        out.emit_json({**head, "solutions": solutions, "warnings": warnings})
     else:
-        emit_tables(contacts_table(contacts))
-    show_messages(messages)
+        out.emit_tables(contacts_table(contacts))
+    out.show_messages(messages)
