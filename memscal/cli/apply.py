@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from memscal.cli import output as out
+from memscal.cli.failures import exit_code_of
 from memscal.cli.options import FILE, option, output_options
 
 EXAMPLES = """\b
@@ -54,7 +55,6 @@ def command(
     written = output or out.beside(scans[0], ".stress.h5")
     out.prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
 
-    from memscal.cli.failures import exit_code_of
     from memscal.measurement.measure_stress import measure_stress
     from memscal.summaries.stress import tables
 

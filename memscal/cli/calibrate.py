@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from memscal.cli import output as out
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli.failures import DONE, debug_option, exit_code_of
 from memscal.cli.options import FILE, force_option, json_option, option
 
 if TYPE_CHECKING:
@@ -334,13 +334,11 @@ def _rehearse(
     readings = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
     reference_spectra(stresses, readings, [scan.film.thickness for scan in scans])
-    points = joined_points(readings)
+    points, plan = joined_points(readings), (regulariser.name, outputs.paths)
     if as_json:
-        out.emit_json(rehearsal_json(stresses[0], regulariser.name, outputs.paths))
+        out.emit_json(rehearsal_json(stresses[0], *plan))
     else:
-        out.emit_tables(
-            rehearsal_table(scans[0], points, stresses[0], regulariser.name, outputs.paths)
-        )
+        out.emit_tables(rehearsal_table(scans[0], points, stresses[0], *plan))
     out.message("Nothing was written (--dry-run).")
 
 
@@ -352,13 +350,8 @@ def _show(
     as_json: bool,
 ) -> int:
     """Print the results and the messages; return the exit code."""
-    from memscal.cli.failures import exit_code_of
-
-    further = {
-        name: result
-        for name, result in (("sweep", sweep), ("monte_carlo", drawn))
-        if result is not None
-    }
+    results = {"sweep": sweep, "monte_carlo": drawn}
+    further = {name: result for name, result in results.items() if result is not None}
     if as_json:
         files = {"schema_version": "1", "artifact": str(outputs.artifact)}
         values = {name: result.to_dict() for name, result in further.items()}

@@ -109,6 +109,7 @@ def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
 
 
 _COEFFICIENT = Quantity("ratio", open_low=False, infinite=True)
+_FORMATS = [suffix.removeprefix(".") for suffix in out.FIGURE_SUFFIXES]
 
 EXAMPLES = """\b
 Examples:
@@ -158,11 +159,7 @@ Examples:
     "Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
     "coefficients, maxima, effective friction, likelihood, interface."
 )
-@option(
-    "--figure-format",
-    click.Choice([suffix.removeprefix(".") for suffix in out.FIGURE_SUFFIXES]),
-    "png",
-)("Format of --figures.")
+@option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
 @output_options
 def command(
     artifact: Path,

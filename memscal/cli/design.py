@@ -34,6 +34,9 @@ else:  # generic since click 8.2 only
     _TargetType = click.ParamType
 
 _VARIED = ("step", "half-range", "repeats")
+#: Options in other units than SI, by the power of ten.
+_IN_MM_OR_MV = ("conversion_constant", "step", "half_range", "noise_voltage", "centre")
+_SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(("load_uncertainty", "noise"), -2)
 
 _HIDDEN = (
     "Beyond the resolved band G follows from the prior: its uncertainty there does not scatter "
@@ -154,18 +157,10 @@ def _designed(options: dict[str, Any], targets: dict[str, float], vary: str | No
         film=film_from(options),
         rod=rod,
         kernel=kernel_from(options),
-        conversion_constant=si(options["conversion_constant"], -3),
-        load=options["load"],
-        load_uncertainty=si(options["load_uncertainty"], -2),
-        step=si(options["step"], -3),
-        half_range=si(options["half_range"], -3),
-        repeats=options["repeats"],
-        noise=si(options["noise"], -2),
-        noise_voltage=si(options["noise_voltage"], -3),
-        centre=si(options["centre"], -3),
-        method=options["method"],
         want=targets,
         vary=None if vary is None else vary.replace("-", "_"),
+        **{name: si(options[name], power) for name, power in _SCALED.items()},
+        **{name: options[name] for name in ("load", "repeats", "method")},
     )
 
 

@@ -66,8 +66,7 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     checks = [
         (
             check["name"].replace("_", " "),
-            "-" if check["value"] is None else f"{check['value']:.3g}",
-            "-" if check["limit"] is None else f"{check['limit']:.3g}",
+            *(_number(check[name], ".3g") for name in ("value", "limit")),
             "passed" if check["passed"] else "FAILED",
         )
         for check in contents["checks"]
@@ -111,17 +110,13 @@ def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
 
 
 def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:
-    def number(value: float | None) -> str:
-        return "-" if value is None else f"{value:.5g}"
+    shape = " x ".join(str(n) for n in item["shape"]) or "one"
+    low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
+    return item["path"], shape, low, high, item["unit"], str(item["missing"] or "-")
 
-    return (
-        item["path"],
-        " x ".join(str(n) for n in item["shape"]) or "one",
-        number(item["minimum"]),
-        number(item["maximum"]),
-        item["unit"],
-        str(item["missing"] or "-"),
-    )
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else f"{value:{form}}"
 
 
 def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

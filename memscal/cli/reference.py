@@ -35,10 +35,7 @@ _RADIUS = {"rod": 0.25, "sphere": 128.8}
 SHAPES = ("rod", "sphere", "cone", "profile")
 
 # What each shape is described by; every other of these options belongs to another shape.
-_DESCRIBED_BY = {"rod": "radius", "sphere": "radius"}
-_DESCRIBED_BY |= {"cone": "inclination", "profile": "profile_table"}
-
-
+_DESCRIBED_BY = dict(zip(SHAPES, ("radius", "radius", "inclination", "profile_table"), strict=True))
 _ASPERITIES = (Quantity("um"), Quantity("1/mm^2"), Quantity("um"))
 
 interface_options = options_of(
@@ -223,9 +220,8 @@ def _pressed(
     interface = interface_of(options)
     from memscal.mechanics.indent import indent
 
-    settings: dict[str, Any] = {
-        name: options[name] for name in ("friction", "loading", "backend", "strain", "rings")
-    }
+    names = ("friction", "loading", "backend", "strain", "rings")
+    settings: dict[str, Any] = {name: options[name] for name in names}
     settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
     if depths:
         return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)

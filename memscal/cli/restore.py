@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from memscal.cli import output as out
+from memscal.cli.failures import exit_code_of
 from memscal.cli.options import FILE, option, output_options
 
 if TYPE_CHECKING:
@@ -63,7 +64,6 @@ def command(
     files = [path for path in (output, *figures) if path is not None]
     out.prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
-    from memscal.cli.failures import exit_code_of
     from memscal.measurement.restore import restore
     from memscal.summaries.restoration import tables
 
