@@ -132,6 +132,7 @@ def command(
     if bool(targets) != (vary is not None):
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
     out.prove_writable(figures, force=force)
+    vary = None if vary is None else vary.replace("-", "_")
     planned = _designed(options, dict(targets), vary)
     out.write_files(out.rendered(lambda: _figure(planned, vary), figures), force=force)
 
@@ -148,23 +149,15 @@ def command(
 
 
 def _designed(options: dict[str, Any], targets: dict[str, float], vary: str | None) -> Design:
-    from memscal.model.indenter import Rod
     from memscal.planning.design import design
 
-    rod = indenter_from("rod", options)
-    assert isinstance(rod, Rod)
-    return design(
-        film=film_from(options),
-        rod=rod,
-        kernel=kernel_from(options),
-        want=targets,
-        vary=None if vary is None else vary.replace("-", "_"),
-        **{name: si(options[name], power) for name, power in _SCALED.items()},
-        **{name: options[name] for name in ("load", "repeats", "method")},
-    )
+    settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
+    settings |= {name: options[name] for name in ("load", "repeats", "method")}
+    settings |= {"rod": indenter_from("rod", options), "film": film_from(options)}
+    return design(kernel=kernel_from(options), want=targets, vary=vary, **settings)
 
 
 def _figure(planned: Design, vary: str | None) -> Figure:
     from memscal.figures.design import design_figure
 
-    return design_figure(planned, vary="step" if vary is None else vary.replace("-", "_"))
+    return design_figure(planned, vary="step" if vary is None else vary)

@@ -29,6 +29,7 @@ from memscal.cli.options import (
 )
 from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable
 from memscal.cli.reference import interface_of, interface_options
+from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
     from memscal.model.scan import Scan
@@ -114,17 +115,12 @@ def _experiment_from(options: Mapping[str, Any]) -> Experiment:
         "radius": options["sphere_radius"],
         "radius_uncertainty": options["sphere_radius_uncertainty"],
     }
-    sphere = indenter_from("sphere", radius)
-    interface = interface_of(options)
-    from memscal.model.indenter import Sphere
+    settings |= {"sphere": indenter_from("sphere", radius), "interface": interface_of(options)}
     from memscal.simulation.experiment import simulate_experiment
 
-    assert isinstance(sphere, Sphere)
     return simulate_experiment(
-        sphere=sphere,
         rod_points=options["points"],
         loads=options["loads"] or _LOADS,
-        interface=interface,
         points=options["contacts"],
         spacing=si(options["spacing"], -3),
         load_scatter=si(options["load_scatter"], -2),
@@ -136,8 +132,6 @@ def _experiment_from(options: Mapping[str, Any]) -> Experiment:
 
 def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
     """Print the truth of scans, one column for each."""
-    from memscal.summaries.table import Table
-
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
     names = dict.fromkeys(name for truth in sorted(truths, key=len, reverse=True) for name in truth)
     rows: list[Sequence[str]] = [

@@ -187,8 +187,9 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
 
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
-    names = ("friction", "p_max", "chi_square", "p_value")
-    calculated = zip(comparison.friction, load.p_max, load.chi_square, load.p_values, strict=True)
+    names = [quantity.name for quantity in CALCULATED]
+    mu, sticking = comparison.friction, np.isinf(comparison.friction).tolist()
+    calculated = zip(mu, sticking, load.p_max, load.chi_square, load.p_values, strict=True)
     return {
         "effective_friction_coefficient": {
             "by_maximum": _estimate(load.by_maximum),
@@ -197,10 +198,7 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
         "profiles": [
-            members(
-                CALCULATED, None, sticking=math.isinf(row[0]), **dict(zip(names, row, strict=True))
-            )
-            for row in calculated
+            members(CALCULATED, None, **dict(zip(names, row, strict=True))) for row in calculated
         ],
     }
 
