@@ -6,19 +6,9 @@ from pathlib import Path
 
 import click
 
+from memscal.cli import output as out
+from memscal.cli.failures import exit_code_of
 from memscal.cli.options import FILE, option, output_options
-from memscal.cli.output import (
-    FigurePath,
-    beside,
-    emit_json,
-    emit_tables,
-    message,
-    prove_writable,
-    rendered,
-    show_messages,
-    working,
-    write_files,
-)
 
 EXAMPLES = """\b
 Examples:
@@ -37,7 +27,7 @@ Examples:
 @option("--override", is_flag=True)(
     "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
 )
-@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the profiles of all loads, linear and logarithmic. May be repeated."
 )
 @output_options
@@ -62,24 +52,23 @@ def command(
     from memscal.formats.scan import read_scan
 
     data = [read_scan(path) for path in scans]
-    written = output or beside(scans[0], ".stress.h5")
-    prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
+    written = output or out.beside(scans[0], ".stress.h5")
+    out.prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
 
-    from memscal.cli.failures import exit_code_of
     from memscal.measurement.measure_stress import measure_stress
     from memscal.summaries.stress import tables
 
-    with working("Measuring"):
+    with out.working("Measuring"):
         stress = measure_stress(data, artifact, override=override)
-    with working("Drawing"):
-        drawn = rendered(stress.plot, figures)
+    with out.working("Drawing"):
+        drawn = out.rendered(stress.plot, figures)
     stress.save(written, overwrite=force)
-    write_files(drawn, force=force)
+    out.write_files(drawn, force=force)
     if as_json:
-        emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
+        out.emit_json({"schema_version": "1", "output": str(written), **stress.to_dict()})
     else:
-        emit_tables(*tables(stress))
-    show_messages(stress.messages)
+        out.emit_tables(*tables(stress))
+    out.show_messages(stress.messages)
     for path in (written, *figures):
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     return exit_code_of(stress.checks)

@@ -11,20 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from memscal.cli.failures import DONE, debug_option
+from memscal.cli import output as out
+from memscal.cli.failures import DONE, debug_option, exit_code_of
 from memscal.cli.options import FILE, force_option, json_option, option
-from memscal.cli.output import (
-    FigurePath,
-    beside,
-    emit_json,
-    message,
-    note,
-    prove_writable,
-    rendered,
-    show_messages,
-    working,
-    write_files,
-)
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -44,7 +33,7 @@ def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
 
     # Starting a process takes about as long as forty draws of a line.
     workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
-    with working(f"Drawing {draws} scans") as show:
+    with out.working(f"Drawing {draws} scans") as show:
         return monte_carlo(
             calibration,
             draws=draws,
@@ -64,7 +53,7 @@ def _show_disagreements(drawn: MonteCarlo) -> None:
         for c in drawn.comparisons
         if not c.agrees
     ]
-    show_messages([*drawn.messages, *disagreements])
+    out.show_messages([*drawn.messages, *disagreements])
 
 
 @dataclass(frozen=True)
@@ -89,9 +78,9 @@ class Outputs:
             from memscal.figures.report import html_report
 
             contents[self.report] = html_report(calibration.apparatus).encode("utf-8")
-        contents |= rendered(calibration.plot, self.figures)
+        contents |= out.rendered(calibration.plot, self.figures)
         if self.sweep_figure is not None and sweep is not None:
-            contents |= rendered(sweep.plot, [self.sweep_figure])
+            contents |= out.rendered(sweep.plot, [self.sweep_figure])
         return contents
 
 
@@ -113,7 +102,7 @@ def _chosen_method(
     except InputError as failure:
         raise click.UsageError(f"{failure.problem} {failure.cure}".strip()) from failure
     if seed is not None and not hasattr(regulariser, "seed"):
-        note(f"--seed changes nothing here: {regulariser.name} draws no random numbers.")
+        out.note(f"--seed changes nothing here: {regulariser.name} draws no random numbers.")
     return regulariser
 
 
@@ -204,13 +193,13 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
 @option("--seed", click.IntRange(min=0), metavar="N")("Seed of random numbers.  [default: 0]")
 @json_option
 @option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
-@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw scan, apparatus function and transfer function. May be repeated."
 )
 @option("--sweep sweeping", is_flag=True)(
     "Show how the results depend on the noise amplitude, over two decades and eight seeds."
 )
-@option("--sweep-figure", FigurePath(), metavar="FILE.png|svg|pdf")(
+@option("--sweep-figure", out.FigurePath(), metavar="FILE.png|svg|pdf")(
     "Draw the sweep; implies --sweep."
 )
 @option("--monte-carlo draws", click.IntRange(min=2), metavar="DRAWS")(
@@ -254,21 +243,21 @@ def command(
     A failed quality check is exit code 1: the artifact is written and states it.
     """
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
-    output = output or beside(scans[0], ending)
+    output = output or out.beside(scans[0], ending)
     outputs = Outputs(output, report, figures, sweep_figure)
     regulariser = _chosen_method(method, options, seed, channel)
     pairs = [_correlation(text) for text in correlations]
     data, profile = _read(scans, reference)
     other = None if alternative is None else _read_reference(alternative)
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
-    prove_writable(outputs.paths, force=force, inputs=inputs)
+    out.prove_writable(outputs.paths, force=force, inputs=inputs)
     if dry_run:
         _rehearse(data, profile, channel, regulariser, outputs, as_json)
         return DONE
 
     from memscal.calibration.calibrate import calibrate
 
-    with working(f"Calibrating by {regulariser.name}"):
+    with out.working(f"Calibrating by {regulariser.name}"):
         calibration = calibrate(
             data,
             reference=profile,
@@ -280,15 +269,15 @@ def command(
         )
     sweep, drawn = None, None
     if sweeping or sweep_figure:
-        with working("Sweeping the noise amplitude"):
+        with out.working("Sweeping the noise amplitude"):
             sweep = calibration.sweep(seed=seed or 0)
     if draws is not None:
         drawn = _drawn(calibration, draws, seed or 0)
         _show_disagreements(drawn)
-    with working("Drawing"):
+    with out.working("Drawing"):
         contents = outputs.rendered(calibration, sweep)
     calibration.apparatus.save(output, overwrite=force)
-    write_files(contents, force=force)
+    out.write_files(contents, force=force)
     return _show(calibration, sweep, drawn, outputs, as_json)
 
 
@@ -303,7 +292,7 @@ def _read(
     for scan, path in zip(scans, paths, strict=True):
         require_calibration_rod(scan)
         if reference is not None and scan.reference is not None:
-            note(f"{reference.name} is used in place of the reference in {path.name}.")
+            out.note(f"{reference.name} is used in place of the reference in {path.name}.")
     return scans, None if reference is None else _read_reference(reference)
 
 
@@ -332,7 +321,6 @@ def _rehearse(
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.stages import require_channel_method
-    from memscal.cli.output import emit_tables
     from memscal.estimation.points import joined_points, measured_points
     from memscal.estimation.reference import (
         reference_profile,
@@ -346,12 +334,12 @@ def _rehearse(
     readings = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
     reference_spectra(stresses, readings, [scan.film.thickness for scan in scans])
-    points = joined_points(readings)
+    points, plan = joined_points(readings), (regulariser.name, outputs.paths)
     if as_json:
-        emit_json(rehearsal_json(stresses[0], regulariser.name, outputs.paths))
+        out.emit_json(rehearsal_json(stresses[0], *plan))
     else:
-        emit_tables(rehearsal_table(scans[0], points, stresses[0], regulariser.name, outputs.paths))
-    message("Nothing was written (--dry-run).")
+        out.emit_tables(rehearsal_table(scans[0], points, stresses[0], *plan))
+    out.message("Nothing was written (--dry-run).")
 
 
 def _show(
@@ -362,23 +350,17 @@ def _show(
     as_json: bool,
 ) -> int:
     """Print the results and the messages; return the exit code."""
-    from memscal.cli.failures import exit_code_of
-    from memscal.cli.output import emit_tables
-
-    further = {
-        name: result
-        for name, result in (("sweep", sweep), ("monte_carlo", drawn))
-        if result is not None
-    }
+    results = {"sweep": sweep, "monte_carlo": drawn}
+    further = {name: result for name, result in results.items() if result is not None}
     if as_json:
         files = {"schema_version": "1", "artifact": str(outputs.artifact)}
         values = {name: result.to_dict() for name, result in further.items()}
-        emit_json(files | calibration.to_dict() | values)
+        out.emit_json(files | calibration.to_dict() | values)
     else:
         tables = [table for result in further.values() for table in result.tables()]
-        emit_tables(*calibration.tables(), *tables)
-    show_messages(calibration.apparatus.process.messages)
+        out.emit_tables(*calibration.tables(), *tables)
+    out.show_messages(calibration.apparatus.process.messages)
     for path in outputs.paths:
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     checks = calibration.apparatus.checks
     return exit_code_of(checks, then=f" {outputs.artifact.name} was written and is marked so.")

@@ -8,7 +8,8 @@ import click
 
 from memscal.cli.failures import DONE, REFUSED, debug_option
 from memscal.cli.options import FILE, json_option
-from memscal.cli.output import emit_json, error
+from memscal.cli.output import emit_json, emit_tables, error
+from memscal.summaries.table import Table
 
 EXAMPLES = """\b
 Examples:
@@ -36,9 +37,6 @@ def command(file: Path, as_json: bool) -> int:
         head = {"schema_version": "1", "file": str(file), "passed": passed}
         emit_json({**head, "findings": listed})
     else:
-        from memscal.cli.output import emit_tables
-        from memscal.summaries.table import Table
-
         rows = [(f.name, "passed" if f.passed else "FAILED", f.meaning) for f in findings]
         failed = frozenset(i for i, f in enumerate(findings) if not f.passed)
         emit_tables(Table(str(file), ("step", "result", "finding"), rows, failed))

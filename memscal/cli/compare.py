@@ -11,18 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from memscal.cli import output as out
 from memscal.cli.options import FILE, Quantity, option, options_of, output_options
-from memscal.cli.output import (
-    FIGURE_SUFFIXES,
-    FigurePath,
-    emit_json,
-    message,
-    prove_writable,
-    rendered,
-    show_messages,
-    working,
-    write_files,
-)
 
 if TYPE_CHECKING:
     from memscal.friction.results import FrictionComparison
@@ -65,9 +55,9 @@ class FigureFiles:
         if self.folder is not None and not self.folder.is_dir():
             if self.folder.exists():
                 raise click.UsageError(f"--figures names a folder, but {self.folder} is a file.")
-            prove_writable([*self.single, self.folder], force=force, inputs=inputs)
+            out.prove_writable([*self.single, self.folder], force=force, inputs=inputs)
         else:
-            prove_writable(self.paths, force=force, inputs=inputs)
+            out.prove_writable(self.paths, force=force, inputs=inputs)
 
     def rendered(self, comparison: FrictionComparison) -> dict[Path, bytes]:
         """Return the content of each file."""
@@ -76,7 +66,7 @@ class FigureFiles:
         from memscal.figures.friction import comparison_figures
         from memscal.figures.style import render_figure
 
-        ready = rendered(comparison.plot, self.single)
+        ready = out.rendered(comparison.plot, self.single)
         if self.folder is not None:
             named = self.in_folder
             for stem, draw in comparison_figures(comparison).items():
@@ -87,7 +77,7 @@ class FigureFiles:
         """Write what was rendered."""
         if self.folder is not None:
             self.folder.mkdir(exist_ok=True)
-        write_files(ready, force=force)
+        out.write_files(ready, force=force)
 
 
 def user_cache_folder() -> Path | None:
@@ -119,6 +109,7 @@ def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
 
 
 _COEFFICIENT = Quantity("ratio", open_low=False, infinite=True)
+_FORMATS = [suffix.removeprefix(".") for suffix in out.FIGURE_SUFFIXES]
 
 EXAMPLES = """\b
 Examples:
@@ -161,16 +152,14 @@ Examples:
     "Compare although sensor, channel or film of artifact and scan differ; recorded."
 )
 @cache_options
-@option("--figure single", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+@option("--figure single", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated."
 )
 @option("--figures folder", FILE, metavar="FOLDER")(
     "Draw each figure into a file of its own in this folder: profiles, profiles for a set of "
     "coefficients, maxima, effective friction, likelihood, interface."
 )
-@option(
-    "--figure-format", click.Choice([suffix.removeprefix(".") for suffix in FIGURE_SUFFIXES]), "png"
-)("Format of --figures.")
+@option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
 @output_options
 def command(
     artifact: Path,
@@ -217,7 +206,7 @@ def command(
     files = FigureFiles(single, folder, figure_format, lubrications, interface)
     files.prove(force=force, inputs=[artifact, *scans, *references])
 
-    with working("Comparing with calculated contacts"):
+    with out.working("Comparing with calculated contacts"):
         comparison = compare(
             data,
             apparatus,
@@ -231,12 +220,12 @@ def command(
             cache=kept,
             workers=min(2, os.cpu_count() or 1),
         )
-    with working("Drawing"):
+    with out.working("Drawing"):
         ready = files.rendered(comparison)
     files.write(ready, force=force)
     _show(comparison, artifact, profiles, files.paths, as_json)
     for path in files.paths:
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     failed = [
         f"{kind} {' '.join(check.profile for check in checks)}".strip()
         for kind, checks in failures(comparison.checks).items()
@@ -281,7 +270,6 @@ def _show(
     """Print the results and the messages."""
     import hashlib
 
-    from memscal.cli.output import emit_tables
     from memscal.formats.files import read_bytes
     from memscal.model.provenance import SourceFile
     from memscal.summaries.comparison import file_json, notes, tables
@@ -293,7 +281,7 @@ def _show(
             "references": [file_json(profile.source) for profile in references],
             "figures": [str(path) for path in figures],
         }
-        emit_json(comparison.to_dict() | files)
+        out.emit_json(comparison.to_dict() | files)
     else:
-        emit_tables(*tables(comparison))
-    show_messages(notes(comparison))
+        out.emit_tables(*tables(comparison))
+    out.show_messages(notes(comparison))

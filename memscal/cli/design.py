@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     PAPER_FILM,
@@ -22,16 +23,6 @@ from memscal.cli.options import (
     require_one_kernel,
     si,
 )
-from memscal.cli.output import (
-    FigurePath,
-    emit_json,
-    emit_tables,
-    message,
-    note,
-    prove_writable,
-    rendered,
-    write_files,
-)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,6 +34,9 @@ else:  # generic since click 8.2 only
     _TargetType = click.ParamType
 
 _VARIED = ("step", "half-range", "repeats")
+#: Options in other units than SI, by the power of ten.
+_IN_MM_OR_MV = ("conversion_constant", "step", "half_range", "noise_voltage", "centre")
+_SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(("load_uncertainty", "noise"), -2)
 
 _HIDDEN = (
     "Beyond the resolved band G follows from the prior: its uncertainty there does not scatter "
@@ -116,7 +110,7 @@ class _Target(_TargetType):
 @option("--vary", click.Choice(_VARIED))(
     "What to vary for --want: the coarsest step, shortest range or fewest repeats is found."
 )
-@option("--figure figures", FigurePath(), multiple=True, metavar="FILE")(
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE")(
     "Figure of the expected result (.png, .svg or .pdf). May be repeated."
 )
 @output_options
@@ -137,48 +131,33 @@ def command(
     require_one_kernel(options)
     if bool(targets) != (vary is not None):
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
-    prove_writable(figures, force=force)
+    out.prove_writable(figures, force=force)
+    vary = None if vary is None else vary.replace("-", "_")
     planned = _designed(options, dict(targets), vary)
-    write_files(rendered(lambda: _figure(planned, vary), figures), force=force)
+    out.write_files(out.rendered(lambda: _figure(planned, vary), figures), force=force)
 
     if as_json:
-        emit_json({"schema_version": "1", **planned.to_dict()})
+        out.emit_json({"schema_version": "1", **planned.to_dict()})
     else:
         from memscal.summaries.design import tables
 
-        emit_tables(*tables(planned))
-    note(_HIDDEN)
+        out.emit_tables(*tables(planned))
+    out.note(_HIDDEN)
     for path in figures:
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     return DONE
 
 
 def _designed(options: dict[str, Any], targets: dict[str, float], vary: str | None) -> Design:
-    from memscal.model.indenter import Rod
     from memscal.planning.design import design
 
-    rod = indenter_from("rod", options)
-    assert isinstance(rod, Rod)
-    return design(
-        film=film_from(options),
-        rod=rod,
-        kernel=kernel_from(options),
-        conversion_constant=si(options["conversion_constant"], -3),
-        load=options["load"],
-        load_uncertainty=si(options["load_uncertainty"], -2),
-        step=si(options["step"], -3),
-        half_range=si(options["half_range"], -3),
-        repeats=options["repeats"],
-        noise=si(options["noise"], -2),
-        noise_voltage=si(options["noise_voltage"], -3),
-        centre=si(options["centre"], -3),
-        method=options["method"],
-        want=targets,
-        vary=None if vary is None else vary.replace("-", "_"),
-    )
+    settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
+    settings |= {name: options[name] for name in ("load", "repeats", "method")}
+    settings |= {"rod": indenter_from("rod", options), "film": film_from(options)}
+    return design(kernel=kernel_from(options), want=targets, vary=vary, **settings)
 
 
 def _figure(planned: Design, vary: str | None) -> Figure:
     from memscal.figures.design import design_figure
 
-    return design_figure(planned, vary="step" if vary is None else vary.replace("-", "_"))
+    return design_figure(planned, vary="step" if vary is None else vary)

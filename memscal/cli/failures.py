@@ -66,10 +66,8 @@ def guarded(run: Callable[[Session], int]) -> int:
             return failure.exit_code
         except MemoryError:
             _traceback(session)
-            error(
-                "The computer ran out of memory.",
-                cure="Close other programs, or give a scan with fewer points.",
-            )
+            cure = "Close other programs, or give a scan with fewer points."
+            error("The computer ran out of memory.", cure=cure)
             return INTERNAL
         except Exception as failure:  # noqa: BLE001 - the last resort, and reported as such
             _traceback(session)
@@ -78,12 +76,9 @@ def guarded(run: Callable[[Session], int]) -> int:
 
 def _internal(failure: BaseException) -> int:
     text = " ".join(str(failure).split())
-    kind = type(failure).__name__
-    error(
-        f"memscal failed by a fault of its own, not of its input: {kind}"
-        + (f" ({text})." if text else "."),
-        cure="Please report it, with what `memscal --debug` and the same arguments print.",
-    )
+    fault = type(failure).__name__ + (f" ({text})" if text else "")
+    cure = "Please report it, with what `memscal --debug` and the same arguments print."
+    error(f"memscal failed by a fault of its own, not of its input: {fault}.", cure=cure)
     return INTERNAL
 
 

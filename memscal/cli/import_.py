@@ -87,35 +87,30 @@ def _unused_options(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str
 
 def _read_reference(path: Path, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
-    setting: dict[str, Any] = {
-        "film": None if all(options[name] is None for name in FILM) else film_from(options),
-        "indenter": None
-        if options["radius"] is None
-        else indenter_from(options["indenter"], options),
-    }
+    setting = _stated(options, (*_SHARED, "load"))
+    if any(options[name] is not None for name in FILM):
+        setting["film"] = film_from(options)
+    if options["radius"] is not None:
+        setting["indenter"] = indenter_from(options["indenter"], options)
     if not _is_mesh(path):
         from memscal.formats.tables.reference import read_reference_table
 
-        return read_reference_table(
-            path, **_stated(options, (*_OF_TABLES, *_SHARED, *_READING, "load")), **setting
-        )
+        return read_reference_table(path, **_stated(options, (*_OF_TABLES, *_READING)), **setting)
     from memscal.formats.meshes.reference_mesh import read_reference_mesh
 
-    places = _stated(options, ("base", "centre"))
-    if "base" in places:
-        places["base"] = si(places["base"], -3)
-    if "centre" in places:
-        places["centre"] = tuple(si(position, -3) for position in places["centre"])
-    return read_reference_mesh(
-        path, **_stated(options, (*_SHARED, "vertical", "load")), **places, **setting
-    )
+    setting |= _stated(options, _OF_MESHES)
+    if "base" in setting:
+        setting["base"] = si(setting["base"], -3)
+    if "centre" in setting:
+        setting["centre"] = tuple(si(position, -3) for position in setting["centre"])
+    return read_reference_mesh(path, **setting)
 
 
 def _is_mesh(path: Path) -> bool:
     """Return whether a file's name says that it is a mesh."""
-    from memscal.formats.meshes import mesh_files
+    from memscal.formats.meshes.mesh_files import is_mesh
 
-    return mesh_files.is_mesh(path)
+    return is_mesh(path)
 
 
 EXAMPLES = """\b
@@ -268,9 +263,7 @@ def _scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     from memscal.formats.tables.scan import read_scan_table
     from memscal.model.scan import StressSensor
 
-    labels = {
-        key: options[name] for key, name in _SENSOR_NAMES.items() if options[name] is not None
-    }
+    labels = _stated({key: options[name] for key, name in _SENSOR_NAMES.items()}, [*_SENSOR_NAMES])
     return read_scan_table(
         path,
         **_stated(options, [*_SCAN_NAMES, *_TABLE_NAMES]),

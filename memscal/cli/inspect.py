@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from memscal.cli.failures import DONE, debug_option
 from memscal.cli.options import FILE, json_option
-from memscal.cli.output import emit_json
-
-if TYPE_CHECKING:
-    from memscal.summaries.table import Table
+from memscal.cli.output import emit_json, emit_tables
+from memscal.model.notation import format_measured
+from memscal.summaries.table import Table, stated_text
 
 EXAMPLES = """\b
 Examples:
@@ -39,15 +38,11 @@ def command(file: Path, as_json: bool) -> int:
     if as_json:
         emit_json(contents)
     else:
-        from memscal.cli.output import emit_tables
-
         emit_tables(*_tables(contents))
     return DONE
 
 
 def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
-    from memscal.summaries.table import Table
-
     rows = [
         ("schema", f"{contents['schema']} {contents['schema_version']}"),
         ("title", contents["title"]),
@@ -66,8 +61,7 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
     checks = [
         (
             check["name"].replace("_", " "),
-            "-" if check["value"] is None else f"{check['value']:.3g}",
-            "-" if check["limit"] is None else f"{check['limit']:.3g}",
+            *(_number(check[name], ".3g") for name in ("value", "limit")),
             "passed" if check["passed"] else "FAILED",
         )
         for check in contents["checks"]
@@ -84,8 +78,6 @@ def _tables(contents: Mapping[str, Any]) -> Iterator[Table]:
 
 
 def _value(item: Mapping[str, Any]) -> str:
-    from memscal.model.notation import format_measured
-
     if item["value"] is None:
         return "not a number"
     if isinstance(item["value"], str):
@@ -111,22 +103,16 @@ def _unit_to_show(item: Mapping[str, Any]) -> tuple[float, str]:
 
 
 def _array_row(item: Mapping[str, Any]) -> tuple[str, ...]:
-    def number(value: float | None) -> str:
-        return "-" if value is None else f"{value:.5g}"
+    shape = " x ".join(str(n) for n in item["shape"]) or "one"
+    low, high = (_number(item[name], ".5g") for name in ("minimum", "maximum"))
+    return item["path"], shape, low, high, item["unit"], str(item["missing"] or "-")
 
-    return (
-        item["path"],
-        " x ".join(str(n) for n in item["shape"]) or "one",
-        number(item["minimum"]),
-        number(item["maximum"]),
-        item["unit"],
-        str(item["missing"] or "-"),
-    )
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else f"{value:{form}}"
 
 
 def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    from memscal.summaries.table import stated_text
-
     for name, value in provenance.items():
         words = name.replace("_", " ")
         if isinstance(value, Mapping):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import output as out
 from memscal.cli.failures import DONE
 from memscal.cli.options import (
     FILE,
@@ -23,16 +24,6 @@ from memscal.cli.options import (
     radius_options,
     si,
 )
-from memscal.cli.output import (
-    FigurePath,
-    emit_json,
-    emit_tables,
-    message,
-    prove_writable,
-    rendered,
-    show_messages,
-    write_files,
-)
 
 if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
@@ -44,10 +35,7 @@ _RADIUS = {"rod": 0.25, "sphere": 128.8}
 SHAPES = ("rod", "sphere", "cone", "profile")
 
 # What each shape is described by; every other of these options belongs to another shape.
-_DESCRIBED_BY = {"rod": "radius", "sphere": "radius"}
-_DESCRIBED_BY |= {"cone": "inclination", "profile": "profile_table"}
-
-
+_DESCRIBED_BY = dict(zip(SHAPES, ("radius", "radius", "inclination", "profile_table"), strict=True))
 _ASPERITIES = (Quantity("um"), Quantity("1/mm^2"), Quantity("um"))
 
 interface_options = options_of(
@@ -168,7 +156,7 @@ Examples:
 @option("-o --output", FILE, metavar="OUT")(
     "Reference file to write (memscal-reference); for one load or depth."
 )
-@option("--figure figures", FigurePath(), multiple=True, metavar="FILE")(
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE")(
     "Figure of the contacts (.png, .svg or .pdf). May be repeated."
 )
 @option("--mesh", FILE, metavar="FILE.vtu")(
@@ -195,13 +183,13 @@ def command(
     _check_usage(loads, depths, output, mesh, options)
     files = [path for path in (output, mesh, *figures) if path is not None]
     table = options["profile_table"]
-    prove_writable(files, force=force, inputs=[table] if table else [])
+    out.prove_writable(files, force=force, inputs=[table] if table else [])
     contacts = _pressed(indenter, loads, depths, options)
     _write(contacts, output, figures, mesh, force=force)
 
     _print(contacts, options["loading"], output, as_json=as_json)
     for path in files:
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     return DONE
 
 
@@ -232,9 +220,8 @@ def _pressed(
     interface = interface_of(options)
     from memscal.mechanics.indent import indent
 
-    settings: dict[str, Any] = {
-        name: options[name] for name in ("friction", "loading", "backend", "strain", "rings")
-    }
+    names = ("friction", "loading", "backend", "strain", "rings")
+    settings: dict[str, Any] = {name: options[name] for name in names}
     settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
     if depths:
         return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
@@ -254,7 +241,7 @@ def _write(
     if figures:
         from memscal.figures.stress import contact_figure
 
-        drawn = rendered(lambda: contact_figure(contacts), figures)
+        drawn = out.rendered(lambda: contact_figure(contacts), figures)
     if mesh is not None:
         from memscal.formats.meshes.mesh_files import write_mesh
 
@@ -263,7 +250,7 @@ def _write(
         from memscal.formats.reference import write_reference
 
         write_reference(contacts[0].profile(), output, overwrite=force)
-    write_files(drawn, force=force)
+    out.write_files(drawn, force=force)
 
 
 def _print(
@@ -277,7 +264,7 @@ def _print(
         # A rod's contact does not depend on the loading that was asked for.
         solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
         head = {"schema_version": "1", "output": None if output is None else str(output)}
-        emit_json({**head, "solutions": solutions, "warnings": warnings})
+        out.emit_json({**head, "solutions": solutions, "warnings": warnings})
     else:
-        emit_tables(contacts_table(contacts))
-    show_messages(messages)
+        out.emit_tables(contacts_table(contacts))
+    out.show_messages(messages)

@@ -8,19 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from memscal.cli import output as out
+from memscal.cli.failures import exit_code_of
 from memscal.cli.options import FILE, option, output_options
-from memscal.cli.output import (
-    FigurePath,
-    emit_json,
-    emit_tables,
-    message,
-    note,
-    prove_writable,
-    rendered,
-    show_messages,
-    working,
-    write_files,
-)
 
 if TYPE_CHECKING:
     from memscal.measurement.restoration import Restoration
@@ -44,7 +34,7 @@ Examples:
     "adds the check expected_stress. By default the scan's indenter is pressed on its film without "
     "friction, to be shown beside the result."
 )
-@option("--figure figures", FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
+@option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
 @output_options
@@ -72,31 +62,30 @@ def command(
     apparatus, data = load_apparatus(artifact), read_scan(scan)
     stress = None if expected is None else read_reference(expected)
     files = [path for path in (output, *figures) if path is not None]
-    prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
+    out.prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
-    from memscal.cli.failures import exit_code_of
     from memscal.measurement.restore import restore
     from memscal.summaries.restoration import tables
 
-    with working("Restoring"):
+    with out.working("Restoring"):
         restored = restore(data, apparatus, expected=stress)
         if stress is None:
             restored = _beside_calculated(restored)
-    with working("Drawing"):
-        drawn = rendered(restored.plot, figures)
+    with out.working("Drawing"):
+        drawn = out.rendered(restored.plot, figures)
     if output is not None:
         from memscal.formats.reference import write_reference
 
         write_reference(restored.profile(), output, overwrite=force)
-    write_files(drawn, force=force)
+    out.write_files(drawn, force=force)
     if as_json:
         written = None if output is None else str(output)
-        emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
+        out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
     else:
-        emit_tables(*tables(restored))
-    show_messages(restored.messages)
+        out.emit_tables(*tables(restored))
+    out.show_messages(restored.messages)
     for path in files:
-        message(f"Written: {path}")
+        out.message(f"Written: {path}")
     return exit_code_of(restored.checks)
 
 
@@ -110,5 +99,5 @@ def _beside_calculated(restored: Restoration) -> Restoration:
         contact = indent(scan.film, scan.indenter, load=scan.load)
         return replace(restored, comparison=restored.compare(contact))
     except MemscalError as failure:
-        note(f"No contact is shown beside the result: {failure.problem}")
+        out.note(f"No contact is shown beside the result: {failure.problem}")
         return restored

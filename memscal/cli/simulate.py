@@ -29,6 +29,7 @@ from memscal.cli.options import (
 )
 from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable
 from memscal.cli.reference import interface_of, interface_options
+from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
     from memscal.model.scan import Scan
@@ -87,55 +88,50 @@ _sphere_options = options_of(
 )
 
 
+#: Options whose values are given on as they are, and those in other units, by the power of ten.
+_SHARED = ("repeats", "state_noise", "seed")
+_SCALED = {"conversion_constant": -3} | dict.fromkeys(
+    ("noise", "baseline", "drift", "load_uncertainty"), -2
+)
+_OF_SPHERE = ("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "gain")
+
+
+def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what describes a rod scan and an experiment alike."""
+    return {
+        "film": film_from(options),
+        "rod": indenter_from("rod", options),
+        "kernel": kernel_from(options),
+        "centre": (si(options["centre"], -3), si(options["centre_y"], -3)),
+        **{name: si(options[name], power) for name, power in _SCALED.items()},
+        **{name: options[name] for name in _SHARED},
+    }
+
+
 def _experiment_from(options: Mapping[str, Any]) -> Experiment:
     """Simulate the experiment that the options describe."""
-    film, rod = film_from(options), indenter_from("rod", options)
+    settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
     radius = {
         "radius": options["sphere_radius"],
         "radius_uncertainty": options["sphere_radius_uncertainty"],
     }
-    sphere = indenter_from("sphere", radius)
-    interface = interface_of(options)
-    from memscal.model.indenter import Rod, Sphere
+    settings |= {"sphere": indenter_from("sphere", radius), "interface": interface_of(options)}
     from memscal.simulation.experiment import simulate_experiment
 
-    assert isinstance(rod, Rod)
-    assert isinstance(sphere, Sphere)
     return simulate_experiment(
-        film=film,
-        rod=rod,
-        sphere=sphere,
-        kernel=kernel_from(options),
-        conversion_constant=si(options["conversion_constant"], -3),
         rod_points=options["points"],
         loads=options["loads"] or _LOADS,
-        lubricated_loads=options["lubricated_loads"],
-        friction=options["friction"],
-        loading=options["loading"],
-        interface=interface,
         points=options["contacts"],
         spacing=si(options["spacing"], -3),
-        repeats=options["repeats"],
-        noise=si(options["noise"], -2),
         load_scatter=si(options["load_scatter"], -2),
-        record_loads=options["record_loads"],
-        load_uncertainty=si(options["load_uncertainty"], -2),
         position_error=si(options["position_error"], -6),
-        centre=(si(options["centre"], -3), si(options["centre_y"], -3)),
-        baseline=si(options["baseline"], -2),
-        drift=si(options["drift"], -2),
-        state_noise=options["state_noise"],
-        draw_inputs=options["draw_inputs"],
-        gain=options["gain"],
         thickness_factor=options["thickness_factor"],
-        seed=options["seed"],
+        **settings,
     )
 
 
 def _print_truth(scans: Mapping[Path, Scan], title: str) -> None:
     """Print the truth of scans, one column for each."""
-    from memscal.summaries.table import Table
-
     truths = [dict(scan.synthetic or {}) for scan in scans.values()]
     names = dict.fromkeys(name for truth in sorted(truths, key=len, reverse=True) for name in truth)
     rows: list[Sequence[str]] = [
@@ -311,27 +307,13 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
 
 
 def _simulate(options: Mapping[str, Any]) -> Scan:
-    from memscal.model.indenter import Rod
     from memscal.simulation.rod_scan import simulate
 
-    film, rod = film_from(options), indenter_from("rod", options)
-    assert isinstance(rod, Rod)
     loads = options["loads"] or (1.0,)
     return simulate(
-        film=film,
-        rod=rod,
-        kernel=kernel_from(options),
-        conversion_constant=si(options["conversion_constant"], -3),
         load=loads[0] if len(loads) == 1 else loads,
         half_range=si(options["half_range"], -3),
         points=options["points"],
-        repeats=options["repeats"],
         raster=options["raster"],
-        noise=si(options["noise"], -2),
-        centre=(si(options["centre"], -3), si(options["centre_y"], -3)),
-        baseline=si(options["baseline"], -2),
-        drift=si(options["drift"], -2),
-        load_uncertainty=si(options["load_uncertainty"], -2),
-        state_noise=options["state_noise"],
-        seed=options["seed"],
+        **_shared_settings(options),
     )

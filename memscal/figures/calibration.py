@@ -16,7 +16,7 @@ from memscal.figures.style import (
     house_style,
     legend_above,
     new_figure,
-    panel_letter,
+    panel_letters,
 )
 from memscal.model.apparatus import ApparatusData, ApparatusRadial
 from memscal.model.arrays import FloatArray
@@ -34,7 +34,7 @@ def draw_radial(axes: Axes, data: ApparatusData) -> None:
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_band(axes, radial, floor=-np.inf)
     _draw_profiles(axes, radial.r, radial.g, radial.g_gaussian)
-    low, high = (radial.g - _EXPANDED * radial.g_errors, radial.g + _EXPANDED * radial.g_errors)
+    low, high = (radial.g + side * _EXPANDED * radial.g_errors for side in (-1, 1))
     peak = max(_largest(radial.g), _largest(radial.g_gaussian))
     # The band may be much larger than G, which must stay legible in it.
     top = min(_largest(high), 3 * peak)
@@ -54,9 +54,8 @@ def draw_radial_log(axes: Axes, data: ApparatusData) -> None:
     smallest = np.min(np.maximum(radial.g_gaussian[inside], 10**-_LOG_DECADES * peak))
     floor = max(0.3 * float(smallest), 10**-_LOG_DECADES * peak)
     _draw_band(axes, radial, floor=floor)
-    _draw_profiles(
-        axes, radial.r, *(np.where(g > 0, g, np.nan) for g in (radial.g, radial.g_gaussian))
-    )
+    positive = (np.where(g > 0, g, np.nan) for g in (radial.g, radial.g_gaussian))
+    _draw_profiles(axes, radial.r, *positive)
     axes.set_ylim(floor / PER_MM2, 3 * peak / PER_MM2)
     axes.set_xlim(0.0, _shown_radius(radial) / MM)
     axes.set_xlabel("distance from the axis $r$ (mm)")
@@ -163,9 +162,7 @@ def calibration_figure(result: Calibrated) -> Figure:
         draw_transfer(transfer, data)
         for axes in (scan, residuals, radial):
             axes.tick_params(labelbottom=False)
-        panels = (scan, residuals, scan_log, radial, radial_log, transfer)
-        for letter, axes in zip("abcdef", panels, strict=True):
-            panel_letter(axes, letter)
+        panel_letters((scan, residuals, scan_log, radial, radial_log, transfer))
         # One pass of the layout, then none, so that rendering twice gives the same picture.
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
@@ -174,11 +171,11 @@ def calibration_figure(result: Calibrated) -> Figure:
 
 def values_text(data: ApparatusData) -> str:
     """Return the main values with their standard uncertainties, in one line."""
-    values = [f"A = {measured_text(data.parameters, 'conversion_constant')}"]
-    values.append(f"σ = {measured_text(data.parameters, 'gaussian_sigma')} (data space)")
-    if "gaussian_sigma_deconvolved" in data.parameters:
-        text = measured_text(data.parameters, "gaussian_sigma_deconvolved")
-        values.append(f"{text} (deconvolved G)")
+    parameters, deconvolved = data.parameters, "gaussian_sigma_deconvolved"
+    values = [f"A = {measured_text(parameters, 'conversion_constant')}"]
+    values.append(f"σ = {measured_text(parameters, 'gaussian_sigma')} (data space)")
+    if deconvolved in parameters:
+        values.append(f"{measured_text(parameters, deconvolved)} (deconvolved G)")
     return ",  ".join(values)
 
 

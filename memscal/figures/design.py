@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.errors import InputError
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.model.quantities import MM, PER_MM, PER_MM2
 from memscal.planning.design import varied_designs
 from memscal.planning.expected import Design
@@ -49,8 +49,7 @@ def design_figure(planned: Design, vary: str = "step") -> Figure:
         _draw_radial(panels[0], planned)
         _draw_transfer(panels[1], planned)
         _draw_varied(panels[2], planned, vary)
-        for axes, letter in zip(panels, "abc", strict=True):
-            panel_letter(axes, letter)
+        panel_letters(panels)
     return figure
 
 

@@ -33,7 +33,7 @@ from memscal.figures.friction_scale import (
     lubricated_words,
     main_loading,
 )
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.friction.family import FRICTION_SCALE
 from memscal.friction.results import (
     FrictionComparison,
@@ -76,8 +76,7 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
         if slip is not None and implied is not None:
             measured = [load for load in loads if load.lubrication == slip.lubrication]
             _draw_implied(panels[2], implied, measured)
-        for axes, letter in zip(panels, "abc", strict=False):
-            panel_letter(axes, letter)
+        panel_letters(panels)
     return figure
 
 
@@ -151,8 +150,7 @@ def maxima_figure(comparison: FrictionComparison) -> Figure:
         panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
         for axes, loading in zip(panels, comparison.loadings, strict=True):
             draw_maxima(axes, comparison, loading)
-        for axes, letter in zip(panels, "abc", strict=False):
-            panel_letter(axes, letter)
+        panel_letters(panels)
         for axes in panels[1:]:
             axes.set_ylabel("")
     return figure
@@ -249,8 +247,7 @@ def comparison_figure(
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
         draw_effective(panels[1, 1], comparison, loads[0].lubrication, loading)
         legend_above(panels[1, 1], columns=2)
-        for axes, letter in zip(panels.flat, "abcd", strict=True):
-            panel_letter(axes, letter)
+        panel_letters(panels.flat)
     return figure
 
 

@@ -22,7 +22,7 @@ from memscal.figures.friction_scale import (
     on_axis,
     share_limits,
 )
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letter
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.quantities import KPA, MM
 
@@ -51,8 +51,7 @@ def profile_figure(
         for axes, index in zip(panels[1], (0, -1), strict=True):
             draw_residuals(axes, comparison, loads, index)
         share_limits(panels[1])
-        for axes, letter in zip(panels.flat, "abcd", strict=True):
-            panel_letter(axes, letter)
+        panel_letters(panels.flat)
     return figure
 
 

@@ -19,7 +19,7 @@ from memscal.figures.friction_scale import (
     lubricated_words,
     main_loading,
 )
-from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
+from memscal.figures.style import COLOURS, house_style, new_figure, panel_letters
 from memscal.friction.results import BoundedEstimate, FrictionComparison
 
 _READINGS = {
@@ -129,8 +129,8 @@ def _panels(
                 draw(axes, comparison, lubrication, loading)
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
-        for axes, letter in zip(panels.flat, "abcdef", strict=False):
-            panel_letter(axes, letter)
+        panel_letters(panels.flat)
+        for axes in panels.flat:
             axes.label_outer()
         _one_legend(figure, panels.flat)
     return figure

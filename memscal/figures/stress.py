@@ -19,7 +19,7 @@ from memscal.figures.style import (
     legend_above,
     marker_size,
     new_figure,
-    panel_letter,
+    panel_letters,
 )
 from memscal.measurement.restoration import Restoration, StressComparison
 from memscal.mechanics.contact import Contact
@@ -44,14 +44,14 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
         figure = new_figure(3.6)
         panels = figure.subplots(1, 2)
         scales = ("linear scale", "logarithmic scale, three decades")
-        for axes, letter, scale in zip(panels, "ab", scales, strict=True):
+        for axes, scale in zip(panels, scales, strict=True):
             axes.set_title(scale, fontsize=8, loc="left")
             for profile, colour in _coloured(measured):
                 _draw(axes, profile, colour, logarithmic=axes is panels[1])
             axes.set_xlabel("distance from the centre (mm)")
             axes.set_ylabel(r"measured stress $S_{zz}$ (kPa)")
             axes.set_xlim(left=0.0)
-            panel_letter(axes, letter)
+        panel_letters(panels)
         panels[0].axhline(0.0, color="0.8", lw=0.5, zorder=0)
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
         panels[1].set_yscale("log")
@@ -123,8 +123,7 @@ def restoration_figure(restored: Restoration, compared: StressComparison | None 
         left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))
         _draw_stress(left, restored, compared)
         _draw_residuals(right, restored)
-        for axes, letter in zip((left, right), "ab", strict=True):
-            panel_letter(axes, letter)
+        panel_letters((left, right))
     return figure
 
 
@@ -201,8 +200,7 @@ def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
         _draw_base(panels[1], contacts, colours)
         if several:
             _draw_loading(panels[2], contacts, colours)
-        for axes, letter in zip(panels, "abc", strict=False):
-            panel_letter(axes, letter)
+        panel_letters(panels)
     return figure
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -98,12 +98,12 @@ def new_figure(height: float) -> Figure:
     return figure
 
 
-def panel_letter(axes: Axes, letter: str) -> None:
-    """Put the panel's letter at the upper left, outside the frame and clear of all data."""
-    label = axes.annotate(
-        letter, (0.0, 1.0), (-30, 4), xycoords="axes fraction", textcoords="offset points"
-    )
-    label.set(fontweight="bold", fontsize=10, in_layout=False)
+def panel_letters(panels: Iterable[Axes]) -> None:
+    """Put each panel's letter at the upper left, outside the frame and clear of all data."""
+    place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
+    for axes, letter in zip(panels, "abcdef", strict=False):
+        label = axes.annotate(letter, (0.0, 1.0), (-30, 4), **place)
+        label.set(fontweight="bold", fontsize=10, in_layout=False)
 
 
 def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:

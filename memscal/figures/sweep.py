@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.calibration.sweep import Sweep
-from memscal.figures.style import COLOURS, house_style, new_figure, panel_letter
+from memscal.figures.style import COLOURS, house_style, new_figure, panel_letters
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM, MV
 
@@ -33,10 +33,10 @@ def sweep_figure(sweep: Sweep) -> Figure:
     with house_style():
         figure = new_figure(6.6)
         panels = figure.subplots(3, 1, sharex=True)
-        for letter, axes, (label, exact, draws, scale) in zip("abc", panels, rows, strict=True):
+        for axes, (label, exact, draws, scale) in zip(panels, rows, strict=True):
             _draw_row(axes, sweep.amplitude, exact / scale, draws / scale)
             axes.set_ylabel(label)
-            panel_letter(axes, letter)
+        panel_letters(panels)
         for axes in panels[:2]:
             _relative_axis(axes, sweep.amplitude)
         axes = panels[2]

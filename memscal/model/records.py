@@ -5,7 +5,7 @@ from __future__ import annotations
 from memscal.model.quantities import Quantity, Record, measured, record
 
 _L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
-_PER_AREA = "per area"
+_A, _W, _PER_AREA = "voltage per stress", "wavenumber", "per area"
 _R, _X, _YX, _K = ("r",), ("x",), ("y", "x"), ("k",)
 # The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
 _RR = ("r", "r_prime")
@@ -31,13 +31,8 @@ INDENTER_FACE = record(
 )
 _LOAD = measured(Quantity("load", "force", "load", "P", required=True))
 LOAD = record("NXcollection", *_LOAD)
-INDENTER = record(
-    "NXcollection",
-    Quantity("shape", "text", "shape of the indenter", required=True),
-    *_RADIUS,
-    _SLOPE,
-    *_LOAD,
-)
+_SHAPE = Quantity("shape", "text", "shape of the indenter", required=True)
+INDENTER = record("NXcollection", _SHAPE, *_RADIUS, _SLOPE, *_LOAD)
 """What the group of an indenter may hold, by its shape."""
 
 SAMPLE = record(
@@ -51,15 +46,8 @@ SENSOR = record(
     Quantity("model", "text", "model of the sensor", origin="sensor_model"),
     Quantity("channel", "text", "channel of the sensor", origin="channel"),
 )
-CONVERSION = record(
-    "NXcollection",
-    *measured(
-        Quantity(
-            "conversion_constant", "voltage per stress", "conversion constant", "A", required=True
-        ),
-        required=True,
-    ),
-)
+_CONSTANT = Quantity("conversion_constant", _A, "conversion constant", "A", required=True)
+CONVERSION = record("NXcollection", *measured(_CONSTANT, required=True))
 
 EXPERIMENT = record(
     "NXentry",
@@ -141,23 +129,16 @@ RADIAL_COVARIANCE = record(
     Quantity("g_covariance", "per area squared", "covariance of G", axes=_RR, required=True),
     signal="g_covariance",
 )
-RADIAL_VERSION_1_0 = record(
-    "NXdata",
-    *RADIAL.quantities[:4],
-    *RADIAL_COVARIANCE.quantities[1:],
-    RADIAL.quantities[4],
-    signal="g",
-)
+_G, _COVARIANCE = RADIAL.quantities, RADIAL_COVARIANCE.quantities
+RADIAL_VERSION_1_0 = record("NXdata", *_G[:4], *_COVARIANCE[1:], _G[4], signal="g")
 """The radial profile in files of version 1.0, which held its covariance."""
 TRANSFER = record(
     "NXdata",
-    Quantity("k", "wavenumber", "wavenumber", "k", _K, required=True),
+    Quantity("k", _W, "wavenumber", "k", _K, required=True),
     Quantity("modulus", _ONE, "modulus of the transfer function", "|Ĝ|", _K, required=True),
     Quantity("modulus_errors", _ONE, "standard uncertainty of |Ĝ|", axes=_K, required=True),
     Quantity("window", _ONE, "window of the regularisation", axes=_K, required=True),
-    Quantity(
-        "resolved_wavenumber", "wavenumber", "resolved up to the wavenumber", "k", required=True
-    ),
+    Quantity("resolved_wavenumber", _W, "resolved up to the wavenumber", "k", required=True),
     signal="modulus",
 )
 RECONVOLUTION = record(
@@ -180,18 +161,14 @@ CHECK = record(
     Quantity("meaning", "text", "meaning"),
     Quantity("p_value", _ONE, "chance of such a value, or a larger one", "p"),
 )
+_ENVIRONMENT = "Versions of Python and of the numerical libraries."
 PROCESS = record(
     "NXprocess",
     Quantity("program", "text", "program", origin="program"),
     Quantity("version", "text", "version of the program", origin="version"),
     Quantity("date", "text", "date", origin="date"),
     Quantity("configuration", "mapping", "Every option with its value.", origin="configuration"),
-    Quantity(
-        "environment",
-        "mapping",
-        "Versions of Python and of the numerical libraries.",
-        origin="environment",
-    ),
+    Quantity("environment", "mapping", _ENVIRONMENT, origin="environment"),
     Quantity("messages", "messages", "What the user was told while it ran.", origin="messages"),
     Quantity("input_scan", "file", "scan", origin="input_scan"),
     Quantity("input_reference", "file", "reference", origin="input_reference"),
@@ -302,7 +279,7 @@ EXPECTED = (*measured(Quantity("g_at_axis", _PER_AREA, "G at the axis")), TRANSF
 FORCE_BUDGET = Quantity("force_budget", _COUNT, "uncertainty of the force by source, in N")
 MAXIMUM_BUDGET = Quantity("maximum_budget", _P, "that of the maximum", axes=("source",))
 APPLIED = (
-    *measured(Quantity("conversion_constant", "voltage per stress", "conversion constant A")),
+    *measured(Quantity("conversion_constant", _A, "conversion constant A")),
     *measured(Quantity("force_over_load", _ONE, "total force over applied load")),
 )
 """What holds for all measured profiles."""

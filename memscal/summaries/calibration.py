@@ -11,11 +11,11 @@ from memscal.calibration.stages import Misfit
 from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.model import records
-from memscal.model.apparatus import ApparatusData, OtherEstimate, ParameterSet
+from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.quantities import MM, PER_MM, measured_text, parameter_quantity
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-from memscal.summaries.declared import correlated_numbers, members, parameter_json, record_arrays
+from memscal.summaries.declared import correlated_parameters, members, parameter_json, record_arrays
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
 
 if TYPE_CHECKING:
@@ -42,8 +42,11 @@ def tables(result: Calibrated) -> list[Table]:
         rows.append(("reconvolution with the deconvolved G", "", _misfit(misfit)))
         rows.append(("reconvolution with the Gaussian", "", _misfit(gaussian)))
     title = f"{advice(apparatus)}\n{sensor_title(apparatus)} (± standard uncertainty, k = 1)"
-    beside = [] if apparatus.other is None else [_other_table(apparatus.other)]
-    return [Table(title, ("", "", ""), rows), *beside, checks_table(apparatus.checks)]
+    shown = [Table(title, ("", "", ""), rows)]
+    if (other := apparatus.other) is not None:
+        title = f"The same by method {other.method}, to compare"
+        shown.append(Table(title, ("", "", ""), _parameter_rows(other.parameters)))
+    return [*shown, checks_table(apparatus.checks)]
 
 
 def advice(apparatus: ApparatusData) -> str:
@@ -62,14 +65,6 @@ def advice(apparatus: ApparatusData) -> str:
 
 def _method(apparatus: ApparatusData) -> str:
     return str(apparatus.process.configuration.get("method") or "")
-
-
-def _other_table(other: OtherEstimate) -> Table:
-    """Return A and the widths of G by the route that was not chosen."""
-    parameters = other.parameters
-    quantities = {name: parameter_quantity(parameters, name) for name in parameters.names}
-    rows = [(q.words, q.symbol, measured_text(parameters, name)) for name, q in quantities.items()]
-    return Table(f"The same by method {other.method}, to compare", ("", "", ""), rows)
 
 
 def _estimates_json(apparatus: ApparatusData) -> dict[str, Any]:
@@ -134,16 +129,15 @@ def correlated(result: Calibrated) -> dict[str, Any]:
     return correlated_parameters(apparatus_of(result).parameters)
 
 
-def correlated_parameters(parameters: ParameterSet) -> dict[str, Any]:
-    """Return parameters as numbers of the package uncertainties, with their covariance."""
-    return correlated_numbers(parameters.names, parameters.values, parameters.covariance)
-
-
 def estimate_rows(parameters: ParameterSet, resolved: float) -> list[tuple[str, str, str]]:
     """Return words, symbol and value of each parameter and of the resolved wavenumber (rad/m)."""
+    band = ("resolved up to the wavenumber", "k", f"{resolved / PER_MM:.3g} rad/mm")
+    return [*_parameter_rows(parameters), band]
+
+
+def _parameter_rows(parameters: ParameterSet) -> list[tuple[str, str, str]]:
     quantities = {name: parameter_quantity(parameters, name) for name in parameters.names}
-    rows = [(q.words, q.symbol, measured_text(parameters, name)) for name, q in quantities.items()]
-    return [*rows, ("resolved up to the wavenumber", "k", f"{resolved / PER_MM:.3g} rad/mm")]
+    return [(q.words, q.symbol, measured_text(parameters, name)) for name, q in quantities.items()]
 
 
 def sensor_title(apparatus: ApparatusData) -> str:
@@ -166,13 +160,8 @@ def rehearsal_json(
     stress: StressProfile | Contact, method: str, outputs: Sequence[Path]
 ) -> dict[str, Any]:
     """Return the object that ``calibrate --dry-run --json`` prints."""
-    return {
-        "schema_version": "1",
-        "dry_run": True,
-        "method": method,
-        "reference": _origin(stress),
-        "outputs": [str(path) for path in outputs],
-    }
+    plan = {"method": method, "reference": _origin(stress), "outputs": list(map(str, outputs))}
+    return {"schema_version": "1", "dry_run": True, **plan}
 
 
 def rehearsal_table(

@@ -50,6 +50,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
         file_json(scan.source) | {"lubrication": scan.lubrication}
         for scan in comparison.measured.scans
     ]
+    head = {"schema_version": "1", "scans": scans}
     joint = [
         {"lubrication": lubrication, "loading": loading, **_estimate(estimate)}
         for lubrication, loading, estimate in _joint(comparison)
@@ -66,18 +67,11 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
             }
             for i, profile in enumerate(comparison.measured.profiles)
         ]
-        return {
-            "schema_version": "1",
-            "scans": scans,
-            "loads": loads,
-            "joint": joint,
-            "warnings": texts_of(comparison.messages),
-        }
+        return {**head, "loads": loads, "joint": joint, "warnings": texts_of(comparison.messages)}
     laws, sliding = comparison.interface, comparison.macroscopic
     first = comparison.loads[comparison.loadings[0]]
     return {
-        "schema_version": "1",
-        "scans": scans,
+        **head,
         "loads": [_load(i, comparison, load) for i, load in enumerate(first)],
         "joint": joint,
         "dry_against_lubricated": [
@@ -193,7 +187,9 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
 
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
-    calculated = zip(comparison.friction, load.p_max, load.chi_square, load.p_values, strict=True)
+    names = [quantity.name for quantity in CALCULATED]
+    mu, sticking = comparison.friction, np.isinf(comparison.friction).tolist()
+    calculated = zip(mu, sticking, load.p_max, load.chi_square, load.p_values, strict=True)
     return {
         "effective_friction_coefficient": {
             "by_maximum": _estimate(load.by_maximum),
@@ -202,16 +198,7 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
         "profiles": [
-            members(
-                CALCULATED,
-                None,
-                friction=mu,
-                sticking=math.isinf(mu),
-                p_max=p_max,
-                chi_square=chi_square,
-                p_value=p_value,
-            )
-            for mu, p_max, chi_square, p_value in calculated
+            members(CALCULATED, None, **dict(zip(names, row, strict=True))) for row in calculated
         ],
     }
 

@@ -148,3 +148,8 @@ def correlated_numbers(
     from uncertainties import correlated_values
 
     return dict(zip(names, correlated_values(list(values), covariance), strict=True))
+
+
+def correlated_parameters(parameters: ParameterSet) -> dict[str, Any]:
+    """Return parameters as numbers of the package uncertainties, with their covariance."""
+    return correlated_numbers(parameters.names, parameters.values, parameters.covariance)

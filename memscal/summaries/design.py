@@ -9,7 +9,7 @@ from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantit
 from memscal.model.records import EXPECTED, PLAN, RADIAL, TRANSFER
 from memscal.planning.expected import Design
 from memscal.summaries.declared import (
-    correlated_numbers,
+    correlated_parameters,
     data_frame,
     labelled_dataset,
     members,
@@ -139,5 +139,4 @@ def frame(planned: Design) -> pd.DataFrame:
 
 def correlated(planned: Design) -> dict[str, Any]:
     """Return the expected parameters with their joint covariance."""
-    parameters = planned.parameters
-    return correlated_numbers(parameters.names, parameters.values, parameters.covariance)
+    return correlated_parameters(planned.parameters)

@@ -8,8 +8,8 @@ from memscal.calibration.many import FleetCalibration
 from memscal.errors import InputError
 from memscal.model.quantities import parameter_quantity
 from memscal.model.records import TRANSFER
-from memscal.summaries.calibration import correlated_parameters, estimate_rows
-from memscal.summaries.declared import members, parameter_json
+from memscal.summaries.calibration import estimate_rows
+from memscal.summaries.declared import correlated_parameters, members, parameter_json
 from memscal.summaries.table import Table, checks_json, checks_table, texts_of
 
 if TYPE_CHECKING:
