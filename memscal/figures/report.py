@@ -75,9 +75,9 @@ $body
 def html_report(data: ApparatusData) -> str:
     """Return a calibration as a self-contained HTML page; what came from files is escaped."""
     title = sensor_title(data)
-    values, _ = tables(data)
+    *values, _ = tables(data)
     sections = {
-        "Values": values.html(),
+        "Values": "\n".join(table.html() for table in values),
         "Quality checks": checks_table(data.checks, meanings=True).html(),
         "Figure": _figure(data),
         "Uncertainty budget": _budget(data),
