@@ -99,8 +99,6 @@ def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:
     return float(rest @ rest), int(data.size - basis.shape[1])
 
 
-#: Loads must differ by this share of their mean before linearity can be tested.
-_LOAD_CONTRAST = 0.05
 #: Posterior probabilities are cut off at this and one minus this.
 _LEAST_PROBABILITY = 1e-4
 
@@ -159,7 +157,7 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     r"""Fit eta of :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`; ``None`` for equal loads."""
     load = estimate.points.load
     mean = float(load.mean())
-    if np.ptp(load) < _LOAD_CONTRAST * mean:
+    if np.ptp(load) < _SAME_LOAD * mean:
         return None
     signal = estimate.predicted - estimate.background
     return _add(estimate, (signal * (load - mean) / mean)[:, None])

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.special import ive, j0, j1
 
 from memscal.axisymmetry.hankel import RadialSpectrum
-from memscal.estimation.points import ScanPoints, channel_axis
+from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
 
@@ -66,7 +66,7 @@ class ForwardModel:
     @property
     def axis(self) -> int:
         """Which component a tangential channel measures: 0 for x, 1 for y."""
-        return channel_axis(self.points.channel)
+        return int(self.points.channel == "yz")
 
     @property
     def k(self) -> FloatArray:

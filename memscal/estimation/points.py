@@ -36,11 +36,6 @@ def channel_order(channel: str) -> int:
     return int(channel in TANGENTIAL)
 
 
-def channel_axis(channel: str) -> int:
-    """Axis of the component that a tangential channel measures: 0 for x, 1 for y."""
-    return int(channel == "yz")
-
-
 def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | None]:
     """Return a channel's voltages and their stated standard uncertainty, in V."""
     if channel_order(channel) == 0:
@@ -216,11 +211,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
 def measured_mask(scan: Scan, channel: str = "zz") -> NDArray[np.bool_]:
     """Say which voltages of a channel were measured: they, their loads and errors are numbers."""
     u, errors = channel_signal(scan, channel)
-    keep: NDArray[np.bool_] = np.isfinite(u)
-    for further in (errors, scan.normal_load):
-        if further is not None:
-            keep &= np.isfinite(further)
-    return keep
+    stated = [values for values in (u, errors, scan.normal_load) if values is not None]
+    return np.asarray(np.all([np.isfinite(values) for values in stated], axis=0))
 
 
 def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
