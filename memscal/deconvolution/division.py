@@ -165,16 +165,13 @@ class WhiteNoiseDraw:
         """Divide one draw; the window is that of its expectation."""
         grid = problem.grid
         rng = np.random.default_rng(self.seed)
-        numerator = grid.to_period(problem.voltage)
-        denominator = grid.to_period(problem.reference)
+        noisy_u, noisy_s = grid.to_period(problem.voltage), grid.to_period(problem.reference)
         # Noise of spectral amplitude s has, per pixel, s / (cell area * sqrt(pixels)).
-        per_pixel = self.amplitude * NOISE_RATIO / (grid.cell_area * np.sqrt(numerator.size))
-        noisy_u = numerator + rng.normal(0, per_pixel * problem.weakest_voltage, numerator.shape)
-        noisy_s = denominator + rng.normal(
-            0, per_pixel * problem.weakest_reference, denominator.shape
-        )
+        per_pixel = self.amplitude * NOISE_RATIO / (grid.cell_area * np.sqrt(noisy_u.size))
+        noisy_u = noisy_u + rng.normal(0, per_pixel * problem.weakest_voltage, noisy_u.shape)
+        noisy_s = noisy_s + rng.normal(0, per_pixel * problem.weakest_reference, noisy_s.shape)
         quotient = scipy.fft.rfft2(noisy_u) / scipy.fft.rfft2(noisy_s)
-        period = scipy.fft.irfft2(quotient, s=numerator.shape) / grid.cell_area
+        period = scipy.fft.irfft2(quotient, s=noisy_u.shape) / grid.cell_area
         expected = WhiteNoise(amplitude=self.amplitude).divide(problem)
         return Division(grid.from_quotient(period), expected.window)
 

@@ -301,27 +301,19 @@ def fit_gaussian(g: Field, start: float | None = None) -> float:
     def slope(scaled: FloatArray) -> FloatArray:
         return (root * unit_gaussian_slope(r, scaled[0] * start) * start**3)[:, None]
 
-    begin = np.array([max(start, 2 * narrowest) / start])
-
     def linearise(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
         # A step may lead beyond the narrowest width, where the search with a bound takes over.
         inside = np.maximum(scaled, narrowest / start)
         return misfit(inside), slope(inside)
 
+    begin = np.array([max(start, 2 * narrowest) / start])
     width = gauss_newton(linearise, begin, tolerance=1e-10)
     if width is not None and width[0] * start > 2 * narrowest:
         return float(width[0] * start)
     from scipy.optimize import least_squares
 
-    bounded = least_squares(
-        misfit,
-        begin,
-        jac=slope,
-        bounds=(narrowest / start, np.inf),
-        xtol=1e-12,
-        ftol=1e-14,
-        gtol=1e-14,
-    )
+    bounds = (narrowest / start, np.inf)
+    bounded = least_squares(misfit, begin, slope, bounds, xtol=1e-12, ftol=1e-14, gtol=1e-14)
     return float(bounded.x[0] * start)
 
 

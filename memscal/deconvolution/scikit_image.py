@@ -32,10 +32,8 @@ class _Images:
     @classmethod
     def of(cls, problem: DivisionProblem) -> _Images:
         grid = problem.grid
-        image = grid.to_image(problem.voltage)
-        spread = grid.to_image(problem.reference)
-        peak = float(np.abs(image).max())
-        total = float(spread.sum())
+        image, spread = grid.to_image(problem.voltage), grid.to_image(problem.reference)
+        peak, total = float(np.abs(image).max()), float(spread.sum())
         # u = sum(g * spread) * cell area, with image / peak and spread / total.
         return cls(image / peak, spread / total, peak / (total * grid.cell_area))
 
@@ -91,9 +89,8 @@ class UnsupervisedWiener:
         from skimage.restoration import unsupervised_wiener
 
         images = _Images.of(problem)
-        restored, _ = unsupervised_wiener(
-            images.image, images.point_spread, clip=False, rng=self.seed
-        )
+        blurred, spread = images.image, images.point_spread
+        restored, _ = unsupervised_wiener(blurred, spread, clip=False, rng=self.seed)
         return image_division(problem, restored * images.scale)
 
 

@@ -60,14 +60,14 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     count = int(group.max()) + 1
     # Of too many groups, neighbouring ones are joined.
     fold = (group if count <= _MOST_FOLDS else group * _MOST_FOLDS // count)[model.point]
-    outcomes = {
-        int(i): outcome
-        for i in np.unique(fold)
-        if (outcome := _predict(model, columns, fold == i)) is not None
-    }
+    predicted = {int(i): _predict(model, columns, fold == i) for i in np.unique(fold)}
+    outcomes = {i: outcome for i, outcome in predicted.items() if outcome is not None}
     if len(outcomes) < 2:
         return None
-    p_values = {i: _p_value(*outcome) for i, outcome in outcomes.items()}
+    p_values = {
+        i: float(chdtrc(degrees, degrees * x) if rest is None else fdtrc(degrees, rest, x))
+        for i, (x, degrees, rest) in outcomes.items()
+    }
     worst = min(p_values, key=lambda i: p_values[i])
     # The worst of several is worse than one: Bonferroni's correction, for any dependence.
     folds = len(outcomes)
@@ -99,14 +99,6 @@ def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:
     return float(rest @ rest), int(data.size - basis.shape[1])
 
 
-def _p_value(value: float, degrees: int, rest: int | None) -> float:
-    if rest is None:
-        return float(chdtrc(degrees, degrees * value))
-    return float(fdtrc(degrees, rest, value))
-
-
-#: Loads must differ by this share of their mean before linearity can be tested.
-_LOAD_CONTRAST = 0.05
 #: Posterior probabilities are cut off at this and one minus this.
 _LEAST_PROBABILITY = 1e-4
 
@@ -158,14 +150,14 @@ def axisymmetry_test(estimate: ProfileEstimate) -> ExtraColumns:
     dx, dy = estimate.offset
     quadrupole = np.stack([dx**2 - dy**2, 2 * dx * dy], axis=1)
     columns = [quadrupole * shape[:, None] for shape in _widened(estimate, (0.5, 1.0)).T]
-    return _add(estimate, np.concatenate(columns, axis=1))
+    return _add(estimate, np.hstack(columns))
 
 
 def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     r"""Fit eta of :math:`U \propto P (1 + \eta (P - \bar P)/\bar P)`; ``None`` for equal loads."""
     load = estimate.points.load
     mean = float(load.mean())
-    if np.ptp(load) < _LOAD_CONTRAST * mean:
+    if np.ptp(load) < _SAME_LOAD * mean:
         return None
     signal = estimate.predicted - estimate.background
     return _add(estimate, (signal * (load - mean) / mean)[:, None])
@@ -193,13 +185,9 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     free = scaled - base @ (base.T @ scaled)
     information = np.linalg.pinv(free.T @ free, hermitian=True)
     coefficients = information @ (free.T @ residual)
-    return ExtraColumns(
-        fall=float(residual @ free @ coefficients),
-        count=columns.shape[1],
-        coefficients=coefficients / scale,
-        errors=np.sqrt(np.diag(information)) / scale,
-        size=float(np.abs(columns @ coefficients).max() / estimate.largest_signal),
-    )
+    fall, errors = float(residual @ free @ coefficients), np.sqrt(np.diag(information))
+    size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
+    return ExtraColumns(fall, columns.shape[1], coefficients / scale, errors / scale, size)
 
 
 #: So many voltages at the top, equal within a share of their range, are clipped ...

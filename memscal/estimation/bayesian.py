@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import ClassVar
 
 import numpy as np
@@ -119,20 +119,15 @@ class Shape:
             envelope = np.sqrt(q) * np.exp(-0.5 * (q / self.extent) ** 4)
             plain = Rings(width * q, np.full(count, width * self.blur), envelope)
         gaussian = amplitude / (2 * np.sqrt(np.pi) * width)
-        return Rings(plain.radius, plain.blur, plain.amplitude * gaussian / plain.size)
+        return replace(plain, amplitude=plain.amplitude * gaussian / plain.size)
 
 
 #: Edges (a disc, a plateau), a core (a ring, a spike), and tails.
 SHAPES = (
-    Shape("edge", 0.65, 0.8),
-    Shape("edge", 0.65, 1.2),
-    Shape("rough edge", 0.4, 0.8),
-    Shape("rough edge", 0.4, 1.2),
-    Shape("rough edge", 0.5, 0.8),
-    Shape("rough edge", 0.5, 1.2),
+    *(Shape("edge", 0.65, extent) for extent in (0.8, 1.2)),
+    *(Shape("rough edge", blur, extent) for blur in (0.4, 0.5) for extent in (0.8, 1.2)),
     Shape("core", 0.3, 2.0, scales=True),
-    Shape("tail", 0.85, 1.8),
-    Shape("tail", 0.85, 3.0),
+    *(Shape("tail", 0.85, extent) for extent in (1.8, 3.0)),
 )
 
 
@@ -241,9 +236,7 @@ class _LinearModel:
     added: float  # variance of noise that is expected, but not in the data
 
     @classmethod
-    def from_columns(
-        cls, flat: FloatArray, data: FloatArray, freedom: float, added: float
-    ) -> _LinearModel:
+    def of(cls, flat: FloatArray, data: FloatArray, freedom: float, added: float) -> _LinearModel:
         """Project the weighted flat columns out of the weighted data."""
         scale = np.linalg.norm(flat, axis=0)
         q, r = np.linalg.qr(flat / scale)
@@ -283,15 +276,11 @@ class _LinearModel:
             explained = design.power * variance / (variance + signal)
             variance = self._floor((beyond + float(explained.sum())) / self.freedom)
         log_determinant = float(np.log(1 + signal / variance).sum())
+        log_marginal = -0.5 * (self.freedom * np.log(variance) + log_determinant)
+        shrink = strength**2 * design.singular / (variance + signal)
         left_over = signal / (variance + signal) * design.along
-        return _Conditional(
-            log_marginal=-0.5 * (self.freedom * np.log(variance) + log_determinant),
-            variance=variance,
-            strength=strength,
-            design=design,
-            shrink=strength**2 * design.singular / (variance + signal),
-            slope=(design.left @ left_over - self.rest) / variance,
-        )
+        slope = (design.left @ left_over - self.rest) / variance
+        return _Conditional(log_marginal, variance, strength, design, shrink, slope)
 
     def _floor(self, variance: float) -> float:
         return max(variance, (_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
@@ -320,12 +309,9 @@ def _hypotheses() -> tuple[Hypothesis, ...]:
     hypotheses = [Hypothesis(None, 0.0, 0.40, 0.0)]
     for kind, strengths, estimate, uncertainty in kinds:
         shapes = [s for s in SHAPES if kind in (s.name, f"{s.name} {s.blur}")]
-        share = len(shapes) * len(strengths)
-        hypotheses += [
-            Hypothesis(shape, strength, estimate / share, uncertainty / share)
-            for shape in shapes
-            for strength in strengths
-        ]
+        pairs = list(product(shapes, strengths))
+        priors = estimate / len(pairs), uncertainty / len(pairs)
+        hypotheses += [Hypothesis(shape, strength, *priors) for shape, strength in pairs]
     return tuple(hypotheses)
 
 
@@ -369,7 +355,7 @@ def weigh_departures(
     rings, data = standardised(voltages, weights), standardised(unexplained, weights)
     # Down-weighted points carry no full degree of freedom.
     jacobian = standardised(fit.jacobian, weights)
-    linear = _LinearModel.from_columns(jacobian, data, effective_count - flat, expected_noise**2)
+    linear = _LinearModel.of(jacobian, data, effective_count - flat, expected_noise**2)
     designs = [
         linear.decompose(rings[:, block.start - flat : block.stop - flat], block)
         for block in basis.blocks
@@ -402,7 +388,7 @@ def _average(
     # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
     moving, covariance = np.zeros_like(gain), np.zeros((count, count))
     for p, q, conditional in zip(estimate, uncertainty, conditionals, strict=True):
-        if p == 0 and q == 0:
+        if p == q == 0:
             continue
         of_hypothesis = np.zeros_like(gain)
         _add_gain(of_hypothesis, linear, conditional, 1.0)
@@ -415,18 +401,11 @@ def _average(
                 apart = of_hypothesis - gain
                 covariance += q * linear.added * (apart @ apart.T)
             _add_covariance(covariance, linear, conditional, q, least_variance)
-    variance = np.array([c.variance for c in conditionals])
+    noise = float(np.sqrt(estimate @ np.array([c.variance for c in conditionals])))
     possible = prior > 0
     likelihood = float(np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible])))
-    return WeighedFit(
-        mean=mean,
-        covariance=covariance,
-        gain=gain + moving,
-        noise=float(np.sqrt(estimate @ variance)),
-        probability=estimate,
-        residual=linear.data,
-        log_marginal_likelihood=likelihood,
-    )
+    gain += moving
+    return WeighedFit(mean, covariance, gain, noise, estimate, linear.data, likelihood)
 
 
 def _posterior(log_marginal: FloatArray, prior: FloatArray) -> FloatArray:

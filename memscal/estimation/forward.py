@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.special import ive, j0, j1
 
 from memscal.axisymmetry.hankel import RadialSpectrum
-from memscal.estimation.points import ScanPoints, channel_axis
+from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
 
 
@@ -66,7 +66,7 @@ class ForwardModel:
     @property
     def axis(self) -> int:
         """Which component a tangential channel measures: 0 for x, 1 for y."""
-        return channel_axis(self.points.channel)
+        return int(self.points.channel == "yz")
 
     @property
     def k(self) -> FloatArray:
@@ -112,18 +112,18 @@ class ForwardModel:
     def signal(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Voltages for kernels in V/Pa by their transforms, shape (nodes,) or (nodes, m)."""
         per_newton = np.empty((geometry.radius.size, *kernel.shape[1:]))
-        synthesis = self.synthesis(geometry)
+        synthesis, load = self.synthesis(geometry), self.points.load
         for rows, measure in self._measures:
             spread = measure * kernel if kernel.ndim == 1 else measure[:, None] * kernel
             per_newton[rows] = synthesis[rows] @ spread
-        return self._times_load(per_newton)
+        return np.asarray(per_newton * (load if kernel.ndim == 1 else load[:, None]))
 
     def radial_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivative of :meth:`signal` by the distance from the centre, shape (n,), in V/m."""
         if self.order:
             slope, _ = self._vector_slopes(geometry, kernel)
             return np.asarray(-geometry.towards[self.axis] * slope)
-        return self._times_load(-self._summed(geometry.bessel1, kernel))
+        return -self._summed(geometry.bessel1, kernel)
 
     def shift_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by each point's centre, shape (2, n), in V/m."""
@@ -137,31 +137,22 @@ class ForwardModel:
 
     def centre_derivative(self, geometry: Geometry, kernel: FloatArray) -> FloatArray:
         """Derivatives of :meth:`signal` by the free coordinates of all centres, shape (n, m)."""
-        shift = self.shift_derivative(geometry, kernel)
-        columns = [
-            np.where(self.points.scan == i, shift[axis], 0.0)
-            for i, axis in np.argwhere(self.points.free)
-        ]
-        return np.stack(columns, axis=1)
+        shift, scan = self.shift_derivative(geometry, kernel), self.points.scan
+        free = np.argwhere(self.points.free)
+        return np.stack([np.where(scan == i, shift[axis], 0.0) for i, axis in free], axis=1)
 
-    def _vector_slopes(
-        self, geometry: Geometry, kernel: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def _vector_slopes(self, geometry: Geometry, kernel: FloatArray) -> list[FloatArray]:
         """Radial component f of a vector: its derivative by R, and f/R; on the axis the same."""
         x = np.multiply.outer(geometry.radius, self.k)
         turn = np.divide(geometry.bessel1, x, out=np.full_like(x, 0.5), where=x > 0)
-        bent, turned = (
-            self._times_load(self._summed(matrix, kernel))
-            for matrix in (geometry.bessel0 - turn, turn)
-        )
-        return bent, turned
+        return [self._summed(matrix, kernel) for matrix in (geometry.bessel0 - turn, turn)]
 
     def _summed(self, matrix: FloatArray, kernel: FloatArray) -> FloatArray:
-        """Sum k times a kernel over the quadrature, by every scan's own reference."""
+        """Voltages by k times a kernel, summed over the quadrature, shape (n,)."""
         per_newton = np.empty(len(matrix))
         for rows, measure in self._measures:
             per_newton[rows] = matrix[rows] @ (measure * self.k * kernel)
-        return per_newton
+        return np.asarray(per_newton * self.points.load)
 
     @property
     def _measures(self) -> list[tuple[slice | NDArray[np.bool_], FloatArray]]:
@@ -170,10 +161,6 @@ class ForwardModel:
         if len(measures) == 1:
             return [(slice(None), measures[0])]
         return [(self.points.scan == i, measure) for i, measure in enumerate(measures)]
-
-    def _times_load(self, per_newton: FloatArray) -> FloatArray:
-        load = self.points.load
-        return np.asarray(per_newton * (load if per_newton.ndim == 1 else load[:, None]))
 
 
 def _unit_range(positions: FloatArray) -> FloatArray:
@@ -196,11 +183,10 @@ def elliptic_columns(
     model: ForwardModel, geometry: Geometry, sigma: float, ellipticity: FloatArray
 ) -> FloatArray:
     """Response per A of an elliptic Gaussian, and its derivatives by s, e1 and e2."""
-    steps = np.array([[0.0, 0.0, 0.0], [_STEP * sigma, 0.0, 0.0], [0, _STEP, 0], [0, 0, _STEP]])
     here = np.concatenate([[sigma], ellipticity])
-    harmonics = _bessel(geometry.bessel0, geometry.bessel1, geometry.radius, model.k)
+    harmonics = _bessel(geometry, model.k)
     columns = [_response(model, geometry, harmonics, here)]
-    for step in steps[1:]:
+    for step in np.diag([_STEP * sigma, _STEP, _STEP]):
         above = _response(model, geometry, harmonics, here + step)
         below = _response(model, geometry, harmonics, here - step)
         columns.append((above - below) / (2 * step.sum()))
@@ -213,8 +199,7 @@ def elliptic_departure(
     """Elliptic Gaussian of unit integral less the round one of the same s, on a grid (y, x)."""
     e1, e2 = _bounded(ellipticity)
     plane_x, plane_y = np.meshgrid(x, y)
-    determinant = 1 - e1**2 - e2**2
-    round_ = plane_x**2 + plane_y**2
+    round_, determinant = plane_x**2 + plane_y**2, 1 - e1**2 - e2**2
     form = (1 - e1) * plane_x**2 - 2 * e2 * plane_x * plane_y + (1 + e1) * plane_y**2
     scale = 1 / (2 * np.pi * sigma**2)
     elliptic = np.exp(-0.5 * form / (determinant * sigma**2)) / np.sqrt(determinant)
@@ -242,15 +227,12 @@ def _response(
     return total
 
 
-def _bessel(
-    bessel0: FloatArray, bessel1: FloatArray, radius: FloatArray, k: FloatArray
-) -> list[FloatArray]:
+def _bessel(geometry: Geometry, k: FloatArray) -> list[FloatArray]:
     """Bessel functions of even order by upward recurrence; at small arguments their first term."""
     # Repeats share their positions.
-    unique, first, back = np.unique(radius, return_index=True, return_inverse=True)
-    x = np.multiply.outer(unique, k)
-    even, below, above = [bessel0], bessel0[first], bessel1[first]
-    factorial = 1.0
+    unique, first, back = np.unique(geometry.radius, return_index=True, return_inverse=True)
+    x, factorial = np.multiply.outer(unique, k), 1.0
+    even, below, above = [geometry.bessel0], geometry.bessel0[first], geometry.bessel1[first]
     for order in range(2, 2 * _HARMONICS):
         small = x < 0.1 * order
         safe = np.where(small, 1.0, x)

@@ -6,7 +6,7 @@ It is fitted by weighted least squares, with A, centre, baseline and linear drif
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -140,11 +140,8 @@ def _robust_start_of_scan(model: ForwardModel, weights: FloatArray) -> FloatArra
         # The potential of a shear looks much as the normal stress does.
         potentials = wavenumbers.synthesise(spectra / model.k[:, None], radii).T
         even = [np.interp(distances, radii, table) * (points.load * root) for table in potentials]
-        _require_parity(
-            points,
-            _amplitudes(np.concatenate(odd), data, drift),
-            _amplitudes(np.concatenate(even), data, drift),
-        )
+        trials = [_amplitudes(np.concatenate(shapes), data, drift) for shapes in (odd, even)]
+        _require_parity(points, *trials)
     if not best.size:
         raise _undetermined(model)
     return best
@@ -164,18 +161,12 @@ def _amplitudes(
 
 def _trial_centres(model: ForwardModel) -> FloatArray:
     """At most 40 candidates per axis: the positions themselves, less the outer tenth."""
-    points = model.points
-
-    def inner(positions: FloatArray) -> FloatArray:
-        unique = np.unique(positions)
+    points, along = model.points, [np.zeros(1), np.zeros(1)]
+    for axis in np.flatnonzero(points.free[0]):
+        unique = np.unique((points.x, points.y)[axis])
         margin = unique.size // 10
         central = unique[margin : unique.size - margin]
-        return central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
-
-    along = [
-        inner(positions) if free else np.zeros(1)
-        for free, positions in zip(points.free[0], (points.x, points.y), strict=True)
-    ]
+        along[axis] = central[:: int(np.ceil(central.size / (12 if points.planar else 40)))]
     return np.stack([axis.ravel() for axis in np.meshgrid(*along)], axis=1)
 
 
@@ -286,19 +277,20 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
         if not result.success:
             raise _undetermined(model, linearise(model, result.x * scale).conversion_constant)
         solution = np.asarray(result.x)
+    # The model is even in the width.
+    solution[1] = abs(solution[1])
     fit = linearise(model, solution * scale)
     if not 0 < fit.conversion_constant < np.inf:
         raise _undetermined(model, fit.conversion_constant)
-    return _positive_width(fit)
+    return fit
 
 
 def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     """Typical size of each parameter, so that the solver sees numbers near one."""
     width = max(abs(theta[1]), 0.05 * _smoothing_length(model))
-    amplitude = np.ptp(model.points.u)
     centres = int(model.points.free.sum())
     ellipse = np.full(model.points.ellipse, _TYPICAL_ELLIPTICITY)
-    drift = np.full(theta.size - 2 - centres - ellipse.size, amplitude)
+    drift = np.full(theta.size - 2 - centres - ellipse.size, np.ptp(model.points.u))
     return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift, ellipse])
 
 
@@ -314,28 +306,17 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     geometry = model.geometry(centre)
     kernel = gaussian_transfer(model.k, sigma)
     columns = np.stack([kernel, -sigma * model.k**2 * kernel], axis=1)
-    shape, widening, *ovals = (
-        elliptic_columns(model, geometry, sigma, ellipticity).T
-        if elliptic
-        else model.signal(geometry, columns).T
-    )
-    shift = model.centre_derivative(geometry, amplitude * kernel)
-    baseline = model.drift_columns
+    if elliptic:
+        shape, widening, *ovals = elliptic_columns(model, geometry, sigma, ellipticity).T
+    else:
+        shape, widening, *ovals = model.signal(geometry, columns).T
+    shift, baseline = model.centre_derivative(geometry, amplitude * kernel), model.drift_columns
     oval = [amplitude * column for column in ovals[:elliptic]]
     jacobian = np.column_stack([shape, amplitude * widening, shift, baseline, *oval])
     predicted = amplitude * shape + baseline @ drift
     return GaussianFit(
         amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
     )
-
-
-def _positive_width(fit: GaussianFit) -> GaussianFit:
-    """The model is even in the width: choose its positive branch."""
-    if fit.sigma >= 0:
-        return fit
-    jacobian = fit.jacobian.copy()
-    jacobian[:, 1] *= -1
-    return replace(fit, sigma=-fit.sigma, jacobian=jacobian)
 
 
 def robust_scale(residual: FloatArray) -> float:

@@ -36,11 +36,6 @@ def channel_order(channel: str) -> int:
     return int(channel in TANGENTIAL)
 
 
-def channel_axis(channel: str) -> int:
-    """Axis of the component that a tangential channel measures: 0 for x, 1 for y."""
-    return int(channel == "yz")
-
-
 def channel_signal(scan: Scan, channel: str) -> tuple[FloatArray, FloatArray | None]:
     """Return a channel's voltages and their stated standard uncertainty, in V."""
     if channel_order(channel) == 0:
@@ -183,8 +178,6 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     u, errors = channel_signal(scan, channel)
     load = np.full(u.shape, scan.load) if scan.normal_load is None else scan.normal_load
     x, y = scan.positions
-    repeat = scan.passes
-    x_errors = np.zeros(()) if scan.x_errors is None else scan.x_errors
     keep = measured_mask(scan, channel)
     if not keep.any():
         raise InputError(
@@ -192,14 +185,19 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
             why="There is nothing to calibrate with.",
             cure="Check the voltage column and its import.",
         )
+    if errors is not None and np.any(errors[keep] <= 0):
+        raise InputError(
+            f"u_{channel}_errors holds a standard uncertainty of zero.",
+            why="A point without noise would outweigh every other point.",
+            cure="Give the electronic noise, or leave it out to have it estimated.",
+        )
+    arrays = {"x": x, "y": y, "u": u, "load": load, "repeat": scan.passes}
+    x_errors = np.zeros(()) if scan.x_errors is None else scan.x_errors
+    arrays["x_errors"] = np.broadcast_to(x_errors, u.shape)
+    columns: dict[str, Any] = {name: values[keep] for name, values in arrays.items()}
     points = ScanPoints(
-        x=x[keep],
-        y=y[keep],
-        u=u[keep],
-        load=load[keep],
-        u_errors=_stated_errors(errors, keep, channel),
-        x_errors=np.broadcast_to(x_errors, u.shape)[keep],
-        repeat=repeat[keep],
+        **columns,
+        u_errors=None if errors is None else errors[keep],
         scan=np.zeros(int(keep.sum()), dtype=np.intp),
         free=np.array([[scan.direction == "x", scan.direction == "y" or scan.planar]]),
         missing=int(u.size - keep.sum()),
@@ -213,11 +211,8 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
 def measured_mask(scan: Scan, channel: str = "zz") -> NDArray[np.bool_]:
     """Say which voltages of a channel were measured: they, their loads and errors are numbers."""
     u, errors = channel_signal(scan, channel)
-    keep: NDArray[np.bool_] = np.isfinite(u)
-    for further in (errors, scan.normal_load):
-        if further is not None:
-            keep &= np.isfinite(further)
-    return keep
+    stated = [values for values in (u, errors, scan.normal_load) if values is not None]
+    return np.asarray(np.all([np.isfinite(values) for values in stated], axis=0))
 
 
 def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
@@ -234,16 +229,15 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     first_repeat = np.cumsum([0, *(int(points.repeat.max()) + 1 for points in scans[:-1])])
     repeats = [points.repeat + first for points, first in zip(scans, first_repeat, strict=True)]
     numbers = [np.full(points.u.size, i, dtype=np.intp) for i, points in enumerate(scans)]
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(points, name) for points in scans])
+        for name in ("x", "y", "u", "load", "x_errors", "free")
+    }
     return ScanPoints(
-        x=np.concatenate([points.x for points in scans]),
-        y=np.concatenate([points.y for points in scans]),
-        u=np.concatenate([points.u for points in scans]),
-        load=np.concatenate([points.load for points in scans]),
+        **columns,
         u_errors=np.concatenate(stated) if stated else None,
-        x_errors=np.concatenate([points.x_errors for points in scans]),
         repeat=np.concatenate(repeats),
         scan=np.concatenate(numbers),
-        free=np.concatenate([points.free for points in scans]),
         missing=sum(points.missing for points in scans),
         decorrelation=_joined_decorrelation(scans),
         channel=scans[0].channel,
@@ -269,20 +263,6 @@ def _decorrelation(scan: Scan, keep: NDArray[np.bool_]) -> FloatArray | None:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(whole[measured])))
 
 
-def _stated_errors(
-    errors: FloatArray | None, keep: NDArray[np.bool_], channel: str
-) -> FloatArray | None:
-    if errors is None:
-        return None
-    if np.any(errors[keep] <= 0):
-        raise InputError(
-            f"u_{channel}_errors holds a standard uncertainty of zero.",
-            why="A point without noise would outweigh every other point.",
-            cure="Give the electronic noise, or leave it out to have it estimated.",
-        )
-    return np.asarray(errors[keep])
-
-
 def _require_usable(points: ScanPoints) -> None:
     positions = points.places[0].count
     needed = MINIMUM_POSITIONS + 2 * points.planar
@@ -299,12 +279,8 @@ def _require_usable(points: ScanPoints) -> None:
             cure="Check the channel.",
         )
     # The parity of a shear is tested later, by estimation.gaussian.
-    if points.order == 0:
-        _require_positive_peak(points)
-
-
-def _require_positive_peak(points: ScanPoints) -> None:
-    """Refuse a voltage that does not rise where the indenter is above the sensor."""
+    if points.order:
+        return
     # The median of three points does not follow a single outlier.
     ordered = np.sort(rise_of(points.x, points.y, points.u / points.load))
     rise, fall = np.median(ordered[-3:]), -np.median(ordered[:3])

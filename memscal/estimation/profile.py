@@ -94,8 +94,7 @@ class ProfileEstimate:
     @property
     def spectrum(self) -> RadialSpectrum:
         """Transform of the voltage's radial profile per newton, in V m^2 / N."""
-        reference = self.model.reference
-        return replace(reference, values=self.kernel * reference.values)
+        return replace(self.model.reference, values=self.kernel * self.model.reference.values)
 
     @property
     def conversion_constant(self) -> float:
@@ -105,8 +104,7 @@ class ProfileEstimate:
     @property
     def centres(self) -> FloatArray:
         """Centre of the sensor in each scan, shape (scans, 2), in m, departures allowed for."""
-        corrected = self.gaussian.centre.copy()
-        free = self.points.free
+        corrected, free = self.gaussian.centre.copy(), self.points.free
         corrected[free] += self.weighed.mean[2 : 2 + free.sum()]
         return corrected
 
@@ -169,15 +167,13 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     stated = _stated_weights(points, _position_noise(model, fit))
     residual = points.u - fit.predicted
     outlier = outlier_weights(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
-    least = NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
-    least = least if points.u_errors is None else 1.0
+    floor = NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
+    least = floor if points.u_errors is None else 1.0
     for _ in range(_WEIGHING_ROUNDS):
-        weights = stated * outlier
+        weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
         basis = departure_basis(model, fit)
-        weighed = weigh_departures(
-            model, fit, basis, weights, float(outlier.sum()), least_noise=least
-        )
+        weighed = weigh_departures(model, fit, basis, weights, count, least_noise=least)
         updated = outlier_weights(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
@@ -226,8 +222,7 @@ def require_significant(estimate: ProfileEstimate, cure: str) -> None:
     """Refuse a conversion constant that is not distinct from zero, and say why."""
     a, integrals = estimate.conversion_constant, estimate.basis.integrals
     # Rounding makes the variance of a scan without noise negative.
-    variance = float(integrals @ estimate.covariance @ integrals)
-    uncertainty = float(np.sqrt(max(variance, 0.0)))
+    uncertainty = np.sqrt(max(float(integrals @ estimate.covariance @ integrals), 0.0))
     if not a > LEAST_SIGNIFICANCE * uncertainty:
         wrong = "negative" if a < -LEAST_SIGNIFICANCE * uncertainty else "not distinct from zero"
         raise FitError(

@@ -37,8 +37,7 @@ def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
             cure="Calibrate each sensor by itself; check /entry/instrument/stress_sensor.",
         )
     films: dict[str, ElasticFilm] = {}
-    for scan in scans:
-        film = scan.film
+    for film in (scan.film for scan in scans):
         first = films.setdefault(film.name, film)
         if film.name and first != film:
             raise InputError(
@@ -103,40 +102,31 @@ def _per_newton(
 ) -> FloatArray:
     if isinstance(reference, Contact):
         return _base_spectrum(reference, k.tobytes(), order) / reference.load
-    stress = _shear(reference) if order else reference.sigma_zz
-    _require_coverage(reference, stress, span)
-    values = hankel_transform(reference.r, stress, k, order=order) / reference.load
-    if order:
-        _require_held_back(values)
-    elif values[0] <= 0:
-        raise InputError(
-            "The stress of the reference adds up to a pull, not a push.",
-            why="Normal stress is positive in compression.",
-            cure="Change the sign of sigma_zz in the reference.",
-        )
-    return values
-
-
-def _shear(reference: StressProfile) -> FloatArray:
-    if reference.sigma_rz is None or not reference.sigma_rz.any():
+    stress = reference.sigma_rz if order else reference.sigma_zz
+    if stress is None or (order and not stress.any()):
         raise InputError(
             "The reference holds no shear (sigma_rz), only the normal stress.",
             why="A tangential channel is calibrated with the shear at the base of the film.",
             cure="Give a reference with sigma_rz (memscal import --format reference --shear "
             "COLUMN), or leave it out to have the rod solved.",
         )
-    return reference.sigma_rz
-
-
-def _require_held_back(values: FloatArray) -> None:
-    """Refuse a shear of the other sign: most of it, whatever the film, holds the film back."""
-    if values[int(np.argmax(np.abs(values)))] > 0:
+    _require_coverage(reference, stress, span)
+    values = hankel_transform(reference.r, stress, k, order=order) / reference.load
+    # Most of a shear, whatever the film, holds the film back.
+    if order and values[int(np.argmax(np.abs(values)))] > 0:
         raise InputError(
             "The shear of the reference pulls the film outward.",
             why="sigma_rz is the traction of the base on the film, positive outward: a film that "
             "is squeezed outward is held back, and it is negative.",
             cure="Change the sign of sigma_rz in the reference (memscal import --shear-sign -1).",
         )
+    if not order and values[0] <= 0:
+        raise InputError(
+            "The stress of the reference adds up to a pull, not a push.",
+            why="Normal stress is positive in compression.",
+            cure="Change the sign of sigma_zz in the reference.",
+        )
+    return values
 
 
 @lru_cache(maxsize=256)

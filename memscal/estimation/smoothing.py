@@ -88,26 +88,21 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     gains = []
     for scans in _groups(references):
         rows = np.flatnonzero(np.isin(points.scan, scans))
-        spline, fit = _fitted(estimate, references[scans[0]], rows)
-        predicted[rows] = points.load[rows] * fit.predicted
-        weight[rows] = fit.outlier_weight
+        load = points.load[rows]
+        of_scans, smoothed, weight[rows] = _fitted(estimate, references[scans[0]], rows)
+        predicted[rows] = load * smoothed
         gain = np.zeros((estimate.model.k.size, points.u.size))
-        gain[:, rows] = spline.transform @ fit.gain / points.load[rows]
+        gain[:, rows] = of_scans / load
         gains.append((references[scans[0]].values, gain))
     return SmoothedProfile(estimate, _joined(gains, estimate), predicted, weight)
 
 
 def _groups(references: Sequence[RadialSpectrum]) -> list[list[int]]:
     """Return the scans that share a reference."""
-    groups: list[list[int]] = []
+    groups: dict[bytes, list[int]] = {}
     for scan, reference in enumerate(references):
-        for group in groups:
-            if np.array_equal(references[group[0]].values, reference.values):
-                group.append(scan)
-                break
-        else:
-            groups.append([scan])
-    return groups
+        groups.setdefault(reference.values.tobytes(), []).append(scan)
+    return list(groups.values())
 
 
 def _joined(
@@ -128,19 +123,11 @@ def _joined(
     return np.asarray((first / below)[:, None] * above)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A spline through some of the points, by voltages per newton."""
-
-    gain: FloatArray  # (m, n): derivative of the coefficients by the voltages
-    predicted: FloatArray  # (n,)
-    outlier_weight: FloatArray  # (n,)
-
-
 def _fitted(
     estimate: ProfileEstimate, reference: RadialSpectrum, rows: NDArray[np.intp]
-) -> tuple[_RadialSpline, _Fit]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
+    # By voltages per newton: derivative of the transform, prediction, weight of outliers.
     points, load = estimate.points, estimate.points.load[rows]
     y = (points.u - estimate.background)[rows] / load
     stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
@@ -149,14 +136,14 @@ def _fitted(
     for _ in range(_ROUNDS):
         gain = spline.gain(y, stated * weight)
         predicted = spline.design @ (gain @ y)
-        own = np.einsum("ij,ji->i", spline.design, gain)
-        left = (y - predicted) * np.sqrt(stated / np.clip(1 - own, _LEAST_FREEDOM, 1.0))
+        freedom = 1 - np.einsum("ij,ji->i", spline.design, gain)
+        left = (y - predicted) * np.sqrt(stated / np.clip(freedom, _LEAST_FREEDOM, 1.0))
         updated = outlier_weights(left, threshold, _LEAST_SCALE)
         threshold = OUTLIER_THRESHOLD
         if np.allclose(updated, weight, atol=0.02):
             break
         weight = updated
-    return spline, _Fit(gain, predicted, weight)
+    return spline.transform @ gain, predicted, weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,22 +164,19 @@ class _RadialSpline:
         nodes, weights = gauss_between(knots, _NODES)
         stress = reference.at(np.append(nodes, [0.0, reach]))
         peak, end = stress[-2], stress[-1]
-        slope = -float(
-            (reference.wavenumbers.weights * reference.wavenumbers.k * reference.values)
-            @ j1(reference.wavenumbers.k * reach)
-        )
+        k, per_newton = reference.wavenumbers.k, reference.values
+        slope = -float((reference.wavenumbers.weights * k * per_newton) @ j1(k * reach))
         # At R a spline has the logarithmic slope of the tail, which goes on from there.
         ending = basis(np.array([reach]), 0)
         tied = step * (end * basis(np.array([reach]), 1) - slope * ending)
         free = np.linalg.svd(tied)[2][1:].T
         curved = basis(nodes, _ORDER) * step**_ORDER
-        # The curvature of what the film transmits falls off as its stress does.
         rho = 1 / (np.abs(stress[:-2]) / peak + _FLOOR) ** 2
         # What no penalty holds, a parabola, is held by next to nothing.
         rows = np.vstack([curved, _NEXT_TO_NOTHING * basis(nodes, 0)]) @ free
         rows *= np.tile(np.sqrt(weights * rho), 2)[:, None]
-        bessel = 2 * np.pi * j0(np.multiply.outer(reference.wavenumbers.k, nodes)) * weights * nodes
-        beyond = (reference.values - bessel @ stress[:-2]) / end
+        bessel = 2 * np.pi * j0(np.multiply.outer(k, nodes)) * weights * nodes
+        beyond = (per_newton - bessel @ stress[:-2]) / end
         transform = (bessel @ basis(nodes, 0) + np.outer(beyond, ending)) @ free
         return cls(basis(radius, 0) @ free, np.asarray(np.linalg.qr(rows)[1]), transform)
 
@@ -227,8 +211,8 @@ def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, c
 
     grid = np.arange(-80.0, 11.0, 1.0)
     best = float(grid[int(np.argmin([loss(place) for place in grid]))])
-    found = minimize_scalar(loss, bounds=(best - 1.0, best + 1.0), method="bounded")
-    return float(squares[0] * np.exp(found.x))
+    least = minimize_scalar(loss, bounds=(best - 1.0, best + 1.0), method="bounded")
+    return float(squares[0] * np.exp(least.x))
 
 
 def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
@@ -243,8 +227,7 @@ def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
     spline = BSpline(extended, np.eye(count), _DEGREE)
 
     def values(radius: FloatArray, derivative: int) -> FloatArray:
-        columns = spline(radius, nu=derivative)
-        middle = count // 2
+        columns, middle = spline(radius, nu=derivative), count // 2
         folded = columns[:, middle:].copy()
         folded[:, count % 2 :] += columns[:, :middle][:, ::-1]
         return np.asarray(folded)

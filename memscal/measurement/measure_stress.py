@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import platform
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any
 
 import numpy as np
 import scipy
@@ -225,8 +224,17 @@ def measure_stress(
         conversion_constant_uncertainty=sensor.parameters.uncertainty("conversion_constant"),
         checks=checks,
         overridden=overridden,
-        process=_process(
-            {"override": bool(override)}, tuple(_messages(loads, sensor, checks, overridden))
+        process=Process(
+            program="memscal",
+            version=__version__,
+            date=timestamp(),
+            configuration={"override": bool(override)},
+            environment={
+                "python": platform.python_version(),
+                "numpy": np.__version__,
+                "scipy": scipy.__version__,
+            },
+            messages=tuple(_messages(loads, sensor, checks, overridden)),
         ),
         artifact=sensor.source,
         artifact_digest=sensor.content_digest,
@@ -272,21 +280,6 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
 def _files_of(measured: MeasuredStress) -> str:
     names = [scan.source.file_name for scan in measured.scans if scan.source]
     return ", ".join(names) or f"{measured.profiles[0].label} and on"
-
-
-def _process(configuration: Mapping[str, Any], messages: tuple[Message, ...]) -> Process:
-    return Process(
-        program="memscal",
-        version=__version__,
-        date=timestamp(),
-        configuration=configuration,
-        environment={
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "scipy": scipy.__version__,
-        },
-        messages=messages,
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -100,9 +100,8 @@ def _lines_of(scan: Scan, rows: NDArray[np.intp]) -> SingleLoad:
     load = float(np.nanmedian(only.normal_load))
     common = scan.load_uncertainty
     uncertainty = None if common is None else common * load / scan.load
-    return SingleLoad(
-        replace(only, load=load, load_uncertainty=uncertainty), load, scan.lubrication
-    )
+    only = replace(only, load=load, load_uncertainty=uncertainty)
+    return SingleLoad(only, load, scan.lubrication)
 
 
 _LARGEST_KH = 20.0
@@ -172,10 +171,9 @@ def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactS
 def require_points(single: SingleLoad, signal: ContactSignal) -> None:
     """Refuse a load whose points are all missing (NaN), or over more than a contact's radius."""
     scan = single.scan
-    complete = np.ones_like(scan.u_zz, dtype=np.bool_)
-    for values in (scan.u_zz, scan.normal_load):
-        if values is not None:
-            complete &= np.isfinite(values)
+    complete = np.isfinite(scan.u_zz)
+    if scan.normal_load is not None:
+        complete &= np.isfinite(scan.normal_load)
     if not complete.any():
         raise InputError(
             f"{place_of(scan, single)}: all {complete.size} points are missing (NaN).",
@@ -209,11 +207,8 @@ def require_ends(single: SingleLoad, signal: ContactSignal, centre: FloatArray) 
         along = centre[0 if scan.direction == "x" else 1]
         ends = [abs(float(x.min() - along)), abs(float(x.max() - along))]
     else:
-        ends = [
-            abs(float(e - c))
-            for a, c in ((scan.x, centre[0]), (scan.y, centre[1]))
-            for e in (a.min(), a.max())
-        ]
+        axes = (scan.x, centre[0]), (scan.y, centre[1])
+        ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
     left = max(signal.share(end) for end in ends)
     if left > _LARGEST_END:
         raise FitError(
@@ -348,7 +343,8 @@ def measured_profile(
     """Return the measured profile of one load of a scan from its restored stress."""
     a, estimate = restored.apparatus.conversion_constant, restored.posterior.estimate
     average, x, y = _averaging(restored, restored.noise / np.sqrt(estimate.outlier_weight))
-    level = average @ (restored.points.u - _background(restored))
+    drift = restored.posterior.state[restored.posterior.nodes + int(restored.points.free.sum()) :]
+    level = average @ (restored.points.u - estimate.model.drift_columns @ drift)
     r = np.hypot(x - restored.centre[0], y - restored.centre[1])
     order = np.argsort(r, kind="stable")
     average, s_zz = average[order], level[order] / a
@@ -391,8 +387,11 @@ def _points(
     """Return the points of one load by channel, as they were measured."""
     normal = measured_points(scan)
     weight = restored.posterior.estimate.outlier_weight
-    noise = _noise_in_shape(prepared, restored)[measured_mask(scan)]
-    points = {"zz": _of_channel(scan, normal, noise, weight)}
+    noise = prepared.electronic
+    if not noise.any():
+        # Only the electronic noise scatters: it is that of the restoration.
+        noise = np.full_like(noise, restored.noise.min())
+    points = {"zz": _of_channel(scan, normal, noise[measured_mask(scan)], weight)}
     for channel in (name for name in TANGENTIAL if f"u_{name}" in scan.channels):
         try:
             shear = measured_points(scan, channel)
@@ -437,11 +436,6 @@ def _averaging(
     return average / average.sum(axis=1, keepdims=True), unique[0], unique[1]
 
 
-def _background(restored: Restoration) -> FloatArray:
-    drift = restored.posterior.state[restored.posterior.nodes + int(restored.points.free.sum()) :]
-    return np.asarray(restored.posterior.estimate.model.drift_columns @ drift)
-
-
 def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatArray]:
     """Covariance that centre, baseline and drift bring, shared out without a rest."""
     posterior, model = restored.posterior, restored.posterior.estimate.model
@@ -477,10 +471,3 @@ def _on_axis(restored: Restoration) -> tuple[float, Mapping[str, float]]:
     budget = {source: float(np.linalg.norm(change)) for source, change in changes.items()}
     noise = float(row @ posterior.covariances["scan"][:nodes, :nodes] @ row)
     return maximum, {"noise": float(np.sqrt(max(noise, 0.0))), **budget}
-
-
-def _noise_in_shape(prepared: PreparedScan, restored: Restoration) -> FloatArray:
-    """Electronic noise of every voltage: that of the restoration where only it scatters."""
-    if prepared.electronic.any():
-        return prepared.electronic
-    return np.full(prepared.scan.u_zz.shape, float(restored.noise.min()))

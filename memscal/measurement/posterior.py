@@ -283,18 +283,19 @@ def restore_posterior(
     model, nodes = estimate.model, estimate.model.k.size
     film = film_transfer(scan.film, model.k)
     scale = np.concatenate([scan.load * film, np.ones(mean.size - nodes)])
-    of_film = {"film": _film_changes(scan.film, model.k)}
-    of_sensor = apparatus_changes(apparatus, model.k)
+    of_film, of_sensor = _film_changes(scan.film, model.k), apparatus_changes(apparatus, model.k)
+    slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
+    scaled = slope * estimate.distance * (scan.position_scale_uncertainty or 0.0)
     shifts = {
         "apparatus": _signals(estimate, mean, of_sensor * film[:, None]),
-        "film": _signals(estimate, mean, of_film["film"] * transfer[:, None]),
-        "position_scale": _position_shift(scan, estimate, mean),
+        "film": _signals(estimate, mean, of_film * transfer[:, None]),
+        "position_scale": scaled[:, None],
     }
     covariances = {"scan": np.outer(scale, scale) * (within + apart @ apart.T)}
     changes = {source: -scale[:, None] * (gain @ shift) for source, shift in shifts.items()}
-    for source, direct in of_film.items():
-        changes[source][:nodes] += scan.load * direct * mean[:nodes, None]
+    changes["film"][:nodes] += scan.load * of_film * mean[:nodes, None]
     covariances |= {source: columns @ columns.T for source, columns in changes.items()}
+    names = [(fit.shape.exponent, fit.shape.shear) for fit in fits]
     posterior = Posterior(
         estimate=estimate,
         state=scale * mean,
@@ -303,10 +304,7 @@ def restore_posterior(
         changes=changes,
         residual=_sum_of(shares, [fit.residual for fit in fits]),
         found_noise=float(np.dot(shares, [fit.noise for fit in fits])),
-        shares={
-            (fit.shape.exponent, fit.shape.shear): float(p)
-            for fit, p in zip(fits, shares, strict=True)
-        },
+        shares=dict(zip(names, shares.tolist(), strict=True)),
         resolved_wavenumber=0.0,
     )
     return replace(posterior, resolved_wavenumber=_resolved(posterior, scan.load * film))
@@ -327,13 +325,10 @@ def _shares(fits: Sequence[ShapeFit]) -> FloatArray:
 def _signals(estimate: ProfileEstimate, state: FloatArray, changes: FloatArray) -> FloatArray:
     """Voltages of the pressure through changed references, shape (n, q), in V."""
     model, kernel = estimate.model, state[: estimate.model.k.size]
-    wavenumbers = model.reference.wavenumbers
-    columns = [
-        replace(model, references=(RadialSpectrum(wavenumbers, change),)).signal(
-            estimate.gaussian.geometry, kernel
-        )
-        for change in changes.T
-    ]
+    geometry, wavenumbers = estimate.gaussian.geometry, model.reference.wavenumbers
+    references = [(RadialSpectrum(wavenumbers, change),) for change in changes.T]
+    models = [replace(model, references=reference) for reference in references]
+    columns = [changed.signal(geometry, kernel) for changed in models]
     return np.stack(columns, axis=1) if columns else np.zeros((model.points.u.size, 0))
 
 
@@ -366,13 +361,6 @@ def _film_changes(film: ElasticFilm, k: FloatArray) -> FloatArray:
         upper, lower = (replace(film, poisson_ratio=nu) for nu in (above, below))
         columns.append((film_transfer(upper, k) - film_transfer(lower, k)) * u / (above - below))
     return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
-
-
-def _position_shift(scan: Scan, estimate: ProfileEstimate, state: FloatArray) -> FloatArray:
-    model = estimate.model
-    slope = model.radial_derivative(estimate.gaussian.geometry, state[: model.k.size])
-    share = scan.position_scale_uncertainty or 0.0
-    return np.asarray((slope * estimate.distance * share)[:, None])
 
 
 def _resolved(posterior: Posterior, per_pressure: FloatArray) -> float:

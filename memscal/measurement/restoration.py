@@ -31,7 +31,6 @@ SAME_LOAD = 0.01
 Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 """A base stress to compare with, or the path of a file that holds one."""
 
-
 #: Coverage factor of 95 %.
 _EXPANDED = 1.96
 #: Differences below this share of the largest stress are negligible.
@@ -93,10 +92,8 @@ def _per_newton(stress: StressProfile | Contact, k: FloatArray) -> FloatArray:
 
 def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[float, int]:
     """Return chi-square of the scan against a calculated stress, and its degrees of freedom."""
-    estimate = posterior.estimate
-    model, points = estimate.model, estimate.points
-    free = points.free
-    centres = np.zeros(free.shape)
+    estimate, points = posterior.estimate, posterior.estimate.points
+    model, free, centres = estimate.model, points.free, np.zeros(points.free.shape)
     centres[free] = posterior.state[posterior.nodes : posterior.nodes + free.sum()]
     geometry = model.geometry(centres)
     pressure = spectrum / film_transfer(scan.film, model.k)
@@ -298,9 +295,8 @@ class Restoration(Result):
     def blurred_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the restored stress blurred again, :math:`G \otimes \sigma_{zz}`, in Pa."""
         k, nodes = self.posterior.estimate.model.k, self.posterior.nodes
-        return np.asarray(
-            self._synthesis(r) @ (sensor_transfer(self.apparatus, k) * self.posterior.state[:nodes])
-        )
+        blurred = sensor_transfer(self.apparatus, k) * self.posterior.state[:nodes]
+        return np.asarray(self._synthesis(r) @ blurred)
 
     def compare(self, expected: Expected) -> StressComparison:
         """Compare a calculated stress with the scan, blurred by G, and with the restored one.
@@ -346,9 +342,8 @@ class Restoration(Result):
     def _at_zero(self) -> FloatArray:
         """Row that reads a transform at k = 0: by a parabola in k^2, as :class:`RadialSpectrum`."""
         wavenumbers = self.posterior.estimate.model.reference.wavenumbers
-        count = wavenumbers.k.size
-        row = np.zeros(count)
-        row[:3] = [RadialSpectrum(wavenumbers, unit).integral for unit in np.eye(3, count)]
+        row = np.zeros(wavenumbers.k.size)
+        row[:3] = [RadialSpectrum(wavenumbers, unit).integral for unit in np.eye(3, row.size)]
         return row
 
     def _along_free(self, values: FloatArray) -> FloatArray:
@@ -358,8 +353,7 @@ class Restoration(Result):
 
     def _synthesis(self, r: ArrayLike) -> FloatArray:
         """Matrix from the transform at the nodes to values at radii."""
-        radii = np.abs(np.asarray(r, dtype=np.float64))
-        reach = reach_of(self.points)
+        radii, reach = np.abs(np.asarray(r, dtype=np.float64)), reach_of(self.points)
         if not np.all(radii <= reach):
             raise InputError(
                 f"A radius is {np.max(radii) * 1e3:.4g} mm.",

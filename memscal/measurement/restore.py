@@ -24,7 +24,7 @@ from memscal.measurement.posterior import (
     restore_posterior,
     sensor_transfer,
 )
-from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration
+from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
     FAILED_CALIBRATION,
@@ -52,7 +52,15 @@ _COMPARED = ("young_modulus", "poisson_ratio", "thickness")
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
     """Refuse a scan of another sensor, of several loads of a curved indenter, or without cov(G)."""
-    _require_same_sensor(scan, apparatus)
+    ours, theirs = scan.sensor, apparatus.sensor
+    other_name = bool(ours.name and theirs.name and ours.name != theirs.name)
+    if other_name or ours.channel != theirs.channel:
+        raise InputError(
+            f"The scan is of sensor {ours.name or 'unnamed'} ({ours.channel}), the apparatus "
+            f"function of sensor {theirs.name or 'unnamed'} ({theirs.channel}).",
+            why="An apparatus function belongs to one sensor and channel.",
+            cure="Give the artifact of the scan's sensor; check /entry/instrument/stress_sensor.",
+        )
     require_covariance(apparatus)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
@@ -64,18 +72,6 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
             why=f"The contact of a {scan.indenter.shape} grows with its load: each has a stress of "
             "its own.",
             cure="Give the scan of one load.",
-        )
-
-
-def _require_same_sensor(scan: Scan, apparatus: ApparatusFunction) -> None:
-    ours, theirs = scan.sensor, apparatus.sensor
-    other_name = bool(ours.name and theirs.name and ours.name != theirs.name)
-    if other_name or ours.channel != theirs.channel:
-        raise InputError(
-            f"The scan is of sensor {ours.name or 'unnamed'} ({ours.channel}), the apparatus "
-            f"function of sensor {theirs.name or 'unnamed'} ({theirs.channel}).",
-            why="An apparatus function belongs to one sensor and channel.",
-            cure="Give the artifact of the scan's sensor; check /entry/instrument/stress_sensor.",
         )
 
 
@@ -147,12 +143,10 @@ _NEGLIGIBLE_FORCE = 0.01
 
 def restoration_checks(restored: Restoration) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
-    checks = [_reconvolution(restored), _force(restored), _film(restored)]
-    checks += _noise(restored)
-    checks.append(_symmetry(restored))
-    checks.append(_outliers(restored))
+    checks = [_reconvolution(restored), _force(restored), _film(restored), *_noise(restored)]
+    checks += [_symmetry(restored), _outliers(restored)]
     if restored.comparison is not None:
-        checks.append(_expected(restored))
+        checks.append(_expected(restored.comparison))
     return tuple(checks)
 
 
@@ -248,9 +242,7 @@ def _outliers(restored: Restoration) -> QualityCheck:
     )
 
 
-def _expected(restored: Restoration) -> QualityCheck:
-    compared = restored.comparison
-    assert compared is not None
+def _expected(compared: StressComparison) -> QualityCheck:
     return check(
         "expected_stress",
         compared.chi_square,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -54,13 +55,19 @@ _CURES = {
 
 @dataclass(frozen=True)
 class _Search:
-    """A number to vary: its name, its least and most count, the plan of a count, and its words."""
+    """A number to vary: its name, its least and most count, and the plan of a count."""
 
     name: str
     least: int
     most: int
     plan: Callable[[int], Plan]
-    words: Callable[[Plan], str]
+
+    def words(self, plan: Plan) -> str:
+        """Return the number that a plan has."""
+        if self.name == "repeats":
+            return f"{plan.repeats} repeats"
+        length = plan.step if self.name == "step" else plan.half_range
+        return f"a {self.name} of {length * 1e3:.4g} mm"
 
 
 def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
@@ -120,31 +127,17 @@ def least_design(
 
 
 def _search(plan: Plan, vary: str) -> _Search:
+    step, width, off = plan.step, 2 * plan.half_range, abs(plan.centre)
     if vary == "repeats":
-        return _Search(
-            "repeats",
-            1,
-            _MOST_REPEATS,
-            lambda count: replace(plan, repeats=count),
-            lambda tried: f"{tried.repeats} repeats",
-        )
+        return _Search(vary, 1, _MOST_REPEATS, lambda count: replace(plan, repeats=count))
+    least, most = _FEWEST_POSITIONS, _MOST_POSITIONS
     if vary == "step":
-        return _Search(
-            "step",
-            _FEWEST_POSITIONS,
-            _MOST_POSITIONS,
-            lambda count: replace(plan, step=2 * plan.half_range / (count - 1)),
-            lambda tried: f"a step of {tried.step * 1e3:.4g} mm",
-        )
+        return _Search(vary, least, most, lambda count: replace(plan, step=width / (count - 1)))
     # The sensor has to lie within.
-    reach = int(np.ceil(2 * abs(plan.centre) / plan.step)) + 1
-    farthest = int(2 * (abs(plan.centre) + _FARTHEST * plan.film.thickness) / plan.step) + 1
+    least = max(least, int(np.ceil(2 * off / step)) + 1)
+    most = max(min(most, int(2 * (off + _FARTHEST * plan.film.thickness) / step) + 1), least)
     return _Search(
-        "half range",
-        max(_FEWEST_POSITIONS, reach),
-        max(min(_MOST_POSITIONS, farthest), reach, _FEWEST_POSITIONS),
-        lambda count: replace(plan, half_range=plan.step * (count - 1) / 2),
-        lambda tried: f"a half range of {tried.half_range * 1e3:.4g} mm",
+        "half range", least, most, lambda count: replace(plan, half_range=step * (count - 1) / 2)
     )
 
 
@@ -186,10 +179,8 @@ def _out_of_reach(search: _Search, targets: Mapping[str, float], tried: list[Des
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
     goal = f"{_in_words(name, targets[name])} is out of reach by the {search.name} alone"
-    problem = (
-        f"{goal[0].upper()}{goal[1:]}: the best is {_in_words(name, _reached(best, name))}, with "
-        f"{search.words(best.plan)}."
-    )
+    reached = f"{_in_words(name, _reached(best, name))}, with {search.words(best.plan)}"
+    problem = f"{goal[0].upper()}{goal[1:]}: the best is {reached}."
     if name == "resolved_wavenumber":
         return _band_ends(best, problem)
     source = best.largest_source(name)
@@ -236,9 +227,8 @@ def design(
 ) -> Design:
     r"""Predict the uncertainties of a calibration from a line scan that is not made yet.
 
-    The covariance of the Gaussian's parameters is that of the linear model about the expected
-    apparatus function, :math:`(J^T J/\sigma^2)^{-1}` (the bound of Cramer and Rao); departures from
-    a Gaussian are weighed as a calibration does.  No scan is simulated, and nothing is drawn.
+    The covariance of the Gaussian's parameters is :math:`(J^T J/\sigma^2)^{-1}` (the bound of
+    Cramer and Rao); departures from a Gaussian are weighed as a calibration does.
 
     Parameters
     ----------
@@ -315,8 +305,6 @@ def varied_designs(planned: Design, vary: str, values: Sequence[float]) -> list[
     designs = []
     for value in values:
         changes: dict[str, Any] = {vary: int(value) if vary == "repeats" else float(value)}
-        try:
+        with suppress(FitError):
             designs.append(evaluate(replace(planned.plan, **changes), planned.method))
-        except FitError:
-            continue
     return designs

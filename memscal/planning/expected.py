@@ -70,14 +70,17 @@ def expected_calibration(plan: Plan, method: Method) -> Expected:
         other=None,
         gaussian_misfit=deconvolution.misfit,
     )
-    return Expected(solution, _propagated(solution))
+    effects = input_effects(solution.scans, solution.stresses, estimate)
+    wavenumbers = fields.along_axis(deconvolution.quotient.window)[0]
+    drawn = drawn_scatter(solution)
+    results = propagate(solution, deconvolution, wavenumbers, effects, {}, drawn)
+    return Expected(solution, results)
 
 
 def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
     """Return the estimate from voltages without noise, at the noise that they state."""
-    errors = model.points.u_errors
-    assert errors is not None
-    weights = np.asarray(1 / errors**2)
+    assert model.points.u_errors is not None
+    weights = np.asarray(1 / model.points.u_errors**2)
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
     basis = departure_basis(model, fit)
     count = float(repeats * weights.size)
@@ -85,14 +88,6 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
     estimate = ProfileEstimate(model, fit, basis, weighed, weights, np.ones_like(weights))
     require_significant(estimate, "Plan a larger half range, more repeats, or a larger load.")
     return estimate
-
-
-def _propagated(solution: Solution) -> Results:
-    estimate, deconvolution = solution.estimate, solution.deconvolution
-    effects = input_effects(solution.scans, solution.stresses, estimate)
-    wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
-    drawn = drawn_scatter(solution)
-    return propagate(solution, deconvolution, wavenumbers, effects, {}, drawn)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
