@@ -1,11 +1,13 @@
 """The HTML report: parsed by another program, self-contained, and safe with hostile names."""
 
 import base64
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
+import memscal
 from memscal.figures.report import html_report
 from memscal.model.apparatus import ParameterSet
 from memscal.model.scan import StressSensor
@@ -100,6 +102,14 @@ def test_values_stand_with_uncertainty_and_unit(page):
     assert rows["centre of the scan"][1] == "(0.1400 ± 0.0042) mm"
     assert rows["baseline"][1] == "(0.0400 ± 0.0011) mV"
     assert rows["resolved up to the wavenumber"][1] == "3.7 rad/mm"
+
+
+def test_the_other_estimate_has_a_table_of_its_own(make_apparatus):
+    data = make_apparatus()
+    of_a = data.parameters.only(("conversion_constant",))
+    other = memscal.OtherEstimate("bayesian", of_a, data.radial_profile)
+    page = Page(html_report(replace(data, other=other)))
+    assert [row[0] for row in page.rows].count("conversion constant") == 2
 
 
 def test_the_budget_adds_up_in_squares(page):
