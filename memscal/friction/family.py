@@ -473,6 +473,7 @@ class FamilySetup:
             axes = {"value": values, "load": self.loads, "k": k}
             keep_contact_table(self.cache, key, axes | arrays)
         fixed = ("spectra", "by_load", "depths", "contact_radii", "convergence")
+        changes = [name for name in arrays if name.startswith(_CHANGE)]
         return ProfileFamily(
             name=name,
             loading=loading,
@@ -480,7 +481,7 @@ class FamilySetup:
             loads=self.loads,
             values=values,
             scale=scale,
-            changes={n.removeprefix(_CHANGE): a for n, a in arrays.items() if _CHANGE in n},
+            changes={source.removeprefix(_CHANGE): arrays[source] for source in changes},
             notes=notes,
             order=self.order,
             **{name: arrays[name] for name in fixed},
