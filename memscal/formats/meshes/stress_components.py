@@ -107,11 +107,18 @@ def _no_such_field(
         more = len(fields) - len(names)
         return f"{where}: " + ", ".join(names) + (f" and {more} more" if more else "")
 
-    places = ((points, "at the nodes"), (cells, "in the cells"))
-    lists = [listed(fields, where) for fields, where in places if fields]
-    has = f"with their numbers of components, {'; '.join(lists)}"
+    lists = [
+        listed(fields, where)
+        for fields, where in ((points, "at the nodes"), (cells, "in the cells"))
+        if fields
+    ]
+    has = (
+        f"It has, with their numbers of components, {'; '.join(lists)}."
+        if lists
+        else ("It has no fields at all.")
+    )
     return InputError(
         f"{mesh.source.file_name} has no field {printable(field, 80)!r}.",
-        why=f"It has, {has}." if lists else "It has no fields at all.",
+        why=has,
         cure="Give the name of the stress among them, or save the mesh with its stress.",
     )
