@@ -26,8 +26,7 @@ from memscal.model.apparatus import (
 def artifact_from(file: SafeFile) -> ApparatusData:
     """Read the apparatus function of an open memscal-artifact file; refuse one that was changed."""
     require_schema(file, ARTIFACT_SCHEMA)
-    problem = altered(file)
-    if problem:
+    if problem := altered(file):
         raise FormatError(
             f"{file.name} was changed after it was written: {problem}",
             why="An apparatus function is used only as its calibration left it.",
@@ -36,15 +35,13 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     load = require_scalar(file, "/entry/indenter/load", "force")
     film = groups.read_film(file, "/entry/sample/film")
     indenter = groups.read_round_indenter(file, "/entry/indenter")
+    transfer = read_record(records.TRANSFER, file, "/entry/transfer_function")
+    reconvolution = read_record(records.RECONVOLUTION, file, "/entry/reconvolution")
     return ApparatusData(
         field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
-        transfer=TransferFunction(
-            **read_record(records.TRANSFER, file, "/entry/transfer_function")
-        ),
-        reconvolution=Reconvolution(
-            **read_record(records.RECONVOLUTION, file, "/entry/reconvolution")
-        ),
+        transfer=TransferFunction(**transfer),
+        reconvolution=Reconvolution(**reconvolution),
         parameters=groups.read_parameters(file, "/entry/parameters"),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file, "/entry/quality"),
@@ -85,15 +82,13 @@ def _entry(data: ApparatusData) -> Group:
         "instrument": groups.instrument_group(data.sensor),
         "indenter": groups.indenter_group(data.indenter, data.load),
         **groups.reference_groups(data.reference),
-        "process": groups.process_group(data.process),
+        "process": write_record(records.PROCESS, data.process),
     }
     if data.other is not None:
-        name = data.other.route
+        name, radial = data.other.route, data.other.radial_profile
         children |= {
-            f"radial_profile_{name}": write_record(records.RADIAL, data.other.radial_profile),
-            f"radial_covariance_{name}": write_record(
-                records.RADIAL_COVARIANCE, data.other.radial_profile
-            ),
+            f"radial_profile_{name}": write_record(records.RADIAL, radial),
+            f"radial_covariance_{name}": write_record(records.RADIAL_COVARIANCE, radial),
             f"parameters_{name}": groups.parameter_group(data.other.parameters, {}),
         }
     return Group("NXentry", children, {"default": "apparatus_function"})
@@ -114,9 +109,8 @@ def _read_radial(file: SafeFile, path: str, covariance_path: str) -> ApparatusRa
     if not file.has(covariance_path):
         return ApparatusRadial(**read_record(records.RADIAL_VERSION_1_0, file, path))
     profile = read_record(records.RADIAL, file, path)
-    covariance = read_record(
-        records.RADIAL_COVARIANCE, file, covariance_path, sizes={"r": profile["r"].size}
-    )
+    sizes = {"r": profile["r"].size}
+    covariance = read_record(records.RADIAL_COVARIANCE, file, covariance_path, sizes=sizes)
     if not np.allclose(covariance["r"], profile["r"], rtol=1e-9, atol=0):
         raise FormatError(
             f"{file.where(covariance_path)}/r differs from {path}/r.",

@@ -63,11 +63,8 @@ def keep_contact_table(folder: CacheFolder, key: str, arrays: Mapping[str, Float
         name: Number(array, *_OTHERS.get(name, _TRANSFORM)) for name, array in arrays.items()
     }
     contacts = Group("NXdata", children, {"signal": "spectra", "axes": _TRANSFORM[1]})
-    entry = Group(
-        "NXentry",
-        {"contacts": contacts, "key": key, "arrays": " ".join(arrays)},
-        {"default": "contacts"},
-    )
+    stored: dict[str, Node] = {"contacts": contacts, "key": key, "arrays": " ".join(arrays)}
+    entry = Group("NXentry", stored, {"default": "contacts"})
     data = tree_to_bytes(file_tree(CONTACT_TABLE_SCHEMA, entry))
     try:
         os.makedirs(folder, exist_ok=True)

@@ -129,8 +129,6 @@ def _place_new(temporary: Path, target: Path) -> None:
     """Give the temporary file its name, only if no other file has taken it in the meantime."""
     try:
         os.link(temporary, target)
-    except FileExistsError:
-        raise
     except OSError as error:
         if error.errno not in _NO_HARD_LINKS:
             raise

@@ -34,8 +34,7 @@ def parameter_dimension(name: str, unit: str = "") -> str:
     """Return the dimension of a parameter: by its SI unit where that is given, else by its name."""
     if unit:
         return dimension_of(unit, f"parameter {name}")
-    declared = declared_quantity(name)
-    if declared is not None:
+    if (declared := declared_quantity(name)) is not None:
         return declared.dimension
     raise InputError(
         f"The unit of {name} is not known.",
@@ -67,9 +66,8 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
     numbers = parameters.covariance * scale[:, None] * scale[None, :]
     children["covariance"] = Number(numbers, "1", _AXES, {"description": _COVARIANCE})
     if budget:
-        children["budget"] = budget_group(
-            budget, dict(zip(parameters.names, dimensions, strict=True))
-        )
+        of_names = dict(zip(parameters.names, dimensions, strict=True))
+        children["budget"] = budget_group(budget, of_names)
     return Group("NXcollection", children)
 
 
@@ -118,12 +116,13 @@ def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
     """Read the uncertainty budget, in SI units; empty where there is none."""
     if not file.has(path):
         return {}
+
+    def names(group: str) -> list[str]:
+        return [str(name) for name in json_value(file, f"{group}/names", list, [])]
+
     return {
-        str(quantity): {
-            str(source): any_scalar(file, f"{path}/{quantity}/{source}")[0]
-            for source in json_value(file, f"{path}/{quantity}/names", list, [])
-        }
-        for quantity in json_value(file, f"{path}/names", list, [])
+        q: {source: any_scalar(file, f"{path}/{q}/{source}")[0] for source in names(f"{path}/{q}")}
+        for q in names(path)
     }
 
 
@@ -238,31 +237,23 @@ def read_profile(
         film = read_film(file, f"{parameters}/film")
     if file.has(f"{parameters}/indenter"):
         indenter = read_indenter(file, f"{parameters}/indenter")
+    defaults = {} if load is None else {"load": load}
     return StressProfile(
         film=film,
         indenter=indenter,
         source=file.source,
         **read_record(records.PROFILE, file, data),
-        **read_record(
-            records.CONTACT, file, parameters, defaults={} if load is None else {"load": load}
-        ),
+        **read_record(records.CONTACT, file, parameters, defaults=defaults),
         **read_record(records.SOLVER, file, process),
         **read_record(records.NUMERICS, file, f"{process}/numerics"),
         **read_record(records.PROFILE_NOTES, file, process),
     )
 
 
-_NOT_STATED = {"program": "", "version": "", "date": ""}
-
-
-def process_group(process: Process) -> Group:
-    """Return what was done as an NXprocess with its notes."""
-    return write_record(records.PROCESS, process)
-
-
 def read_process(file: SafeFile, path: str) -> Process:
     """Read what was done."""
-    return Process(**read_record(records.PROCESS, file, path, defaults=_NOT_STATED))
+    defaults = {"program": "", "version": "", "date": ""}
+    return Process(**read_record(records.PROCESS, file, path, defaults=defaults))
 
 
 def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
@@ -279,12 +270,9 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
 
 def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
     """Read the quality checks, in their order."""
-    names = [str(name) for name in json_value(file, f"{path}/names", list, [])]
-    return tuple(
-        QualityCheck(
-            **read_record(
-                records.CHECK, file, f"{path}/{name}", defaults={"name": name, "meaning": ""}
-            )
-        )
-        for name in names
-    )
+
+    def check(name: str) -> QualityCheck:
+        defaults = {"name": name, "meaning": ""}
+        return QualityCheck(**read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults))
+
+    return tuple(check(str(name)) for name in json_value(file, f"{path}/names", list, []))

@@ -28,6 +28,7 @@ from memscal.formats.stress import profile_paths, stress_from
 from memscal.formats.units import dimension_of, to_si
 from memscal.formats.values import altered, require_schema, units_of
 from memscal.model import records
+from memscal.model.checks import QualityCheck
 from memscal.model.quantities import Record, record
 
 _READERS: dict[str, Callable[[SafeFile], Any]] = {
@@ -107,7 +108,7 @@ def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
                 _quantity_row(file, at, q.key) for at, q in numbers if not q.key.endswith("_errors")
             ],
             "arrays": [_array_row(file, at) for at, q in paths if q.axes],
-            "checks": list(_checks(file)),
+            "checks": [_check_row(check) for check in read_quality(file, "/entry/quality")],
             "provenance": origins(file, [(at, q) for at, q in paths if q.origin]),
         }
 
@@ -137,13 +138,10 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 
 def _digest(file: SafeFile, schema: str) -> Finding:
     """Results must have a digest: scans and references may come from other programs."""
-    if (
-        schema not in (ARTIFACT_SCHEMA, STRESS_SCHEMA)
-        and file.attribute("/", DIGEST_ATTRIBUTE) is None
-    ):
+    result = schema in (ARTIFACT_SCHEMA, STRESS_SCHEMA)
+    if not result and file.attribute("/", DIGEST_ATTRIBUTE) is None:
         return Finding("digest", True, "None: the file was written by another program.")
-    problem = altered(file)
-    if problem:
+    if problem := altered(file):
         return Finding("digest", False, f"The file was changed after it was written: {problem}")
     return Finding("digest", True, "The content is what was written.")
 
@@ -188,9 +186,8 @@ def _uncertainty(file: SafeFile, path: str) -> float | int | None:
     spread, unit, spread_unit = file.array(errors), units_of(file, path), units_of(file, errors)
     if spread_unit != unit:
         dimension = dimension_of(unit or "1", file.where(path))
-        spread = to_si(spread, spread_unit, dimension, file.where(errors)) / to_si(
-            1.0, unit, dimension, file.where(path)
-        )
+        scale = to_si(1.0, unit, dimension, file.where(path))
+        spread = to_si(spread, spread_unit, dimension, file.where(errors)) / scale
     return _plain(spread)
 
 
@@ -207,15 +204,9 @@ def _array_row(file: SafeFile, path: str) -> dict[str, Any]:
     }
 
 
-def _checks(file: SafeFile) -> Iterator[dict[str, Any]]:
-    for check in read_quality(file, "/entry/quality"):
-        yield {
-            "name": check.name,
-            "value": _plain(check.value),
-            "limit": _plain(check.limit),
-            "passed": check.passed,
-            "meaning": check.meaning,
-        }
+def _check_row(check: QualityCheck) -> dict[str, Any]:
+    numbers = {"value": _plain(check.value), "limit": _plain(check.limit)}
+    return {"name": check.name, **numbers, "passed": check.passed, "meaning": check.meaning}
 
 
 def _plain(value: Any) -> float | int | None:

@@ -68,9 +68,6 @@ def write_reference(
         If the file exists or cannot be written.
     """
     data, parameters, process = profile_groups(profile)
-    entry = Group(
-        "NXentry",
-        {"reference": data, "parameters": parameters, "process": process},
-        {"default": "reference"},
-    )
+    stored = {"reference": data, "parameters": parameters, "process": process}
+    entry = Group("NXentry", stored, {"default": "reference"})
     write_tree(file_tree(REFERENCE_SCHEMA, entry), path, overwrite=overwrite)

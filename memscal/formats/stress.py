@@ -48,14 +48,12 @@ _NOT_ALWAYS = ("centre_y", "centre_y_errors", "load_errors", "lubrication")
 
 def _read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
     """Read the points of each channel of a profile; none of a file of version 1.0."""
-    return {
-        channel: MeasuredPoints(
-            **{"noise": None}
-            | read_record(records.points_record(channel), file, f"{path}/points_{channel}")
-        )
+    stored = {
+        channel: read_record(records.points_record(channel), file, f"{path}/points_{channel}")
         for channel in _CHANNELS
         if file.has(f"{path}/points_{channel}")
     }
+    return {name: MeasuredPoints(**{"noise": None} | values) for name, values in stored.items()}
 
 
 def _scans_group(scans: Sequence[MeasuredScan]) -> Group:
@@ -153,8 +151,7 @@ def read_stress(path: str | os.PathLike[str]) -> MeasuredStress:
 def stress_from(file: SafeFile) -> MeasuredStress:
     """Read the measured stress of an open memscal-stress file."""
     require_schema(file, STRESS_SCHEMA)
-    problem = altered(file)
-    if problem:
+    if problem := altered(file):
         raise FormatError(
             f"{file.name} was changed after it was written: {problem}",
             why="Measured stress is used only as it was measured.",
@@ -198,20 +195,19 @@ def profile_paths(file: SafeFile) -> list[str]:
 
 
 def _entry(measured: MeasuredStress) -> Group:
-    names = [f"profile_{i + 1}" for i in range(len(measured.profiles))]
+    profiles = {
+        f"profile_{i + 1}": _profile_group(profile, measured.scans)
+        for i, profile in enumerate(measured.profiles)
+    }
     first = measured.scans[0]
-    sensor = first.sensor.name
-    digest: dict[str, Node] = {}
-    if measured.artifact_digest:
-        digest["content_sha256"] = measured.artifact_digest
+    sensor, digest = first.sensor.name, measured.artifact_digest
     children: dict[str, Node] = {
         "title": f"Stress measured by {sensor}" if sensor else "Measured stress",
-        "profiles": to_json("profiles", names),
-        **{
-            name: _profile_group(profile, measured.scans)
-            for name, profile in zip(names, measured.profiles, strict=True)
-        },
-        "sensor": write_record(records.CONVERSION, measured, **digest),
+        "profiles": to_json("profiles", list(profiles)),
+        **profiles,
+        "sensor": write_record(
+            records.CONVERSION, measured, **({"content_sha256": digest} if digest else {})
+        ),
         "quality": groups.quality_group(measured.checks),
         "overridden": to_json("overridden", list(measured.overridden)),
         # Those of the first scan; each scan states its own beside them.
@@ -220,9 +216,9 @@ def _entry(measured: MeasuredStress) -> Group:
         "indenter": groups.indenter_group(first.indenter),
         "scans": _scans_group(measured.scans),
         "inputs": _inputs_group(measured),
-        "process": groups.process_group(measured.process),
+        "process": write_record(records.PROCESS, measured.process),
     }
-    return Group("NXentry", children, {"default": names[-1]})
+    return Group("NXentry", children, {"default": [*profiles][-1]})
 
 
 def _inputs_group(measured: MeasuredStress) -> Group:
@@ -253,22 +249,23 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     optional = {name: numbers.pop(name) for name in _NOT_ALWAYS if name in numbers}
     if profile.curve_r.size:
         optional["curve"] = write_record(records.STRESS_CURVE, profile)
+    covariances = {
+        _PREFIX + source: si(values, "stress squared", _AXES)
+        for source, values in profile.covariances.items()
+    }
+    points = {
+        f"points_{channel}": write_record(records.points_record(channel), of_channel)
+        for channel, of_channel in profile.points.items()
+    }
+    budget = {"force": profile.force_budget, "maximum": profile.maximum_budget}
     children: dict[str, Node] = {
         **arrays.children,
         "sources": to_json("sources", list(profile.covariances)),
-        **{
-            _PREFIX + source: si(values, "stress squared", _AXES)
-            for source, values in profile.covariances.items()
-        },
+        **covariances,
         "scan": count(scans.index(profile.scan) + 1),
         **numbers,
-        "budget": groups.budget_group(
-            {"force": profile.force_budget, "maximum": profile.maximum_budget}, _BUDGET
-        ),
-        **{
-            f"points_{channel}": write_record(records.points_record(channel), points)
-            for channel, points in profile.points.items()
-        },
+        "budget": groups.budget_group(budget, _BUDGET),
+        **points,
         **optional,
     }
     return replace(arrays, children=children)
@@ -289,10 +286,8 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
     arrays = read_record(records.STRESS_PROFILE, file, path)
     n = arrays["r"].size
     sources = [str(source) for source in json_value(file, f"{path}/sources", list, [])]
-    declared = (
-        Quantity(_PREFIX + source, "stress squared", axes=_AXES, required=True)
-        for source in sources
-    )
+    kind = "stress squared"
+    declared = (Quantity(_PREFIX + name, kind, axes=_AXES, required=True) for name in sources)
     stored = read_record(record("NXdata", *declared), file, path, sizes={"r": n})
     budget = groups.read_budget(file, f"{path}/budget")
     if not sources or not budget.keys() >= _BUDGET.keys():

@@ -12,13 +12,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.formats.cache import CacheFolder
-from memscal.friction.family import (
-    FRICTION_SCALE,
-    STRONGER,
-    FamilySetup,
-    ProfileFamily,
-    parameter_values,
-)
+from memscal.friction.family import STRONGER, FamilySetup, ProfileFamily, parameter_values
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
@@ -55,16 +49,11 @@ def amontons_family(
     if loading not in ("incremental", "total"):
         raise InputError(f'loading is {loading!r}, but it is "incremental" or "total".')
     paths = [setup.path(friction=float(mu), loading=loading) for mu in values]
-    return setup.family(
-        paths, name="amontons", loading=loading, values=values, scale=FRICTION_SCALE
-    )
+    return setup.family(paths, name="amontons", loading=loading, values=values)
 
 
 SLIP_LENGTHS = (0.0, 0.15e-6, 0.5e-6, 1.5e-6, 4e-6, 1e-5, 3e-5, 1e-4, 4e-4, math.inf)
 """Slip lengths in m, from the rigid interface to the one that bears no shear."""
-
-# The scale of both lengths is h^2/R, that of the film's displacements: twice the height to which
-# the sphere rises over a film's thickness.
 
 #: Lengths of a normally compliant interface in units of the film's roughness.
 _LENGTHS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0)
@@ -114,7 +103,6 @@ def elasto_plastic_family(
         name="elasto-plastic",
         loading="incremental",
         values=values,
-        scale=film.thickness**2 / setup.indenter.radius,
         a_length=True,
         notes=(f"Macroscopic friction coefficient {friction:g}.",),
     )
@@ -157,7 +145,6 @@ def normal_compliance_family(
         name="normal-compliance",
         loading="",
         values=values,
-        scale=film.thickness**2 / setup.indenter.radius,
         a_length=True,
         stronger=stronger if law == "greenwood-tripp" else None,
         notes=(_NORMAL_NOTES[law],),
@@ -177,9 +164,8 @@ def _normal(law: str, film: ElasticFilm, length: float, strength: float) -> Inte
         return Interface()
     if law == "exponential":
         meeting = _MEETING * film.contact_modulus
-        return Interface(
-            normal=ExponentialCompliance(decay_length=length, reference_pressure=meeting)
-        )
+        exponential = ExponentialCompliance(decay_length=length, reference_pressure=meeting)
+        return Interface(normal=exponential)
     radius = _SLENDERNESS * length
     density = strength * _ASPERITIES / (radius * length)
     return Interface(
@@ -201,9 +187,9 @@ class LawFamilies:
     ) -> None:
         scan = profiles[0].scan
         self.film: ElasticFilm = scan.film
-        self.indenter: Indenter = scan.indenter
-        self.reach = _REACH * max(float(profile.r[-1]) for profile in profiles)
-        self.cache, self.workers = cache, workers
+        reach = _REACH * max(float(profile.r[-1]) for profile in profiles)
+        how = {"indenter": scan.indenter, "reach": reach, "cache": cache, "workers": workers}
+        self._how: dict[str, Any] = how
 
     def rigid(
         self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
@@ -212,8 +198,8 @@ class LawFamilies:
         if calculated is not None and tuple(calculated.values[[0, -1]]) != (0.0, math.inf):
             calculated = None
 
-        def family() -> ProfileFamily:
-            return amontons_family(self.film, self.indenter, _distinct(profiles), **self._how)
+        def family(loads: FloatArray) -> ProfileFamily:
+            return amontons_family(self.film, loads=loads, **self._how)
 
         return _at_loads(profiles, calculated, family)
 
@@ -229,13 +215,9 @@ class LawFamilies:
         The change by its standard uncertainty is named ``"macroscopic_friction"``.
         """
 
-        def at(film: ElasticFilm, mu: float) -> ProfileFamily:
-            return elasto_plastic_family(
-                film, self.indenter, _distinct(profiles), friction=mu, **self._how
-            )
-
-        def family() -> ProfileFamily:
-            made = at(self.film, friction)
+        def family(loads: FloatArray) -> ProfileFamily:
+            how = {"loads": loads, **self._how}
+            made = elasto_plastic_family(self.film, friction=friction, **how)
             if uncertainty is None:
                 return made
             # Only its stresses count: without uncertainties it takes a third of the time.
@@ -245,7 +227,8 @@ class LawFamilies:
                 thickness_uncertainty=None,
                 poisson_ratio_uncertainty=None,
             )
-            change = at(bare, friction + uncertainty).spectra - made.spectra
+            more = elasto_plastic_family(bare, friction=friction + uncertainty, **how)
+            change = more.spectra - made.spectra
             return replace(made, changes={**made.changes, "macroscopic_friction": change})
 
         return _at_loads(profiles, calculated, family)
@@ -255,22 +238,16 @@ class LawFamilies:
     ) -> ProfileFamily:
         """Return contacts without friction that yield normally."""
 
-        def family() -> ProfileFamily:
-            return normal_compliance_family(
-                self.film, self.indenter, _distinct(profiles), **self._how
-            )
+        def family(loads: FloatArray) -> ProfileFamily:
+            return normal_compliance_family(self.film, loads=loads, **self._how)
 
         return _at_loads(profiles, calculated, family)
-
-    @property
-    def _how(self) -> dict[str, Any]:
-        return {"reach": self.reach, "cache": self.cache, "workers": self.workers}
 
 
 def _at_loads(
     profiles: Sequence[MeasuredProfile],
     calculated: ProfileFamily | None,
-    calculate: Callable[[], ProfileFamily],
+    calculate: Callable[[FloatArray], ProfileFamily],
 ) -> ProfileFamily:
     """Return a family at the nearest of its loads; calculate it where one is not near enough.
 
@@ -282,14 +259,9 @@ def _at_loads(
         return np.asarray(np.abs(np.log(np.divide.outer(loads, family.loads))))
 
     if calculated is None or np.any(apart(calculated).min(axis=1) > _NEAR):
-        calculated = calculate()
+        distinct: list[float] = []
+        for load in sorted(loads.tolist()):
+            if not distinct or math.log(load / distinct[-1]) > _NEAR:
+                distinct.append(load)
+        calculated = calculate(np.array(distinct))
     return calculated.only(apart(calculated).argmin(axis=1).tolist())
-
-
-def _distinct(profiles: Sequence[MeasuredProfile]) -> FloatArray:
-    """Return the loads that are not near to a smaller one."""
-    loads: list[float] = []
-    for load in sorted(profile.load for profile in profiles):
-        if not loads or math.log(load / loads[-1]) > _NEAR:
-            loads.append(load)
-    return np.array(loads)

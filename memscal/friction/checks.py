@@ -42,21 +42,21 @@ def comparison_checks(
     return tuple(checks)
 
 
-def _best(estimates: Iterable[BoundedEstimate]) -> BoundedEstimate:
-    return min(estimates, key=lambda estimate: estimate.least)
+def _reduced(name: str, estimates: Iterable[BoundedEstimate], meaning: str) -> QualityCheck:
+    """Return the check of the reduced chi-square of the best of some estimates."""
+    best = min(estimates, key=lambda estimate: estimate.least)
+    limit = chi_square_limit(best.degrees) / best.degrees
+    return check(name, best.least / best.degrees, limit, meaning, best.p_value)
 
 
 def _profile(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
-    best = _best(load.by_profile for load in loads)
-    return check(
+    return _reduced(
         f"profile_chi_square_{number}",
-        best.least / best.degrees,
-        chi_square_limit(best.degrees) / best.degrees,
+        (load.by_profile for load in loads),
         f"Reduced chi-square of {_place(loads[0].profile)} against the friction coefficient "
         "that explains it best. A failure means that no calculated contact does: noise or scatter "
         "larger than stated, another shape of contact, or a film, gain or load that is not as "
         "stated.",
-        best.p_value,
     )
 
 
@@ -72,22 +72,18 @@ def _bracketing(number: int, loads: Sequence[LoadComparison]) -> QualityCheck:
 
 
 def _together(lubrication: str, by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
-    best = _best(by_loading.values())
-    suffix = f"_{lubrication}" if lubrication else ""
-    return check(
-        f"joint_chi_square{suffix}",
-        best.least / best.degrees,
-        chi_square_limit(best.degrees) / best.degrees,
+    return _reduced(
+        f"joint_chi_square{f'_{lubrication}' if lubrication else ''}",
+        by_loading.values(),
         f"Reduced chi-square of all {f'{lubrication} ' if lubrication else ''}loads against one "
         "friction coefficient. A failure while the single loads pass means that friction changes "
         "with the load: look at the coefficient of each load, or at laws of the interface.",
-        best.p_value,
     )
 
 
 def _frictionless(by_loading: Mapping[str, BoundedEstimate]) -> QualityCheck:
     # The first of the values is no friction.
-    rises = [float(joint.chi_square[0]) - joint.least for joint in by_loading.values()]
+    rises = (float(joint.chi_square[0]) - joint.least for joint in by_loading.values())
     least = max(min(rises), 0.0)
     return check(
         "lubricated_frictionless",
@@ -144,21 +140,17 @@ def _loadings(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> Iterator[Me
         first, second = by_loading["incremental"], by_loading["total"]
         of = f"the {lubrication} loads" if lubrication else "the loads"
         if first.value is None or second.value is None:
-            if (first.value is None) != (second.value is None):
-                yield Message(
-                    "loading",
-                    f"The definitions of the loading disagree for {of}: incremental loading gives "
-                    f"{in_words(first)}, total loading {in_words(second)}.",
-                )
-            continue
-        apart = abs(first.value - second.value)
-        errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
-        if errors and apart > max(errors):
+            disagree, by = (first.value is None) != (second.value is None), ""
+        else:
+            apart = abs(first.value - second.value)
+            errors = [f.standard_uncertainty for f in (first, second) if f.standard_uncertainty]
+            disagree = bool(errors) and apart > max(errors)
+            by = f" by {apart:.2g}, more than one standard uncertainty"
+        if disagree:
             yield Message(
                 "loading",
-                f"The definitions of the loading disagree for {of} by {apart:.2g}, more than one "
-                f"standard uncertainty: incremental loading gives {in_words(first)}, total "
-                f"loading {in_words(second)}.",
+                f"The definitions of the loading disagree for {of}{by}: incremental loading gives "
+                f"{in_words(first)}, total loading {in_words(second)}.",
             )
 
 
@@ -194,11 +186,8 @@ def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
         worst = float(np.nanmax(family.convergence, initial=0.0))
         if worst > _COARSE:
             words = f" ({loading} loading)" if loading else ""
-            yield Message(
-                "convergence",
-                f"The calculated contacts{words} have converged to {worst:.1%} of "
-                "their stress only.",
-            )
+            text = f"contacts{words} have converged to {worst:.1%} of their stress only."
+            yield Message("convergence", f"The calculated {text}")
         yield from (Message("calculated", text) for text in family.notes)
 
 

@@ -167,9 +167,8 @@ class Confrontation:
         a = self.sensor.conversion_constant
         noise = a * random_uncertainty(profile.maximum_budget)
         points = [points_at(np.zeros(1), self.points[index], a * profile.maximum, noise)]
-        loads = [self.loads[index]]
-        along = likelihood(points, self.sensor, self.members, loads)
-        return self._effective(along, points, loads)
+        along = likelihood(points, self.sensor, self.members, [self.loads[index]])
+        return self._effective(along, points, [self.loads[index]])
 
     def at(self, values: FloatArray, index: int) -> FloatArray:
         """Return chi-square of one load at values that are among the fine ones."""
@@ -201,11 +200,11 @@ class Confrontation:
         self, value: float, points: Sequence[LoadPoints], loads: Sequence[int]
     ) -> dict[str, float]:
         """Contribution of each source to the coefficient, by the slope at its best value."""
-        t, scale = self.family.coordinate(value), self.family.scale
+        t = self.family.coordinate(value)
         if t >= 1:
             return {}
         along = likelihood(points, self.sensor, self.family.at(value), loads)
-        stretch = scale / (1 - t) ** 2
+        stretch = self.family.scale / (1 - t) ** 2
         return {source: stretch * share for source, share in along.budget(0).items()}
 
 
@@ -214,14 +213,8 @@ def confront(
 ) -> Confrontation:
     """Hold measured loads against a family."""
     members = family.at(fine_values(family))
-    return Confrontation(
-        family=family,
-        sensor=sensor,
-        members=members,
-        points=tuple(points),
-        loads=tuple(loads),
-        whole=likelihood(points, sensor, members, loads),
-    )
+    whole = likelihood(points, sensor, members, loads)
+    return Confrontation(family, sensor, members, tuple(points), tuple(loads), whole)
 
 
 def fine_values(family: ProfileFamily) -> FloatArray:
@@ -255,7 +248,6 @@ def load_comparison(
     calculated, errors = _blurred(confronted.sensor, family, load, profile.r, points)
     top, top_errors = _blurred(confronted.sensor, family, load, np.zeros(1), points)
     chi_square = confronted.at(family.values, index)
-    degrees = points.degrees
     ratio = profile.maximum / float(top[0, 0])
     return LoadComparison(
         profile=profile,
@@ -270,8 +262,8 @@ def load_comparison(
         calculated_errors=errors,
         p_max=top[:, 0],
         chi_square=chi_square,
-        p_values=np.asarray(chdtrc(degrees, chi_square)),
-        degrees=degrees,
+        p_values=np.asarray(chdtrc(points.degrees, chi_square)),
+        degrees=points.degrees,
         bracketed=bracketed_share(profile.s_zz, profile.s_zz_errors, calculated, errors),
         by_maximum=confronted.effective_of_maximum(profile, index),
         by_profile=confronted.effective([index]),
@@ -337,18 +329,11 @@ def dry_against_lubricated(
     kept = _common(sides[0].offset, sides[1].offset)
     if kept[0].size < _FEWEST_PLACES:
         return None
-    predicted = [
-        predict(side, sensor, frictionless, load) for side, load in zip(sides, loads, strict=True)
-    ]
+    predicted = [predict(sides[i], sensor, frictionless, loads[i]) for i in range(2)]
+    both = list(zip(sides, predicted, kept, strict=True))
     # What the frictionless contact says of other places and loads is taken off both.
-    dry, wet = (
-        (side.u - of_side.signal[0])[places]
-        for side, of_side, places in zip(sides, predicted, kept, strict=True)
-    )
-    covariance = sum(
-        _covariance(side, of_side)[np.ix_(places, places)]
-        for side, of_side, places in zip(sides, predicted, kept, strict=True)
-    )
+    dry, wet = ((side.u - of_side.signal[0])[places] for side, of_side, places in both)
+    covariance = sum(_covariance(side, p)[np.ix_(places, places)] for side, p, places in both)
     flat = np.column_stack([sides[0].flat, predicted[0].slope[0] * sides[0].side])[kept[0]]
     chi_square = _chi_square(dry - wet, np.asarray(covariance), flat)
     degrees = kept[0].size - flat.shape[1]
@@ -406,18 +391,15 @@ def _difference(
     conversion_share: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Return dry minus lubricated stress at the dry scan's places, and its uncertainty, in Pa."""
-    orders = [np.argsort(profile.x) for profile in profiles]
-    stresses = [
-        profile.s_zz[order][places]
-        for profile, order, places in zip(profiles, orders, kept, strict=True)
-    ]
+    orders = [np.argsort(profiles[i].x)[kept[i]] for i in range(2)]
+    dry, wet = (profiles[i].s_zz[orders[i]] for i in range(2))
     farther = sides[0].radius[kept[0]] - sides[1].radius[kept[1]]
     heavier = math.log(profiles[0].load / profiles[1].load)
     moved = predicted[1].slope[0][kept[1]] * farther + predicted[1].by_load[0][kept[1]] * heavier
-    difference = stresses[0] - stresses[1] - moved / sensor.conversion_constant
+    difference = dry - wet - moved / sensor.conversion_constant
     variance = (conversion_share * difference) ** 2
-    for profile, order, places in zip(profiles, orders, kept, strict=True):
+    for profile, order in zip(profiles, orders, strict=True):
         for source, covariance in profile.covariances.items():
             if source != "conversion_constant":
-                variance = variance + np.diag(covariance)[order][places]
+                variance = variance + np.diag(covariance)[order]
     return difference, np.sqrt(variance)

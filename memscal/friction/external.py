@@ -100,16 +100,15 @@ def _grid(
     grid, missing = [], []
     for mu in frictions:
         row = [_nearest(tables, float(mu), float(load)) for load in loads]
-        missing += [
-            f"{load:g} N with friction {mu:g}"
-            for load, cell in zip(loads, row, strict=True)
-            if cell is None
-        ]
+        absent = (load for load, cell in zip(loads, row, strict=True) if cell is None)
+        missing += [f"{load:g} N with friction {mu:g}" for load in absent]
         grid.append([cell for cell in row if cell is not None])
     if missing:
         stated = sorted({profile.load for profile in tables})
+        more = len(missing) - _MOST_NAMED
+        listed = missing[:_MOST_NAMED] + [f"and {more} more"] * (more > 0)
         raise InputError(
-            f"No table was given for {_listed(missing)}.",
+            f"No table was given for {'; '.join(listed)}.",
             why=f"The tables are for {', '.join(f'{load:g}' for load in stated)} N; a load must be "
             f"within {_SAME_LOAD:.0%} of one of them, because a sphere's stress is not "
             "proportional to its load.",
@@ -119,17 +118,8 @@ def _grid(
     return grid
 
 
-def _listed(names: Sequence[str]) -> str:
-    shown = "; ".join(names[:_MOST_NAMED])
-    return shown + (f"; and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else "")
-
-
 def _nearest(tables: Sequence[StressProfile], mu: float, load: float) -> StressProfile | None:
-    near = [
-        profile
-        for profile in tables
-        if _friction(profile) == mu and abs(profile.load / load - 1) <= _SAME_LOAD
-    ]
+    near = [p for p in tables if _friction(p) == mu and abs(p.load / load - 1) <= _SAME_LOAD]
     near.sort(key=lambda profile: abs(profile.load - load))
     if len(near) > 1 and near[0].load == near[1].load:
         raise InputError(
@@ -181,9 +171,7 @@ def _friction(profile: StressProfile) -> float:
 
 
 def _name(profile: StressProfile) -> str:
-    if profile.source is not None:
-        return profile.source.file_name
-    return f"A table for {profile.load:g} N"
+    return profile.source.file_name if profile.source else f"A table for {profile.load:g} N"
 
 
 def _half_width(profile: StressProfile) -> float:

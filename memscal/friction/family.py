@@ -237,19 +237,16 @@ def _scaled_changes(
     The keywords are the derivatives by P, k, :math:`\ell` and s; s is that of asperities alone.
     """
     stiffer = spectra - load
-    derivatives = {
-        "young_modulus": stiffer,
-        "thickness": 3 * stiffer + wavenumber - 2 * length - strength,
-        "indenter_radius": -stiffer + length + strength,
-    }
+    thicker = 3 * stiffer + wavenumber - 2 * length - strength
+    larger = -stiffer + length + strength
     stated = {
-        "young_modulus": (film.young_modulus, film.young_modulus_uncertainty),
-        "thickness": (film.thickness, film.thickness_uncertainty),
-        "indenter_radius": (indenter.radius, indenter.radius_uncertainty),
+        "young_modulus": (stiffer, film.young_modulus, film.young_modulus_uncertainty),
+        "thickness": (thicker, film.thickness, film.thickness_uncertainty),
+        "indenter_radius": (larger, indenter.radius, indenter.radius_uncertainty),
     }
     return {
-        source: np.asarray(derivatives[source] * (uncertainty / value))
-        for source, (value, uncertainty) in stated.items()
+        source: np.asarray(derivative * (uncertainty / value))
+        for source, (derivative, value, uncertainty) in stated.items()
         if uncertainty is not None
     }
 
@@ -319,19 +316,19 @@ def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
     solved = _contacts(path, visited.ravel()[order])
     contacts = [solved[place] for place in np.argsort(order)]
     nominal = contacts[:count]
-    spectra = np.array([_spectrum(path, contact, k) for contact in nominal])
+
+    def seen(some: Sequence[Contact], k: FloatArray) -> FloatArray:
+        return np.array(
+            [c.base_shear_spectrum(k) if path.order else c.base_spectrum(k) for c in some]
+        )
+
+    spectra = seen(nominal, k)
     by_load = by_wavenumber = np.zeros_like(spectra)
     if path.derivatives:
-        lower, upper = (
-            np.array([_spectrum(path, contact, k) for contact in contacts[first:][:count]])
-            for first in (count, 2 * count)
-        )
+        lower, upper = seen(contacts[count:][:count], k), seen(contacts[2 * count :], k)
         # By P d/dP and not by the logarithm's own step: the force is then met exactly.
         by_load = (upper - lower) / (_NEIGHBOURS[1] - _NEIGHBOURS[0])
-        above, below = (
-            np.array([_spectrum(path, contact, k * stretch) for contact in nominal])
-            for stretch in (1 + _STRETCH, 1 - _STRETCH)
-        )
+        above, below = seen(nominal, k * (1 + _STRETCH)), seen(nominal, k * (1 - _STRETCH))
         by_wavenumber = (above - below) / (2 * _STRETCH)
     return {
         "spectra": spectra,
@@ -341,10 +338,6 @@ def _solve(path: LoadingPath, k: FloatArray) -> dict[str, FloatArray]:
         "contact_radii": np.array([contact.contact_radius for contact in nominal]),
         "convergence": np.array([contact.convergence for contact in nominal]),
     }
-
-
-def _spectrum(path: LoadingPath, contact: Contact, k: FloatArray) -> FloatArray:
-    return contact.base_shear_spectrum(k) if path.order else contact.base_spectrum(k)
 
 
 def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
@@ -393,16 +386,9 @@ def _family_key(
     requests = [asdict(path) | {"law": type(path.interface.normal).__name__} for path in paths]
     for request in requests:
         request["film"].pop("name")
-    return table_key(
-        {
-            "version": __version__,
-            "revision": _REVISION,
-            "paths": requests,
-            "values": values.tolist(),
-            "scale": scale,
-            "k": hashlib.sha256(k.tobytes()).hexdigest(),
-        }
-    )
+    numbers = {"values": values.tolist(), "scale": scale, "paths": requests}
+    digest = hashlib.sha256(k.tobytes()).hexdigest()
+    return table_key({"version": __version__, "revision": _REVISION, "k": digest, **numbers})
 
 
 #: Factor by which the law of an interface is made stronger to see what that changes.
@@ -469,7 +455,6 @@ class FamilySetup:
         name: str,
         loading: str,
         values: FloatArray,
-        scale: float,
         a_length: bool = False,
         stronger: Sequence[LoadingPath] | None = None,
         notes: tuple[str, ...] = (),
@@ -479,6 +464,8 @@ class FamilySetup:
         ``stronger`` are paths with an interface stronger by ``STRONGER``, where that matters.
         """
         k = self.wavenumbers.k
+        # Lengths scale as the film's displacements: twice the sphere's rise over its thickness.
+        scale = self.film.thickness**2 / self.indenter.radius if a_length else FRICTION_SCALE
         key = _family_key(paths, values, scale, k)
         arrays = find_contact_table(self.cache, key)
         if arrays is None:
@@ -486,6 +473,7 @@ class FamilySetup:
             axes = {"value": values, "load": self.loads, "k": k}
             keep_contact_table(self.cache, key, axes | arrays)
         fixed = ("spectra", "by_load", "depths", "contact_radii", "convergence")
+        changes = [name for name in arrays if name.startswith(_CHANGE)]
         return ProfileFamily(
             name=name,
             loading=loading,
@@ -493,11 +481,7 @@ class FamilySetup:
             loads=self.loads,
             values=values,
             scale=scale,
-            changes={
-                name.removeprefix(_CHANGE): array
-                for name, array in arrays.items()
-                if name.startswith(_CHANGE)
-            },
+            changes={source.removeprefix(_CHANGE): arrays[source] for source in changes},
             notes=notes,
             order=self.order,
             **{name: arrays[name] for name in fixed},

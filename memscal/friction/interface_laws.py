@@ -110,14 +110,8 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     t = both[order]
     logs, chi_square = log_likelihood(tables)
     middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
-    return LawCurve(
-        values=family.values_at(t),
-        coordinates=t,
-        edges=family.values_at(middles),
-        tables=tables,
-        log_likelihood=logs[:, 0],
-        chi_square=chi_square[:, 0],
-    )
+    values, edges = family.values_at(t), family.values_at(middles)
+    return LawCurve(values, t, edges, tables, logs[:, 0], chi_square[:, 0])
 
 
 def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> InterfaceLaw:
@@ -140,10 +134,8 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
     evidence = evidence_of_each(tables, weights)
     start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
     chosen, top, chi_square = _best_of_each(tables, start)
-    best = tuple(
-        float(along.values[nodes][place])
-        for along, nodes, place in zip(curves, near, chosen, strict=True)
-    )
+    triples = zip(curves, near, chosen, strict=True)
+    best = tuple(float(along.values[nodes][place]) for along, nodes, place in triples)
     return _law(name, best, evidence.log, evidence.error, top, chi_square, degrees - len(curves))
 
 
@@ -174,12 +166,8 @@ def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int]
     for _ in range(_SWEEPS):
         before = top
         for j, table in enumerate(tables):
-            others = [
-                tuple(array[chosen[i]] for array in other.arrays)
-                for i, other in enumerate(tables)
-                if i != j
-            ]
-            sums = [np.sum(arrays, axis=0) for arrays in zip(*others, strict=True)] or [0.0] * 4
+            at = [[a[chosen[i]] for a in other.arrays] for i, other in enumerate(tables) if i != j]
+            sums = [np.sum(arrays, axis=0) for arrays in zip(*at, strict=True)] or [0.0] * 4
             both = Tables(*(a + s for a, s in zip(table.arrays, sums, strict=True)))
             logs, squares = log_likelihood(both)
             chosen[j] = int(np.argmax(logs[:, 0]))
@@ -252,11 +240,8 @@ def _length_reason(what: str, interval: Interval, last: float) -> str:
     low, high = interval.low, interval.high
     if low > 0 and high is not None:
         return ""
-    end = (
-        "one that bears no shear"
-        if math.isinf(last)
-        else f"the largest that was calculated, {last / _UM:.3g} um,"
-    )
+    largest = f"the largest that was calculated, {last / _UM:.3g} um,"
+    end = "one that bears no shear" if math.isinf(last) else largest
     if low > 0:
         return (
             f"The {what} is not identifiable above {low / _UM:.3g} um: larger ones, {end} "

@@ -262,18 +262,22 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
 
 @dataclass(frozen=True, eq=False)
 class _Bessel:
-    """Inverse transforms at distances (n,) in m, and their slopes; repeats share theirs."""
+    """Inverse transforms at distances (n,) in m, and their slopes; repeats share theirs.
+
+    Both are times the ``sign`` (n,): of a vector's component, the side of the centre.
+    """
 
     radius: FloatArray
     wavenumbers: Wavenumbers
+    sign: FloatArray | float = 1.0
 
     def values(self, spectra: FloatArray) -> FloatArray:
         """Values of transforms (V, K) at the distances, shape (V, n)."""
-        return np.asarray((spectra @ self._even.T)[:, self._unique[1]])
+        return np.asarray(self.sign * (spectra @ self._even.T)[:, self._unique[1]])
 
     def slopes(self, spectra: FloatArray) -> FloatArray:
         """Their derivatives by the distance, shape (V, n)."""
-        return np.asarray((spectra @ self._odd.T)[:, self._unique[1]])
+        return np.asarray(self.sign * (spectra @ self._odd.T)[:, self._unique[1]])
 
     @cached_property
     def _unique(self) -> tuple[FloatArray, NDArray[np.intp]]:
@@ -290,17 +294,8 @@ class _Bessel:
         return np.asarray(-j1(phase) * self.wavenumbers.weights * self.wavenumbers.k)
 
 
-@dataclass(frozen=True, eq=False)
 class _VectorBessel(_Bessel):
-    """The same of a vector's component, of order one; ``sign`` (n,): the side of the centre."""
-
-    sign: FloatArray
-
-    def values(self, spectra: FloatArray) -> FloatArray:
-        return np.asarray(self.sign * super().values(spectra))
-
-    def slopes(self, spectra: FloatArray) -> FloatArray:
-        return np.asarray(self.sign * super().slopes(spectra))
+    """The same of a vector's component, of order one."""
 
     @cached_property
     def _even(self) -> FloatArray:
@@ -429,17 +424,16 @@ class Likelihood:
             for name, root in load.noises.items():
                 share = root[index] * piece if root.ndim == 2 else root[index].T @ piece
                 shares[name] = float(np.hypot(shares.get(name, 0.0), np.linalg.norm(share)))
-        for source, columns in self._columns.items():
-            shares[source] = float(np.linalg.norm(gain @ columns[index]))
+        for source in self._widths:
+            columns = np.concatenate([self._columns_of(load, source)[index] for load in self.loads])
+            shares[source] = float(np.linalg.norm(gain @ columns))
         return shares
 
     def tables(self) -> Tables:
         """Return what each load tells, as the evidence of laws of the interface is made of."""
         columns = [self._all_columns(load) for load in self.loads]
-        pulls = [
-            np.einsum("vnq,vn->vq", column, load.residual)
-            for column, load in zip(columns, self.loads, strict=True)
-        ]
+        pairs = zip(columns, self.loads, strict=True)
+        pulls = [np.einsum("vnq,vn->vq", column, load.residual) for column, load in pairs]
         return Tables(
             squares=np.stack([np.sum(load.residual**2, axis=-1) for load in self.loads], axis=1),
             pulls=np.stack(pulls, axis=1),
@@ -464,14 +458,6 @@ class Likelihood:
     def _all_columns(self, load: Standardised) -> FloatArray:
         columns = [self._columns_of(load, source) for source in self._widths]
         return np.concatenate([np.zeros((*load.residual.shape, 0)), *columns], axis=-1)
-
-    @cached_property
-    def _columns(self) -> dict[str, FloatArray]:
-        """Systematic columns over all points by source."""
-        return {
-            source: np.concatenate([self._columns_of(load, source) for load in self.loads], axis=1)
-            for source in self._widths
-        }
 
     @cached_property
     def _systematic(self) -> tuple[FloatArray, FloatArray]:

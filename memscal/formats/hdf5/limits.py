@@ -121,10 +121,8 @@ def _messages(data: bytes, header: int) -> Iterator[tuple[int, int, bytes]]:
         position, size = blocks.pop()
         end = min(position + size, len(data))
         while position + prefix <= end:
-            if prefix == 8:
-                kind, length, flags = struct.unpack_from("<HHB", data, position)
-            else:
-                kind, length, flags = struct.unpack_from("<BHB", data, position)
+            layout = "<HHB" if prefix == 8 else "<BHB"
+            kind, length, flags = struct.unpack_from(layout, data, position)
             body = data[position + prefix : position + prefix + length]
             if kind == _CONTINUATION:
                 address, extent = struct.unpack_from("<QQ", body)
@@ -140,6 +138,7 @@ _MAX_RANK = 4
 _MAX_CHUNKS = 2**16
 _MIN_CHUNK_LIMIT = 2**20
 _MAX_NUMBER_BYTES = 16
+_UNWRITTEN = "was never written in full", "Values that are not there would read as zeros."
 
 
 def refuse(where: str, problem: str, why: str) -> UnsafeFileError:
@@ -203,9 +202,7 @@ def _check_storage(where: str, dataset: Any) -> None:
     if layout == h5py.h5d.CHUNKED:
         _check_chunks(where, dataset, plist)
     elif claimed_bytes(dataset) and dataset.get_storage_size() < claimed_bytes(dataset):
-        raise refuse(
-            where, "was never written in full", "Values that are not there would read as zeros."
-        )
+        raise refuse(where, *_UNWRITTEN)
 
 
 def _check_filters(where: str, plist: Any) -> None:
@@ -247,6 +244,4 @@ def _check_chunks(where: str, dataset: Any, plist: Any) -> None:
     if number > _MAX_CHUNKS:
         raise refuse(where, f"is cut into {number:,} chunks", f"At most {_MAX_CHUNKS:,} are read.")
     if number and dataset.get_num_chunks() < number:
-        raise refuse(
-            where, "was never written in full", "Values that are not there would read as zeros."
-        )
+        raise refuse(where, *_UNWRITTEN)

@@ -11,6 +11,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from io import BytesIO
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -229,16 +230,10 @@ class SafeFile:
             address = h5py.h5o.get_info(item).addr
             for length in attribute_text_lengths(self._data, address, key, number):
                 self._check_length(f"{path}@{name}", length)
-        value = h5py.AttributeManager(_Owner(item))[name]
+        # h5py's attribute access needs nothing of an object but its identifier.
+        value = h5py.AttributeManager(SimpleNamespace(id=item))[name]
         if not text:
             return np.asarray(value).reshape(-1)[0].item() if number else None
         if len(attribute.shape) == 0:
             return printable(value, _MAX_ATTRIBUTE_BYTES)
         return tuple(printable(text, _MAX_ATTRIBUTE_BYTES) for text in value)
-
-
-class _Owner:
-    """What h5py's attribute access needs of an object: its identifier."""
-
-    def __init__(self, identifier: Any) -> None:
-        self.id = identifier

@@ -139,29 +139,17 @@ def content_digest(items: Iterable[DigestItem]) -> str:
     for path, value, attributes in items:
         kind, shape, data = _canonical(value)
         plain = {name: _plain(attribute) for name, attribute in attributes.items()}
-        line = json.dumps(
-            [path, kind, shape, plain, hashlib.sha256(data).hexdigest()],
-            sort_keys=True,
-            separators=(",", ":"),
-        )
+        item = [path, kind, shape, plain, hashlib.sha256(data).hexdigest()]
+        line = json.dumps(item, sort_keys=True, separators=(",", ":"))
         total.update(line.encode("ascii") + b"\n")
     return total.hexdigest()
-
-
-def contents_of(root: Group) -> dict[str, list[str]]:
-    """Return each path of a tree with the names of its attributes."""
-    return {path: sorted(_attributes(node)) for path, node in walk(root)}
 
 
 def tree_items(root: Group) -> Iterable[DigestItem]:
     """Yield what :func:`content_digest` needs from a tree that is about to be written."""
     for path, node in sorted(walk(root), key=lambda item: item[0]):
-        if isinstance(node, Group):
-            yield path, None, _attributes(node)
-        elif isinstance(node, Number):
-            yield path, node.values, _attributes(node)
-        else:
-            yield path, node, {}
+        value = node.values if isinstance(node, Number) else node
+        yield path, None if isinstance(value, Group) else value, _attributes(node)
 
 
 def _attributes(node: Node) -> dict[str, Any]:
@@ -196,27 +184,19 @@ _COMPRESS_ABOVE = 4096
 
 def file_tree(schema: str, entry: Group) -> Group:
     """Return the root of a file around its entry: schema, contents list and digest."""
-    root = Group(
-        "NXroot",
-        {"entry": entry},
-        {"default": "entry", SCHEMA_ATTRIBUTE: schema, VERSION_ATTRIBUTE: SCHEMA_VERSION},
-    )
+    schemas = {SCHEMA_ATTRIBUTE: schema, VERSION_ATTRIBUTE: SCHEMA_VERSION}
+    root = Group("NXroot", {"entry": entry}, {"default": "entry", **schemas})
     listed = _with_contents(root, "")
     # The list names itself, so it is made once with a place for itself and once in full.
-    listed = _with_contents(root, to_json("contents", contents_of(listed)))
+    contents = {path: sorted(_attributes(node)) for path, node in walk(listed)}
+    listed = _with_contents(root, to_json("contents", contents))
     digest = content_digest(tree_items(listed))
     return replace(listed, attributes={**listed.attributes, DIGEST_ATTRIBUTE: digest})
 
 
-def write_tree(
-    root: Group,
-    path: str | os.PathLike[str],
-    *,
-    overwrite: bool = False,
-    inputs: Iterable[str | os.PathLike[str]] = (),
-) -> None:
+def write_tree(root: Group, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write a tree as one HDF5 file, whole or not at all."""
-    atomic_write_bytes(path, tree_to_bytes(root), overwrite=overwrite, inputs=inputs)
+    atomic_write_bytes(path, tree_to_bytes(root), overwrite=overwrite)
 
 
 def tree_to_bytes(root: Group) -> bytes:
@@ -260,7 +240,7 @@ def _write_number(file: Any, path: str, node: Number) -> None:
     if node.values.nbytes > _COMPRESS_ABOVE:
         storage = {"compression": "gzip", "shuffle": True, "fletcher32": True, "chunks": True}
     dataset = file.create_dataset(path, data=node.values, track_times=False, **storage)
-    for name, value in {"units": node.units, **node.attributes}.items():
+    for name, value in _attributes(node).items():
         _write_attribute(dataset, name, value)
 
 

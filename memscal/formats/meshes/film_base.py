@@ -137,12 +137,8 @@ def average_over_circles(
     distinct, index = np.unique(np.round(places / reach, 7), axis=0, return_inverse=True)
     number = np.bincount(index.ravel())
     try:
-        fields = {
-            name: LinearNDInterpolator(
-                distinct * reach, np.bincount(index.ravel(), values) / number
-            )(points)
-            for name, values in columns.items()
-        }
+        nodes = {name: np.bincount(index.ravel(), v) / number for name, v in columns.items()}
+        fields = {n: LinearNDInterpolator(distinct * reach, v)(points) for n, v in nodes.items()}
     except QhullError as error:
         raise InputError(
             "The nodes on the base of the film lie on one line.",

@@ -137,24 +137,15 @@ def _checked(
     cells = tuple(_cells(header["cells"], arrays, len(points), sources[0]))
     if not cells:
         raise _unusable(sources[0], "no cells")
-    notes = [
-        f"Its numbers are those of {drawn.file_name} (sha256 {drawn.sha256})."
-        for drawn in sources[1:]
-    ]
+    heavy = sources[1:]
+    notes = [f"Its numbers are those of {file.file_name} (sha256 {file.sha256})." for file in heavy]
     if words := printable(header["printed"], _MAX_NOTES):
         notes.append(f"meshio says: {words}")
     if not header["limited"]:
         notes.append("It was read without a limit of memory, which this system does not offer.")
-    return Mesh(
-        points=points,
-        cells=cells,
-        point_data=_fields(
-            {key: arrays[i] for key, i in header["point_data"].items()}, len(points)
-        ),
-        sources=sources,
-        notes=tuple(notes),
-        tensor_order=tensor_order,
-    )
+    fields = {key: arrays[i] for key, i in header["point_data"].items()}
+    point_data = _fields(fields, len(points))
+    return Mesh(points, cells, point_data, sources, tuple(notes), tensor_order)
 
 
 def _cells(

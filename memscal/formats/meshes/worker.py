@@ -240,12 +240,9 @@ def _mesh_and_fields(grid: Element) -> Iterator[Element]:
     for element in grid:
         element[:] = element.findall("DataItem")
         if element.tag == "Attribute":
-            element.set("Center", element.get("Center", "Node"))
-            if (
-                element.get("Name")
-                and element.get("Center") in ("Node", "Cell")
-                and len(element) == 1
-            ):
+            centre = element.get("Center", "Node")
+            element.set("Center", centre)
+            if element.get("Name") and centre in ("Node", "Cell") and len(element) == 1:
                 yield element
         elif element.tag == "Geometry":
             if not {"Type", "GeometryType"} & set(element.attrib):

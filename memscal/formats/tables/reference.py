@@ -219,15 +219,12 @@ def read_reference_table(
     if shear is not None:
         values = to_si(table.column(shear), sigma_unit, "stress", table.where(shear))
         columns["sigma_rz"] = shear_sign * values
+    source = table.source
+    origin = f"Imported from {source.file_name} (sha256 {source.sha256})."
     samples = Samples(
         columns=columns,
-        source=table.source,
-        notes=import_notes(
-            [
-                f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
-                *table.notes,
-            ]
-        ),
+        source=source,
+        notes=import_notes([origin, *table.notes]),
         kind="table",
         item="data row",
         units=(r_unit, sigma_unit),

@@ -71,10 +71,8 @@ def read_scan_table(
     if u_sign not in (1, -1):
         raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
     table = read_table(path, delimiter=delimiter, decimal=decimal)
-    notes = [
-        f"Imported from {table.source.file_name} (sha256 {table.source.sha256}).",
-        *table.notes,
-    ]
+    source = table.source
+    notes = [f"Imported from {source.file_name} (sha256 {source.sha256}).", *table.notes]
     channels = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz}
     columns = {
         name: _voltage(table, column, u_unit, u_scale)
@@ -119,7 +117,7 @@ def read_scan_table(
         sensor=sensor or StressSensor(),
         title=title,
         notes="\n".join(marked_texts(messages)),
-        source=table.source,
+        source=source,
     )
     return ImportedScan(scan, tuple(messages))
 

@@ -36,7 +36,6 @@ class Table:
     source: SourceFile
     names: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    first_line: int
     decimal: str
     notes: tuple[str, ...]
 
@@ -123,7 +122,6 @@ def read_table(
         source=SourceFile(name, hashlib.sha256(data).hexdigest()),
         names=tuple(printable(cell, _MAX_NAME) for cell in header),
         rows=body,
-        first_line=int(headed) + 1,
         decimal=decimal,
         notes=tuple(notes),
     )
