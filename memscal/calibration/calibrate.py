@@ -78,8 +78,9 @@ def assemble(
         record["further_scans"] = [
             s and {"file_name": s.file_name, "sha256": s.sha256} for s in sources
         ]
+    g, errors = solution.deconvolution.g, np.sqrt(np.diag(results.radial_covariance))
     return ApparatusFunction(
-        field=_field(solution, results),
+        field=ApparatusField(g.x, g.y, g.image, np.interp(np.hypot.outer(g.y, g.x), g.r, errors)),
         radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=_transfer(solution, results),
         reconvolution=_reconvolution(solution),
@@ -112,12 +113,6 @@ def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
     parameters = results.parameters.only(_OF_A_ROUTE)
     method = "white-noise" if isinstance(solution.method, Bayesian) else "bayesian"
     return OtherEstimate(method, parameters, _radial(solution, solution.other, results))
-
-
-def _field(solution: Solution, results: Results) -> ApparatusField:
-    g = solution.deconvolution.g
-    errors = np.sqrt(np.diag(results.radial_covariance))
-    return ApparatusField(g.x, g.y, g.image, np.interp(np.hypot.outer(g.y, g.x), g.r, errors))
 
 
 def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:

@@ -57,16 +57,6 @@ _KINDS = {
 }
 
 
-def model_checks(estimate: ProfileEstimate) -> list[QualityCheck]:
-    """Run every check of the model that applies to the scan."""
-    residuals = residuals_of(estimate)
-    checks = _noise(estimate)
-    if residuals.degrees >= FEWEST_RESIDUALS:
-        checks += _size(estimate, residuals) + _order(residuals)
-    checks += [_bayes_factor(estimate), _symmetry(estimate)]
-    return checks + _linearity(estimate) + _held_out(estimate)
-
-
 def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
     if estimate.points.u_errors is None:
         return []
@@ -244,14 +234,21 @@ _MOST_NAMED = 12
 
 def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
+    estimate, residuals = solution.estimate, residuals_of(solution.estimate)
+    enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
         *_constraint(solution),
         *_agreements(solution, parameters),
         *_shape(solution, parameters),
         *_set_up(solution),
-        *model_checks(solution.estimate),
-        *_saturation(solution.estimate),
+        *_noise(estimate),
+        *(_size(estimate, residuals) + _order(residuals) if enough else []),
+        _bayes_factor(estimate),
+        _symmetry(estimate),
+        *_linearity(estimate),
+        *_held_out(estimate),
+        *_saturation(estimate),
     )
 
 

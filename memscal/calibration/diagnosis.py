@@ -53,7 +53,10 @@ def require_profile(
     references: Sequence[RadialSpectrum],
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
-    search = _Search(tuple(scans), tuple(stresses), tuple(map(_thinned, points)))
+    # The search takes some of the points, evenly, without correlations.
+    steps = [-(-scan.u.size // _MOST_POINTS) for scan in points]
+    some = [p.selected(np.arange(0, p.u.size, step)) for p, step in zip(points, steps, strict=True)]
+    search = _Search(tuple(scans), tuple(stresses), tuple(some))
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
         with np.errstate(all="ignore"):
@@ -85,8 +88,8 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     squared = replace(fit, jacobian=slope).covariance(estimate.weights, estimate.noise_scale)
     widest = np.sqrt(2 * np.sqrt(squared[1, 1]))
     stated = estimate.points.u_errors
-    noise = 0.0 if stated is None else float(np.median(stated)) / estimate.largest_signal
-    residual = float(np.median(estimate.noise)) / estimate.largest_signal
+    noise = 0.0 if stated is None else np.median(stated) / estimate.largest_signal
+    residual = np.median(estimate.noise) / estimate.largest_signal
     why = (
         f"The nearest fit leaves residuals of {residual:.1%} of the largest signal: the voltage "
         "does not rise and fall with the distance from one centre."
@@ -94,13 +97,13 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
         else "Film and rod blur the sensor's image. A sensor of a Gaussian width below "
         f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined."
     )
+    places = ", ".join(length.place for length in search.lengths)
     return FitError(
         "The scan is as narrow as its reference, the stress at the base of the film: the width of "
         "the apparatus function would be zero.",
         why=why,
-        cure="Look at the scan for a second peak; check the values and units of "
-        f"{', '.join(length.place for length in search.lengths)}. If they are right, use a thinner "
-        "film or a narrower rod, or average more repeats.",
+        cure=f"Look at the scan for a second peak; check the values and units of {places}. If they "
+        "are right, use a thinner film or a narrower rod, or average more repeats.",
     )
 
 
@@ -284,9 +287,3 @@ def _scaled(stress: StressProfile | Contact, path: str, factor: float) -> Stress
 def _grid(most: float) -> FloatArray:
     """Factors from 1 to at most ``most``."""
     return np.asarray(_RATIO ** np.arange(int(np.log(max(most, 1.0)) / np.log(_RATIO)) + 1.0))
-
-
-def _thinned(points: ScanPoints) -> ScanPoints:
-    """Return some of a scan's points, evenly, without correlations."""
-    every = -(-points.u.size // _MOST_POINTS)
-    return points.selected(np.arange(0, points.u.size, every))

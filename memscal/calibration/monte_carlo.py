@@ -140,9 +140,23 @@ class DrawnScans:
 
     @cached_property
     def solved(self) -> tuple[SolvedInput, ...]:
-        """Stated inputs that the rod is solved for."""
-        inputs = _solved_inputs(self.solution.scans)
-        return tuple(item for item in inputs if item.source in self.effects)
+        """Stated properties of each distinct film and rod, named as their effects are."""
+        scans, inputs = self.solution.scans, []
+        for name, component, attribute in (
+            ("thickness", "film", "thickness"),
+            ("poisson_ratio", "film", "poisson_ratio"),
+            ("rod_radius", "indenter", "radius"),
+        ):
+            owners = [getattr(scan, component) for scan in scans]
+            for number, owner in enumerate(dict.fromkeys(owners), start=1):
+                value, u = getattr(owner, attribute), getattr(owner, f"{attribute}_uncertainty")
+                source = name if number == 1 else f"{name}_{number}"
+                if u and source in self.effects:
+                    bounds = (0.0, 0.5) if name == "poisson_ratio" else (value / 2, np.inf)
+                    places = tuple(i for i, other in enumerate(owners) if other == owner)
+                    item = SolvedInput(source, places, component, attribute, value, u, bounds)
+                    inputs.append(item)
+        return tuple(inputs)
 
     @cached_property
     def _geometry(self) -> Geometry:
@@ -175,23 +189,6 @@ class DrawnScans:
         numbers, g = read_off(solution.deconvolution, first.deconvolution.g.r)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
-
-
-def _solved_inputs(scans: tuple[Scan, ...]) -> Iterator[SolvedInput]:
-    """Uncertain properties of each distinct film and rod, named as their effects are."""
-    for name, component, attribute in (
-        ("thickness", "film", "thickness"),
-        ("poisson_ratio", "film", "poisson_ratio"),
-        ("rod_radius", "indenter", "radius"),
-    ):
-        owners = [getattr(scan, component) for scan in scans]
-        for number, owner in enumerate(dict.fromkeys(owners), start=1):
-            value, u = getattr(owner, attribute), getattr(owner, f"{attribute}_uncertainty")
-            if u:
-                source = name if number == 1 else f"{name}_{number}"
-                bounds = (0.0, 0.5) if name == "poisson_ratio" else (value / 2, np.inf)
-                places = tuple(i for i, other in enumerate(owners) if other == owner)
-                yield SolvedInput(source, places, component, attribute, value, u, bounds)
 
 
 def _rod_spectrum(scan: Scan, reference: RadialSpectrum) -> FloatArray:
@@ -300,10 +297,9 @@ class MonteCarlo(Result):
 
     def __getitem__(self, name: str) -> BudgetComparison:
         """Return the comparison of one parameter."""
-        for comparison in self.comparisons:
-            if comparison.name == name:
-                return comparison
-        raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(BUDGETED)}.")
+        if name not in BUDGETED:
+            raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(BUDGETED)}.")
+        return self.comparisons[BUDGETED.index(name)]
 
 
 @single_threaded()

@@ -2,9 +2,8 @@ r"""First-order propagation of noise, regularisation and uncertain inputs to A, 
 
 A division is linear in the voltages: :math:`A\,G(r)` is the inverse transform of the window times
 the smoothed voltages' transform over the reference's.  Its covariance by noise is exact for given
-centre, weights, smoothing and window; centre, baseline and drift are those of the estimate, by
-their derivatives.  What window and smoothing hide is stated apart (``window``): what they take from
-the posterior mean of the Bayesian estimate, and from its posterior about that.
+centre, weights, smoothing and window; centre, baseline and drift enter by their derivatives.  What
+window and smoothing hide of the posterior is stated apart (``window``).
 
 Method ``bayesian`` is a linear function of the posterior of the profile's parameters: what
 scatters from scan to scan is ``noise``, the rest of the expected squared error ``regularisation``.
@@ -12,8 +11,7 @@ scatters from scan to scan is ``noise``, the rest of the expected squared error 
 Inputs add one column each, the change of all results by one standard uncertainty.  An input that
 is larger than stated changes the results as voltages would: by :math:`-A\,G\otimes\delta
 \sigma_{zz}` for the base stress, by :math:`-U'(R)\,\delta R` for the positions.  A change of the
-load scales A alone.  Numbers read off G(r) are functionals of it: their derivative is a row that
-multiplies a change of G.
+load scales A alone.
 """
 
 from __future__ import annotations
