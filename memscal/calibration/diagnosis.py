@@ -34,7 +34,7 @@ _NO_WIDTH = 0.1
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
 _MISFIT = 0.03
 #: A length is at fault if another value lowers chi-square by this much, in which residuals beyond
-#: so many standard deviations count linearly; values within the last rise of the best fit as well.
+#: so many standard deviations count linearly; values up to the last rise fit as well as the best.
 _CLEARLY, _KNEE, _AS_GOOD = 25.0, 3.0, 4.0
 #: Factors are tried by this ratio, on so many points, until the misfit has risen by this factor.  A
 #: length is followed up if a factor leaves less than this share of the misfit.
@@ -113,7 +113,7 @@ class _Trial:
 
     factor: float
     fit: GaussianFit | None
-    residual: FloatArray  # (n,): over the stated noise, in V where none is stated; infinite
+    residual: FloatArray  # (n,): over the stated noise, or in V; infinite without a fit
     weights: FloatArray
 
     def loss(self, noise: float) -> float:
