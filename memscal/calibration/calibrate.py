@@ -37,7 +37,6 @@ from memscal.model.apparatus import (
     Reconvolution,
     TransferFunction,
 )
-from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
     NOISE_UNSTATED,
     OUTLIER_WEIGHT,
@@ -48,7 +47,7 @@ from memscal.model.checks import (
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result
-from memscal.model.scan import Scan, StressSensor
+from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 from memscal.parallel import single_threaded
 from memscal.version import __version__
@@ -66,10 +65,22 @@ def assemble(
     configuration: Mapping[str, Any],
 ) -> ApparatusFunction:
     """Return the apparatus function with everything that its artifact stores."""
-    scan, stress = solution.scan, solution.stress
+    scan, stress, channel = solution.scan, solution.stress, solution.estimate.points.channel
     reference = stress.profile() if isinstance(stress, Contact) else stress
+    versions = {"numpy": np.__version__, "scipy": scipy.__version__}
+    record: dict[str, Any] = {
+        **configuration,
+        "grid": dict(solution.choice.reasons),
+        "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
+    }
+    if len(solution.scans) > 1:
+        sources = [further.source for further in solution.scans[1:]]
+        record["further_scans"] = [
+            s and {"file_name": s.file_name, "sha256": s.sha256} for s in sources
+        ]
+    g, errors = solution.deconvolution.g, np.sqrt(np.diag(results.radial_covariance))
     return ApparatusFunction(
-        field=_field(solution, results),
+        field=ApparatusField(g.x, g.y, g.image, np.interp(np.hypot.outer(g.y, g.x), g.r, errors)),
         radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=_transfer(solution, results),
         reconvolution=_reconvolution(solution),
@@ -77,24 +88,15 @@ def assemble(
         checks=checks,
         film=scan.film,
         indenter=scan.indenter,
-        sensor=_sensor(solution),
+        sensor=scan.sensor if channel == "zz" else replace(scan.sensor, channel=channel),
         load=scan.load,
         reference=reference,
         process=Process(
             program="memscal",
             version=__version__,
             date=timestamp(),
-            configuration={
-                **configuration,
-                "grid": dict(solution.choice.reasons),
-                "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
-                **_further_scans(solution),
-            },
-            environment={
-                "python": platform.python_version(),
-                "numpy": np.__version__,
-                "scipy": scipy.__version__,
-            },
+            configuration=record,
+            environment={"python": platform.python_version(), **versions},
             messages=messages,
             input_scan=scan.source,
             input_reference=reference.source,
@@ -113,32 +115,8 @@ def _other(solution: Solution, results: Results | None) -> OtherEstimate | None:
     return OtherEstimate(method, parameters, _radial(solution, solution.other, results))
 
 
-def _sensor(solution: Solution) -> StressSensor:
-    """Return the scan's sensor, with the channel that was calibrated."""
-    channel, sensor = solution.estimate.points.channel, solution.scan.sensor
-    return sensor if channel == "zz" else replace(sensor, channel=channel)
-
-
-def _further_scans(solution: Solution) -> dict[str, Any]:
-    """Return the files of the scans after the first."""
-    sources = [scan.source for scan in solution.scans[1:]]
-    if not sources:
-        return {}
-    listed = [
-        None if s is None else {"file_name": s.file_name, "sha256": s.sha256} for s in sources
-    ]
-    return {"further_scans": listed}
-
-
-def _field(solution: Solution, results: Results) -> ApparatusField:
-    g = solution.deconvolution.g
-    errors = np.sqrt(np.diag(results.radial_covariance))
-    return ApparatusField(g.x, g.y, g.image, np.interp(np.hypot.outer(g.y, g.x), g.r, errors))
-
-
 def _radial(solution: Solution, deconvolution: Deconvolution, results: Results) -> ApparatusRadial:
-    g = deconvolution.g
-    covariance = results.radial_covariance
+    g, covariance = deconvolution.g, results.radial_covariance
     gaussian = unit_gaussian(g.r, solution.estimate.gaussian.sigma)
     errors = np.sqrt(np.diag(covariance))
     with_a = results.cross_covariance[:, results.parameters.names.index("conversion_constant")]
@@ -156,8 +134,7 @@ def _transfer(solution: Solution, results: Results) -> TransferFunction:
 
 
 def _reconvolution(solution: Solution) -> Reconvolution:
-    estimate = solution.estimate
-    points = estimate.points
+    estimate, points = solution.estimate, solution.estimate.points
     # A raster is shown against the distance from the centre, a line against the position.
     along = points.x if points.free[0, 0] else points.y
     place = estimate.distance if points.planar or points.scans > 1 else along
@@ -166,16 +143,14 @@ def _reconvolution(solution: Solution) -> Reconvolution:
         place = estimate.offset[estimate.model.axis]
     order = np.argsort(place, kind="stable")
 
-    def sorted_(values: FloatArray) -> FloatArray:
-        return np.asarray(values[order])
-
+    predicted = solution.deconvolution.predicted
     return Reconvolution(
-        x=sorted_(place),
-        u_zz=sorted_(points.u),
-        u_zz_errors=sorted_(estimate.noise),
-        u_zz_predicted=sorted_(solution.deconvolution.predicted),
-        u_zz_gaussian=sorted_(estimate.gaussian.predicted),
-        residual=sorted_(points.u - solution.deconvolution.predicted),
+        x=place[order],
+        u_zz=points.u[order],
+        u_zz_errors=estimate.noise[order],
+        u_zz_predicted=predicted[order],
+        u_zz_gaussian=estimate.gaussian.predicted[order],
+        residual=(points.u - predicted)[order],
     )
 
 
@@ -189,28 +164,20 @@ def calibration_messages(
     solution: Solution, checks: tuple[QualityCheck, ...]
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, warnings first."""
-    estimate, scan = solution.estimate, solution.scan
+    scan, channel = solution.scan, solution.estimate.points.channel
     messages = failed_check_messages(checks)
-    messages += _channel(estimate)
-    messages += _points(estimate)
-    messages += _method(solution)
-    messages += _reference(solution)
+    if solution.estimate.model.order:
+        text = (
+            f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
+            "those of the shear at the base; the voltage is positive where the film pulls the "
+            f"sensor towards larger {channel[0]}."
+        )
+        messages.append(Message("experimental", text))
+    messages += _points(solution.estimate) + _method(solution) + _reference(solution)
     messages += _unstated(scan)
     if scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
-
-
-def _channel(estimate: ProfileEstimate) -> list[Message]:
-    channel = estimate.points.channel
-    if estimate.model.order == 0:
-        return []
-    text = (
-        f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
-        "those of the shear at the base; the voltage is positive where the film pulls the sensor "
-        f"towards larger {channel[0]}."
-    )
-    return [Message("experimental", text)]
 
 
 def _points(estimate: ProfileEstimate) -> list[Message]:
@@ -225,11 +192,8 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
             place += f", y = {points.y[i] * 1e3:.4g} mm"
         if points.repeat.any():
             place += f" of repeat {points.repeat[i]}"
-        text = (
-            f"Outlier at {place}: {points.u[i] * 1e3:.4g} mV instead of "
-            f"{estimate.predicted[i] * 1e3:.4g} mV; its weight is "
-            f"{estimate.outlier_weight[i]:.2g}."
-        )
+        voltages = f"{points.u[i] * 1e3:.4g} mV instead of {estimate.predicted[i] * 1e3:.4g} mV"
+        text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
         messages.append(Message("outlier", text))
     if points.u_errors is None:
         text = (
@@ -248,11 +212,9 @@ def _method(solution: Solution) -> list[Message]:
         return []
     way = "uncertainties are first-order through its effective window"
     if not is_linear(method):
-        own = " and of its own random numbers" if hasattr(method, "seed") else ""
-        way = (
-            f"what noise adds to the uncertainties is the scatter of {draw_count(solution)} draws "
-            f"of the voltages{own}"
-        )
+        way = "what noise adds to the uncertainties is the scatter of "
+        way += f"{draw_count(solution)} draws of the voltages"
+        way += " and of its own random numbers" if hasattr(method, "seed") else ""
     return [Message("method", f"Method {method.name}: {way}. {method.fails}")]
 
 
@@ -313,12 +275,9 @@ def _unstated(scan: Scan) -> list[Message]:
         "load": scan.load_uncertainty,
     }
     names = [name for name, value in missing.items() if value is None]
-    if not names:
-        return []
     pronoun = "them" if len(names) > 1 else "it"
-    listed = ", ".join(names)
-    text = f"No uncertainty is stated for {listed}: nothing is counted for {pronoun}."
-    return [Message("uncertainty_unstated", text)]
+    text = f"No uncertainty is stated for {', '.join(names)}: nothing is counted for {pronoun}."
+    return [Message("uncertainty_unstated", text)] if names else []
 
 
 Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
@@ -328,8 +287,6 @@ Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Result):
     """A finished calibration: its result, and every step that led to it.
-
-    ``print(calibration)`` shows the table of ``memscal calibrate``.
 
     Parameters
     ----------
@@ -408,26 +365,23 @@ def calibrate(
     ----------
     scan : Scan or path, or a sequence of them
         Voltage against the rod's position.  Several scans of one sensor, at other loads, with
-        other rods or films, along x or y, are fitted together: A and G are shared, and each has
-        its own centre and baseline.
+        other rods or films, along x or y, are fitted together.
     reference : StressProfile, Contact or path, optional
-        Stress at the base of the film, one for each scan.  Without it, the one that travels with
+        Stress at the base of the film, one for each scan.  By default the one that travels with
         the scan; without that, the rod is solved on the film.
     alternative : StressProfile, Contact or path, optional
-        The same by another model of the film, such as finite strain.  Its difference from the
-        reference is counted as an uncertainty of the model's form, ``model_form``, rectangular.
+        The same by another model of the film, such as finite strain.  Its difference is counted
+        as a rectangular uncertainty of the model's form, ``model_form``.
     channel : str, default "zz"
         ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
         by method ``"bayesian"``; see docs/tangential.md.
     method : str or Regulariser, default "white-noise"
         Whose A and G the result has.  ``"white-noise"``, the paper's, divides the field of the
-        smoothed voltages, and follows all that the resolved band shows;
-        :func:`memscal.deconvolution.division.regulariser_names` lists other divisions.
-        ``"bayesian"`` takes A and G from the scan's points: the smaller error, for friction.
-        Both routes are computed: ``.apparatus.other`` is the estimate by the other one.
+        smoothed voltages; :func:`memscal.deconvolution.division.regulariser_names` lists other
+        divisions.  ``"bayesian"`` takes A and G from the scan's points: the smaller error, for
+        friction.  ``.apparatus.other`` is the estimate by the other route.
     correlations : mapping of (str, str) to float, optional
-        Correlation coefficients of the inputs' errors, such as
-        ``{("thickness", "poisson_ratio"): 0.5}``.
+        Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
     seed : int, default 0
         Seed of methods that draw random numbers.
     **options
@@ -452,7 +406,7 @@ def calibrate(
     >>> 0.54e-3 < calibration.apparatus.gaussian_sigma < 0.58e-3
     True
     """
-    scans = require_one_sensor(opened_scans(scan))
+    scans, pairs = require_one_sensor(opened_scans(scan)), correlations or {}
     for rod_scan in scans:
         require_calibration_rod(rod_scan)
     references = _references(reference, scans)
@@ -460,19 +414,20 @@ def calibrate(
     chosen = chosen_method(method, options, seed=seed)
     solution = solve(scans, stresses, chosen, channel)
     effects = _effects(solution, None if alternative is None else _references(alternative, scans))
-    results = uncertainties(solution, solution.deconvolution, effects, correlations or {})
-    other = None
-    if solution.other is not None:
-        other = uncertainties(solution, solution.other, effects, correlations or {})
+    results = uncertainties(solution, solution.deconvolution, effects, pairs)
+    beside = solution.other
+    other = None if beside is None else uncertainties(solution, beside, effects, pairs)
     checks = quality_checks(solution, results.parameters)
     messages = calibration_messages(solution, checks)
-    configuration = {"method": chosen.name, "seed": seed, **_settings(chosen)}
+    of_method: Any = chosen
+    settings = asdict(of_method) if is_dataclass(chosen) else {}
+    configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
     if channel != "zz":
         configuration["channel"] = channel
-    if correlations:
-        configuration["correlations"] = {" ".join(pair): c for pair, c in correlations.items()}
+    if pairs:
+        configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
     apparatus = assemble(solution, results, other, checks, messages, configuration)
-    return Calibration(apparatus, solution, effects, dict(correlations or {}))
+    return Calibration(apparatus, solution, effects, dict(pairs))
 
 
 def _references(
@@ -481,11 +436,10 @@ def _references(
     """Read a reference for each scan; a single one is that of all scans."""
     if isinstance(reference, Sequence) and not isinstance(reference, str):
         if len(reference) != len(scans):
-            raise InputError(
-                f"{len(reference)} references were given, but there "
-                f"{'is one scan' if len(scans) == 1 else f'are {len(scans)} scans'}.",
-                cure="Give one for each scan, in their order, or one for all.",
-            )
+            count = "is one scan" if len(scans) == 1 else f"are {len(scans)} scans"
+            problem = f"{len(reference)} references were given, but there {count}."
+            cure = "Give one for each scan, in their order, or one for all."
+            raise InputError(problem, cure=cure)
         return [_read(item) for item in reference]
     return [_read(reference)] * len(scans)
 
@@ -501,13 +455,6 @@ def _read(reference: Reference) -> StressProfile | Contact | None:
         f"The reference is a {type(reference).__name__}.",
         cure="Give a contact from memscal.indent(), a StressProfile, or the path of a file.",
     )
-
-
-def _settings(chosen: Method) -> Mapping[str, Any]:
-    """Parameters of a method, for the record."""
-    method: Any = chosen
-    stated = is_dataclass(method) and not isinstance(method, type)
-    return {"options": asdict(method) if stated else {}}
 
 
 def _effects(

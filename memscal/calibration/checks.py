@@ -27,6 +27,7 @@ from memscal.estimation.reference import carried_force
 from memscal.estimation.residuals import (
     FEWEST_RESIDUALS,
     Residuals,
+    TestOutcome,
     chi_square_test,
     free_model,
     neighbour_correlation_test,
@@ -56,31 +57,15 @@ _KINDS = {
 }
 
 
-def model_checks(estimate: ProfileEstimate) -> list[QualityCheck]:
-    """Run every check of the model that applies to the scan."""
-    residuals = residuals_of(estimate)
-    checks = _noise(estimate)
-    if residuals.degrees >= FEWEST_RESIDUALS:
-        checks += _size(estimate, residuals) + _order(residuals)
-    checks.append(_bayes_factor(estimate))
-    checks += _symmetry(estimate)
-    checks += _linearity(estimate)
-    return checks + _held_out(estimate)
-
-
 def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
     if estimate.points.u_errors is None:
         return []
-    return [
-        check(
-            "noise_as_stated",
-            estimate.weighed.noise,
-            NOISE_LIMIT,
-            f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. "
-            "A failure means that something besides electronic noise scatters the scan, such as "
-            "position or load; the uncertainties have been raised accordingly.",
-        )
-    ]
+    meaning = (
+        f"Scatter about the fitted profile over the stated u_{estimate.points.channel}_errors. A "
+        "failure means that something besides electronic noise scatters the scan, such as position "
+        "or load; the uncertainties have been raised accordingly."
+    )
+    return [check("noise_as_stated", estimate.weighed.noise, NOISE_LIMIT, meaning)]
 
 
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
@@ -102,7 +87,7 @@ def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]
         "radius, the film's thickness and Poisson's ratio, a baseline that is no straight line, "
         "and the positions; every uncertainty is doubtful until then."
     )
-    return [check("chi_square", outcome.value, outcome.limit, meaning, outcome.p_value)]
+    return [_tested("chi_square", outcome, meaning)]
 
 
 def _order(residuals: Residuals) -> list[QualityCheck]:
@@ -111,42 +96,37 @@ def _order(residuals: Residuals) -> list[QualityCheck]:
         "to point (a slow amplifier, creep, temperature). Look at the residual; state a known "
         "correlation as u_zz_correlation; uncertainties are too small until then."
     )
-    runs, alike = runs_test(residuals), neighbour_correlation_test(residuals)
+    in_runs = (
+        "Share of neighbours along the scan whose residuals have the same sign: a half by chance. "
+        f"A failure means that residuals come in runs: {cause}"
+    )
+    alike = (
+        "Correlation of each residual with its neighbours along the scan, halved for each step "
+        f"farther, over what chance gives on average. A failure means that residuals are "
+        f"alike: {cause}"
+    )
     return [
-        check(
-            "residual_runs",
-            runs.value,
-            runs.limit,
-            "Share of neighbours along the scan whose residuals have the same sign: a half by "
-            f"chance. A failure means that residuals come in runs: {cause}",
-            runs.p_value,
-        ),
-        check(
-            "residual_correlation",
-            alike.value,
-            alike.limit,
-            "Correlation of each residual with its neighbours along the scan, halved for each step "
-            f"farther, over what chance gives on average. A failure means that residuals are "
-            f"alike: {cause}",
-            alike.p_value,
-        ),
+        _tested("residual_runs", runs_test(residuals), in_runs),
+        _tested("residual_correlation", neighbour_correlation_test(residuals), alike),
     ]
+
+
+def _tested(name: str, outcome: TestOutcome, meaning: str) -> QualityCheck:
+    return check(name, outcome.value, outcome.limit, meaning, outcome.p_value)
 
 
 def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
     departure = departure_test(estimate)
-    return check(
-        "gaussian_evidence",
-        departure.log_bayes_factor,
-        _LOG_BAYES_LIMIT,
+    meaning = (
         "Natural logarithm of the Bayes factor for a departure of G from a Gaussian (within ±8.5); "
         "below zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
         "means that G is not Gaussian: use the deconvolved G. The most probable departure is "
-        f"{_KINDS[departure.kind]} ({departure.share:.0%} of them).",
+        f"{_KINDS[departure.kind]} ({departure.share:.0%} of them)."
     )
+    return check("gaussian_evidence", departure.log_bayes_factor, _LOG_BAYES_LIMIT, meaning)
 
 
-def _symmetry(estimate: ProfileEstimate) -> list[QualityCheck]:
+def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
     if estimate.points.planar:
         uneven = axisymmetry_test(estimate)
         meaning = (
@@ -154,19 +134,18 @@ def _symmetry(estimate: ProfileEstimate) -> list[QualityCheck]:
             f"up {uneven.size:.2%} of the largest signal. A failure means that the radial profile "
             "is only a mean over directions: use the field."
         )
-        return [_added("axisymmetry", uneven, meaning)]
+        return _added("axisymmetry", uneven, meaning)
     extra = symmetry_test(estimate)
     parity, failure = "odd", ": a tilted rod, an uneven film, or a drifting load"
     if estimate.model.order:
-        parity = "even"
-        failure = " by more than their sign: cross-talk of the normal stress, a tilted rod, or an "
-        failure += "uneven film"
+        parity, failure = "even", " by more than their sign: cross-talk of the normal stress, "
+        failure += "a tilted rod, or an uneven film"
     meaning = (
         f"Fall of chi-square by {extra.count} {parity} columns, which then make up "
         f"{extra.size:.2%} of the largest signal. A failure means that the left and right halves "
         f"differ{failure}."
     )
-    return [_added("symmetry", extra, meaning)]
+    return _added("symmetry", extra, meaning)
 
 
 def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
@@ -188,15 +167,13 @@ def _added(name: str, extra: ExtraColumns, meaning: str) -> QualityCheck:
 
 def _held_out(estimate: ProfileEstimate) -> list[QualityCheck]:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
-    points = estimate.points
-    load = load_groups(points.load)
-    several_scans = points.scans > 1
+    points, load = estimate.points, load_groups(estimate.points.load)
     # Where every repeat has a load, or a scan, of its own, it is held out under that name.
     repeat = not _same(points.repeat, load) and not _same(points.repeat, points.scan)
     checks = [
         _prediction(estimate, "repeat", points.repeat) if repeat else None,
         _prediction(estimate, "load", load) if not _same(load, points.scan) else None,
-        _prediction(estimate, "scan", points.scan) if several_scans else None,
+        _prediction(estimate, "scan", points.scan) if points.scans > 1 else None,
     ]
     return [outcome for outcome in checks if outcome is not None]
 
@@ -251,20 +228,27 @@ _NEGATIVE_LIMIT = 0.4
 _ROUGHNESS_LIMIT = 0.1
 _BEYOND = 1.5
 _NEGLIGIBLE_DIFFERENCE = 0.002
+_WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
 
 
 def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
+    estimate, residuals = solution.estimate, residuals_of(solution.estimate)
+    enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
         *_constraint(solution),
         *_agreements(solution, parameters),
         *_shape(solution, parameters),
         *_set_up(solution),
-        *_reference_and_outliers(solution),
-        *model_checks(solution.estimate),
-        *_saturation(solution.estimate),
+        *_noise(estimate),
+        *(_size(estimate, residuals) + _order(residuals) if enough else []),
+        _bayes_factor(estimate),
+        _symmetry(estimate),
+        *_linearity(estimate),
+        *_held_out(estimate),
+        *_saturation(estimate),
     )
 
 
@@ -274,23 +258,20 @@ def _reconvolutions(solution: Solution) -> list[QualityCheck]:
         if isinstance(solution.method, Bayesian)
         else "the regularisation has removed something that the scan shows (see method bayesian)"
     )
+    division = (
+        "Reduced chi-square of the scan against the G found, convolved with the reference. A "
+        f"failure means that {removed}, or that the scan is no convolution of the reference: "
+        "look at chi_square, which does not depend on G."
+    )
+    gaussian = (
+        "Reduced chi-square of the scan against the fitted Gaussian convolved with the reference. "
+        "A failure means that G is not Gaussian at this noise: use the deconvolved G, not "
+        "gaussian_sigma."
+    )
     stated = solution.estimate.points.u_errors is not None
     return [
-        _chi_square(
-            "reconvolution",
-            solution.deconvolution.misfit,
-            "Reduced chi-square of the scan against the G found, convolved with the reference. A "
-            f"failure means that {removed}, or that the scan is no convolution of the reference: "
-            "look at chi_square, which does not depend on G.",
-        ),
-        _chi_square(
-            "gaussian_misfit",
-            solution.gaussian_misfit,
-            "Reduced chi-square of the scan against the fitted Gaussian convolved with the "
-            "reference. A failure means that G is not Gaussian at this noise: use the "
-            "deconvolved G, not gaussian_sigma.",
-            exact=stated,
-        ),
+        _chi_square("reconvolution", solution.deconvolution.misfit, division),
+        _chi_square("gaussian_misfit", solution.gaussian_misfit, gaussian, exact=stated),
     ]
 
 
@@ -306,15 +287,12 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
     ]
     # As many combinations of departures as the scan determines, and as a constraint may remove.
     determined = free_model(estimate).design.shape[1] - estimate.basis.flat
-    return [
-        check(
-            "constraint",
-            max(misfits[0] - misfits[1], 0.0),
-            chi_square_limit(max(determined, 1)),
-            "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
-            "estimate. A failure means that the scan contradicts it: leave it out.",
-        )
-    ]
+    rise, limit = max(misfits[0] - misfits[1], 0.0), chi_square_limit(max(determined, 1))
+    meaning = (
+        "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
+        "estimate. A failure means that the scan contradicts it: leave it out."
+    )
+    return [check("constraint", rise, limit, meaning)]
 
 
 def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
@@ -330,113 +308,91 @@ def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityChe
         )
         routes.append(check("method_agreement", difference, _ROUTES_LIMIT, meaning))
     route = "by division of the fields" if solution.deconvolution.divided else "in data space"
-    width = _agreement(
-        parameters,
-        ("gaussian_sigma_deconvolved", "gaussian_sigma"),
-        "width_agreement",
+    meaning = (
         f"Difference of the width of G {route} from the one fitted to the scan, in its standard "
         "uncertainty. A failure means that G is not Gaussian, so that its width depends on how "
-        "it is read off. Look at both reconvolutions.",
+        "it is read off. Look at both reconvolutions."
     )
-    return [*routes, width]
+    i, j = (parameters.names.index(name) for name in _WIDTHS)
+    c, (fitted, deconvolved) = parameters.covariance, parameters.values[[i, j]]
+    variance = max(c[i, i] + c[j, j] - 2 * c[i, j], 0.0)
+    # Differences below a fifth of a percent are negligible, however small their noise.
+    allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * fitted)
+    return [*routes, check("width_agreement", abs(deconvolved - fitted) / allowed, 3.0, meaning)]
 
 
 def _shape(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
     """Look for what divisions that went wrong do to G: spikes, lobes and ripples."""
     estimate, deconvolution = solution.estimate, solution.deconvolution
     a, g, fields = deconvolution.conversion_constant, deconvolution.g, solution.fields
-    widths = ("gaussian_sigma", "gaussian_sigma_deconvolved")
-    ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in widths]
+    ratios = [parameters["fwhm"] / (_HALF_WIDTH * parameters[name]) for name in _WIDTHS]
+    widest = max(max(ratio, 1 / ratio) for ratio in ratios)
     share = ring_areas(g.r) * g.radial
+    negative = float(np.maximum(-share, 0.0).sum() / np.abs(share).sum())
     k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)) / a)
     power = k * modulus**2
     end = max(solution.band.resolved, solution.band.relevant, 2 / estimate.gaussian.sigma)
+    rough = float(power[k > _BEYOND * end].sum() / power.sum())
     cure = "take method white-noise or bayesian, or more regularisation"
+    spike = (
+        "Full width at half maximum of the deconvolved G over that of a Gaussian, of the one "
+        "fitted to the scan or the one nearest to G, or the inverse, whichever is largest. A "
+        f"failure means that G is a spike, or has lobes far out: {cure}."
+    )
+    ripples = (
+        "Share of the integral of |G| over its support where G is negative. A failure means "
+        f"that G consists of ripples: {cure}."
+    )
+    noise = (
+        f"Share of the power of G at wavenumbers beyond {_BEYOND * end * 1e-3:.3g} rad/mm, "
+        f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
+        f"noise: {cure}."
+    )
     return [
-        check(
-            "shape_width",
-            max(max(ratio, 1 / ratio) for ratio in ratios),
-            _SHAPE_WIDTH_LIMIT,
-            "Full width at half maximum of the deconvolved G over that of a Gaussian, of the one "
-            "fitted to the scan or the one nearest to G, or the inverse, whichever is largest. A "
-            f"failure means that G is a spike, or has lobes far out: {cure}.",
-        ),
-        check(
-            "shape_negative",
-            float(np.maximum(-share, 0.0).sum() / np.abs(share).sum()),
-            _NEGATIVE_LIMIT,
-            "Share of the integral of |G| over its support where G is negative. A failure means "
-            f"that G consists of ripples: {cure}.",
-        ),
-        check(
-            "shape_roughness",
-            float(power[k > _BEYOND * end].sum() / power.sum()),
-            _ROUGHNESS_LIMIT,
-            f"Share of the power of G at wavenumbers beyond {_BEYOND * end * 1e-3:.3g} rad/mm, "
-            f"{_BEYOND:g} times those that the scan determines. A failure means that G's detail is "
-            f"noise: {cure}.",
-        ),
+        check("shape_width", widest, _SHAPE_WIDTH_LIMIT, spike),
+        check("shape_negative", negative, _NEGATIVE_LIMIT, ripples),
+        check("shape_roughness", rough, _ROUGHNESS_LIMIT, noise),
     ]
 
 
 def _set_up(solution: Solution) -> list[QualityCheck]:
-    """Film, band, reach and baseline."""
-    estimate = solution.estimate
-    resolved = solution.band.resolved
-    return [
-        check(
-            "width_over_thickness",
-            estimate.gaussian.sigma / solution.scan.film.thickness,
-            _WIDTH_LIMIT,
-            "Width of G over the film's thickness. A failure means that the unit of the positions "
-            "or of the film's thickness should be looked at.",
-        ),
-        check(
-            "resolved_band",
-            float(gaussian_transfer(np.array(resolved), estimate.gaussian.sigma)),
-            _BAND_LIMIT,
-            "Transfer function of the fitted Gaussian at the resolved wavenumber, here "
-            f"{resolved * 1e-3:.3g} rad/mm: up to there, the posterior standard uncertainty of G's "
-            f"transfer function is less than 1/{RESOLVED:g} of it, whatever the method of "
-            "division; beyond, G is determined by the prior. A failure means that noise hides more "
-            "than half of G's spectrum: average repeats or raise the load.",
-        ),
-        check(
-            "tail_share",
-            solution.tail_share,
-            _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT,
-            "Share of the voltage's integral that lies beyond the scan and is extrapolated. A "
-            "failure means that A rests on the extrapolation: scan farther.",
-        ),
-        check(
-            "baseline_drift",
-            2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal,
-            _BASELINE_DRIFT_LIMIT,
-            "Change of the baseline across the scan over the largest signal. It is fitted and "
-            "removed as a straight line; a failure means that what is left of it may bias A.",
-        ),
-    ]
-
-
-def _reference_and_outliers(solution: Solution) -> list[QualityCheck]:
-    estimate = solution.estimate
-    return [
-        check(
-            "reference_force",
-            abs(carried_force(solution.stress, estimate.model.reference) - 1.0),
-            _FORCE_LIMIT,
-            "Relative difference of the reference's total force from the load. A failure means "
-            "that the reference was made for another load, or that its table ends too early; A is "
-            "wrong by as much.",
-        ),
-        check(
-            "outliers",
-            float(np.mean(estimate.outlier_weight < OUTLIER_WEIGHT)),
-            OUTLIER_LIMIT,
-            "Share of points whose weight was more than halved. A failure means that the noise is "
-            "not what the uncertainties take it for: look at the points that the messages name.",
-        ),
-    ]
+    """Film, band, reach, baseline, force and outliers."""
+    estimate, resolved = solution.estimate, solution.band.resolved
+    sigma = estimate.gaussian.sigma
+    change = 2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal
+    force = abs(carried_force(solution.stress, estimate.model.reference) - 1.0)
+    outliers = float(np.mean(estimate.outlier_weight < OUTLIER_WEIGHT))
+    transfer = float(gaussian_transfer(np.array(resolved), sigma))
+    tail = _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT
+    values = {
+        "width_over_thickness": (sigma / solution.scan.film.thickness, _WIDTH_LIMIT),
+        "resolved_band": (transfer, _BAND_LIMIT),
+        "tail_share": (solution.tail_share, tail),
+        "baseline_drift": (change, _BASELINE_DRIFT_LIMIT),
+        "reference_force": (force, _FORCE_LIMIT),
+        "outliers": (outliers, OUTLIER_LIMIT),
+    }
+    meanings = {
+        "width_over_thickness": "Width of G over the film's thickness. A failure means that the "
+        "unit of the positions or of the film's thickness should be looked at.",
+        "resolved_band": "Transfer function of the fitted Gaussian at the resolved wavenumber, "
+        f"here {resolved * 1e-3:.3g} rad/mm: up to there, the posterior standard uncertainty of "
+        f"G's transfer function is less than 1/{RESOLVED:g} of it, whatever the method of "
+        "division; beyond, G is determined by the prior. A failure means that noise hides more "
+        "than half of G's spectrum: average repeats or raise the load.",
+        "tail_share": "Share of the voltage's integral that lies beyond the scan and is "
+        "extrapolated. A failure means that A rests on the extrapolation: scan farther.",
+        "baseline_drift": "Change of the baseline across the scan over the largest signal. It is "
+        "fitted and removed as a straight line; a failure means that what is left of it may bias "
+        "A.",
+        "reference_force": "Relative difference of the reference's total force from the load. A "
+        "failure means that the reference was made for another load, or that its table ends too "
+        "early; A is wrong by as much.",
+        "outliers": "Share of points whose weight was more than halved. A failure means that the "
+        "noise is not what the uncertainties take it for: look at the points that the messages "
+        "name.",
+    }
+    return [check(name, *values[name], meanings[name]) for name in values]
 
 
 def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:
@@ -463,14 +419,3 @@ def _chi_square(name: str, misfit: Misfit, meaning: str, *, exact: bool = False)
     limit = chi_square_limit(misfit.degrees) / misfit.degrees
     p_value = float(chdtrc(misfit.degrees, misfit.chi2_reduced * misfit.degrees))
     return check(name, misfit.chi2_reduced, limit, meaning, p_value if exact else None)
-
-
-def _agreement(
-    parameters: ParameterSet, names: tuple[str, str], name: str, meaning: str
-) -> QualityCheck:
-    i, j = (parameters.names.index(name) for name in names)
-    c, values = parameters.covariance, parameters.values
-    variance = max(c[i, i] + c[j, j] - 2 * c[i, j], 0.0)
-    # Differences below a fifth of a percent are negligible, however small their noise.
-    allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * values[j])
-    return check(name, abs(values[i] - values[j]) / allowed, 3.0, meaning)

@@ -8,6 +8,7 @@ scaled, the rod solved again, and a Gaussian fitted, to find the value at which 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,21 +28,17 @@ from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-#: A width below this share of its standard uncertainty is zero: its best square is none, or
-#: negative.  Of a sensor that the film hides entirely, half of the scans give such a width.
+#: A width below this share of its standard uncertainty is zero.  Of a sensor that the film hides
+#: entirely, half of the scans give such a width.
 _NO_WIDTH = 0.1
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
 _MISFIT = 0.03
 #: A length is at fault if another value lowers chi-square by this much, in which residuals beyond
-#: so many standard deviations count linearly.
-_CLEARLY, _KNEE = 25.0, 3.0
-#: The search needs no more points of a scan than this.
-_MOST_POINTS = 200
-#: Factors are tried by this ratio: a minimum of chi-square is wider.  Beyond one it rises by this.
-_RATIO, _RISEN = 1.4, 1.05
-#: A length is followed up if a factor leaves less than this share of the misfit; values fit as well
-#: as the best one up to this rise of chi-square, two standard deviations.
-_PROMISING, _AS_GOOD, _HALVINGS = 0.9, 4.0, 7
+#: so many standard deviations count linearly; values up to the last rise fit as well as the best.
+_CLEARLY, _KNEE, _AS_GOOD = 25.0, 3.0, 4.0
+#: Factors are tried by this ratio, on so many points, until the misfit has risen by this factor.  A
+#: length is followed up if a factor leaves less than this share of the misfit.
+_RATIO, _MOST_POINTS, _RISEN, _PROMISING, _HALVINGS = 1.4, 200, 1.05, 0.9, 7
 #: Lengths are scaled until the scan spans so many thicknesses of the film, and a rod until its
 #: radius is so small a share of the thickness that it acts as a point.
 _LONGEST_SPAN, _THINNEST = 60.0, 0.02
@@ -56,7 +53,10 @@ def require_profile(
     references: Sequence[RadialSpectrum],
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
-    search = _Search(tuple(scans), tuple(stresses), tuple(map(_thinned, points)))
+    # The search takes some of the points, evenly, without correlations.
+    steps = [-(-scan.u.size // _MOST_POINTS) for scan in points]
+    some = [p.selected(np.arange(0, p.u.size, step)) for p, step in zip(points, steps, strict=True)]
+    search = _Search(tuple(scans), tuple(stresses), tuple(some))
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
         with np.errstate(all="ignore"):
@@ -88,8 +88,8 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
     squared = replace(fit, jacobian=slope).covariance(estimate.weights, estimate.noise_scale)
     widest = np.sqrt(2 * np.sqrt(squared[1, 1]))
     stated = estimate.points.u_errors
-    noise = 0.0 if stated is None else float(np.median(stated)) / estimate.largest_signal
-    residual = float(np.median(estimate.noise)) / estimate.largest_signal
+    noise = 0.0 if stated is None else np.median(stated) / estimate.largest_signal
+    residual = np.median(estimate.noise) / estimate.largest_signal
     why = (
         f"The nearest fit leaves residuals of {residual:.1%} of the largest signal: the voltage "
         "does not rise and fall with the distance from one centre."
@@ -97,13 +97,13 @@ def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
         else "Film and rod blur the sensor's image. A sensor of a Gaussian width below "
         f"{widest * 1e3:.2g} mm is hidden by the noise, and G is not determined."
     )
+    places = ", ".join(length.place for length in search.lengths)
     return FitError(
         "The scan is as narrow as its reference, the stress at the base of the film: the width of "
         "the apparatus function would be zero.",
         why=why,
-        cure="Look at the scan for a second peak; check the values and units of "
-        f"{', '.join(length.place for length in search.lengths)}. If they are right, use a thinner "
-        "film or a narrower rod, or average more repeats.",
+        cure=f"Look at the scan for a second peak; check the values and units of {places}. If they "
+        "are right, use a thinner film or a narrower rod, or average more repeats.",
     )
 
 
@@ -113,13 +113,11 @@ class _Trial:
 
     factor: float
     fit: GaussianFit | None
-    residual: FloatArray  # (n,): over the stated noise; in V where none is stated
+    residual: FloatArray  # (n,): over the stated noise, or in V; infinite without a fit
     weights: FloatArray
 
     def loss(self, noise: float) -> float:
         """Chi-square of the residuals, linear beyond the knee."""
-        if self.fit is None:
-            return np.inf
         root = np.sqrt(1 + (self.residual / (noise * _KNEE)) ** 2)
         return float(np.sum(2 * _KNEE**2 * (root - 1)))
 
@@ -183,35 +181,32 @@ class _Search:
 
     def error(self) -> FitError | None:
         """Return the error that names the lengths at fault; ``None`` if none is."""
-        trials = [self._coarse(length) for length in self.lengths]
-        fitted = [trial for several in trials for trial in several if trial.fit is not None]
+        trials = {length: self._coarse(length) for length in self.lengths}
+        fitted = [trial for tried in trials.values() for trial in tried if trial.fit is not None]
         if not fitted:
             return None
         # Where no noise is stated, it is that of the best fit.
         stated = self.points[0].u_errors is not None
         noise = 1.0 if stated else min(robust_scale(trial.residual) for trial in fitted)
-        pairs = list(zip(self.lengths, trials, strict=True))
-        best = [self._refined(length, several, noise) for length, several in pairs]
-        least = min(trial.loss(noise) for trial in best)
+        best = {length: self._refined(length, tried, noise) for length, tried in trials.items()}
+        least = min(trial.loss(noise) for trial in best.values())
+        unscaled = trials[self.lengths[0]][0].loss(noise)
         per_degree = max(1.0, least / fitted[0].residual.size)
-        most = min(trials[0][0].loss(noise) - _CLEARLY * per_degree, 2 * least + _CLEARLY)
-        causes, others = [], []
-        for (length, several), trial in zip(pairs, best, strict=True):
-            if trial.loss(noise) <= most and trial.explains(noise * float(np.sqrt(per_degree))):
-                causes.append(self._cause(length, several, trial, noise))
-            else:
-                others.append(length.place)
+        most = min(unscaled - _CLEARLY * per_degree, 2 * least + _CLEARLY)
+        wider = noise * float(np.sqrt(per_degree))
+        fits = {x: t.loss(noise) <= most and t.explains(wider) for x, t in best.items()}
+        causes = [self._cause(x, trials[x], best[x], noise) for x in fits if fits[x]]
         if not causes:
             return None
-        beyond = f" No other value of {' or '.join(others)} makes it fit." if others else ""
-        source = self.scans[0].source
+        others = " or ".join(length.place for length in fits if not fits[length])
+        beyond = f" No other value of {others} makes it fit." if others else ""
+        source, cause = self.scans[0].source, "; or with ".join(causes)
         return FitError(
             f"{f'{source.file_name}: the' if source else 'The'} scan is narrower than its "
             "reference, the stress at the base of the film as stated.",
             why="Film and rod blur the sensor's image, so that no voltage is narrower than the "
             "reference: the width of the apparatus function would be zero, and A any number.",
-            cure=f"Check the stated lengths. The scan would fit with {'; or with '.join(causes)}."
-            f"{beyond}",
+            cure=f"Check the stated lengths. The scan would fit with {cause}.{beyond}",
         )
 
     def _coarse(self, length: _Length) -> list[_Trial]:
@@ -237,10 +232,8 @@ class _Search:
             return min(tried[-1].loss(noise), 1e300)
 
         middle, reach = np.log(tried[0].factor), np.log(_RATIO)
-        minimize_scalar(
-            loss, bounds=(middle - reach, middle + reach), method="bounded",
-            options={"xatol": 5e-3, "maxiter": 15},
-        )  # fmt: skip
+        bounds = (middle - reach, middle + reach)
+        minimize_scalar(loss, bounds=bounds, options={"xatol": 5e-3, "maxiter": 15})
         return min(tried, key=lambda trial: trial.loss(noise))
 
     def _cause(self, length: _Length, trials: list[_Trial], best: _Trial, noise: float) -> str:
@@ -263,43 +256,34 @@ class _Search:
             points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
         else:
             stresses = tuple(_scaled(stress, length.path, factor) for stress in stresses)
-            thinner = min(factor, 1.0) if length.path != "indenter/radius" else 1.0
-            thicknesses = [h * thinner for h in thicknesses]
+            if length.path != "indenter/radius":
+                thicknesses = [h * min(factor, 1.0) for h in thicknesses]
         joined = joined_points(points)
         weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
-        nothing = _Trial(factor, None, np.zeros(0), weights)
-        with np.errstate(all="ignore"):
-            try:
-                model = ForwardModel(joined, reference_spectra(stresses, points, thicknesses))
-                fit = fit_gaussian_to_points(model, weights)
-            except (MemscalError, np.linalg.LinAlgError):
-                return nothing
-        residual = (joined.u - fit.predicted) * np.sqrt(weights)
-        return _Trial(factor, fit, residual, weights) if np.isfinite(residual).all() else nothing
+        with np.errstate(all="ignore"), suppress(MemscalError, np.linalg.LinAlgError):
+            model = ForwardModel(joined, reference_spectra(stresses, points, thicknesses))
+            fit = fit_gaussian_to_points(model, weights)
+            residual = (joined.u - fit.predicted) * np.sqrt(weights)
+            if np.isfinite(residual).all():
+                return _Trial(factor, fit, residual, weights)
+        return _Trial(factor, None, np.full(1, np.inf), weights)
 
 
 def _scaled(stress: StressProfile | Contact, path: str, factor: float) -> StressProfile | Contact:
     """Return the linear rod with one length scaled, or a profile at scaled radii."""
     if isinstance(stress, Contact) and isinstance(stress.indenter, Rod) and path != "reference/r":
-        radius, thickness = stress.indenter.radius, stress.film.thickness
+        film, rod = stress.film, stress.indenter
         if path == "indenter/radius":
-            radius *= factor
+            rod = replace(rod, radius=rod.radius * factor)
         else:
-            thickness *= factor
-        film = replace(stress.film, thickness=thickness)
-        return reference_contact(film, replace(stress.indenter, radius=radius), _LOAD)
+            film = replace(film, thickness=film.thickness * factor)
+        return reference_contact(film, rod, _LOAD)
     profile = stress.profile() if isinstance(stress, Contact) else stress
     shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
-    pressure = profile.sigma_zz / factor**2
-    return replace(profile, r=profile.r * factor, sigma_zz=pressure, sigma_rz=shear)
+    zz = profile.sigma_zz / factor**2
+    return replace(profile, r=profile.r * factor, sigma_zz=zz, sigma_rz=shear)
 
 
 def _grid(most: float) -> FloatArray:
     """Factors from 1 to at most ``most``."""
     return np.asarray(_RATIO ** np.arange(int(np.log(max(most, 1.0)) / np.log(_RATIO)) + 1.0))
-
-
-def _thinned(points: ScanPoints) -> ScanPoints:
-    """Return some of a scan's points, evenly, without correlations."""
-    every = -(-points.u.size // _MOST_POINTS)
-    return points.selected(np.arange(0, points.u.size, every))

@@ -17,10 +17,9 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import radial_spline
 from memscal.calibration.fields import choose_grid
-from memscal.calibration.stages import Solution, deconvolve, prepare_fields
+from memscal.calibration.stages import Deconvolution, Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import DrawnScatter, kernel_functionals
 from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw
-from memscal.deconvolution.fourier_ratio import Field
 from memscal.deconvolution.scikit_image import Wiener
 from memscal.errors import FitError
 from memscal.estimation.band import find_band
@@ -50,36 +49,33 @@ def drawn_scatter(
     count = draw_count(solution) if draws is None else draws
     rng = np.random.default_rng([seed, count])
     errors, results, failure = [], [], ""
-    for error, estimate, sigma in _drawn_estimates(solution.estimate, rng, count):
-        method = _reseeded(solution.method, int(rng.integers(2**32)))
+    method: Any = solution.method
+    seeded = is_dataclass(method) and hasattr(method, "seed")
+    for error, estimate in _drawn_estimates(solution.estimate, rng, count):
+        new_seed = int(rng.integers(2**32))
         try:
-            results.append(_divided(solution, estimate, sigma, method))
+            other = replace(method, seed=new_seed) if seeded else method
+            results.append(_divided(solution, estimate, error, other))
+            errors.append(error)
         except FitError as problem:
             failure = problem.problem
-            continue
-        errors.append(error)
     if len(results) <= count // 2:
         raise FitError(
-            f"Method {solution.method.name} fails on {count - len(results)} of {count} scans "
-            f"like this one. The last time: {failure}",
+            f"Method {method.name} fails on {count - len(results)} of {count} scans like this one. "
+            f"The last time: {failure}",
             why="Its uncertainty is the scatter of repeated draws of the voltages.",
             cure='Use method "white-noise" or "bayesian".',
         )
     parameters, radial, transfer = zip(*results, strict=True)
-    return DrawnScatter(
-        voltages=_columns(errors),
-        parameters={name: _columns([row[name] for row in parameters]) for name in parameters[0]},
-        radial=_columns(radial),
-        transfer=_columns(transfer),
-    )
+    numbers = {name: _columns([row[name] for row in parameters]) for name in parameters[0]}
+    return DrawnScatter(_columns(errors), numbers, _columns(radial), _columns(transfer))
 
 
 def draw_count(solution: Solution) -> int:
     """Return how many draws the scatter of a solution is taken from."""
     if isinstance(solution.method, WhiteNoiseDraw):
         return _MOST
-    pixels = solution.fields.voltage.image.size
-    return int(np.clip(round(_PIXELS / pixels), _FEWEST, _MOST))
+    return int(np.clip(round(_PIXELS / solution.fields.voltage.image.size), _FEWEST, _MOST))
 
 
 def _columns(rows: Any) -> FloatArray:
@@ -90,57 +86,42 @@ def _columns(rows: Any) -> FloatArray:
 
 def _drawn_estimates(
     estimate: ProfileEstimate, rng: np.random.Generator, count: int
-) -> Iterator[tuple[FloatArray, ProfileEstimate, float]]:
-    """Draw noise of the voltages (n,), in V; move estimate and width (m) with it to first order."""
+) -> Iterator[tuple[FloatArray, ProfileEstimate]]:
+    """Draw noise of the voltages (n,), in V; move estimate and width with it to first order."""
     model, fit, basis = estimate.model, estimate.gaussian, estimate.basis
     kernels = basis.kernels(model.k)[:, basis.flat :]
     design = np.hstack([fit.jacobian, model.signal(fit.geometry, kernels)])
-    predicted, root = estimate.predicted, estimate.noise_root
-    width_gain = estimate.gaussian_gain[1]
+    predicted, root, weighed = estimate.predicted, estimate.noise_root, estimate.weighed
     for _ in range(count):
         error = root @ rng.standard_normal(predicted.size)
-        change = estimate.weighed.gain @ error
-        points = replace(model.points, u=predicted + error)
-        mean, residual = estimate.weighed.mean + change, error - design @ change
-        yield (
-            error,
-            replace(
-                estimate,
-                model=replace(model, points=points),
-                weighed=replace(estimate.weighed, mean=mean, residual=residual),
-            ),
-            fit.sigma + float(width_gain @ error),
-        )
-
-
-def _reseeded(method: Any, seed: int) -> Method:
-    """Return the method with other random numbers, if it draws any."""
-    seeded = is_dataclass(method) and hasattr(method, "seed")
-    drawn: Method = replace(method, seed=seed) if seeded else method
-    return drawn
+        change = weighed.gain @ error
+        drawn_model = replace(model, points=replace(model.points, u=predicted + error))
+        mean, residual = weighed.mean + change, error - design @ change
+        drawn = replace(weighed, mean=mean, residual=residual)
+        yield error, replace(estimate, model=drawn_model, weighed=drawn)
 
 
 def _divided(
-    solution: Solution, estimate: ProfileEstimate, sigma: float, method: Method
+    solution: Solution, estimate: ProfileEstimate, error: FloatArray, method: Method
 ) -> tuple[dict[str, float], FloatArray, FloatArray]:
     """Divide a draw: A and the numbers read off G, G at the solution's radii, and its transfer."""
     smoothed = smooth_profile(estimate)
     band = find_band(estimate, smoothed)
+    # The width of the Gaussian chooses the grid.
+    sigma = estimate.gaussian.sigma + float(solution.estimate.gaussian_gain[1] @ error)
     wider = replace(estimate, gaussian=replace(estimate.gaussian, sigma=sigma))
     fields = prepare_fields(estimate, smoothed, choose_grid(wider, band))
     drawn = deconvolve(estimate, band, fields, method)
-    a = drawn.conversion_constant
-    parameters = {f.name: f.value for f in kernel_functionals(drawn.g, drawn.gaussian_sigma)}
-    k, modulus = fields.along_axis(np.abs(fields.grid.transfer(drawn.quotient.values)) / a)
+    spectrum = np.abs(fields.grid.transfer(drawn.quotient.values)) / drawn.conversion_constant
     wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
-    return (
-        parameters | {"conversion_constant": a},
-        on_radii(drawn.g, solution.deconvolution.g.r),
-        np.interp(wavenumbers, k, modulus, right=0.0),
-    )
+    transfer = np.interp(wavenumbers, *fields.along_axis(spectrum), right=0.0)
+    return *read_off(drawn, solution.deconvolution.g.r), transfer
 
 
-def on_radii(g: Field, radii: FloatArray) -> FloatArray:
-    """Profile of a field at other radii (m), zero beyond its support."""
-    inside = np.minimum(radii, g.r[-1])
-    return np.where(radii <= g.r[-1], radial_spline(g.r, g.radial)(inside), 0.0)
+def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float], FloatArray]:
+    """A and the numbers read off G, and G at other radii (m), zero beyond its support."""
+    g = result.g
+    numbers = {f.name: f.value for f in kernel_functionals(g, result.gaussian_sigma)}
+    inside = radial_spline(g.r, g.radial)(np.minimum(radii, g.r[-1]))
+    numbers["conversion_constant"] = result.conversion_constant
+    return numbers, np.where(radii <= g.r[-1], inside, 0.0)

@@ -134,18 +134,6 @@ _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class _Oval:
-    """What an elliptic Gaussian adds to the round one, in V/Pa/m^2."""
-
-    fit: GaussianFit
-
-    def on(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Values on a grid about the kernel's zero."""
-        departure = elliptic_departure(x, y, self.fit.sigma, self.fit.ellipticity)
-        return self.fit.conversion_constant * departure
-
-
-@dataclass(frozen=True, eq=False)
 class RasterFields:
     """A measured raster on its own lattice, continued by the fitted profile around it."""
 
@@ -154,18 +142,13 @@ class RasterFields:
     stress: Field
     support: float
     step: float
-    oval: _Oval
+    gaussian: GaussianFit
     index: tuple[NDArray[np.intp], NDArray[np.intp]]
     even: bool
 
     @classmethod
     def place(
-        cls,
-        estimate: ProfileEstimate,
-        smoothed: SmoothedProfile,
-        choice: GridChoice,
-        *,
-        divided: bool,
+        cls, estimate: ProfileEstimate, smoothed: SmoothedProfile, choice: GridChoice, divided: bool
     ) -> RasterFields:
         """Place the raster, continued by its smoothed profile; a field that is divided is even."""
         points = estimate.points
@@ -195,9 +178,8 @@ class RasterFields:
             departure = (smoothed.signal - smoothed.predicted) * smoothed.outlier_weight
             voltage += _mean_at(voltage.shape, (rows, columns), departure / points.load)
         stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
-        oval = _Oval(estimate.gaussian)
-        index = (rows, columns)
-        return cls(grid, Field(grid, voltage), stress, choice.support, step, oval, index, even)
+        fit, index, reach = estimate.gaussian, (rows, columns), choice.support
+        return cls(grid, Field(grid, voltage), stress, reach, step, fit, index, even)
 
     @property
     def confinement(self) -> FloatArray:
@@ -210,12 +192,18 @@ class RasterFields:
 
     @property
     def _kernel_grid(self) -> Lattice:
-        return Lattice(_about_zero(self.grid.x), _about_zero(self.grid.y))
+        # A kernel's zero is the central point of the lattice, wherever the sensor is.
+        x, y = self.grid.x, self.grid.y
+        return Lattice(x - x[x.size // 2], y - y[y.size // 2])
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Lift a radial function about a kernel's zero."""
-        grid = self._kernel_grid
-        return on_grid(profile, grid, self.step) + self.oval.on(grid.x, grid.y)
+        """Lift a radial function about a kernel's zero, with what an ellipse adds to it."""
+        return self._lifted(profile, self._kernel_grid)
+
+    def _lifted(self, profile: Callable[[FloatArray], FloatArray], grid: Lattice) -> FloatArray:
+        fit = self.gaussian
+        oval = elliptic_departure(grid.x, grid.y, fit.sigma, fit.ellipticity)
+        return on_grid(profile, grid, self.step) + fit.conversion_constant * oval
 
     def at_points(self, field: FloatArray) -> FloatArray:
         """Return the values of a field at the measured points."""
@@ -234,8 +222,7 @@ class RasterFields:
         profiled = np.ones_like(readings)
         np.subtract.at(profiled, self.index, share)
         kept = profiled > _ROUNDING
-        rings = self.grid.radius[kept]
-        bessel = j0(np.multiply.outer(k, rings))
+        bessel = j0(np.multiply.outer(k, self.grid.radius[kept]))
         elsewhere = (bessel * profiled[kept]) @ (bessel.T * weights) @ smoothed.gain
         own = j0(np.multiply.outer(k, self.grid.radius[self.index])) * (share / points.load)
         return np.asarray(self.grid.cell_area * (own + elsewhere))
@@ -247,7 +234,7 @@ class RasterFields:
         refinement = max(_REFINEMENT, int(np.ceil(step / (2 * self.step))) | 1)
         fine, values = self.grid.refined(kernel, refinement)
         if profile is not None:
-            values = on_grid(profile.radial, fine, self.step) + self.oval.on(fine.x, fine.y)
+            values = self._lifted(profile.radial, fine)
         inside_x, inside_y = np.abs(fine.x) <= self.support, np.abs(fine.y) <= self.support
         plane = values[np.ix_(inside_y, inside_x)]
         return Field(Lattice(fine.x[inside_x], fine.y[inside_y]), plane)
@@ -259,11 +246,6 @@ class RasterFields:
 
 Fields: TypeAlias = LineFields | RasterFields
 """Voltage and stress on one grid, with the ways back from the grid."""
-
-
-def _about_zero(axis: FloatArray) -> FloatArray:
-    """A kernel's zero is the central point of the lattice, wherever the sensor is."""
-    return np.asarray(axis - axis[axis.size // 2])
 
 
 def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray, NDArray[np.intp]]:

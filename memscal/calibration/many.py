@@ -84,15 +84,14 @@ def calibrate_many(
         Scans or their files; a sequence within counts as one, and is fitted together.
     workers : int, default 1
         Processes that share the work.  Where these are more than one, a script needs the usual
-        ``if __name__ == "__main__":``, because each process imports it.
+        ``if __name__ == "__main__":``.
     **options
         Options of :func:`memscal.calibrate`, the same for all.
 
     Returns
     -------
     list of FleetCalibration
-        One for each scan, in their order.  A scan that cannot be used has its error in place;
-        the others are not affected.
+        One for each scan, in their order.  A scan that cannot be used has its error in place.
 
     Raises
     ------
@@ -120,7 +119,7 @@ def calibrate_many(
     task = partial(_calibrated, options=options)
     items = list(enumerate(scans))
     if workers == 1 or len(items) < 2:
-        return [task(item) for item in items]
+        return list(map(task, items))
     chunk = max(1, min(_LARGEST_CHUNK, len(items) // (4 * workers)))
     with worker_pool(min(workers, len(items))) as pool:
         return list(pool.map(task, items, chunksize=chunk))
@@ -134,12 +133,13 @@ def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCal
     except MemscalError as failure:
         return FleetCalibration(index=index, budget={}, error=failure)
     except Exception as failure:  # noqa: BLE001 - the rest must go on
-        unforeseen = MemscalError(
-            f"Scan {index} met {type(failure).__name__}: {failure}",
-            why="This should have been refused with a reason.",
-            cure="Please report it, with the scan.",
+        problem = f"Scan {index} met {type(failure).__name__}: {failure}"
+        why, cure = (
+            "This should have been refused with a reason.",
+            "Please report it, with the scan.",
         )
-        return FleetCalibration(index=index, budget={}, error=unforeseen)
+        error = MemscalError(problem, why=why, cure=cure)
+        return FleetCalibration(index=index, budget={}, error=error)
     return FleetCalibration(
         index=index,
         parameters=apparatus.parameters,

@@ -17,7 +17,7 @@ from scipy.special import ndtr, ndtri
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.calibration.calibrate import Calibration, uncertainties
-from memscal.calibration.drawn_scatter import on_radii
+from memscal.calibration.drawn_scatter import read_off
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import (
     BUDGETED,
@@ -26,7 +26,6 @@ from memscal.calibration.uncertainty import (
     correlation_matrix,
     drawn_about,
     expected_values,
-    kernel_functionals,
 )
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
@@ -141,15 +140,27 @@ class DrawnScans:
 
     @cached_property
     def solved(self) -> tuple[SolvedInput, ...]:
-        """Stated inputs that the rod is solved for."""
-        return tuple(
-            item for item in _solved_inputs(self.solution.scans) if item.source in self.effects
-        )
+        """Stated properties of each distinct film and rod, named as their effects are."""
+        scans, inputs = self.solution.scans, []
+        for name, component, attribute in (
+            ("thickness", "film", "thickness"),
+            ("poisson_ratio", "film", "poisson_ratio"),
+            ("rod_radius", "indenter", "radius"),
+        ):
+            owners = [getattr(scan, component) for scan in scans]
+            for number, owner in enumerate(dict.fromkeys(owners), start=1):
+                value, u = getattr(owner, attribute), getattr(owner, f"{attribute}_uncertainty")
+                source = name if number == 1 else f"{name}_{number}"
+                if u and source in self.effects:
+                    bounds = (0.0, 0.5) if name == "poisson_ratio" else (value / 2, np.inf)
+                    places = tuple(i for i, other in enumerate(owners) if other == owner)
+                    item = SolvedInput(source, places, component, attribute, value, u, bounds)
+                    inputs.append(item)
+        return tuple(inputs)
 
     @cached_property
     def _geometry(self) -> Geometry:
-        estimate = self.solution.estimate
-        return estimate.model.geometry(estimate.centres)
+        return self.solution.estimate.model.geometry(self.solution.estimate.centres)
 
     @cached_property
     def _nominal(self) -> list[FloatArray]:
@@ -164,10 +175,10 @@ class DrawnScans:
             for i in item.scans:
                 owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
                 true[i] = replace(true[i], **{item.component: owner})
-        references = self.solution.estimate.model.references
+        rods = zip(true, self.solution.estimate.model.references, self._nominal, strict=True)
         return tuple(
             replace(ref, values=ref.values * (_rod_spectrum(scan, ref) / nominal - 1))
-            for scan, ref, nominal in zip(true, references, self._nominal, strict=True)
+            for scan, ref, nominal in rods
         )
 
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
@@ -175,28 +186,9 @@ class DrawnScans:
         first = self.solution
         channel = first.estimate.points.channel
         solution = solve(scans, first.stresses, first.method, channel, both=False)
-        result = solution.deconvolution
-        g = on_radii(result.g, first.deconvolution.g.r)
-        numbers = (f.value for f in kernel_functionals(result.g, result.gaussian_sigma))
-        sigma = solution.estimate.gaussian.sigma
-        return np.array([result.conversion_constant, sigma, *numbers, *g])
-
-
-def _solved_inputs(scans: tuple[Scan, ...]) -> Iterator[SolvedInput]:
-    """Uncertain properties of each distinct film and rod, named as their effects are."""
-    for name, component, attribute in (
-        ("thickness", "film", "thickness"),
-        ("poisson_ratio", "film", "poisson_ratio"),
-        ("rod_radius", "indenter", "radius"),
-    ):
-        owners = [getattr(scan, component) for scan in scans]
-        for number, owner in enumerate(dict.fromkeys(owners), start=1):
-            value, u = getattr(owner, attribute), getattr(owner, f"{attribute}_uncertainty")
-            if u:
-                source = name if number == 1 else f"{name}_{number}"
-                bounds = (0.0, 0.5) if name == "poisson_ratio" else (value / 2, np.inf)
-                places = tuple(i for i, other in enumerate(owners) if other == owner)
-                yield SolvedInput(source, places, component, attribute, value, u, bounds)
+        numbers, g = read_off(solution.deconvolution, first.deconvolution.g.r)
+        numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
+        return np.array([*(numbers[name] for name in BUDGETED), *g])
 
 
 def _rod_spectrum(scan: Scan, reference: RadialSpectrum) -> FloatArray:
@@ -216,9 +208,8 @@ def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:
 
 _COVERAGE = 0.95
 _TAILS = ((1 - _COVERAGE) / 2, (1 + _COVERAGE) / 2)
-#: Share by which standard uncertainties may differ, and by which the mean may be off.
-_TOLERANCE = 0.1
-_LARGEST_SHIFT = 0.25
+#: Shares of u by which the standard uncertainties may differ, and by which the mean may be off.
+_TOLERANCE, _LARGEST_SHIFT = 0.1, 0.25
 #: A cut-off is named where the drawn values lose this share of their scatter, and the budget has
 #: this share of its uncertainty from them.
 _CUT, _COUNTS = 0.05, 0.2
@@ -248,16 +239,12 @@ class BudgetComparison:
     @property
     def agrees(self) -> bool:
         """Whether the budget may be used in place of draws."""
-        # The standard uncertainties may differ by a tenth, and the mean of the draws from the value
-        # by a quarter of one, beyond what the number of draws allows (two standard errors).
         return not self.reason
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MonteCarlo(Result):
-    """Draws of a calibration; from :func:`monte_carlo`.
-
-    ``print(drawn)`` shows the comparison; ``drawn.to_dataframe()`` holds the draws.
+    """Draws of a calibration, from :func:`monte_carlo`; ``to_dataframe()`` holds them.
 
     Parameters
     ----------
@@ -267,7 +254,7 @@ class MonteCarlo(Result):
         What was drawn: noise, then the inputs whose uncertainty is stated.
     samples : ndarray, shape (m, 5)
         A (V/Pa), both widths (m), full width at half maximum (m) and noise-equivalent area (m^2)
-        of the m draws that could be calibrated: all of them, unless a message says otherwise.
+        of the m draws that could be calibrated.
     comparisons : tuple of BudgetComparison
         The same, summed up, beside the budget.
     r : ndarray, shape (n,)
@@ -299,9 +286,8 @@ class MonteCarlo(Result):
 
     def __repr__(self) -> str:
         """Return what was drawn, and whether the budget agrees."""
-        differing = [comparison.name for comparison in self.comparisons if not comparison.agrees]
-        names = ", ".join(differing)
-        verdict = f"the budget does not agree for {names}" if differing else "the budget agrees"
+        names = ", ".join(comparison.name for comparison in self.comparisons if comparison.reason)
+        verdict = f"the budget does not agree for {names}" if names else "the budget agrees"
         return f"<MonteCarlo: {self.draws} draws of {', '.join(self.sources)}; {verdict}>"
 
     @property
@@ -311,10 +297,9 @@ class MonteCarlo(Result):
 
     def __getitem__(self, name: str) -> BudgetComparison:
         """Return the comparison of one parameter."""
-        for comparison in self.comparisons:
-            if comparison.name == name:
-                return comparison
-        raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(BUDGETED)}.")
+        if name not in BUDGETED:
+            raise InputError(f"{name} is not drawn.", cure=f"There are {', '.join(BUDGETED)}.")
+        return self.comparisons[BUDGETED.index(name)]
 
 
 @single_threaded()
@@ -328,10 +313,9 @@ def monte_carlo(
 ) -> MonteCarlo:
     r"""Propagate the distributions of noise and inputs through a calibration.
 
-    Every draw is calibrated by the same method, with the same options.  Its voltages are
-    those of the calibration's A and G under the drawn film, rod, load and positions, with new
-    noise.  Inputs are normal, cut off where no film is (a Poisson's ratio above 1/2), or
-    rectangular (the model's form).
+    Every draw is calibrated by the same method.  Its voltages are those of the calibration's A
+    and G under the drawn film, rod, load and positions, with new noise.  Inputs are normal, cut off
+    where no film is (a Poisson's ratio above 1/2), or rectangular (the model's form).
 
     Parameters
     ----------
@@ -343,8 +327,8 @@ def monte_carlo(
     seed : int, default 0
         Every draw has a seed of its own, spawned from this one.
     workers : int, default 1
-        Processes that share the draws; the draws do not depend on it.  Where these are more than
-        one, a script needs the usual ``if __name__ == "__main__":``.
+        Processes that share the draws.  Where these are more than one, a script needs the usual
+        ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with the number of draws that are done and the number of all draws.
 
@@ -371,10 +355,8 @@ def monte_carlo(
     numbers: list[tuple[str, Any, int]] = [("draws", draws, 2), ("seed", seed, 0)]
     for name, value, least in numbers:
         if not isinstance(value, Integral) or int(value) < least:
-            raise InputError(
-                f"{name} is {value!r}, but it is a whole number from {least} on.",
-                cure=f"Give {name}={least} or more.",
-            )
+            problem = f"{name} is {value!r}, but it is a whole number from {least} on."
+            raise InputError(problem, cure=f"Give {name}={least} or more.")
     require_workers(workers)
     solution, effects = calibration.solution, calibration.effects
     model = DrawnScans(solution, effects, calibration.correlations, seed)
@@ -386,25 +368,24 @@ def monte_carlo(
             cure="The scan is close to failing, too; measure with less noise.",
         )
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
-    expected = expected_values(solution)
+    expected, result = expected_values(solution), solution.deconvolution
     comparisons = tuple(
         _compared(calibration, name, expected[name], column, model.solved)
         for name, column in zip(BUDGETED, samples.T, strict=True)
     )
+    first_order = uncertainties(solution, result, effects, calibration.correlations)
     return MonteCarlo(
         draws=draws,
         seed=seed,
         sources=("noise", *effects),
         samples=samples,
         comparisons=comparisons,
-        r=solution.deconvolution.g.r,
+        r=result.g.r,
         g_mean=g.mean(axis=0),
         g_uncertainty=g.std(axis=0, ddof=1),
         g_symmetric=np.quantile(g, _TAILS, axis=0),
         g_shortest=shortest_interval(g),
-        g_first_order=uncertainties(
-            solution, solution.deconvolution, effects, calibration.correlations
-        ).radial_scatter,
+        g_first_order=first_order.radial_scatter,
         messages=tuple(_messages(calibration, comparisons, failures, draws)),
     )
 
@@ -418,17 +399,17 @@ def _compared(
 ) -> BudgetComparison:
     """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
-    value, mean, spread = parameters[name], float(column.mean()), float(column.std(ddof=1))
+    mean, spread = float(column.mean()), float(column.std(ddof=1))
     error, u = spread * _sampling_error(column), _random_part(budget)
+    # Beyond what the number of draws allows: two standard errors.
     same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
+    agrees = same_spread and same_mean
     low, high = np.quantile(column, _TAILS)
     first, last = shortest_interval(column)
-    agrees = same_spread and same_mean
-    reason = "" if agrees else _reason(spread, mean - expected, u, budget, solved)
     return BudgetComparison(
         name=name,
-        value=value,
+        value=parameters[name],
         expected=expected,
         mean=mean,
         uncertainty=spread,
@@ -437,7 +418,7 @@ def _compared(
         shortest=(float(first), float(last)),
         first_order=u,
         stated=parameters.uncertainty(name),
-        reason=reason,
+        reason="" if agrees else _reason(spread, mean - expected, u, budget, solved),
     )
 
 
@@ -452,11 +433,11 @@ def _reason(
     shift: float,
     u: float,
     budget: Mapping[str, float],
-    solved: Sequence[SolvedInput],
+    inputs: Sequence[SolvedInput],
 ) -> str:
     """Return by how much draws and budget disagree, and whether a distribution is cut off."""
     text = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
-    for item in solved:
+    for item in inputs:
         kept = float(item.truncated(ndtri((np.arange(1000) + 0.5) / 1000)).std())
         if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:
             return (
@@ -487,7 +468,7 @@ def _sampling_error(draws: FloatArray) -> float:
 def _messages(
     calibration: Calibration,
     comparisons: Sequence[BudgetComparison],
-    failures: Sequence[str],
+    failures: list[str],
     draws: int,
 ) -> Iterator[Message]:
     """Return messages on what was drawn, and on uncertainty that no draw shows."""
@@ -500,18 +481,14 @@ def _messages(
         if comparison.first_order < (1 - _TOLERANCE) * comparison.stated
     ]
     if hidden:
-        yield Message(
-            "regularisation",
+        text = (
             "Not all of the stated uncertainty scatters: of its square, what regularisation or "
             f"window hides makes up {', '.join(hidden)}. It is the same error in every draw, so it "
-            "is counted, but not drawn; the comparison is with the rest.",
+            "is counted, but not drawn; the comparison is with the rest."
         )
+        yield Message("regularisation", text)
     if (calibration.solution.estimate.outlier_weight < OUTLIER_WEIGHT).any():
         yield Message("outlier", "Outliers keep their distance from the prediction in every draw.")
     if failures:
-        yield Message(
-            "failed_draws",
-            f"{len(failures)} of {draws} draws could not be calibrated and are left out. The "
-            f"first one: {failures[0]}",
-            "warning",
-        )
+        text = f"{len(failures)} of {draws} draws could not be calibrated and are left out."
+        yield Message("failed_draws", f"{text} The first one: {failures[0]}", "warning")

@@ -48,11 +48,7 @@ def solve(
     *,
     both: bool = True,
 ) -> Solution:
-    """Find A and G: profile of the scans, fields over the plane, and their division.
-
-    With ``both``, the estimate by the other route, too: of a division the Bayesian, of that the
-    division with white noise, where the fields can be divided.
-    """
+    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back."""
     require_channel_method(channel, method)
     points = [measured_points(scan, channel) for scan in scans]
     references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
@@ -64,19 +60,10 @@ def solve(
     other: Method = WhiteNoise() if isinstance(method, Bayesian) else Bayesian()
     divisible = smoothed is not None and fields.even
     beside = deconvolve(estimate, band, fields, other) if both and divisible else None
-    return Solution(
-        scans=tuple(scans),
-        stresses=tuple(stresses),
-        estimate=estimate,
-        smoothed=smoothed,
-        band=band,
-        choice=choice,
-        fields=fields,
-        method=method,
-        deconvolution=deconvolve(estimate, band, fields, method),
-        other=beside,
-        gaussian_misfit=_misfit(estimate, estimate.gaussian.predicted),
-    )
+    result = deconvolve(estimate, band, fields, method)
+    gaussian = _misfit(estimate, estimate.gaussian.predicted)
+    steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
+    return Solution(*steps, result, beside, gaussian)
 
 
 def deconvolve(
@@ -104,13 +91,12 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
         estimate, nonnegative=method.nonnegative, monotone=method.monotone
     )
     values = fields.kernel(profile.radial) * fields.confinement
-    open_window = np.ones(fields.grid.transfer(values).shape)
+    quotient = Quotient(fields.grid, values, np.ones(fields.grid.transfer(values).shape))
     a, g = normalise(fields.on_support(values, profile))
     sigma = fit_gaussian(g, estimate.gaussian.sigma)
-    geometry = estimate.model.geometry(estimate.centres)
-    signal = estimate.model.signal(geometry, profile.transform(estimate.model.k)) + estimate.oval
-    predicted = signal + estimate.background
-    quotient = Quotient(fields.grid, values, open_window)
+    model = estimate.model
+    signal = model.signal(model.geometry(estimate.centres), profile.transform(model.k))
+    predicted = signal + estimate.oval + estimate.background
     misfit = _misfit(estimate, predicted)
     return Deconvolution(quotient, a, g, sigma, predicted, misfit, divided=False)
 
@@ -134,11 +120,9 @@ def prepare_fields(
     divided: bool = True,
 ) -> Fields:
     """Lift the profile of lines or several scans, or place a raster (evenly if it is divided)."""
-    if smoothed is None:
-        return LineFields.lift(estimate, estimate.spectrum, choice)
-    if estimate.points.as_raster:
-        return RasterFields.place(estimate, smoothed, choice, divided=divided)
-    return LineFields.lift(estimate, smoothed.spectrum, choice)
+    if smoothed is not None and estimate.points.as_raster:
+        return RasterFields.place(estimate, smoothed, choice, divided)
+    return LineFields.lift(estimate, (smoothed or estimate).spectrum, choice)
 
 
 @dataclass(frozen=True)
@@ -216,8 +200,7 @@ def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) 
 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     """Compare a prediction with the scan, outliers at their reduced weight."""
-    residual = estimate.points.u - predicted
-    weight = estimate.outlier_weight
+    residual, weight = estimate.points.u - predicted, estimate.outlier_weight
     stated = estimate.points.u_errors
     noise = estimate.noise if stated is None else stated
     degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]

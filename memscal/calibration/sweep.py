@@ -55,30 +55,18 @@ def sweep_noise(solution: Solution, *, amplitudes: int, draws: int, seed: int) -
     require_count("sweep", "amplitudes", amplitudes, 3)
     require_count("sweep", "draws", draws, 1)
     # The method's own fields may be those of points that lie on no lattice: they cannot be divided.
-    solution = replace(
-        solution, fields=prepare_fields(solution.estimate, solution.smoothed, solution.choice)
-    )
+    fields = prepare_fields(solution.estimate, solution.smoothed, solution.choice)
+    solution, seeds = replace(solution, fields=fields), range(seed, seed + draws)
     amplitude = np.logspace(-1, 1, amplitudes)
     expected = np.array([_outcome(solution, WhiteNoise(amplitude=a)) for a in amplitude])
-    drawn = np.array(
-        [
-            [
-                _outcome(solution, WhiteNoiseDraw(amplitude=a, seed=s))
-                for s in range(seed, seed + draws)
-            ]
-            for a in amplitude
-        ]
-    ).reshape(amplitudes, draws, 3)
+    single = [WhiteNoiseDraw(amplitude=a, seed=s) for a in amplitude for s in seeds]
+    drawn = np.reshape([_outcome(solution, draw) for draw in single], (amplitudes, draws, 3))
     return Sweep(amplitude, *expected.T, *np.moveaxis(drawn, -1, 0))
 
 
 def _outcome(solution: Solution, regulariser: Regulariser) -> tuple[float, float, float]:
     try:
-        deconvolution = deconvolve(solution.estimate, solution.band, solution.fields, regulariser)
+        result = deconvolve(solution.estimate, solution.band, solution.fields, regulariser)
     except FitError:
         return np.nan, np.nan, np.nan
-    return (
-        deconvolution.conversion_constant,
-        deconvolution.gaussian_sigma,
-        deconvolution.misfit.relative_rms,
-    )
+    return result.conversion_constant, result.gaussian_sigma, result.misfit.relative_rms

@@ -2,9 +2,8 @@ r"""First-order propagation of noise, regularisation and uncertain inputs to A, 
 
 A division is linear in the voltages: :math:`A\,G(r)` is the inverse transform of the window times
 the smoothed voltages' transform over the reference's.  Its covariance by noise is exact for given
-centre, weights, smoothing and window; centre, baseline and drift are those of the estimate, by
-their derivatives.  What window and smoothing hide is stated apart (``window``): what they take from
-the posterior mean of the Bayesian estimate, and from its posterior about that.
+centre, weights, smoothing and window; centre, baseline and drift enter by their derivatives.  What
+window and smoothing hide of the posterior is stated apart (``window``).
 
 Method ``bayesian`` is a linear function of the posterior of the profile's parameters: what
 scatters from scan to scan is ``noise``, the rest of the expected squared error ``regularisation``.
@@ -12,8 +11,7 @@ scatters from scan to scan is ``noise``, the rest of the expected squared error 
 Inputs add one column each, the change of all results by one standard uncertainty.  An input that
 is larger than stated changes the results as voltages would: by :math:`-A\,G\otimes\delta
 \sigma_{zz}` for the base stress, by :math:`-U'(R)\,\delta R` for the positions.  A change of the
-load scales A alone.  Numbers read off G(r) are functionals of it: their derivative is a row that
-multiplies a change of G.
+load scales A alone.
 """
 
 from __future__ import annotations
@@ -43,10 +41,8 @@ from memscal.model.stress import StressProfile
 _FINE = 20
 #: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
 _RECTANGLE = 1 / np.sqrt(3)
-#: Windows below this have closed.
-_CLOSED = 1e-9
-#: What sums of squares lose to rounding.
-_ROUNDING = 1e-9
+#: Windows below this have closed; what sums of squares lose to rounding.
+_CLOSED = _ROUNDING = 1e-9
 #: Parameters whose uncertainty is broken down by source.
 BUDGETED = (
     "conversion_constant",
@@ -90,8 +86,7 @@ def _half_width(r: FloatArray, g: FloatArray) -> Functional:
     fine = np.linspace(r[0], r[-1], _FINE * r.size)
     values = radial_spline(r, g)(fine)
     top = int(np.argmax(values))
-    last = int(np.flatnonzero(values >= values[top] / 2)[-1])
-    last = min(last, fine.size - 2)
+    last = min(int(np.flatnonzero(values >= values[top] / 2)[-1]), fine.size - 2)
     slope = (values[last + 1] - values[last]) / (fine[1] - fine[0])
     half = fine[last] + (values[top] / 2 - values[last]) / slope if slope else fine[last]
     row = _at(r, half) - 0.5 * _at(r, float(fine[top]))
@@ -101,9 +96,8 @@ def _half_width(r: FloatArray, g: FloatArray) -> Functional:
 
 def _equivalent_area(r: FloatArray, g: FloatArray) -> Functional:
     r"""Noise-equivalent area :math:`1/\int G^2\,dA`, in m^2: 4 pi sigma^2 of a Gaussian."""
-    ring = ring_areas(r)
-    area = float(1 / np.sum(ring * g**2))
-    return Functional("noise_equivalent_area", area, -2 * area**2 * ring * g)
+    area = float(1 / np.sum(ring_areas(r) * g**2))
+    return Functional("noise_equivalent_area", area, -2 * area**2 * ring_areas(r) * g)
 
 
 def _at(r: FloatArray, place: float) -> FloatArray:
@@ -137,16 +131,13 @@ def input_effects(
         owners = [getattr(scan, attribute) for scan in scans]
         distinct = list(dict.fromkeys(owners))
         for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
-            number = distinct.index(owner)
-            suffix = "" if number == 0 else f"_{number + 1}"
+            suffix = _number(distinct.index(owner))
             for source, change in sensitivities(scan, model.references[i]).items():
                 blank = [np.zeros_like(change) for _ in scans]
                 changes.setdefault(source + suffix, blank)[i] = change
-    for i, stress in enumerate(stresses):
-        # Stated errors are those of the normal stress, not of the shear.
-        if model.order or not isinstance(stress, StressProfile):
-            continue
-        if stress.sigma_zz_errors is not None:
+    # Stated errors are those of the normal stress, not of the shear.
+    for i, stress in enumerate(() if model.order else stresses):
+        if isinstance(stress, StressProfile) and stress.sigma_zz_errors is not None:
             errors = hankel_transform(stress.r, stress.sigma_zz_errors, model.k) / stress.load
             blank = [np.zeros_like(errors) for _ in scans]
             changes.setdefault("reference_stress", blank)[i] = errors
@@ -158,11 +149,9 @@ def input_effects(
 
 
 def _of_reference(estimate: ProfileEstimate, changes: Sequence[FloatArray]) -> InputEffect:
-    spectra = (
-        replace(reference, values=change)
-        for reference, change in zip(estimate.model.references, changes, strict=True)
-    )
-    changed = replace(estimate.model, references=tuple(spectra))
+    pairs = zip(estimate.model.references, changes, strict=True)
+    spectra = tuple(replace(reference, values=change) for reference, change in pairs)
+    changed = replace(estimate.model, references=spectra)
     return InputEffect(-changed.signal(estimate.gaussian.geometry, estimate.kernel))
 
 
@@ -179,27 +168,19 @@ def _of_loads(
     scans: Sequence[Scan], stresses: Sequence[StressProfile | Contact], estimate: ProfileEstimate
 ) -> dict[str, InputEffect]:
     """Effects of factors: loads, forces of references, and their discretisation."""
-    model = estimate.model
     signal = estimate.predicted - estimate.background
+    pairs = zip(stresses, estimate.model.references, strict=True)
     shares: dict[str, Sequence[float | None]] = {
-        "reference_force": [
-            abs(carried_force(stress, reference) - 1.0)
-            for stress, reference in zip(stresses, model.references, strict=True)
-        ],
-        "load": [
-            None if scan.load_uncertainty is None else scan.load_uncertainty / scan.load
-            for scan in scans
-        ],
+        "reference_force": [abs(carried_force(*pair) - 1.0) for pair in pairs],
+        "load": [scan.load_uncertainty and scan.load_uncertainty / scan.load for scan in scans],
         "reference_convergence": [stress.convergence for stress in stresses],
     }
     effects = {}
     for source, stated in shares.items():
-        if all(share is None for share in stated):
-            continue
         of_scans = np.array([share or 0.0 for share in stated])
-        common = float(of_scans.mean())
-        apart = (of_scans - common)[estimate.points.scan]
-        effects[source] = InputEffect(-apart * signal, -common)
+        apart = (of_scans - of_scans.mean())[estimate.points.scan]
+        if any(share is not None for share in stated):
+            effects[source] = InputEffect(-apart * signal, -float(of_scans.mean()))
     return effects
 
 
@@ -217,16 +198,15 @@ def correlation_matrix(
                 cure=f"Choose from {', '.join(sources) or 'none'}.",
             )
         if not -1 <= coefficient <= 1:
-            raise InputError(
-                f"The correlation of {pair[0]} and {pair[1]} is {coefficient:g}, outside -1 to 1."
-            )
+            names = " and ".join(pair)
+            raise InputError(f"The correlation of {names} is {coefficient:g}, outside -1 to 1.")
         i, j = (sources.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = coefficient
     least = float(np.linalg.eigvalsh(matrix)[0]) if sources else 1.0
     if least < -1e-9:
         raise InputError(
-            f"The correlations of the inputs contradict each other: their matrix has the "
-            f"eigenvalue {least:.3g}.",
+            "The correlations of the inputs contradict each other: their matrix has the eigenvalue "
+            f"{least:.3g}.",
             why="A covariance is positive semi-definite.",
             cure="Two inputs that both follow a third closely cannot be opposed.",
         )
@@ -271,22 +251,6 @@ class _Derivatives:
         parts = (self.by_voltage, self.by_state, self.hidden)
         return _Derivatives(*((row @ part)[None, :] for part in parts))
 
-    def columns(self, estimate: ProfileEstimate) -> dict[str, FloatArray]:
-        """Contributions of the scan to the uncertainties, by source."""
-        return {
-            "noise": self.by_voltage @ estimate.noise_root,
-            "regularisation": self.by_state @ _fixed_root(estimate),
-            "window": self.hidden,
-        }
-
-
-def _stacked(parts: Sequence[_Derivatives]) -> _Derivatives:
-    return _Derivatives(
-        np.vstack([part.by_voltage for part in parts]),
-        np.vstack([part.by_state for part in parts]),
-        np.vstack([part.hidden for part in parts]),
-    )
-
 
 def propagate(
     solution: Solution,
@@ -302,14 +266,19 @@ def propagate(
     numbers = _numbers(estimate, deconvolution, kernel)
     names = tuple(numbers)
     values = np.array([value for value, _ in numbers.values()])
-    rows = _stacked([*(derivatives for _, derivatives in numbers.values()), kernel[1:]])
-    columns = rows.columns(estimate)
+    parts = [*(derivatives for _, derivatives in numbers.values()), kernel[1:]]
+    by_voltage = np.vstack([part.by_voltage for part in parts])
+    columns = {
+        "noise": by_voltage @ estimate.noise_root,
+        "regularisation": np.vstack([part.by_state for part in parts]) @ _fixed_root(estimate),
+        "window": np.vstack([part.hidden for part in parts]),
+    }
     if drawn is not None:
-        columns["noise"] = _drawn_columns(rows, names, columns["noise"], drawn)
+        columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
     scaled = [name.startswith("conversion_constant") for name in names]
     for source, effect in effects.items():
-        column = rows.by_voltage @ effect.voltage
+        column = by_voltage @ effect.voltage
         column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
         columns[source] = column[:, None]
     if effects:
@@ -376,47 +345,40 @@ def _numbers(
     }
 
 
-def _fitted(
-    estimate: ProfileEstimate, row: FloatArray, state: FloatArray | None, hidden: int
-) -> _Derivatives:
+def _fitted(estimate: ProfileEstimate, row: FloatArray, hidden: int) -> _Derivatives:
     """Derivatives of a parameter that no regularisation touches."""
-    states = np.zeros(estimate.basis.integrals.size) if state is None else state
-    return _Derivatives(row[None, :], states[None, :], np.zeros((1, hidden)))
+    states = np.zeros((1, estimate.basis.integrals.size))
+    return _Derivatives(row[None, :], states, np.zeros((1, hidden)))
 
 
 def _gaussian_numbers(
     estimate: ProfileEstimate, hidden: int
 ) -> dict[str, tuple[float, _Derivatives]]:
     """Width and ellipticity: a round departure beside an ellipse would be read as less of both."""
-    gaussian, gain = estimate.gaussian, estimate.gaussian_gain
-    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1], None, hidden))}
-    first = estimate.basis.flat - estimate.points.ellipse
-    for i, name in enumerate(("ellipticity", "ellipticity_diagonal")[: estimate.points.ellipse]):
-        derivatives = _fitted(estimate, gain[first + i], None, hidden)
-        numbers[name] = (float(gaussian.ellipticity[i]), derivatives)
+    gaussian, gain, count = estimate.gaussian, estimate.gaussian_gain, estimate.points.ellipse
+    numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1], hidden))}
+    first = estimate.basis.flat - count
+    for i, name in enumerate(("ellipticity", "ellipticity_diagonal")[:count]):
+        numbers[name] = float(gaussian.ellipticity[i]), _fitted(estimate, gain[first + i], hidden)
     return numbers
 
 
 def _nuisances(estimate: ProfileEstimate, hidden: int) -> dict[str, tuple[float, _Derivatives]]:
     """Centre, baseline and drift of each scan (of the second ``_2``), and the Gaussian's A."""
-    free, states = estimate.points.free, estimate.basis.integrals.size
-    entries = [
-        (("centre", "centre_y")[axis] + _number(scan), 1.0) for scan, axis in np.argwhere(free)
-    ]
-    for scan, directions in enumerate(free):
+    free, gain = estimate.points.free, estimate.weighed.gain
+    entries = [(("centre", "centre_y")[axis] + _number(i), 1.0) for i, axis in np.argwhere(free)]
+    for i, directions in enumerate(free):
         # The drift is stated across the whole range; its coefficient spans half of it.
-        along = [("drift", "drift_y")[axis] for axis in np.flatnonzero(directions)]
-        entries += [("baseline" + _number(scan), 1.0), *((n + _number(scan), 2.0) for n in along)]
+        along = [("drift", "drift_y")[axis] + _number(i) for axis in np.flatnonzero(directions)]
+        entries += [("baseline" + _number(i), 1.0), *((name, 2.0) for name in along)]
     values = np.concatenate([estimate.centres[free], estimate.drifts])
-    gain = estimate.weighed.gain
-    numbers = {
-        name: (
-            scale * float(values[i]),
-            _fitted(estimate, scale * gain[2 + i], scale * _unit(states, 2 + i), hidden),
-        )
-        for i, (name, scale) in enumerate(entries)
-    }
-    gaussian = _fitted(estimate, estimate.gaussian_gain[0], None, hidden)
+    states = np.eye(estimate.basis.integrals.size)
+    numbers = {}
+    for i, (name, scale) in enumerate(entries):
+        fitted = _fitted(estimate, scale * gain[2 + i], hidden)
+        state = scale * states[2 + i : 3 + i]
+        numbers[name] = scale * float(values[i]), replace(fitted, by_state=state)
+    gaussian = _fitted(estimate, estimate.gaussian_gain[0], hidden)
     numbers["conversion_constant_gaussian"] = (estimate.gaussian.conversion_constant, gaussian)
     return numbers
 
@@ -454,8 +416,7 @@ def _posterior_kernel(
     # Normalised: a change of A G by dK changes G by (dK - G dA) / A.
     normalised = (basis.kernels(k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     radial = (basis.radial(r) - np.outer(estimate.radial(r) / a, basis.integrals)) / a
-    transfer = _interpolated(wavenumbers, k, normalised)
-    rows = np.vstack([basis.integrals, radial, transfer])
+    rows = np.vstack([basis.integrals, radial, _interpolated(wavenumbers, k, normalised)])
     return _Derivatives(rows @ estimate.weighed.gain, rows, np.zeros((len(rows), 0)))
 
 
@@ -504,12 +465,8 @@ def _division_map(
     nuisance = np.hstack([model.centre_derivative(geometry, estimate.kernel), model.drift_columns])
     signals = model.signal(geometry, np.column_stack([estimate.kernel, basis.kernels(model.k)]))
     radial = np.column_stack([estimate.radial(r), basis.radial(r)])
-    return _DivisionMap(
-        direct=normalised(synthesis @ gain),
-        nuisance=nuisance,
-        signals=signals,
-        lost=normalised(radial - synthesis @ (gain @ signals)),
-    )
+    lost = normalised(radial - synthesis @ (gain @ signals))
+    return _DivisionMap(normalised(synthesis @ gain), nuisance, signals, lost)
 
 
 def route_difference(solution: Solution) -> float | None:
@@ -545,36 +502,28 @@ def _interpolated(places: FloatArray, nodes: FloatArray, columns: FloatArray) ->
 
 
 def _drawn_columns(
-    rows: _Derivatives, names: tuple[str, ...], noise: FloatArray, drawn: DrawnScatter
+    by_voltage: FloatArray, names: tuple[str, ...], noise: FloatArray, drawn: DrawnScatter
 ) -> FloatArray:
     """Scatter of repeated draws in place of the first-order noise of what the division decides."""
-    columns = rows.by_voltage @ drawn.voltages
+    columns = by_voltage @ drawn.voltages
     # What no division decides keeps its size to first order, and is correlated as the draws are.
     size = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
     columns *= (np.linalg.norm(noise, axis=1) / size)[:, None]
     for name, column in drawn.parameters.items():
         columns[names.index(name)] = column
-    stop = len(names) + len(drawn.radial)
-    columns[len(names) : stop], columns[stop:] = drawn.radial, drawn.transfer
+    columns[len(names) :] = np.vstack([drawn.radial, drawn.transfer])
     return np.asarray(columns)
-
-
-def _unit(count: int, index: int) -> FloatArray:
-    row = np.zeros(count)
-    row[index] = 1.0
-    return row
 
 
 def _fixed_root(estimate: ProfileEstimate) -> FloatArray:
     """Square root of what of the posterior's covariance does not scatter from scan to scan."""
-    covariance, random = estimate.covariance, estimate.weighed.gain @ estimate.noise_root
-    return _root(covariance - random @ random.T, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+    random = estimate.weighed.gain @ estimate.noise_root
+    return _root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))
 
 
-def _root(covariance: FloatArray, scale: FloatArray | None = None) -> FloatArray:
-    """A square root of a covariance that may be singular, its rows of the given sizes."""
-    if scale is None:
-        scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    safe = np.where(scale > 0, scale, 1.0)
+def _root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
+    """A square root of a covariance that may be singular, scaled by the given variances."""
+    scale = np.maximum(np.diag(covariance) if variances is None else variances, 0.0)
+    safe = np.where(scale > 0, np.sqrt(scale), 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
     return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
