@@ -123,10 +123,8 @@ def test_each_library_stays_in_its_room(trees: dict[str, ast.Module]) -> None:
 def test_slow_libraries_are_imported_only_when_needed(trees: dict[str, ast.Module]) -> None:
     wrong = []
     for name, tree in trees.items():
-        at_import_time = [
-            node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)
-        ]
-        names = set(imported(ast.Module(body=list(at_import_time), type_ignores=[])))
+        at_once = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+        names = set(imported(ast.Module(body=list(at_once), type_ignores=[])))
         own = {library for library, rooms in ONLY_IN.items() if room(name) in rooms == {"figures"}}
         wrong += [(name, library) for library in (names & SLOW) - own]
     assert wrong == []

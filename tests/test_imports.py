@@ -74,14 +74,8 @@ def offered(public: Any) -> Iterator[Any]:
         hints = get_type_hints(public, localns=names)
         yield from (hint for name, hint in hints.items() if not name.startswith("_"))
     for member in members:
-        function = next(
-            (
-                getattr(member, name)
-                for name in ("fget", "func", "__func__")
-                if hasattr(member, name)
-            ),
-            member,
-        )
+        held = [name for name in ("fget", "func", "__func__") if hasattr(member, name)]
+        function = getattr(member, held[0]) if held else member
         if isfunction(function):
             yield get_type_hints(function, localns=names).get("return")
 

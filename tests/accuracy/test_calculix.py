@@ -18,13 +18,8 @@ from helpers.getfem_sphere import contact_radius
 
 import memscal
 
-pytestmark = [
-    pytest.mark.accuracy,
-    pytest.mark.skipif(
-        shutil.which("ccx") is None,
-        reason="CalculiX (Debian package calculix-ccx) is not installed",
-    ),
-]
+MISSING = "CalculiX (Debian package calculix-ccx) is not installed"
+pytestmark = [pytest.mark.accuracy, pytest.mark.skipif(not shutil.which("ccx"), reason=MISSING)]
 
 # An incompressible film is beyond CalculiX's elements: both sides are nearly so.
 RATIOS = (0.495, 0.499) if FULL else (0.495,)

@@ -144,10 +144,8 @@ def test_g_and_a_are_found_and_a_is_as_uncertain_as_stated(kind: str, noise: flo
 @pytest.mark.parametrize("noise", NOISES)
 def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(noise: float) -> None:
     columns, seeds = study("Gaussian", noise), seeds_of("Gaussian")
-    error, stated = (
-        columns["fit"] / [1.0, WIDTHS[noise]] - 1,
-        columns["u_fit"] / [1.0, WIDTHS[noise]],
-    )
+    truth = [1.0, WIDTHS[noise]]
+    error, stated = columns["fit"] / truth - 1, columns["u_fit"] / truth
     bound = cramer_rao(noise, sigma=WIDTHS[noise])
     limit = root_mean_square_limit(1.1, seeds, CHANCE)
     assert (np.sqrt(np.mean(error**2, axis=0)) < limit * np.array(bound)).all()

@@ -85,13 +85,9 @@ def weighed(friction: float, slip_length: float, kind: str, seed: int) -> LawCom
         **KINDS[kind],
     )
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
-    found = compare_interface(
-        memscal.measure_stress([made.dry], apparatus).profiles,
-        apparatus,
-        macroscopic=MACROSCOPIC,
-        amontons=rigid(film),
-        slipping=slipping(film),
-    ).tangential
+    profiles = memscal.measure_stress([made.dry], apparatus).profiles
+    families = {"amontons": rigid(film), "slipping": slipping(film)}
+    found = compare_interface(profiles, apparatus, macroscopic=MACROSCOPIC, **families).tangential
     assert found is not None
     return found
 

@@ -79,12 +79,9 @@ def test_the_messy_scan_is_the_normal_case() -> None:
     order = np.random.default_rng(7).permutation(65)
     messy = replace(clean, x=clean.x[order], u_zz=u[:, order], u_zz_errors=None)
     apparatus = memscal.calibrate(messy).apparatus
-    for name, truth in [
-        ("conversion_constant", CONVERSION),
-        ("gaussian_sigma", SIGMA),
-        ("centre", 1.2e-3),
-        ("baseline", clean.synthetic["baseline"]),
-    ]:
+    truths = {"conversion_constant": CONVERSION, "gaussian_sigma": SIGMA, "centre": 1.2e-3}
+    truths["baseline"] = clean.synthetic["baseline"]
+    for name, truth in truths.items():
         assert abs(apparatus.parameters[name] - truth) < 5 * apparatus.parameters.uncertainty(name)
     text = "\n".join(map(str, apparatus.process.messages))
     assert "5 points of the scan are missing" in text
@@ -128,11 +125,8 @@ def test_a_raster_is_used_as_it_is_and_agrees_with_a_line() -> None:
         simulated(raster=True, points=33, centre=(0.3e-3, -0.4e-3), noise=0.005)
     )
     parameters = raster.apparatus.parameters
-    for name, truth in [
-        ("conversion_constant", CONVERSION),
-        ("centre", 0.3e-3),
-        ("centre_y", -0.4e-3),
-    ]:
+    truths = {"conversion_constant": CONVERSION, "centre": 0.3e-3, "centre_y": -0.4e-3}
+    for name, truth in truths.items():
         assert abs(parameters[name] - truth) < 5 * parameters.uncertainty(name)
     assert plane_error(R, raster.apparatus.radial(R), memscal.GaussianMixture().radial(R)) < 0.15
     assert {c.name for c in raster.apparatus.checks} >= {"axisymmetry", "reconvolution"}

@@ -175,11 +175,8 @@ def test_outliers_and_missing_points_move_nothing() -> None:
     u[40] = np.nan
     found = calibrated(replace(scan, channels={**scan.channels, "u_xz": u})).apparatus
     spread = clean.parameters.uncertainty("conversion_constant_gaussian")
-    moved = (
-        found.parameters["conversion_constant_gaussian"]
-        - clean.parameters["conversion_constant_gaussian"]
-    )
-    assert abs(moved) < 1.5 * spread
+    spoilt, usual = (p.parameters["conversion_constant_gaussian"] for p in (found, clean))
+    assert abs(spoilt - usual) < 1.5 * spread
     assert any(message.kind == "outlier" for message in found.process.messages)
 
 

@@ -90,11 +90,8 @@ def stated(item: ElasticFilm | Indenter) -> dict[str, float]:
 
 def test_the_folder_holds_what_its_readme_lists_and_is_small() -> None:
     listed = set(re.findall(r"^\| `([^`]+)`", README, flags=re.MULTILINE))
-    shipped = {
-        path.relative_to(DATA).as_posix()
-        for path in DATA.rglob("*")
-        if path.suffix in {".h5", ".csv"}
-    }
+    paths = [path for path in DATA.rglob("*") if path.suffix in {".h5", ".csv"}]
+    shipped = {path.relative_to(DATA).as_posix() for path in paths}
     assert shipped == listed == {*SCANS, *EXPERIMENT, *TABLES, ARTIFACT}
     assert sum(path.stat().st_size for path in DATA.rglob("*") if path.is_file()) < 1_000_000
 
@@ -167,10 +164,8 @@ def test_the_readmes_commands_make_the_shipped_scans(name: str, rebuilt: Path) -
 
 def test_the_contacts_of_the_experiment_are_what_its_readme_says() -> None:
     dry, lubricated = (memscal.read_scan(DATA / name) for name in EXPERIMENT[1:])
-    for scan, loads, friction in (
-        (dry, [0.34, 0.69, 1.37, 2.75], 0.2),
-        (lubricated, [0.69, 2.75], 0),
-    ):
+    cases = ((dry, [0.34, 0.69, 1.37, 2.75], 0.2), (lubricated, [0.69, 2.75], 0))
+    for scan, loads, friction in cases:
         assert scan.synthetic["friction"] == friction
         assert_allclose(np.diff(scan.x), 0.5e-3)
         assert_allclose(scan.normal_load, np.repeat(loads, 2)[:, None] * np.ones(33))

@@ -24,16 +24,9 @@ def artifact(shared_artifact: Path, folder: Path) -> Path:
 
 def test_inspect_shows_values_arrays_checks_and_provenance(run: Run, artifact: Path):
     shown = run("inspect", artifact).exits(0)
-    kind, array = "memscal-artifact", "/entry/apparatus_function/g "
-    for text in (
-        kind,
-        array,
-        "mV/Pa",
-        "FAILED",
-        "What the failures mean",
-        "scan.h5",
-        "white-noise",
-    ):
+    for text in ("memscal-artifact", "/entry/apparatus_function/g ", "mV/Pa", "FAILED"):
+        assert text in shown.out
+    for text in ("What the failures mean", "scan.h5", "white-noise"):
         assert text in shown.out
 
 

@@ -19,20 +19,14 @@ def _gaussian(r: FloatArray, width: float) -> FloatArray:
     return np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
 
 
-def _axis(count: int, step: float, offset: float = 0.0) -> FloatArray:
-    return (np.arange(count) - count // 2) * step + offset
+def _lattice(x: float = 0.0, y: float = 0.0) -> Lattice:
+    return Lattice(np.arange(-80, 81) * 0.12e-3 + x, np.arange(-70, 71) * 0.11e-3 + y)
 
 
 GRIDS: dict[str, tuple[FieldGrid, FieldGrid]] = {
     "quarter plane": (EvenGrid(129, 0.1e-3), EvenGrid(129, 0.1e-3)),
-    "lattice": (
-        Lattice(_axis(161, 0.12e-3), _axis(141, 0.11e-3)),
-        Lattice(_axis(161, 0.12e-3), _axis(141, 0.11e-3)),
-    ),
-    "lattice off centre": (
-        Lattice(_axis(161, 0.12e-3, 0.63e-3), _axis(141, 0.11e-3, -0.41e-3)),
-        Lattice(_axis(161, 0.12e-3), _axis(141, 0.11e-3)),
-    ),
+    "lattice": (_lattice(), _lattice()),
+    "lattice off centre": (_lattice(0.63e-3, -0.41e-3), _lattice()),
 }
 
 
@@ -64,12 +58,9 @@ def _make(grid_name: str = "quarter plane", weakest: float = 1e-3) -> Gaussians:
         grid, A * _gaussian(grid.radius, both), _gaussian(grid.radius, STRESS_WIDTH),
         A * float(np.exp(-((k * both) ** 2) / 2)), weakest,
     )  # fmt: skip
-    return Gaussians(
-        problem,
-        _gaussian(centred.radius, KERNEL_WIDTH),
-        np.exp(-((grid.wavenumber * STRESS_WIDTH) ** 2) / 2),
-        np.exp(-((grid.wavenumber * KERNEL_WIDTH) ** 2) / 2),
-    )
+    widths = (STRESS_WIDTH, KERNEL_WIDTH)
+    transforms = [np.exp(-((grid.wavenumber * width) ** 2) / 2) for width in widths]
+    return Gaussians(problem, _gaussian(centred.radius, KERNEL_WIDTH), *transforms)
 
 
 @pytest.fixture

@@ -80,10 +80,8 @@ def test_richardson_and_lucy_keep_the_kernel_positive_where_others_overshoot(on_
 
 def test_more_steps_of_richardson_and_lucy_resolve_more(gaussians: Callable) -> None:
     problem = gaussians()
-    errors = [
-        problem.error(RichardsonLucy(iterations=count).divide(problem.problem))
-        for count in (2, 8, 32)
-    ]
+    divided = [RichardsonLucy(iterations=n).divide(problem.problem) for n in (2, 8, 32)]
+    errors = [problem.error(division) for division in divided]
     assert errors == sorted(errors, reverse=True)
 
 

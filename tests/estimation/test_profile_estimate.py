@@ -88,12 +88,9 @@ def test_the_gain_is_the_derivative_of_the_estimate_by_the_voltages() -> None:
 def test_noise_that_is_stated_too_large_widens_the_band_by_what_noise_does_and_no_more() -> None:
     """What the film hides does not grow with the noise: only its share of the band does."""
     scan = simulated(noise=0.002)
-    bands = [
-        memscal.calibrate(
-            replace(scan, u_zz_errors=scan.u_zz_errors * factor), method="bayesian"
-        ).apparatus.radial_uncertainty(0.0)
-        for factor in (1.0, 10.0)
-    ]
+    scans = [replace(scan, u_zz_errors=scan.u_zz_errors * factor) for factor in (1.0, 10.0)]
+    found = [memscal.calibrate(stated, method="bayesian").apparatus for stated in scans]
+    bands = [apparatus.radial_uncertainty(0.0) for apparatus in found]
     assert bands[0] < bands[1] < 3 * bands[0]
 
 

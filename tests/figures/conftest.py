@@ -10,15 +10,9 @@ import pytest
 from helpers.builders import make_artifact
 from matplotlib.figure import Figure
 
+from memscal import ApparatusRadial, Reconvolution, TransferFunction
 from memscal.figures.calibration import calibration_figure
-from memscal.model.apparatus import (
-    ApparatusData,
-    ApparatusField,
-    ApparatusRadial,
-    ParameterSet,
-    Reconvolution,
-    TransferFunction,
-)
+from memscal.model.apparatus import ApparatusData, ApparatusField, ParameterSet
 from memscal.model.checks import Message, QualityCheck
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile

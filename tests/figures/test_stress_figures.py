@@ -16,10 +16,8 @@ from memscal.model.measured_stress import MeasuredStress
 
 @pytest.fixture(scope="module")
 def stress() -> MeasuredStress:
-    scans = [
-        contact_scan(1, load=(0.34, 2.75)),
-        contact_scan(2, load=(0.34,), lubrication="lubricated"),
-    ]
+    lubricated = contact_scan(2, load=(0.34,), lubrication="lubricated")
+    scans = [contact_scan(1, load=(0.34, 2.75)), lubricated]
     return memscal.measure_stress(scans, known_apparatus(conversion_uncertainty=0.01))
 
 

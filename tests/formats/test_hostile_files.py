@@ -260,10 +260,8 @@ def test_text_of_variable_length_as_other_programs_write_it_is_read(tmp_path: Pa
 def test_variable_text_is_read_in_every_version_of_the_format(tmp_path: Path, libver, further):
     """Where attributes are many, HDF5 moves them out of the object's header."""
     write_scan(make_scan(), tmp_path / "ours.h5")
-    with (
-        h5py.File(tmp_path / "ours.h5") as ours,
-        h5py.File(tmp_path / "scan.h5", "w", libver=libver) as file,
-    ):
+    path = tmp_path / "scan.h5"
+    with h5py.File(tmp_path / "ours.h5") as ours, h5py.File(path, "w", libver=libver) as file:
         ours.copy("/entry", file)
         x = file["/entry/data/x"]
         del file["/entry/title"], x.attrs["units"]
@@ -274,7 +272,7 @@ def test_variable_text_is_read_in_every_version_of_the_format(tmp_path: Path, li
         x.attrs["units"] = "um"
         for name, value in ours.attrs.items():
             file.attrs[name] = value
-    scan = read_scan(tmp_path / "scan.h5")
+    scan = read_scan(path)
     assert (scan.title, scan.x[0]) == ("variable", pytest.approx(-8e-6))
 
 

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import memscal
+from memscal import MeasuredPoints, MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.errors import FormatError, InputError, MemscalError, OutputError, UnitError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
@@ -21,17 +22,10 @@ from memscal.formats.stress import read_stress, write_stress
 from memscal.formats.units import from_si, to_si
 from memscal.model.checks import QualityCheck
 from memscal.model.indenter import Sphere
-from memscal.model.measured_stress import (
-    MeasuredPoints,
-    MeasuredProfile,
-    MeasuredScan,
-    MeasuredStress,
-)
 from memscal.model.provenance import Process, SourceFile
 from memscal.model.scan import StressSensor
 
 DATA = Path(__file__).parent / "data"
-
 
 SCANS = tuple(
     MeasuredScan(
@@ -78,6 +72,7 @@ def make_stress_profile(load: float, n: int = 7, **fields: Any) -> MeasuredProfi
 
 
 def make_stress(**fields: Any) -> MeasuredStress:
+    process = Process(program="memscal", version="1", date="", configuration={"override": True})
     made: dict[str, Any] = {
         "profiles": (make_stress_profile(0.5, scan=SCANS[0]), make_stress_profile(1.5, 9)),
         "scans": SCANS,
@@ -88,9 +83,7 @@ def make_stress(**fields: Any) -> MeasuredStress:
             QualityCheck("symmetry_1", np.nan, 3.0, False, "not a number"),
         ),
         "overridden": ('scan.h5: film "a" in the scan, "b" in the artifact',),
-        "process": Process(
-            program="memscal", version="1", date="", configuration={"override": True}
-        ),
+        "process": process,
         "artifact": SourceFile("sensor.apparatus.h5", "0" * 64),
         "artifact_digest": "a" * 64,
     }

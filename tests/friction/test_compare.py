@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -106,32 +107,23 @@ def test_lubricated_contacts_are_found_frictionless_and_dry_ones_not(found) -> N
 
 
 def test_no_value_comes_without_interval_and_budget(found: memscal.FrictionComparison) -> None:
-    readings = [
-        reading
-        for loads in found.loads.values()
-        for one in loads
-        for reading in (one.by_maximum, one.by_profile)
-    ] + [reading for by in found.joint.values() for reading in by.values()]
+    loads = [load for by_loading in found.loads.values() for load in by_loading]
+    readings = [reading for load in loads for reading in (load.by_maximum, load.by_profile)]
+    readings += [reading for by in found.joint.values() for reading in by.values()]
+    sources = {"noise", "apparatus", "young_modulus", "thickness", "load"}
     for reading in readings:
         if reading.value is None:
             assert reading.reason
             assert not reading.budget
         else:
             assert reading.interval.holds(reading.value)
-            assert {"noise", "apparatus", "young_modulus", "thickness", "load"} <= set(
-                reading.budget
-            )
+            assert sources <= set(reading.budget)
 
 
 def test_a_clean_experiment_passes_its_checks_of_friction(found) -> None:
-    assert {
-        "applied_force_1",
-        "profile_chi_square_4",
-        "bracketing_1",
-        "joint_chi_square_dry",
-        "joint_chi_square_lubricated",
-        "lubricated_frictionless",
-    } <= {check.name for check in found.checks}
+    joint = {"joint_chi_square_dry", "joint_chi_square_lubricated", "lubricated_frictionless"}
+    single = {"applied_force_1", "profile_chi_square_4", "bracketing_1"}
+    assert joint | single <= {check.name for check in found.checks}
     assert "lubricated_frictionless" not in failed(found)
 
 
@@ -157,13 +149,8 @@ def test_noise_that_is_understated_fails_the_chi_square(made, apparatus, familie
 
 
 def test_profiles_from_elsewhere_take_the_place_of_ours(made, apparatus) -> None:
-    tables = [
-        contact.profile()
-        for mu in (0.0, 0.3)
-        for contact in memscal.indent(
-            made.dry.film, made.dry.indenter, load=[0.69, 2.75], friction=mu
-        )
-    ]
+    press = partial(memscal.indent, made.dry.film, made.dry.indenter, load=[0.69, 2.75])
+    tables = [contact.profile() for mu in (0.0, 0.3) for contact in press(friction=mu)]
     found = memscal.compare(made.dry, apparatus, references=tables)
     (reading,) = found.joint["dry"].values()
     assert found.friction.tolist() == [0.0, 0.3]

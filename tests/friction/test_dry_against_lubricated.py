@@ -37,10 +37,8 @@ def compared(
     wet = laboratory.measured(0.0, 2 * seed + 1, systematic=False)[LOAD]
     if shift:
         there = replace(wet, offset=wet.offset + shift)
-        moved = (
-            laboratory.predicted(0.0, LOAD, there).signal
-            - laboratory.predicted(0.0, LOAD, wet).signal
-        )
+        after, before = (laboratory.predicted(0.0, LOAD, read).signal for read in (there, wet))
+        moved = after - before
         wet = replace(there, u=wet.u + moved[0])
     return dry_against_lubricated(
         (profile(dry, "dry"), profile(wet, "lubricated")), (dry, wet), laboratory.sensor,

@@ -66,12 +66,8 @@ def test_the_slope_of_a_member_is_the_derivative_by_the_coordinate() -> None:
 
 
 def test_a_family_is_not_extrapolated() -> None:
-    short = ProfileFamily(
-        **{
-            **{name: getattr(family(), name) for name in family().__dataclass_fields__},
-            "values": np.array([0.05, 0.1, 0.2, 0.3, 0.4]),
-        }
-    )
+    fields = {name: getattr(family(), name) for name in family().__dataclass_fields__}
+    short = ProfileFamily(**(fields | {"values": np.array([0.05, 0.1, 0.2, 0.3, 0.4])}))
     for beyond in (0.01, 0.5, math.inf):
         with pytest.raises(InputError, match="does not reach"):
             short.at(beyond)

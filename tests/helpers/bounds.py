@@ -32,17 +32,11 @@ def cramer_rao(
 
     By finite differences of simulated, noise-free scans: not by the estimator's own Jacobian.
     """
+    still = {"noise": 0.0, "points": points, "baseline": 0.0, "drift": 0.0}
 
     def voltage(a: float = CONVERSION, s: float = sigma, x: float = centre) -> FloatArray:
-        return simulated(
-            noise=0.0,
-            conversion_constant=a,
-            kernel=memscal.GaussianMixture((1.0,), (s,)),
-            centre=(x, 0.0),
-            points=points,
-            baseline=0.0,
-            drift=0.0,
-        ).u_zz
+        kernel = memscal.GaussianMixture((1.0,), (s,))
+        return simulated(conversion_constant=a, kernel=kernel, centre=(x, 0.0), **still).u_zz
 
     step, shift = 1e-4, 0.01e-3
     columns = [

@@ -5,15 +5,9 @@ from typing import Any
 
 import numpy as np
 
+import memscal
 from memscal import ElasticFilm, Process, Rod, Scan, SourceFile, StressProfile, StressSensor
-from memscal.model.apparatus import (
-    ApparatusData,
-    ApparatusField,
-    ApparatusRadial,
-    ParameterSet,
-    Reconvolution,
-    TransferFunction,
-)
+from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial, ParameterSet
 from memscal.model.checks import Message, QualityCheck
 
 SIGMA = 561e-6
@@ -82,40 +76,22 @@ def make_artifact(**changes: Any) -> ApparatusData:
     radial = np.exp(-(r**2) / (2 * SIGMA**2)) / (2 * np.pi * SIGMA**2)
     errors = 0.01 * radial.max() * np.ones_like(r)
     k = np.linspace(0.0, 6e3, 31)
-    modulus = np.exp(-(k**2) * SIGMA**2 / 2)
+    modulus, window = np.exp(-(k**2) * SIGMA**2 / 2), np.where(k < 3.7e3, 1.0, 0.1)
+    values = {
+        "conversion_constant": CONVERSION, "gaussian_sigma": SIGMA,
+        "gaussian_sigma_deconvolved": 1.01 * SIGMA, "centre": 1e-5, "baseline": 2e-6,
+    }  # fmt: skip
+    covariance = np.diag([1e-20, 1e-12, 4e-12, 1e-12, 1e-14])
     scan = make_scan()
     voltage = np.nan_to_num(scan.u_zz)
     data = ApparatusData(
         field=ApparatusField(x=x, y=y, g=g, g_errors=0.01 * g),
-        radial_profile=ApparatusRadial(
-            r=r, g=radial, g_errors=errors, g_gaussian=radial, g_covariance=np.diag(errors**2)
+        radial_profile=ApparatusRadial(r, radial, errors, radial, np.diag(errors**2)),
+        transfer=memscal.TransferFunction(k, modulus, 0.01 * modulus, window, 3.7e3),
+        reconvolution=memscal.Reconvolution(
+            scan.x, scan.u_zz, np.full(33, 1e-5), voltage, 1.001 * voltage, scan.u_zz - voltage
         ),
-        transfer=TransferFunction(
-            k=k,
-            modulus=modulus,
-            modulus_errors=0.01 * modulus,
-            window=np.where(k < 3.7e3, 1.0, 0.1),
-            resolved_wavenumber=3.7e3,
-        ),
-        reconvolution=Reconvolution(
-            x=scan.x,
-            u_zz=scan.u_zz,
-            u_zz_errors=np.full(scan.x.shape, 1e-5),
-            u_zz_predicted=voltage,
-            u_zz_gaussian=1.001 * voltage,
-            residual=scan.u_zz - voltage,
-        ),
-        parameters=ParameterSet(
-            names=(
-                "conversion_constant",
-                "gaussian_sigma",
-                "gaussian_sigma_deconvolved",
-                "centre",
-                "baseline",
-            ),
-            values=np.array([CONVERSION, SIGMA, 1.01 * SIGMA, 1e-5, 2e-6]),
-            covariance=np.diag([1e-20, 1e-12, 4e-12, 1e-12, 1e-14]),
-        ),
+        parameters=ParameterSet(tuple(values), np.array(list(values.values())), covariance),
         checks=(
             QualityCheck("reconvolution", 0.004, 0.02, True, "The scan is met."),
             QualityCheck("symmetry", 0.05, 0.03, False, "Left and right differ."),

@@ -144,6 +144,7 @@ def comparison(
 
 def interface_comparison(slip_length: float = 1.8e-6) -> memscal.InterfaceComparison:
     """Return laws of a dry and of a lubricated interface, a slip length preferred."""
+    pressures = np.array([27e3, 33e3, 50e3, 80e3])
     return memscal.InterfaceComparison(
         macroscopic=(1.6, 0.2),
         tangential=_laws(
@@ -154,10 +155,8 @@ def interface_comparison(slip_length: float = 1.8e-6) -> memscal.InterfaceCompar
             memscal.ImpliedFriction(
                 loads=np.array(LOADS),
                 friction=np.outer([0.11, 0.14, 0.17, 0.2], [1.3, 1.0, 0.8]),
-                pressures=np.array([27e3, 33e3, 50e3, 80e3]),
-                stiffnesses=np.outer(
-                    [27e3, 33e3, 50e3, 80e3], 1.6 / slip_length / np.array([0.8, 1.0, 1.3])
-                ),
+                pressures=pressures,
+                stiffnesses=np.outer(pressures, 1.6 / slip_length / np.array([0.8, 1.0, 1.3])),
             ),
         ),
         normal=_laws(
@@ -184,24 +183,13 @@ def _laws(
     )
     better, worse = sorted((-1, 0), key=lambda i: -evidence[i])
     factor = memscal.BayesFactor(names[better], names[worse], abs(evidence[-1] - evidence[0]))
-    return memscal.LawComparison(
-        lubrication=lubrication,
-        loads=np.array(LOADS),
-        laws=laws,
-        factors=(factor,),
-        length=memscal.BoundedEstimate(
-            value=length,
-            standard_uncertainty=0.1 * length,
-            interval=memscal.Interval(inside[0], inside[-1]),
-            reason="",
-            values=lengths,
-            chi_square=chi_square,
-            least=120.0,
-            unit="m",
-        ),
-        priors=(memscal.PriorChoice("lengths from 0.1 to 30 um", evidence[-1] - 0.4),),
-        implied=implied,
+    interval = memscal.Interval(inside[0], inside[-1])
+    estimate = memscal.BoundedEstimate(
+        length, 0.1 * length, interval, "", lengths, chi_square, least=120.0, unit="m"
     )
+    prior = memscal.PriorChoice("lengths from 0.1 to 30 um", evidence[-1] - 0.4)
+    loads = np.array(LOADS)
+    return memscal.LawComparison(lubrication, loads, laws, (factor,), estimate, (prior,), implied)
 
 
 def _joint(of_each: Sequence[memscal.LoadComparison], lubrication: str) -> memscal.BoundedEstimate:

@@ -76,29 +76,18 @@ def sensor(family: ProfileFamily, conversion: float = 0.012, width: float = 0.00
     return Sensor(family.wavenumbers, transfer, np.stack(changes, axis=1), 1.0)
 
 
-def read_without_error(
-    truth: ProfileFamily, value: float, precision: Precision
-) -> list[LoadPoints]:
+def read_without_error(truth: ProfileFamily, value: float, stated: Precision) -> list[LoadPoints]:
     """Return 33 points 0.5 mm apart at each load of a family, and their repeats, as calculated."""
-    x = np.tile(np.linspace(-8e-3, 8e-3, 33), precision.repeats)
-    gauge = sensor(truth)
-    spectra = truth.at(value).spectra[0]
-    found = []
-    for own in spectra:
-        u = truth.wavenumbers.synthesise(gauge.transfer * own, np.abs(x))
-        found.append(
-            LoadPoints(
-                u=u,
-                offset=x,
-                log_load=np.zeros(x.size),
-                noise=np.full(x.size, precision.noise * u.max()),
-                load_errors=np.full(x.size, precision.scatter),
-                x_errors=np.zeros(x.size),
-                flat=np.stack([np.ones(x.size), np.linspace(-1, 1, x.size)], axis=1),
-                load_share=0.002,
-            )
-        )
-    return found
+    x = np.tile(np.linspace(-8e-3, 8e-3, 33), stated.repeats)
+    ones, transfer = np.ones(x.size), sensor(truth).transfer
+    voltages = [
+        truth.wavenumbers.synthesise(transfer * spectrum, np.abs(x))
+        for spectrum in truth.at(value).spectra[0]
+    ]
+    flat = np.stack([ones, np.linspace(-1, 1, x.size)], axis=1)
+    errors = {"load_errors": stated.scatter * ones, "x_errors": 0 * ones, "load_share": 0.002}
+    shared = {"offset": x, "log_load": 0 * ones, "flat": flat, **errors}
+    return [LoadPoints(u, noise=stated.noise * u.max() * ones, **shared) for u in voltages]
 
 
 def measured(points: Sequence[LoadPoints], family: ProfileFamily) -> Measured:

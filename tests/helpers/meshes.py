@@ -48,22 +48,10 @@ def section(plane: str = "xy", *, radii: Any = RADII, heights: Any = HEIGHTS) ->
     full[:, i, j] = full[:, j, i] = rz
     six = np.stack([full[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))], 1)
     middle = flat[cells].mean(axis=1)
-    return meshio.Mesh(
-        points,
-        [("quad", cells)],
-        point_data={
-            "S4": np.stack([rr, zz, hoop, rz], axis=1),
-            "S6": six,
-            "S9": full.reshape(-1, 9),
-            "S33": zz,
-            "S13": rz,
-            "u": points,
-        },
-        cell_data={
-            "C33": [-pressure(middle[:, 0])],
-            "C4": [tensor(middle[:, 0], 0 * middle[:, 0])],
-        },
-    )
+    four, nine = np.stack([rr, zz, hoop, rz], axis=1), full.reshape(-1, 9)
+    at_points = {"S4": four, "S6": six, "S9": nine, "S33": zz, "S13": rz, "u": points}
+    at_cells = {"C33": [-pressure(middle[:, 0])], "C4": [tensor(middle[:, 0], 0 * middle[:, 0])]}
+    return meshio.Mesh(points, [("quad", cells)], point_data=at_points, cell_data=at_cells)
 
 
 def block(x: Any, y: Any, *, centre: tuple[float, float] = (0.0, 0.0)) -> meshio.Mesh:

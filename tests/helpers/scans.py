@@ -154,9 +154,7 @@ def known_apparatus(
         process=Process(program="test", version="0", date=""),
         budget={},
     )
-    return memscal.ApparatusFunction(
-        **{item.name: getattr(data, item.name) for item in fields(data)}
-    )
+    return memscal.ApparatusFunction(**{f.name: getattr(data, f.name) for f in fields(data)})
 
 
 LOADS = (0.34, 0.69, 1.37, 2.75)
@@ -202,11 +200,8 @@ def shear_scan(
     offset = scan.x - CENTRE
     signal = SHEAR_CONVERSION * spectrum.at(np.abs(offset)) * np.sign(offset)
     largest = float(np.abs(signal).max())
-    level = (
-        0.01
-        + 0.0025 * scan.x / np.abs(scan.x).max()
-        + crosstalk * np.exp(-((offset / 1.5e-3) ** 2) / 2)
-    )
+    level = 0.01 + 0.0025 * scan.x / np.abs(scan.x).max()
+    level += crosstalk * np.exp(-((offset / 1.5e-3) ** 2) / 2)
     rng = np.random.default_rng([seed, 1])
     u = signal + largest * (level + rng.normal(0.0, noise, scan.u_zz.shape))
     channels = {f"u_{channel}": u, f"u_{channel}_errors": np.full(u.shape, noise * largest)}

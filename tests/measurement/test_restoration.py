@@ -186,33 +186,17 @@ def test_the_paper_s_film_adds_its_uncertainty() -> None:
 
 
 SCAN = sphere_scan(pressed(), seed=1)
+OTHER, NOISE = memscal.StressSensor(name="other"), np.random.default_rng(0).normal(0, 1e-5, 33)
+BARE = replace(EXACT.radial_profile, g_covariance=np.full((301, 301), np.nan))
+BESIDE = replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None)
 BAD = {
     "several loads": (replace(SCAN, normal_load=np.linspace(0.5, 1.5, 33)), EXACT, "grows"),
-    "another sensor": (
-        replace(SCAN, sensor=memscal.StressSensor(name="other")),
-        EXACT,
-        "belongs to one sensor",
-    ),
-    "no covariance": (
-        SCAN,
-        replace(
-            EXACT,
-            radial_profile=replace(EXACT.radial_profile, g_covariance=np.full((301, 301), np.nan)),
-        ),
-        "does not state the covariance",
-    ),
+    "another sensor": (replace(SCAN, sensor=OTHER), EXACT, "belongs to one sensor"),
+    "no covariance": (SCAN, replace(EXACT, radial_profile=BARE), "does not state the covariance"),
     "zero noise": (replace(SCAN, u_zz_errors=np.zeros(33)), EXACT, "uncertainty of zero"),
     "wrong sign": (replace(SCAN, u_zz=-SCAN.u_zz), EXACT, "Change the sign"),
-    "beside the sensor": (
-        replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None),
-        EXACT,
-        "Scan across",
-    ),
-    "noise alone": (
-        replace(SCAN, u_zz=np.random.default_rng(0).normal(0, 1e-5, 33)),
-        EXACT,
-        "determines no stress",
-    ),
+    "beside the sensor": (BESIDE, EXACT, "Scan across"),
+    "noise alone": (replace(SCAN, u_zz=NOISE), EXACT, "determines no stress"),
     "no scan": (1.0, EXACT, "where a Scan is needed"),
     "no apparatus": (SCAN, 1.0, "where an apparatus function is needed"),
 }

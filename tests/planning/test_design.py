@@ -52,10 +52,8 @@ def test_sigma_has_the_bound_of_cramer_and_rao_by_finite_differences() -> None:
 
 def test_four_repeats_halve_the_noise_of_sigma() -> None:
     once, often = (memscal.design(**EXACT, repeats=n) for n in (1, 4))
-    ratio = once.relative_uncertainty("gaussian_sigma") / often.relative_uncertainty(
-        "gaussian_sigma"
-    )
-    assert ratio == pytest.approx(2.0, rel=1e-6)
+    few, many = (plan.relative_uncertainty("gaussian_sigma") for plan in (once, often))
+    assert few == pytest.approx(2.0 * many, rel=1e-6)
 
 
 def test_a_voltage_and_a_share_of_noise_are_the_same_thing(paper: Design) -> None:
@@ -64,11 +62,10 @@ def test_a_voltage_and_a_share_of_noise_are_the_same_thing(paper: Design) -> Non
 
 
 def test_at_a_given_voltage_of_noise_twice_the_load_is_worth_four_repeats() -> None:
-    heavy = memscal.design(**EXACT, load=2.0, noise_voltage=5e-5)
-    often = memscal.design(**EXACT, repeats=4, noise_voltage=5e-5)
-    assert heavy.relative_uncertainty("gaussian_sigma") == pytest.approx(
-        often.relative_uncertainty("gaussian_sigma"), rel=1e-6
-    )
+    loud = EXACT | {"noise_voltage": 5e-5}
+    plans = [memscal.design(**loud, load=2.0), memscal.design(**loud, repeats=4)]
+    heavy, often = (plan.relative_uncertainty("gaussian_sigma") for plan in plans)
+    assert heavy == pytest.approx(often, rel=1e-6)
 
 
 def test_the_loads_uncertainty_is_as_much_of_a() -> None:
@@ -133,9 +130,8 @@ def test_no_expected_noise_leaves_the_data_as_they_are() -> None:
     estimate = estimated(simulated(seed=3))
     count = float(estimate.outlier_weight.sum())
     given = (estimate.model, estimate.gaussian, estimate.basis, estimate.weights, count)
-    assert_same_to_rounding(
-        weigh_departures(*given).covariance, weigh_departures(*given, 0.0).covariance
-    )
+    without, zero = weigh_departures(*given), weigh_departures(*given, 0.0)
+    assert_same_to_rounding(without.covariance, zero.covariance)
     more = weigh_departures(*given, expected_noise=estimate.weighed.noise)
     assert more.noise > estimate.weighed.noise
 
@@ -171,9 +167,8 @@ def test_plans_are_varied_one_number_at_a_time(paper: Design) -> None:
     designs = varied_designs(paper, "step", steps)
     # Of the last, five positions, nothing can be determined.
     assert [each.plan.step for each in designs] == steps[:2]
-    assert designs[0].relative_uncertainty("gaussian_sigma") < designs[1].relative_uncertainty(
-        "gaussian_sigma"
-    )
+    fine, coarse = (each.relative_uncertainty("gaussian_sigma") for each in designs)
+    assert fine < coarse
 
 
 @pytest.mark.parametrize(("want", "vary"), [
@@ -194,12 +189,9 @@ def test_what_is_found_reaches_the_target_and_one_less_does_not(want, vary) -> N
 
 def reaches(planned: Design, want: dict[str, float]) -> bool:
     names = {"A": "conversion_constant", "sigma": "gaussian_sigma", "fwhm": "fwhm"}
-    return all(
-        planned.resolved_wavenumber >= value
-        if name == "resolved"
-        else planned.relative_uncertainty(names[name]) <= value
-        for name, value in want.items()
-    )
+    resolved = planned.resolved_wavenumber >= want.get("resolved", 0.0)
+    limits = {names[name]: value for name, value in want.items() if name != "resolved"}
+    return resolved and all(planned.relative_uncertainty(n) <= limits[n] for n in limits)
 
 
 @pytest.mark.parametrize(("want", "vary", "told"), [

@@ -111,8 +111,5 @@ def test_a_second_call_returns_what_the_first_found() -> None:
 
 def test_asking_for_the_same_load_again_moves_nothing() -> None:
     once, again = indent(FILM, SPHERE, load=[1.0, 1.0], friction=0.2)
-    assert (again.depth, again.stick_radius, again.steps) == (
-        once.depth,
-        once.stick_radius,
-        once.steps,
-    )
+    for name in ("depth", "stick_radius", "steps"):
+        assert getattr(again, name) == getattr(once, name)
