@@ -156,6 +156,7 @@ def _reconvolution(solution: Solution) -> Reconvolution:
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
+_LINEAR = (*_WINDOWS, "wiener")
 #: Relative difference below which two lengths or ratios are the same.
 _SAME = 1e-6
 
@@ -478,5 +479,7 @@ def uncertainties(
 ) -> Results:
     """Propagate noise and inputs through the steps of one route."""
     wavenumbers = solution.fields.along_axis(deconvolution.quotient.window)[0]
-    drawn = drawn_scatter(solution) if deconvolution is solution.deconvolution else None
+    # A linear method's derivatives are complete; of another, the scatter of draws is taken.
+    linear = deconvolution is not solution.deconvolution or solution.method.name in _LINEAR
+    drawn = None if linear else drawn_scatter(solution)
     return propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)

@@ -14,13 +14,11 @@ from functools import cached_property
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.errors import FitError, MemscalError
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
-from memscal.estimation.plausibility import mistaken_unit
-from memscal.estimation.points import ScanPoints, joined_points
-from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate, estimate_profile
+from memscal.estimation.points import ScanPoints, joined_points, mistaken_unit
+from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
 from memscal.estimation.reference import reference_contact, reference_spectra
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
@@ -28,9 +26,6 @@ from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
-#: A width below this share of its standard uncertainty is zero.  Of a sensor that the film hides
-#: entirely, half of the scans give such a width.
-_NO_WIDTH = 0.1
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
 _MISFIT = 0.03
 #: A length is at fault if another value lowers chi-square by this much, in which residuals beyond
@@ -46,37 +41,24 @@ _LONGEST_SPAN, _THINNEST = 60.0, 0.02
 _LOAD = 1e-6
 
 
-def require_profile(
+def diagnosed(
     scans: Sequence[Scan],
     stresses: Sequence[StressProfile | Contact],
     points: Sequence[ScanPoints],
-    references: Sequence[RadialSpectrum],
-) -> ProfileEstimate:
-    """Estimate the profile of scans; refuse one that is as narrow as its reference."""
+    found: ProfileEstimate | Exception,
+) -> Exception:
+    """Return why the profile of scans has no width, or cannot be fitted at all."""
     # The search takes some of the points, evenly, without correlations.
     steps = [-(-scan.u.size // _MOST_POINTS) for scan in points]
     some = [p.selected(np.arange(0, p.u.size, step)) for p, step in zip(points, steps, strict=True)]
     search = _Search(tuple(scans), tuple(stresses), tuple(some))
-    try:
-        # At a width of zero the slopes by the width vanish, and no later step is defined.
-        with np.errstate(all="ignore"):
-            estimate = estimate_profile(joined_points(points), *references)
-    except (FitError, np.linalg.LinAlgError) as failure:
-        cure = "Look at the scan; check the values and units of positions, film and rod."
-        singular = FitError("No apparatus function of any width fits the scan.", cure=cure)
-        raise search.error() or (failure if isinstance(failure, FitError) else singular) from None
-    if not _has_width(estimate.gaussian, estimate.weights, estimate.noise_scale):
-        raise search.error() or _hidden(estimate, search)
-    return estimate
-
-
-def _has_width(fit: GaussianFit, weights: FloatArray, noise: float) -> bool:
-    # The slope by the width vanishes with the width, so its uncertainty grows without bound.
-    try:
-        variance = float(fit.covariance(weights, noise)[1, 1])
-    except np.linalg.LinAlgError:
-        return False
-    return fit.sigma >= _NO_WIDTH * float(np.sqrt(variance))
+    if error := search.error():
+        return error
+    if isinstance(found, ProfileEstimate):
+        return _hidden(found, search)
+    cure = "Look at the scan; check the values and units of positions, film and rod."
+    singular = FitError("No apparatus function of any width fits the scan.", cure=cure)
+    return found if isinstance(found, FitError) else singular
 
 
 def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:
@@ -123,7 +105,7 @@ class _Trial:
 
     def explains(self, noise: float) -> bool:
         """Whether a sensor of some width fits, with a signal."""
-        if self.fit is None or not _has_width(self.fit, self.weights, noise):
+        if self.fit is None or not self.fit.has_width(self.weights, noise):
             return False
         variance = self.fit.covariance(self.weights, noise)[0, 0]
         return self.fit.conversion_constant > LEAST_SIGNIFICANCE * float(np.sqrt(variance))

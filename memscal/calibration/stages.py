@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import j1
 
-from memscal.calibration.diagnosis import require_profile
+from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
 from memscal.deconvolution.division import Method, WhiteNoise
 from memscal.deconvolution.fourier_ratio import (
@@ -23,11 +23,11 @@ from memscal.deconvolution.fourier_ratio import (
     normalise,
     reconvolve,
 )
-from memscal.errors import InputError
+from memscal.errors import FitError, InputError
 from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.points import channel_order, measured_points
-from memscal.estimation.profile import ProfileEstimate, constrained_profile
+from memscal.estimation.points import ScanPoints, channel_order, joined_points, measured_points
+from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import Contact
@@ -64,6 +64,28 @@ def solve(
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
     steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
     return Solution(*steps, result, beside, gaussian)
+
+
+def require_profile(
+    scans: Sequence[Scan],
+    stresses: Sequence[StressProfile | Contact],
+    points: Sequence[ScanPoints],
+    references: Sequence[RadialSpectrum],
+) -> ProfileEstimate:
+    """Estimate the profile of scans; refuse one that is as narrow as its reference."""
+    found: ProfileEstimate | Exception
+    try:
+        # At a width of zero the slopes by the width vanish, and no later step is defined.
+        with np.errstate(all="ignore"):
+            found = estimate_profile(joined_points(points), *references)
+        if found.gaussian.has_width(found.weights, found.noise_scale):
+            return found
+    except (FitError, np.linalg.LinAlgError) as failure:
+        found = failure
+    # Imported here, for it searches only where something is wrong.
+    from memscal.calibration.diagnosis import diagnosed
+
+    raise diagnosed(scans, stresses, points, found) from None
 
 
 def deconvolve(

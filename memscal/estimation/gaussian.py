@@ -197,6 +197,11 @@ _KNEE = 3.0
 _NARROWEST = 0.05
 
 
+#: A width below this share of its standard uncertainty is zero.  Of a sensor that the film hides
+#: entirely, half of the scans give such a width.
+_NO_WIDTH = 0.1
+
+
 @dataclass(frozen=True, eq=False)
 class GaussianFit:
     """Best Gaussian in data space, and the model linearised about it."""
@@ -210,6 +215,14 @@ class GaussianFit:
     geometry: Geometry
     jacobian: FloatArray  # (n, p): voltages by A, sigma, centre, drift and ellipticity
     predicted: FloatArray  # (n,): voltages of the fit, in V
+
+    def has_width(self, weights: FloatArray, noise: float) -> bool:
+        """Whether the width is distinct from zero, where its slopes vanish."""
+        try:
+            variance = float(self.covariance(weights, noise)[1, 1])
+        except np.linalg.LinAlgError:
+            return False
+        return self.sigma >= _NO_WIDTH * float(np.sqrt(variance))
 
     def covariance(self, weights: FloatArray, noise: float) -> FloatArray:
         """Covariance of the parameters for a noise (V) and relative weights."""

@@ -10,8 +10,7 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import InputError
-from memscal.estimation.plausibility import require_plausible
-from memscal.estimation.points import ScanPoints
+from memscal.estimation.points import ScanPoints, require_plausible
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.model.arrays import FloatArray
