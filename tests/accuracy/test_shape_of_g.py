@@ -30,7 +30,13 @@ def test_the_shape_of_a_sound_g_passes(method: str) -> None:
     assert failures <= binom.isf(CHANCE, SEEDS, FALSE_ALARM)
 
 
-@pytest.mark.parametrize("method", ["white-noise-draw", "unsupervised-wiener", "richardson-lucy"])
+FULL_ONLY = [
+    pytest.param(method, marks=pytest.mark.full_study)
+    for method in ("unsupervised-wiener", "richardson-lucy")
+]
+
+
+@pytest.mark.parametrize("method", ["white-noise-draw", *FULL_ONLY])
 def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated(method: str) -> None:
     count, radii, values, stated = 20 if FULL else 8, np.linspace(0, 2e-3, 9), [], []
     kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
