@@ -38,10 +38,12 @@ _VARIED = ("step", "half-range", "repeats")
 _IN_MM_OR_MV = ("conversion_constant", "step", "half_range", "noise_voltage", "centre")
 _SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(("load_uncertainty", "noise"), -2)
 
+#: What stands for G beyond the resolved band, by method bayesian or by a division.
 _HIDDEN = (
-    "Beyond the resolved band G follows from the prior: its uncertainty there does not scatter "
-    "from scan to scan, and repeats do not show it."
+    "Beyond the resolved band {what}: the uncertainty there does not scatter from scan to scan, "
+    "and repeats do not show it."
 )
+_BY_PRIOR, _BY_WINDOW = "G follows from the prior", "the window hides G"
 
 EXAMPLES = """\b
 Examples:
@@ -142,7 +144,7 @@ def command(
         from memscal.summaries.design import tables
 
         out.emit_tables(*tables(planned))
-    out.note(_HIDDEN)
+    out.note(_HIDDEN.format(what=_BY_PRIOR if planned.method == "bayesian" else _BY_WINDOW))
     for path in figures:
         out.message(f"Written: {path}")
     return DONE

@@ -76,3 +76,10 @@ def test_figures_are_written_and_not_overwritten(run: Run, folder: Path):
     assert (folder / "d.png").read_bytes() == before
     assert run("design", "--noise", 2, "--figure", "d.png", "--force").code == 0
     assert (folder / "d.png").read_bytes() != before
+
+
+@pytest.mark.parametrize(
+    ("method", "words"), [("bayesian", "follows from the prior"), ("tikhonov", "window hides G")]
+)
+def test_what_stands_for_g_beyond_the_band_depends_on_the_method(run, method, words) -> None:
+    assert words in run("design", "--method", method).err
