@@ -45,7 +45,7 @@ def diagnosed(
     scans: Sequence[Scan],
     stresses: Sequence[StressProfile | Contact],
     points: Sequence[ScanPoints],
-    found: ProfileEstimate | Exception,
+    outcome: ProfileEstimate | Exception,
 ) -> Exception:
     """Return why the profile of scans has no width, or cannot be fitted at all."""
     # The search takes some of the points, evenly, without correlations.
@@ -54,11 +54,11 @@ def diagnosed(
     search = _Search(tuple(scans), tuple(stresses), tuple(some))
     if error := search.error():
         return error
-    if isinstance(found, ProfileEstimate):
-        return _hidden(found, search)
+    if isinstance(outcome, ProfileEstimate):
+        return _hidden(outcome, search)
     cure = "Look at the scan; check the values and units of positions, film and rod."
     singular = FitError("No apparatus function of any width fits the scan.", cure=cure)
-    return found if isinstance(found, FitError) else singular
+    return outcome if isinstance(outcome, FitError) else singular
 
 
 def _hidden(estimate: ProfileEstimate, search: _Search) -> FitError:

@@ -73,19 +73,19 @@ def require_profile(
     references: Sequence[RadialSpectrum],
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
-    found: ProfileEstimate | Exception
+    outcome: ProfileEstimate | Exception
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
         with np.errstate(all="ignore"):
-            found = estimate_profile(joined_points(points), *references)
-        if found.gaussian.has_width(found.weights, found.noise_scale):
-            return found
+            outcome = estimate_profile(joined_points(points), *references)
+        if outcome.gaussian.has_width(outcome.weights, outcome.noise_scale):
+            return outcome
     except (FitError, np.linalg.LinAlgError) as failure:
-        found = failure
+        outcome = failure
     # Imported here, for it searches only where something is wrong.
     from memscal.calibration.diagnosis import diagnosed
 
-    raise diagnosed(scans, stresses, points, found) from None
+    raise diagnosed(scans, stresses, points, outcome) from None
 
 
 def deconvolve(
@@ -158,7 +158,7 @@ class Misfit:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Deconvolution:
-    """One division of the fields: A and G, and what they predict for the scan."""
+    """A and G by one route, a division of the fields or the posterior, and what they predict."""
 
     quotient: Quotient  # A G confined to the support, with its window
     conversion_constant: float  # in V/Pa

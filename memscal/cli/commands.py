@@ -31,7 +31,8 @@ SETTINGS = {"help_option_names": ["--help", "-h"], "max_content_width": 100}
 class LazyGroup(click.Group):
     """Commands whose modules are imported when they are used."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's
+    # click passes its context to each of these methods, whether it is needed or not.
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Return the names in the order of use."""
         return list(COMMANDS)
 

@@ -86,6 +86,7 @@ class MeasuredPoints:
     def __eq__(self, other: object) -> bool:
         return same_content(self, other) if isinstance(other, MeasuredPoints) else NotImplemented
 
+    # Arrays have no hash; object's own is declared as a method.
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
