@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from scipy.special import j1
+from scipy.special import chndtr, j1
 
-from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, require_positive
 
@@ -27,10 +26,6 @@ def unit_gaussian(r: FloatArray, sigma: float) -> FloatArray:
 def unit_gaussian_slope(r: FloatArray, sigma: float) -> FloatArray:
     """Derivative of :func:`unit_gaussian` by its width, in 1/m^3."""
     return np.asarray(unit_gaussian(r, sigma) * ((r / sigma) ** 2 - 2) / sigma)
-
-
-# exp(-s^2 k^2 / 2) is below the rounding of 1 beyond this value of s k.
-_VANISHED = 8.6
 
 
 @runtime_checkable
@@ -146,11 +141,9 @@ class SmoothedDisc:
 
     def radial(self, r: FloatArray) -> FloatArray:
         """G at radii ``r`` (m), in 1/m^2."""
-        radii = np.abs(np.asarray(r, dtype=np.float64))
-        # The disc's transform oscillates in k with its radius, J0(kr) with r.
-        fastest = self.radius + float(radii.max(initial=0.0))
-        wavenumbers = Wavenumbers.covering(_VANISHED / self.sigma, fastest)
-        return wavenumbers.synthesise(self.transform(wavenumbers.k), radii)
+        # A point blurred from r falls into the disc: a non-central chi-square probability.
+        share = chndtr((self.radius / self.sigma) ** 2, 2, (np.asarray(r) / self.sigma) ** 2)
+        return np.asarray(share / (np.pi * self.radius**2))
 
     def describe(self) -> dict[str, float | str]:
         """Radius and blur, as text."""

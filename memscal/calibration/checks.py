@@ -49,11 +49,12 @@ from memscal.model.checks import (
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
 _LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))
+_EDGE = "an edge: a flat top with steep flanks, as of a disc"
+_CORE = "a core of its own: a ring or a spike in the middle"
 _KINDS = {
-    "edge": "an edge: a flat top with steep flanks, as of a disc",
-    "rough edge": "an edge: a flat top with steep flanks, as of a disc",
-    "core": "a core of its own: a ring or a spike in the middle",
-    "tail": "tails that fall more slowly than a Gaussian's",
+    **dict.fromkeys(("edge", "rough edge", "disc"), _EDGE),
+    **dict.fromkeys(("core", "ring"), _CORE),
+    **dict.fromkeys(("tail", "wide tail"), "tails that fall more slowly than a Gaussian's"),
 }
 
 

@@ -130,9 +130,8 @@ def departure_test(estimate: ProfileEstimate) -> Departure:
     factor = (1 - posterior) / posterior * prior / (1 - prior)
     kinds: dict[str, float] = {}
     for hypothesis, probability in zip(HYPOTHESES[1:], averaged.probability[1:], strict=True):
-        if hypothesis.shape is not None and hypothesis.estimate > 0:
-            name = hypothesis.shape.name
-            kinds[name] = kinds.get(name, 0.0) + float(probability)
+        if hypothesis.estimate > 0:
+            kinds[hypothesis.kind] = kinds.get(hypothesis.kind, 0.0) + float(probability)
     kind = max(kinds, key=lambda name: kinds[name])
     return Departure(float(np.log(factor)), kind, kinds[kind] / max(sum(kinds.values()), 1e-300))
 
@@ -230,7 +229,7 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
         fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     except FitError:
         return none
-    basis = departure_basis(model, fit)
+    basis = departure_basis(model, fit, weights)
     count = float(estimate.outlier_weight[~plateau].sum())
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
     others = weigh_departures(model, fit, basis, weights, count, least_noise=least)

@@ -29,15 +29,23 @@ squared error with priors that allow departures only, rougher ones among them.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import compress, pairwise, product
 from typing import ClassVar
 
 import numpy as np
 from scipy.special import i0e, j0
 
-from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian, unit_gaussian_slope
+from memscal.axisymmetry.kernels import (
+    GaussianMixture,
+    RadialKernel,
+    SmoothedDisc,
+    gaussian_transfer,
+    unit_gaussian,
+    unit_gaussian_slope,
+)
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray
@@ -131,6 +139,50 @@ SHAPES = (
 )
 
 
+@dataclass(frozen=True)
+class Family:
+    """Sensors that no departure from a Gaussian resembles: blurred discs, wide tails, rings."""
+
+    name: str
+    share: float  # of the disc in the mean square radius; of the second Gaussian in the integral
+    spread: float  # standard deviation of the share within the family
+    ratio: float = 0.0  # of the second Gaussian's width to the first's; none of a disc
+
+    def kernel(self, width: float, offset: float = 0.0) -> RadialKernel:
+        """G for a width (m), with the share off by some of its spread."""
+        share = self.share + offset * self.spread
+        if self.ratio:
+            return GaussianMixture((1 - share, share), (width, self.ratio * width))
+        return SmoothedDisc(2 * width * math.sqrt(share), width * math.sqrt(1 - share))
+
+
+_DISCS = ((0.3, 0.15), (0.5, 0.15), (0.65, 0.1), (0.78, 0.1), (0.87, 0.06), (0.935, 0.05))
+FAMILIES = (
+    *(Family("disc", share, spread) for share, spread in (*_DISCS, (0.98, 0.03))),
+    *(Family("wide tail", 0.15, 0.08, ratio) for ratio in (2.0, 2.5, 3.0)),
+    Family("wide tail", 0.35, 0.12, 2.0),
+    *(Family("ring", share, 0.1, 0.5) for share in (-0.2, -0.4)),
+)
+_RELATIVE_STEP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyFit:
+    """The sensor of a family that fits the scan best."""
+
+    family: Family
+    conversion_constant: float  # in V/Pa
+    width: float  # in m
+
+    def columns(self, of: Callable[[RadialKernel], FloatArray]) -> list[FloatArray]:
+        """A G of the sensor, and its changes by ln(width) and by the spread of the share."""
+        step, family, width = _RELATIVE_STEP, self.family, self.width
+        wider, narrower = (of(family.kernel(width * (1 + x))) for x in (step, -step))
+        above, below = (of(family.kernel(width, x)) for x in (0.5, -0.5))
+        changes = of(family.kernel(width)), (wider - narrower) / (2 * step), above - below
+        return [self.conversion_constant * change for change in changes]
+
+
 @dataclass(frozen=True, eq=False)
 class DepartureBasis:
     """The kernels that an estimate is a combination of, about the best Gaussian."""
@@ -139,11 +191,13 @@ class DepartureBasis:
     sigma: float
     flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
+    families: tuple[FamilyFit, ...] = ()  # as many as fit the scan
 
     @property
     def blocks(self) -> tuple[slice, ...]:
-        """Columns of each shape."""
-        ends = self.flat + np.cumsum([0, *(ring.radius.size for ring in self.rings)])
+        """Columns of each shape, then of each family: its sensor less the Gaussian, changes."""
+        counts = [*(ring.radius.size for ring in self.rings), *(3 for _ in self.families)]
+        ends = self.flat + np.cumsum([0, *counts])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     def kernels(self, k: FloatArray) -> FloatArray:
@@ -151,13 +205,15 @@ class DepartureBasis:
         # The first two are by A and width; parameters that move no kernel hold zeros.
         gaussian = gaussian_transfer(k, self.sigma)
         widening = -self.conversion_constant * self.sigma * k**2 * gaussian
-        return self._columns(gaussian, widening, [ring.transform(k) for ring in self.rings])
+        rings = [ring.transform(k) for ring in self.rings]
+        return self._columns(gaussian, widening, rings, lambda kernel: kernel.transform(k))
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values of all columns at radii ``r`` (m), shape (r, p)."""
         gaussian = unit_gaussian(r, self.sigma)
         widening = self.conversion_constant * unit_gaussian_slope(r, self.sigma)
-        return self._columns(gaussian, widening, [ring.radial(r) for ring in self.rings])
+        rings = [ring.radial(r) for ring in self.rings]
+        return self._columns(gaussian, widening, rings, lambda kernel: kernel.radial(r))
 
     @cached_property
     def integrals(self) -> FloatArray:
@@ -165,17 +221,74 @@ class DepartureBasis:
         return np.asarray(self.kernels(np.zeros(1))[0])
 
     def _columns(
-        self, gaussian: FloatArray, widening: FloatArray, rings: list[FloatArray]
+        self,
+        gaussian: FloatArray,
+        widening: FloatArray,
+        rings: list[FloatArray],
+        of: Callable[[RadialKernel], FloatArray],
     ) -> FloatArray:
         unmoved = np.zeros((gaussian.size, self.flat - 2))
-        return np.hstack([gaussian[:, None], widening[:, None], unmoved, *rings])
+        families = []
+        for fit in self.families:
+            sensor, *changes = fit.columns(of)
+            families += [sensor - self.conversion_constant * gaussian, *changes]
+        return np.hstack(
+            [gaussian[:, None], widening[:, None], unmoved, *rings, *(c[:, None] for c in families)]
+        )
 
 
-def departure_basis(model: ForwardModel, fit: GaussianFit) -> DepartureBasis:
-    """Return the kernels of the fit's own parameters and of every shape about it."""
+def departure_basis(
+    model: ForwardModel, fit: GaussianFit, weights: FloatArray | None = None
+) -> DepartureBasis:
+    """Return the kernels of the fit's own parameters and of every shape about it.
+
+    With the weights of the points, (n,), of the families' best fits, too.
+    """
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
-    return DepartureBasis(fit.conversion_constant, fit.sigma, fit.jacobian.shape[1], rings)
+    families = () if weights is None else tuple(_fitted_families(model, fit, weights, width))
+    basis = DepartureBasis(fit.conversion_constant, fit.sigma, fit.jacobian.shape[1], rings)
+    return replace(basis, families=families)
+
+
+_FAMILY_ROUNDS = 8
+_SETTLED, _LONGEST, _FARTHEST = 1e-3, 0.3, 2.5
+
+
+def _fitted_families(
+    model: ForwardModel, fit: GaussianFit, weights: FloatArray, start: float
+) -> Iterator[FamilyFit]:
+    """Fit A and width of every family, centre, baseline and drift by the way."""
+    standardised, step = model.points.standardised, _RELATIVE_STEP
+    others = np.linalg.qr(standardised(fit.jacobian[:, 2:], weights))[0]
+
+    def free(values: FloatArray) -> FloatArray:
+        values = standardised(values, weights)
+        return np.asarray(values - others @ (others.T @ values))
+
+    gaussian = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
+    data = free(model.points.u - fit.predicted + model.signal(fit.geometry, gaussian))
+    widths, amplitudes = np.full((2, len(FAMILIES)), start)
+    for _ in range(_FAMILY_ROUNDS):
+        kernels = [
+            family.kernel(width * factor).transform(model.k)
+            for factor in (1.0, 1 + step)
+            for family, width in zip(FAMILIES, widths, strict=True)
+        ]
+        signal, wider = np.hsplit(free(model.signal(fit.geometry, np.stack(kernels, axis=1))), 2)
+        # Least squares in A and A d ln(width), of all families at once.
+        slope = (wider - signal) / step
+        a, b, c = (np.sum(x, axis=0) for x in (signal**2, signal * slope, slope**2))
+        determinant = a * c - b**2
+        amplitudes = (c * (data @ signal) - b * (data @ slope)) / determinant
+        growth = (a * (data @ slope) - b * (data @ signal)) / determinant / amplitudes
+        growth = np.clip(growth, -_LONGEST, _LONGEST)
+        widths = widths * np.exp(growth)
+        if np.abs(growth).max() < _SETTLED:
+            break
+    for family, width, amplitude in zip(FAMILIES, widths, amplitudes, strict=True):
+        if amplitude > 0 and start / _FARTHEST < width < start * _FARTHEST:
+            yield FamilyFit(family, float(amplitude), float(width))
 
 
 _VARIANCE_ROUNDS = 8
@@ -187,9 +300,9 @@ _NEGLIGIBLE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class _Design:
-    """One shape's weighted columns, and the SVD of what is left of them beside the flat columns."""
+    """Weighted columns of departures, and the SVD of what is left of them beside the flat ones."""
 
-    block: slice  # where its amplitudes stand among all parameters
+    places: FloatArray  # (p, m): where their amplitudes stand among all parameters
     columns: FloatArray  # (n, m)
     left: FloatArray
     singular: FloatArray
@@ -202,20 +315,36 @@ class _Design:
 class _Conditional:
     """Marginal likelihood and posterior given one hypothesis, at the MAP estimate of the noise."""
 
+    linear: _LinearModel
     log_marginal: float
-    variance: float  # of the noise
-    strength: float
-    design: _Design | None
-    shrink: FloatArray  # from data to amplitudes, along the singular vectors
+    scatter: float  # variance of the residuals
+    variance: float  # of the noise: at least as stated
     slope: FloatArray  # (n,): derivative of log_marginal by the weighted data
+    design: _Design | None = None
+    strength: float = 0.0
+    shrink: FloatArray | None = None  # from data to amplitudes, along the singular vectors
 
-    def amplitude_covariance(self, least_variance: float) -> FloatArray:
-        """Posterior covariance of the amplitudes, for at least this variance of the noise."""
-        if self.design is None:
-            return np.zeros((0, 0))
-        prior, right = self.strength**2, self.design.right
-        variance = max(self.variance, least_variance)
-        left_over = prior * variance / (variance + prior * self.design.singular**2)
+    def posterior(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mean (p,), its derivative by the weighted data (p, n), and covariance (p, p)."""
+        linear, design = self.linear, self.design
+        fitted, places = linear.least_squares, linear.places
+        plain = linear.inverse @ linear.inverse.T / np.outer(linear.scale, linear.scale)
+        gain, covariance = fitted, self.variance * plain
+        if design is not None:
+            amplitudes = (design.right.T * self.shrink) @ design.left.T
+            carried = fitted @ design.columns
+            spread = self._amplitude_covariance(design)
+            gain = np.vstack([fitted - carried @ amplitudes, amplitudes])
+            both = np.vstack([-carried, np.eye(spread.shape[0])])
+            whole = both @ spread @ both.T
+            whole[: len(plain), : len(plain)] += covariance
+            covariance, places = whole, np.hstack([places, design.places])
+        mean = linear.start + places @ (gain @ linear.data)
+        return mean, places @ gain, places @ covariance @ places.T
+
+    def _amplitude_covariance(self, design: _Design) -> FloatArray:
+        prior, right = self.strength**2, design.right
+        left_over = prior * self.variance / (self.variance + prior * design.singular**2)
         determined = (right.T * left_over) @ right
         if right.shape[0] == right.shape[1]:
             return np.asarray(determined)
@@ -225,22 +354,38 @@ class _Conditional:
 
 @dataclass(frozen=True, eq=False)
 class _LinearModel:
-    """Weighted data and columns of flat prior, which every hypothesis shares."""
+    """Weighted data and columns of flat prior about one sensor, the Gaussian or a family's."""
 
+    start: FloatArray  # (p,): the sensor among all parameters
+    places: FloatArray  # (p, flat): where the flat parameters stand among them
     scale: FloatArray  # (flat,)
     q: FloatArray
     inverse: FloatArray
+    log_determinant: float  # of the columns
     data: FloatArray  # (n,)
     rest: FloatArray  # (n,): what the flat columns leave over
     freedom: float
     added: float  # variance of noise that is expected, but not in the data
+    least: float  # variance of the noise as stated
 
     @classmethod
-    def of(cls, flat: FloatArray, data: FloatArray, freedom: float, added: float) -> _LinearModel:
+    def of(
+        cls,
+        start: FloatArray,
+        places: FloatArray,
+        flat: FloatArray,
+        data: FloatArray,
+        freedom: float,
+        added: float,
+        least: float,
+    ) -> _LinearModel:
         """Project the weighted flat columns out of the weighted data."""
         scale = np.linalg.norm(flat, axis=0)
         q, r = np.linalg.qr(flat / scale)
-        return cls(scale, q, np.linalg.inv(r), data, data - q @ (q.T @ data), freedom, added)
+        size = float(np.log(np.abs(np.diag(r)) * scale).sum())
+        rest = data - q @ (q.T @ data)
+        inverse = np.linalg.inv(r)
+        return cls(start, places, scale, q, inverse, size, data, rest, freedom, added, least)
 
     @cached_property
     def least_squares(self) -> FloatArray:
@@ -252,70 +397,88 @@ class _LinearModel:
         """Square of all that the flat columns leave over, the expected noise included."""
         return float(self.rest @ self.rest) + self.added * self.freedom
 
-    def decompose(self, columns: FloatArray, block: slice) -> _Design:
-        """Decompose a shape's weighted columns; ``block`` is where they stand among all."""
+    def decompose(self, columns: FloatArray, places: FloatArray) -> _Design:
+        """Decompose weighted columns of departures."""
         free = columns - self.q @ (self.q.T @ columns)
         left, singular, right = np.linalg.svd(free, full_matrices=False)
         along = left.T @ self.rest
         # Of a vector that meets the flat columns, only what lies beside them carries noise.
         power = along**2 + self.added * (1 - np.sum((self.q.T @ left) ** 2, axis=0))
-        return _Design(block, columns, left, singular, right, along, power)
+        return _Design(places, columns, left, singular, right, along, power)
 
-    def gaussian(self) -> _Conditional:
-        """Return the conditional without any departure."""
-        variance = self._floor(self.power / self.freedom)
-        log_marginal = -0.5 * self.freedom * float(np.log(variance))
-        return _Conditional(log_marginal, variance, 0.0, None, np.zeros(0), -self.rest / variance)
-
-    def condition(self, design: _Design, strength: float) -> _Conditional:
-        """Return the conditional on a shape and its strength, the noise at its MAP estimate."""
-        beyond = max(self.power - float(design.power.sum()), 0.0)
-        signal = (strength * design.singular) ** 2
-        variance = self._floor(self.power / self.freedom)
-        for _ in range(_VARIANCE_ROUNDS):
-            explained = design.power * variance / (variance + signal)
-            variance = self._floor((beyond + float(explained.sum())) / self.freedom)
+    def condition(self, design: _Design | None = None, strength: float = 0.0) -> _Conditional:
+        """Return the conditional on departures of a strength, the noise at its MAP estimate."""
+        scatter = self._distinct(self.power / self.freedom)
+        beyond, signal, power = self.power, np.zeros(0), np.zeros(0)
+        if design is not None:
+            signal, power = (strength * design.singular) ** 2, design.power
+            beyond = max(self.power - float(power.sum()), 0.0)
+            for _ in range(_VARIANCE_ROUNDS):
+                explained = power * scatter / (scatter + signal)
+                scatter = self._distinct((beyond + float(explained.sum())) / self.freedom)
+        variance = max(scatter, self.least)
+        square = beyond / variance + float((power / (variance + signal)).sum())
         log_determinant = float(np.log(1 + signal / variance).sum())
-        log_marginal = -0.5 * (self.freedom * np.log(variance) + log_determinant)
+        log_marginal = -0.5 * (self.freedom * np.log(variance) + square + log_determinant)
+        log_marginal -= self.log_determinant
+        if design is None:
+            return _Conditional(self, log_marginal, scatter, variance, -self.rest / variance)
         shrink = strength**2 * design.singular / (variance + signal)
         left_over = signal / (variance + signal) * design.along
         slope = (design.left @ left_over - self.rest) / variance
-        return _Conditional(log_marginal, variance, strength, design, shrink, slope)
+        return _Conditional(
+            self, log_marginal, scatter, variance, slope, design, strength, shrink
+        )
 
-    def _floor(self, variance: float) -> float:
+    def _distinct(self, variance: float) -> float:
         return max(variance, (_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A shape at a strength, with its prior probabilities; no shape for the Gaussian itself."""
+    """The Gaussian or a family, with departures of a shape and strength; prior probabilities."""
 
+    family: Family | None
     shape: Shape | None
     strength: float
     estimate: float
     uncertainty: float
 
-
-def _hypotheses() -> tuple[Hypothesis, ...]:
-    """The prior: probabilities by kind of departure, shared evenly within one."""
-    kinds: list[tuple[str, tuple[float, ...], float, float]] = [
-        ("edge", (0.4, 0.8), 0.20, 0.0),
-        ("rough edge 0.4", (0.4,), 0.07, 0.30),
-        ("rough edge 0.5", (0.8, 1.6), 0.0, 0.10),
-        ("core", (0.4,), 0.06, 0.0),
-        ("core", (0.3,), 0.0, 0.30),
-        ("tail", (0.2,), 0.27, 0.30),
-    ]
-    hypotheses = [Hypothesis(None, 0.0, 0.40, 0.0)]
-    for kind, strengths, estimate, uncertainty in kinds:
-        shapes = [s for s in SHAPES if kind in (s.name, f"{s.name} {s.blur}")]
-        pairs = list(product(shapes, strengths))
-        priors = estimate / len(pairs), uncertainty / len(pairs)
-        hypotheses += [Hypothesis(shape, strength, *priors) for shape, strength in pairs]
-    return tuple(hypotheses)
+    @property
+    def kind(self) -> str:
+        """Name of the family, or of the shape; none of the Gaussian itself."""
+        named = self.family or self.shape
+        return named.name if named else ""
 
 
-HYPOTHESES = _hypotheses()
+#: Family (none: the Gaussian), departure from it and its strengths; prior probabilities, shared
+#: evenly within a row, for the estimate and for its uncertainty.
+_PRIOR: tuple[tuple[str, str, tuple[float, ...], float, float], ...] = (
+    ("", "", (0.0,), 0.40, 0.0),
+    ("", "edge", (0.4,), 0.25, 0.0),
+    ("", "rough edge 0.4", (0.4,), 0.01, 0.01),
+    ("", "rough edge 0.5", (0.8, 1.6), 0.0, 0.03),
+    ("", "core", (0.4,), 0.03, 0.0),
+    ("", "core", (0.3,), 0.0, 0.01),
+    ("", "tail", (0.2,), 0.11, 0.01),
+    ("disc", "", (0.0,), 0.065, 0.09),
+    ("disc", "core", (0.2,), 0.0, 0.40),
+    ("wide tail", "", (0.0,), 0.12, 0.20),
+    ("wide tail", "core", (0.2,), 0.0, 0.10),
+    ("ring", "", (0.0,), 0.015, 0.15),
+)
+
+
+def _hypotheses() -> Iterator[Hypothesis]:
+    for name, departure, strengths, estimate, uncertainty in _PRIOR:
+        families = [f for f in FAMILIES if f.name == name] or [None]
+        shapes = [s for s in SHAPES if departure in (s.name, f"{s.name} {s.blur}")] or [None]
+        triples = list(product(families, shapes, strengths))
+        for triple in triples:
+            yield Hypothesis(*triple, estimate / len(triples), uncertainty / len(triples))
+
+
+HYPOTHESES = tuple(_hypotheses())
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,64 +511,109 @@ def weigh_departures(
     """Average departures from a Gaussian fit over the hypotheses."""
     # ``effective_count``: number of readings in the data, more than points if each is a mean of
     # repeats.  Of a point of weight one, ``expected_noise`` is that of voltages that have none
-    # (zero for data), ``least_noise`` the least that the covariance counts.
+    # (zero for data), ``least_noise`` the least that there is, as stated.
     standardised, flat = model.points.standardised, basis.flat
     voltages = model.signal(fit.geometry, basis.kernels(model.k)[:, flat:])
     unexplained = model.points.u - fit.predicted
-    rings, data = standardised(voltages, weights), standardised(unexplained, weights)
+    columns = standardised(np.hstack([fit.jacobian, voltages]), weights)
+    data = standardised(unexplained, weights)
     # Down-weighted points carry no full degree of freedom.
-    jacobian = standardised(fit.jacobian, weights)
-    linear = _LinearModel.of(jacobian, data, effective_count - flat, expected_noise**2)
-    designs = [
-        linear.decompose(rings[:, block.start - flat : block.stop - flat], block)
-        for block in basis.blocks
-    ]
-    conditionals = [linear.gaussian()]
-    for hypothesis in HYPOTHESES[1:]:
-        assert hypothesis.shape is not None
-        design = designs[SHAPES.index(hypothesis.shape)]
-        conditionals.append(linear.condition(design, hypothesis.strength))
-    averaged = _average(linear, conditionals, flat + rings.shape[1], least_noise**2)
+    noise = effective_count - flat, expected_noise**2, least_noise**2
+    conditionals = list(_conditionals(basis, columns, data, noise))
+    averaged = _average(conditionals, expected_noise**2)
     explained = fit.jacobian @ averaged.mean[:flat] + voltages @ averaged.mean[flat:]
     gain = averaged.gain @ standardised(np.eye(data.size), weights)
     return replace(averaged, gain=gain, residual=unexplained - explained)
 
 
-def _average(
-    linear: _LinearModel, conditionals: list[_Conditional], count: int, least_variance: float
-) -> WeighedFit:
+def _conditionals(
+    basis: DepartureBasis, columns: FloatArray, data: FloatArray, noise: tuple[float, float, float]
+) -> Iterator[_Conditional | None]:
+    """Condition on each hypothesis; nothing of a family that does not fit the scan."""
+    count, flat = columns.shape[1], basis.flat
+    unit = np.eye(count)
+    blocks = basis.blocks
+    of_shape = dict(zip(SHAPES, blocks, strict=False))
+    of_family = {
+        fitted.family: block
+        for fitted, block in zip(basis.families, blocks[len(SHAPES) :], strict=True)
+    }
+    # The first two parameters are ln A and ln(width).
+    places = unit[:, :flat] * np.r_[basis.conversion_constant, basis.sigma, np.ones(flat - 2)]
+    linear = {None: _LinearModel.of(np.zeros(count), places, columns @ places, data, *noise)}
+    for family, block in of_family.items():
+        sensor = unit[:, block.start]
+        places = unit[:, :flat].copy()
+        places[:, 0] = sensor + basis.conversion_constant * unit[:, 0]
+        places[:, 1] = unit[:, block.start + 1]
+        rest = data - columns @ sensor
+        linear[family] = _LinearModel.of(sensor, places, columns @ places, rest, *noise)
+    designs: dict[object, _Design] = {}
+    for hypothesis in HYPOTHESES:
+        shape, family = hypothesis.shape, hypothesis.family
+        if family not in linear:
+            yield None
+            continue
+        parts = []
+        if shape is not None:
+            parts.append(unit[:, of_shape[shape]] * (hypothesis.strength if family else 1.0))
+        if family is not None:
+            parts.append(unit[:, of_family[family].stop - 1 : of_family[family].stop])
+        if not parts:
+            yield linear[family].condition()
+            continue
+        key = (family, shape, hypothesis.strength if family else 1.0)
+        if key not in designs:
+            places = np.hstack(parts)
+            designs[key] = linear[family].decompose(columns @ places, places)
+        yield linear[family].condition(designs[key], 1.0 if family else hypothesis.strength)
+
+
+def _average(conditionals: list[_Conditional | None], added: float) -> WeighedFit:
     """Average mean and gain by one set of probabilities, squared errors by the other."""
     # The gain is that of the standardised data, and the residual is left to be computed.
-    log_marginal = np.array([c.log_marginal for c in conditionals])
+    log_marginal = np.array([-np.inf if c is None else c.log_marginal for c in conditionals])
     prior = np.array([h.estimate for h in HYPOTHESES])
     estimate = _posterior(log_marginal, prior)
     uncertainty = _posterior(log_marginal, np.array([h.uncertainty for h in HYPOTHESES]))
-    gain = np.zeros((count, linear.data.size))
-    for p, conditional in zip(estimate, conditionals, strict=True):
-        if p > 0:
-            _add_gain(gain, linear, conditional, p)
-    mean = gain @ linear.data
+    posteriors = [
+        (p, q, c, *c.posterior())
+        for p, q, c in zip(estimate, uncertainty, conditionals, strict=True)
+        if c is not None and (p > 0 or q > 0)
+    ]
+    mean = np.sum([p * m for p, _, _, m, _, _ in posteriors], axis=0)
+    gain = np.sum([p * g for p, _, _, _, g, _ in posteriors], axis=0)
     # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
-    moving, covariance = np.zeros_like(gain), np.zeros((count, count))
-    for p, q, conditional in zip(estimate, uncertainty, conditionals, strict=True):
-        if p == q == 0:
-            continue
-        of_hypothesis = np.zeros_like(gain)
-        _add_gain(of_hypothesis, linear, conditional, 1.0)
-        off = of_hypothesis @ linear.data - mean
-        if p > 0:
-            moving += p * np.outer(off, conditional.slope)
-        if q > 0:
-            covariance += q * np.outer(off, off)
-            if linear.added:
-                apart = of_hypothesis - gain
-                covariance += q * linear.added * (apart @ apart.T)
-            _add_covariance(covariance, linear, conditional, q, least_variance)
-    noise = float(np.sqrt(estimate @ np.array([c.variance for c in conditionals])))
-    possible = prior > 0
+    moving = np.sum([p * np.outer(m - mean, c.slope) for p, _, c, m, _, _ in posteriors], axis=0)
+    covariance = np.zeros((mean.size, mean.size))
+    for _, q, _, m, g, cov in posteriors:
+        covariance += q * (cov + np.outer(m - mean, m - mean))
+        if added and q:
+            covariance += q * added * ((g - gain) @ (g - gain).T)
+    scatter = np.array([0.0 if c is None else c.scatter for c in conditionals])
+    possible = (prior > 0) & np.isfinite(log_marginal)
     likelihood = float(np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible])))
-    gain += moving
-    return WeighedFit(mean, covariance, gain, noise, estimate, linear.data, likelihood)
+    noise = float(np.sqrt(estimate @ scatter))
+    return WeighedFit(mean, covariance, gain + moving, noise, estimate, mean, likelihood)
+
+
+def supported(
+    basis: DepartureBasis, weighed: WeighedFit
+) -> tuple[DepartureBasis, WeighedFit]:
+    """Leave out the shapes and families of negligible probability."""
+    blocks = basis.blocks
+    used = [bool(np.diag(weighed.covariance)[block].any()) for block in blocks]
+    columns = [np.arange(basis.flat)]
+    columns += [np.arange(b.start, b.stop) for b, use in zip(blocks, used, strict=True) if use]
+    chosen = np.concatenate(columns)
+    rings = tuple(compress(basis.rings, used))
+    families = tuple(compress(basis.families, used[len(basis.rings) :]))
+    return replace(basis, rings=rings, families=families), replace(
+        weighed,
+        mean=weighed.mean[chosen],
+        covariance=weighed.covariance[np.ix_(chosen, chosen)],
+        gain=weighed.gain[chosen],
+    )
 
 
 def _posterior(log_marginal: FloatArray, prior: FloatArray) -> FloatArray:
@@ -413,37 +621,3 @@ def _posterior(log_marginal: FloatArray, prior: FloatArray) -> FloatArray:
     weight = prior * np.exp(log_marginal - log_marginal[prior > 0].max())
     weight[weight < _NEGLIGIBLE * weight.sum()] = 0.0
     return np.asarray(weight / weight.sum())
-
-
-def _add_gain(
-    gain: FloatArray, linear: _LinearModel, conditional: _Conditional, share: float
-) -> None:
-    """Add the derivative of the posterior mean given a hypothesis, times its probability."""
-    fitted, design = linear.least_squares, conditional.design
-    flat = len(fitted)
-    gain[:flat] += share * fitted
-    if design is not None:
-        amplitudes = (design.right.T * conditional.shrink) @ design.left.T
-        gain[design.block] += share * amplitudes
-        gain[:flat] -= share * (fitted @ design.columns) @ amplitudes
-
-
-def _add_covariance(
-    covariance: FloatArray,
-    linear: _LinearModel,
-    conditional: _Conditional,
-    share: float,
-    least_variance: float,
-) -> None:
-    """Add the posterior covariance given a hypothesis, times its probability."""
-    flat = linear.scale.size
-    plain = linear.inverse @ linear.inverse.T / np.outer(linear.scale, linear.scale)
-    covariance[:flat, :flat] += share * max(conditional.variance, least_variance) * plain
-    design = conditional.design
-    if design is not None:
-        amplitudes = conditional.amplitude_covariance(least_variance)
-        carried = linear.least_squares @ design.columns
-        covariance[design.block, design.block] += share * amplitudes
-        covariance[:flat, design.block] -= share * carried @ amplitudes
-        covariance[design.block, :flat] -= share * amplitudes @ carried.T
-        covariance[:flat, :flat] += share * carried @ amplitudes @ carried.T

@@ -15,6 +15,7 @@ from memscal.estimation.bayesian import (
     DepartureBasis,
     WeighedFit,
     departure_basis,
+    supported,
     weigh_departures,
 )
 from memscal.estimation.forward import ForwardModel
@@ -41,10 +42,11 @@ class ProfileEstimate:
 
     model: ForwardModel
     gaussian: GaussianFit
-    basis: DepartureBasis  # kernels about the Gaussian
+    basis: DepartureBasis  # the kernels that it combines, about the Gaussian
     weighed: WeighedFit  # their posterior
     weights: FloatArray  # (n,): relative weight of each point, the outliers' below one included
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
+    departures: DepartureBasis  # all kernels, of negligible probability too
 
     @property
     def points(self) -> ScanPoints:
@@ -172,13 +174,13 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     for _ in range(_WEIGHING_ROUNDS):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
-        basis = departure_basis(model, fit)
+        basis = departure_basis(model, fit, weights)
         weighed = weigh_departures(model, fit, basis, weights, count, least_noise=least)
         updated = outlier_weights(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
         outlier = updated
-    estimate = ProfileEstimate(model, fit, basis, weighed, weights, outlier)
+    estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, outlier, basis)
     _require_determined(estimate)
     return estimate
 

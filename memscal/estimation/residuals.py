@@ -52,7 +52,7 @@ class FreeModel:
 def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> FreeModel:
     """Linearise about the best Gaussian with all departures that can be resolved."""
     # ``clip_outliers`` keeps outliers, with residuals cut to four times their noise.
-    points, basis = estimate.points, estimate.basis
+    points, basis = estimate.points, estimate.departures
     ordinary = estimate.outlier_weight >= _OUTLIER
     weights, u = estimate.weights / estimate.outlier_weight, points.u
     if clip_outliers:

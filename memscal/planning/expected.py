@@ -19,7 +19,7 @@ from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.estimation.band import find_band
-from memscal.estimation.bayesian import departure_basis, weigh_departures
+from memscal.estimation.bayesian import departure_basis, supported, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
@@ -82,10 +82,11 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
     assert model.points.u_errors is not None
     weights = np.asarray(1 / model.points.u_errors**2)
     fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
-    basis = departure_basis(model, fit)
+    basis = departure_basis(model, fit, weights)
     count = float(repeats * weights.size)
     weighed = weigh_departures(model, fit, basis, weights, count, expected_noise=1.0)
-    estimate = ProfileEstimate(model, fit, basis, weighed, weights, np.ones_like(weights))
+    ones = np.ones_like(weights)
+    estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, ones, basis)
     require_significant(estimate, "Plan a larger half range, more repeats, or a larger load.")
     return estimate
 
