@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from scipy.special import chndtr, j1
+from scipy.special import chndtr, i0e, j0, j1
 
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, require_positive
@@ -152,3 +152,31 @@ class SmoothedDisc:
             "kernel_radius_um": f"{self.radius * 1e6:g}",
             "kernel_sigmas_um": f"{self.sigma * 1e6:g}",
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """Blurred rings: ``radius`` and ``blur`` in m, ``amplitude`` in V/Pa; each of shape (m,)."""
+
+    radius: FloatArray
+    blur: FloatArray
+    amplitude: FloatArray
+
+    def transform(self, k: FloatArray) -> FloatArray:
+        """Hankel transforms at ``k`` (rad/m), shape (k, m)."""
+        blurred = np.exp(-0.5 * np.multiply.outer(k, self.blur) ** 2)
+        return np.asarray(self.amplitude * blurred * j0(np.multiply.outer(k, self.radius)))
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """Values at radii ``r`` (m), shape (r, m), in V/Pa/m^2."""
+        square = self.blur**2
+        # The scaled Bessel function carries exp(-rq/b^2), which completes the square.
+        near = np.exp(-0.5 * np.subtract.outer(r, self.radius) ** 2 / square)
+        bessel = i0e(np.multiply.outer(r, self.radius / square))
+        return np.asarray(self.amplitude / (2 * np.pi * square) * near * bessel)
+
+    @property
+    def size(self) -> float:
+        """Expected L2 norm over the plane of the sum with random signs, in V/Pa/m."""
+        square = i0e(self.radius**2 / (2 * self.blur**2)) / (4 * np.pi * self.blur**2)
+        return float(np.sqrt(np.sum(self.amplitude**2 * square)))

@@ -157,6 +157,8 @@ def _reconvolution(solution: Solution) -> Reconvolution:
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
 _LINEAR = (*_WINDOWS, "wiener")
+#: Tails of less probability are not told.
+_LEAST_TOLD = 0.001
 #: Relative difference below which two lengths or ratios are the same.
 _SAME = 1e-6
 
@@ -174,7 +176,8 @@ def calibration_messages(
             f"sensor towards larger {channel[0]}."
         )
         messages.append(Message("experimental", text))
-    messages += _points(solution.estimate) + _method(solution) + _reference(solution)
+    messages += _points(solution.estimate) + _tails(solution.estimate)
+    messages += _method(solution) + _reference(solution)
     messages += _unstated(scan)
     if scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
@@ -204,6 +207,20 @@ def _points(estimate: ProfileEstimate) -> list[Message]:
         )
         messages.append(Message(NOISE_UNSTATED, text))
     return messages
+
+
+def _tails(estimate: ProfileEstimate) -> list[Message]:
+    """Return what a tail that the scan hardly tells from the baseline would change in A."""
+    probability, change = estimate.weighed.of_kind("wide tail")
+    if probability < _LEAST_TOLD:
+        return []
+    a = estimate.conversion_constant
+    text = (
+        "Tails of G two to three times as wide as its core have a probability of "
+        f"{probability:.2g} (prior 0.12). With them A by method bayesian is {abs(change) / a:.2%} "
+        f"{'larger' if change > 0 else 'smaller'} than without; it is the mean of both."
+    )
+    return [Message("wide_tails", text)]
 
 
 def _method(solution: Solution) -> list[Message]:

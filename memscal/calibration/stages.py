@@ -223,8 +223,9 @@ def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) 
 def _misfit(estimate: ProfileEstimate, predicted: FloatArray) -> Misfit:
     """Compare a prediction with the scan, outliers at their reduced weight."""
     residual, weight = estimate.points.u - predicted, estimate.outlier_weight
-    stated = estimate.points.u_errors
-    noise = estimate.noise if stated is None else stated
     degrees = float(weight.sum()) - estimate.gaussian.jacobian.shape[1]
     rms = float(np.sqrt(np.average(residual**2, weights=weight)) / estimate.largest_signal)
-    return Misfit(rms, float(np.sum(weight * (residual / noise) ** 2) / degrees), degrees)
+    # As stated, uncertain positions and correlations included, where anything is stated.
+    noise = estimate.noise_scale if estimate.points.u_errors is None else 1.0
+    square = float(np.sum(estimate.points.standardised(residual, estimate.weights) ** 2))
+    return Misfit(rms, square / noise**2 / degrees, degrees)

@@ -36,11 +36,11 @@ from itertools import compress, pairwise, product
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import i0e, j0
 
 from memscal.axisymmetry.kernels import (
     GaussianMixture,
     RadialKernel,
+    Rings,
     SmoothedDisc,
     gaussian_transfer,
     unit_gaussian,
@@ -67,7 +67,7 @@ class Bayesian:
     nonnegative: bool = False  # G is nowhere negative
     monotone: bool = False  # G nowhere rises with the radius (a ring's does)
     name: ClassVar[str] = "bayesian"
-    assumes: ClassVar[str] = "G is a Gaussian, or departs from one smoothly."
+    assumes: ClassVar[str] = "G is a Gaussian, a blurred disc, has wide tails, or departs smoothly."
     fails: ClassVar[str] = (
         "Detail finer than a third of G's width that the film hides is not found, only allowed for."
     )
@@ -76,34 +76,6 @@ class Bayesian:
     def constrained(self) -> bool:
         """Whether a constraint is set."""
         return self.nonnegative or self.monotone
-
-
-@dataclass(frozen=True, eq=False)
-class Rings:
-    """Blurred rings: ``radius`` and ``blur`` in m, ``amplitude`` in V/Pa; each of shape (m,)."""
-
-    radius: FloatArray
-    blur: FloatArray
-    amplitude: FloatArray
-
-    def transform(self, k: FloatArray) -> FloatArray:
-        """Hankel transforms at ``k`` (rad/m), shape (k, m)."""
-        blurred = np.exp(-0.5 * np.multiply.outer(k, self.blur) ** 2)
-        return np.asarray(self.amplitude * blurred * j0(np.multiply.outer(k, self.radius)))
-
-    def radial(self, r: FloatArray) -> FloatArray:
-        """Values at radii ``r`` (m), shape (r, m), in V/Pa/m^2."""
-        square = self.blur**2
-        # The scaled Bessel function carries exp(-rq/b^2), which completes the square.
-        near = np.exp(-0.5 * np.subtract.outer(r, self.radius) ** 2 / square)
-        bessel = i0e(np.multiply.outer(r, self.radius / square))
-        return np.asarray(self.amplitude / (2 * np.pi * square) * near * bessel)
-
-    @property
-    def size(self) -> float:
-        """Expected L2 norm over the plane of the sum with random signs, in V/Pa/m."""
-        square = i0e(self.radius**2 / (2 * self.blur**2)) / (4 * np.pi * self.blur**2)
-        return float(np.sqrt(np.sum(self.amplitude**2 * square)))
 
 
 @dataclass(frozen=True)
@@ -156,12 +128,12 @@ class Family:
         return SmoothedDisc(2 * width * math.sqrt(share), width * math.sqrt(1 - share))
 
 
-_DISCS = ((0.3, 0.15), (0.5, 0.15), (0.65, 0.1), (0.78, 0.1), (0.87, 0.06), (0.935, 0.05))
+_DISCS = ((0.35, 0.2), (0.6, 0.2), (0.8, 0.12), (0.92, 0.08), (0.98, 0.04))
 FAMILIES = (
-    *(Family("disc", share, spread) for share, spread in (*_DISCS, (0.98, 0.03))),
-    *(Family("wide tail", 0.15, 0.08, ratio) for ratio in (2.0, 2.5, 3.0)),
+    *(Family("disc", share, spread) for share, spread in _DISCS),
+    *(Family("wide tail", 0.15, 0.08, ratio) for ratio in (2.0, 2.4, 2.9)),
     Family("wide tail", 0.35, 0.12, 2.0),
-    *(Family("ring", share, 0.1, 0.5) for share in (-0.2, -0.4)),
+    Family("ring", -0.3, 0.15, 0.5),
 )
 _RELATIVE_STEP = 1e-3
 
@@ -176,11 +148,10 @@ class FamilyFit:
 
     def columns(self, of: Callable[[RadialKernel], FloatArray]) -> list[FloatArray]:
         """A G of the sensor, and its changes by ln(width) and by the spread of the share."""
-        step, family, width = _RELATIVE_STEP, self.family, self.width
-        wider, narrower = (of(family.kernel(width * (1 + x))) for x in (step, -step))
-        above, below = (of(family.kernel(width, x)) for x in (0.5, -0.5))
-        changes = of(family.kernel(width)), (wider - narrower) / (2 * step), above - below
-        return [self.conversion_constant * change for change in changes]
+        family, width, a = self.family, self.width, self.conversion_constant
+        sensor, wider = (of(family.kernel(width * x)) for x in (1.0, 1 + _RELATIVE_STEP))
+        less = of(family.kernel(width, -1.0))
+        return [a * sensor, a / _RELATIVE_STEP * (wider - sensor), a * (sensor - less)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +162,7 @@ class DepartureBasis:
     sigma: float
     flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
-    families: tuple[FamilyFit, ...] = ()  # as many as fit the scan
+    families: tuple[FamilyFit, ...]  # as many as fit the scan
 
     @property
     def blocks(self) -> tuple[slice, ...]:
@@ -206,35 +177,38 @@ class DepartureBasis:
         gaussian = gaussian_transfer(k, self.sigma)
         widening = -self.conversion_constant * self.sigma * k**2 * gaussian
         rings = [ring.transform(k) for ring in self.rings]
-        return self._columns(gaussian, widening, rings, lambda kernel: kernel.transform(k))
+        families = self._families(gaussian, lambda kernel: kernel.transform(k))
+        return self._columns(gaussian, widening, rings + families)
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values of all columns at radii ``r`` (m), shape (r, p)."""
         gaussian = unit_gaussian(r, self.sigma)
         widening = self.conversion_constant * unit_gaussian_slope(r, self.sigma)
         rings = [ring.radial(r) for ring in self.rings]
-        return self._columns(gaussian, widening, rings, lambda kernel: kernel.radial(r))
+        families = self._families(gaussian, lambda kernel: kernel.radial(r))
+        return self._columns(gaussian, widening, rings + families)
 
     @cached_property
     def integrals(self) -> FloatArray:
         """Integrals of all columns over the plane, shape (p,)."""
         return np.asarray(self.kernels(np.zeros(1))[0])
 
-    def _columns(
-        self,
-        gaussian: FloatArray,
-        widening: FloatArray,
-        rings: list[FloatArray],
-        of: Callable[[RadialKernel], FloatArray],
-    ) -> FloatArray:
-        unmoved = np.zeros((gaussian.size, self.flat - 2))
-        families = []
+    def _families(
+        self, gaussian: FloatArray, of: Callable[[RadialKernel], FloatArray]
+    ) -> list[FloatArray]:
+        """Columns of each family, three as a block: its sensor less the Gaussian, and changes."""
+        blocks = []
         for fit in self.families:
             sensor, *changes = fit.columns(of)
-            families += [sensor - self.conversion_constant * gaussian, *changes]
-        return np.hstack(
-            [gaussian[:, None], widening[:, None], unmoved, *rings, *(c[:, None] for c in families)]
-        )
+            less = sensor - self.conversion_constant * gaussian
+            blocks.append(np.stack([less, *changes], axis=1))
+        return blocks
+
+    def _columns(
+        self, gaussian: FloatArray, widening: FloatArray, blocks: list[FloatArray]
+    ) -> FloatArray:
+        unmoved = np.zeros((gaussian.size, self.flat - 2))
+        return np.hstack([gaussian[:, None], widening[:, None], unmoved, *blocks])
 
 
 def departure_basis(
@@ -247,8 +221,8 @@ def departure_basis(
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
     families = () if weights is None else tuple(_fitted_families(model, fit, weights, width))
-    basis = DepartureBasis(fit.conversion_constant, fit.sigma, fit.jacobian.shape[1], rings)
-    return replace(basis, families=families)
+    flat = fit.jacobian.shape[1]
+    return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families)
 
 
 _FAMILY_ROUNDS = 8
@@ -322,7 +296,6 @@ class _Conditional:
     slope: FloatArray  # (n,): derivative of log_marginal by the weighted data
     design: _Design | None = None
     strength: float = 0.0
-    shrink: FloatArray | None = None  # from data to amplitudes, along the singular vectors
 
     def posterior(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mean (p,), its derivative by the weighted data (p, n), and covariance (p, p)."""
@@ -331,7 +304,9 @@ class _Conditional:
         plain = linear.inverse @ linear.inverse.T / np.outer(linear.scale, linear.scale)
         gain, covariance = fitted, self.variance * plain
         if design is not None:
-            amplitudes = (design.right.T * self.shrink) @ design.left.T
+            prior = self.strength**2
+            shrink = prior * design.singular / (self.variance + prior * design.singular**2)
+            amplitudes = (design.right.T * shrink) @ design.left.T
             carried = fitted @ design.columns
             spread = self._amplitude_covariance(design)
             gain = np.vstack([fitted - carried @ amplitudes, amplitudes])
@@ -375,17 +350,14 @@ class _LinearModel:
         places: FloatArray,
         flat: FloatArray,
         data: FloatArray,
-        freedom: float,
-        added: float,
-        least: float,
+        *noise: float,
     ) -> _LinearModel:
         """Project the weighted flat columns out of the weighted data."""
         scale = np.linalg.norm(flat, axis=0)
         q, r = np.linalg.qr(flat / scale)
         size = float(np.log(np.abs(np.diag(r)) * scale).sum())
         rest = data - q @ (q.T @ data)
-        inverse = np.linalg.inv(r)
-        return cls(start, places, scale, q, inverse, size, data, rest, freedom, added, least)
+        return cls(start, places, scale, q, np.linalg.inv(r), size, data, rest, *noise)
 
     @cached_property
     def least_squares(self) -> FloatArray:
@@ -423,12 +395,9 @@ class _LinearModel:
         log_marginal -= self.log_determinant
         if design is None:
             return _Conditional(self, log_marginal, scatter, variance, -self.rest / variance)
-        shrink = strength**2 * design.singular / (variance + signal)
         left_over = signal / (variance + signal) * design.along
         slope = (design.left @ left_over - self.rest) / variance
-        return _Conditional(
-            self, log_marginal, scatter, variance, slope, design, strength, shrink
-        )
+        return _Conditional(self, log_marginal, scatter, variance, slope, design, strength)
 
     def _distinct(self, variance: float) -> float:
         return max(variance, (_ROUNDING * float(np.abs(self.data).max())) ** 2, 1e-300)
@@ -471,9 +440,11 @@ _PRIOR: tuple[tuple[str, str, tuple[float, ...], float, float], ...] = (
 
 def _hypotheses() -> Iterator[Hypothesis]:
     for name, departure, strengths, estimate, uncertainty in _PRIOR:
-        families = [f for f in FAMILIES if f.name == name] or [None]
-        shapes = [s for s in SHAPES if departure in (s.name, f"{s.name} {s.blur}")] or [None]
-        triples = list(product(families, shapes, strengths))
+        families: list[Family | None] = [f for f in FAMILIES if f.name == name]
+        shapes: list[Shape | None] = [
+            s for s in SHAPES if departure in (s.name, f"{s.name} {s.blur}")
+        ]
+        triples = list(product(families or [None], shapes or [None], strengths))
         for triple in triples:
             yield Hypothesis(*triple, estimate / len(triples), uncertainty / len(triples))
 
@@ -491,12 +462,22 @@ class WeighedFit:
     noise: float  # noise of a point of weight one: in V, or a factor on the stated uncertainties
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
+    change_of_a: (
+        FloatArray  # (h,): what each hypothesis alone changes in A, in V/Pa; NaN if unlikely
+    )
     log_marginal_likelihood: float = 0.0  # of all hypotheses, up to a constant of the scan
 
     @property
     def gaussian_probability(self) -> float:
         """Posterior probability that there is no departure, from a prior of 0.4."""
         return float(self.probability[0])
+
+    def of_kind(self, name: str) -> tuple[float, float]:
+        """Posterior probability of a kind of hypotheses, and what they change in A, in V/Pa."""
+        shares = [p * (h.kind == name) for p, h in zip(self.probability, HYPOTHESES, strict=True)]
+        total, change = float(np.sum(shares)), np.nan_to_num(self.change_of_a)
+        others = float((self.probability - shares) @ change) / max(1 - total, 1e-300)
+        return total, float(shares @ change) / total - others if total > 0 else 0.0
 
 
 def weigh_departures(
@@ -520,7 +501,7 @@ def weigh_departures(
     # Down-weighted points carry no full degree of freedom.
     noise = effective_count - flat, expected_noise**2, least_noise**2
     conditionals = list(_conditionals(basis, columns, data, noise))
-    averaged = _average(conditionals, expected_noise**2)
+    averaged = _average(conditionals, expected_noise**2, basis.integrals)
     explained = fit.jacobian @ averaged.mean[:flat] + voltages @ averaged.mean[flat:]
     gain = averaged.gain @ standardised(np.eye(data.size), weights)
     return replace(averaged, gain=gain, residual=unexplained - explained)
@@ -530,76 +511,76 @@ def _conditionals(
     basis: DepartureBasis, columns: FloatArray, data: FloatArray, noise: tuple[float, float, float]
 ) -> Iterator[_Conditional | None]:
     """Condition on each hypothesis; nothing of a family that does not fit the scan."""
-    count, flat = columns.shape[1], basis.flat
-    unit = np.eye(count)
-    blocks = basis.blocks
+    unit, flat, blocks = np.eye(columns.shape[1]), basis.flat, basis.blocks
     of_shape = dict(zip(SHAPES, blocks, strict=False))
-    of_family = {
-        fitted.family: block
-        for fitted, block in zip(basis.families, blocks[len(SHAPES) :], strict=True)
-    }
+    of_family = dict(zip([f.family for f in basis.families], blocks[len(SHAPES) :], strict=True))
     # The first two parameters are ln A and ln(width).
     places = unit[:, :flat] * np.r_[basis.conversion_constant, basis.sigma, np.ones(flat - 2)]
-    linear = {None: _LinearModel.of(np.zeros(count), places, columns @ places, data, *noise)}
-    for family, block in of_family.items():
-        sensor = unit[:, block.start]
-        places = unit[:, :flat].copy()
-        places[:, 0] = sensor + basis.conversion_constant * unit[:, 0]
-        places[:, 1] = unit[:, block.start + 1]
-        rest = data - columns @ sensor
-        linear[family] = _LinearModel.of(sensor, places, columns @ places, rest, *noise)
-    designs: dict[object, _Design] = {}
+    linear: dict[Family | None, _LinearModel] = {}
+    linear[None] = _LinearModel.of(0 * unit[0], places, columns @ places, data, *noise)
+    for fitted, block in of_family.items():
+        sensor = unit[block.start]
+        of_a = sensor + basis.conversion_constant * unit[0]
+        places = np.column_stack([of_a, unit[block.start + 1], unit[:, 2:flat]])
+        rest = data - columns[:, block.start]
+        linear[fitted] = _LinearModel.of(sensor, places, columns @ places, rest, *noise)
+    designs: dict[tuple[Family | None, Shape | None], _Design] = {}
     for hypothesis in HYPOTHESES:
-        shape, family = hypothesis.shape, hypothesis.family
+        family, shape, strength = hypothesis.family, hypothesis.shape, hypothesis.strength
         if family not in linear:
             yield None
-            continue
-        parts = []
-        if shape is not None:
-            parts.append(unit[:, of_shape[shape]] * (hypothesis.strength if family else 1.0))
-        if family is not None:
-            parts.append(unit[:, of_family[family].stop - 1 : of_family[family].stop])
-        if not parts:
+        elif family is None and shape is None:
             yield linear[family].condition()
-            continue
-        key = (family, shape, hypothesis.strength if family else 1.0)
-        if key not in designs:
-            places = np.hstack(parts)
-            designs[key] = linear[family].decompose(columns @ places, places)
-        yield linear[family].condition(designs[key], 1.0 if family else hypothesis.strength)
+        else:
+            if (family, shape) not in designs:
+                parts = [] if shape is None else [unit[:, of_shape[shape]]]
+                if family is not None:
+                    # The share of a family departs by its own spread, whatever the strength.
+                    last = of_family[family].stop - 1
+                    parts = [strength * part for part in parts] + [unit[:, last : last + 1]]
+                places = np.hstack(parts)
+                designs[family, shape] = linear[family].decompose(columns @ places, places)
+            yield linear[family].condition(
+                designs[family, shape], strength if family is None else 1.0
+            )
 
 
-def _average(conditionals: list[_Conditional | None], added: float) -> WeighedFit:
+def _average(
+    conditionals: list[_Conditional | None], added: float, integrals: FloatArray
+) -> WeighedFit:
     """Average mean and gain by one set of probabilities, squared errors by the other."""
-    # The gain is that of the standardised data, and the residual is left to be computed.
+    # The gain is that of the standardised data.
     log_marginal = np.array([-np.inf if c is None else c.log_marginal for c in conditionals])
     prior = np.array([h.estimate for h in HYPOTHESES])
     estimate = _posterior(log_marginal, prior)
     uncertainty = _posterior(log_marginal, np.array([h.uncertainty for h in HYPOTHESES]))
-    posteriors = [
-        (p, q, c, *c.posterior())
-        for p, q, c in zip(estimate, uncertainty, conditionals, strict=True)
-        if c is not None and (p > 0 or q > 0)
-    ]
+    change_of_a = np.full(estimate.size, np.nan)
+    posteriors = []
+    for i, conditional in enumerate(conditionals):
+        if conditional is not None and (estimate[i] > 0 or uncertainty[i] > 0):
+            posteriors.append((estimate[i], uncertainty[i], conditional, *conditional.posterior()))
+            change_of_a[i] = integrals @ posteriors[-1][3]
     mean = np.sum([p * m for p, _, _, m, _, _ in posteriors], axis=0)
     gain = np.sum([p * g for p, _, _, _, g, _ in posteriors], axis=0)
     # The probabilities depend on the data, too: d(p m) = (m - mean) p d(log marginal likelihood).
     moving = np.sum([p * np.outer(m - mean, c.slope) for p, _, c, m, _, _ in posteriors], axis=0)
     covariance = np.zeros((mean.size, mean.size))
-    for _, q, _, m, g, cov in posteriors:
-        covariance += q * (cov + np.outer(m - mean, m - mean))
+    for _, q, _, m, g, within in posteriors:
+        covariance += q * (within + np.outer(m - mean, m - mean))
         if added and q:
             covariance += q * added * ((g - gain) @ (g - gain).T)
     scatter = np.array([0.0 if c is None else c.scatter for c in conditionals])
     possible = (prior > 0) & np.isfinite(log_marginal)
     likelihood = float(np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible])))
     noise = float(np.sqrt(estimate @ scatter))
-    return WeighedFit(mean, covariance, gain + moving, noise, estimate, mean, likelihood)
+    # The residual is left to be computed.
+    unknown = np.zeros(0)
+    return WeighedFit(
+        mean, covariance, gain + moving, noise, estimate, unknown, change_of_a, likelihood
+    )
 
 
-def supported(
-    basis: DepartureBasis, weighed: WeighedFit
-) -> tuple[DepartureBasis, WeighedFit]:
+def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:
     """Leave out the shapes and families of negligible probability."""
     blocks = basis.blocks
     used = [bool(np.diag(weighed.covariance)[block].any()) for block in blocks]
