@@ -87,6 +87,20 @@ def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
         np.testing.assert_allclose(line.u_zz, voltage)
 
 
+@pytest.mark.parametrize(("first", "repeat", "branch"), [
+    ("approach", ["--repeat", 3], [[1, 1, 1, 1], [2, 2, 2, 2]]),
+    ("", [], [0, 2, 1, 2, 1, 2, 1, 2]),
+])  # fmt: skip
+def test_branches_are_words_or_numbers(run: Run, folder: Path, first, repeat, branch):
+    words = [first, "Retreat", "1", "2", "APPROACH", "2.0", "approach", "retreat"]
+    rows = [f"{i // 2},{i},{word}\n" for i, word in enumerate(words)]
+    (folder / "scan.csv").write_text("".join(rows), encoding="utf-8")
+    columns = ["--x", 1, "--x-unit", "mm", "--u", 2, "--u-unit", "mV", "--branch", 3, *repeat]
+    done = run("import", "scan.csv", "-o", "scan.h5", *columns, *SET_UP).exits(0)
+    assert "readings on approach, 4 on retreat" in done.out
+    assert memscal.read_scan("scan.h5").branch.tolist() == branch
+
+
 def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: Run, folder: Path):
     rows = np.array([(s, place, s) for s in (0.5, 2.0) for place in range(9)])
     write_table(folder / "mixed.csv", "set,position,voltage", rows[[0, 10, 2, 12, 4, 14]])

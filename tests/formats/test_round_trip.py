@@ -84,12 +84,17 @@ def test_what_was_between_the_contacts_comes_back(tmp_path: Path, kind):
     errors = 0.02 * plain.normal_load * (1 + np.arange(plain.u_zz.size).reshape(plain.u_zz.shape))
     errors[..., 4] = np.nan
     wet = dataclasses.replace(
-        plain, normal_load_errors=errors, lubrication="lubricated", lubricant="glycerol, 99 %"
-    )
+        plain, normal_load_errors=errors, lubrication="lubricated", lubricant="glycerol, 99 %",
+        branch=np.arange(errors.size).reshape(errors.shape) % 3,
+    )  # fmt: skip
     write_scan(wet, tmp_path / "scan.h5")
     assert_same(read_scan(tmp_path / "scan.h5"), wet, but=("source",))
-    with h5py.File(tmp_path / "scan.h5") as file:
+    with h5py.File(tmp_path / "scan.h5", "r+") as file:
         assert file["/entry/data/normal_load_errors"].attrs["units"] == "N"
+        assert "1 approach, 2 retreat" in file["/entry/data/branch"].attrs["meaning"]
+        file["/entry/data/branch"][..., 3] = 7
+    with pytest.raises(InputError, match=r"scan\.h5: /entry/data/branch holds 7"):
+        read_scan(tmp_path / "scan.h5")
 
 
 def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):

@@ -137,6 +137,7 @@ NO_TABLES = ("", "\n\n", "# only a comment\n", "x,u\n", "\0\0\0")
     *((TWO_ROWS, {"u_unit": "uT", "u_scale": value}, "scale") for value in (0.0, np.nan, np.inf)),
     *((text, {}, r"table\.csv") for text in NO_TABLES),
     ("x,y,u\n0,5,1\n1,5,2\n2,5,1\n", {"y": "y"}, r"0 mm along y(.|\n)*Leave y out"),
+    ("x,u\n0,1\n1,3\n", {"branch": "u"}, r"table\.csv: column 'u' holds 3"),
 ])  # fmt: skip
 def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):
     with pytest.raises(InputError, match=words):
@@ -158,11 +159,6 @@ def test_the_load_comes_from_the_option_or_the_median_of_its_column(tmp_path: Pa
     np.testing.assert_allclose(found.scan.normal_load, [0.99, 1.0, 1.03])
     with pytest.raises(InputError, match="load of the scan is not given"):
         scan_table(tmp_path, text, load=None)
-
-
-def test_further_channels_are_carried(tmp_path: Path):
-    found = scan_table(tmp_path, "x,u,s\n0,1,5\n1,2,6\n", u_xz="s")
-    assert found.scan.channels["u_xz"].tolist() == [5e-3, 6e-3]
 
 
 def test_rows_without_a_position_are_left_out_and_counted(tmp_path: Path):
@@ -196,6 +192,8 @@ def test_columns_without_a_header_go_by_number(tmp_path: Path):
 def test_a_cell_that_is_no_number_is_named_by_column_and_row(tmp_path: Path):
     with pytest.raises(FormatError, match=r"column 'u', data row 2: 'overload'"):
         scan_table(tmp_path, "x,u\n0,1\n1,overload\n")
+    with pytest.raises(FormatError, match=r"row 1: 'down' is not a number or approach or retreat"):
+        scan_table(tmp_path, "x,u,b\n0,1,down\n1,2,approach\n", branch="b")
 
 
 def reference_table(path: Path, text: str, **options: Any) -> Any:
