@@ -127,6 +127,9 @@ def test_a_fem_table_becomes_a_reference(run: Run, folder: Path):
     np.testing.assert_allclose(found.sigma_zz, profile.sigma_zz, rtol=1e-12, atol=1e-9)
     assert found.solver == "a FEM program"
     assert found.film is None
+    warned = ["import", "fem.csv", "--format", "reference", "-o", "w.h5", "--sign", "-1", *columns]
+    done = run(*warned[:-1], 1.1).exits(0, "Warning: the table's force differs from the load")
+    assert "Warning" not in done.out
     lossy = run(
         "import", "fem.csv", "--format", "reference", "-o", "kilo.h5", *columns[:-3], "kPa",
         "--load", 1, "--sign", "-1",
@@ -195,15 +198,3 @@ def test_the_table_itself_is_never_replaced(run: Run, table: Path):
     before = table.read_bytes()
     run("import", table, "-o", table, *COLUMNS, *SET_UP, "--force").exits(4)
     assert table.read_bytes() == before
-
-
-def test_a_force_that_is_not_the_load_is_warned_of_beside_the_results(run: Run, folder: Path):
-    r = np.linspace(0, 8, 200)
-    sigma = np.exp(-(r**2) / 2) / (2 * np.pi)  # 1 N, in MPa and mm
-    write_table(folder / "fem.csv", "r,s", np.stack([r, sigma], axis=1))
-    done = run(
-        "import", "fem.csv", "--format", "reference", "-o", "fem.h5", "--load", 1.1,
-        "--r", "r", "--r-unit", "mm", "--sigma", "s", "--sigma-unit", "MPa",
-    )  # fmt: skip
-    done.exits(0, "Warning: the table's force differs from the load")
-    assert "Warning" not in done.out
