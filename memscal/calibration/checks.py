@@ -16,6 +16,7 @@ from memscal.estimation.assumptions import (
     clipped_points,
     departure_test,
     hold_out,
+    hysteresis_test,
     linearity_test,
     load_groups,
     symmetry_test,
@@ -45,6 +46,7 @@ from memscal.model.checks import (
     check,
     chi_square_limit,
 )
+from memscal.model.notation import format_measured
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
@@ -161,6 +163,28 @@ def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
     return [_added("load_linearity", linear, meaning)]
 
 
+def _hysteresis(estimate: ProfileEstimate) -> list[QualityCheck]:
+    extra = hysteresis_test(estimate)
+    if extra is None:
+        return []
+    scales, units = (1e2, 1e6, 1e3), ("%", "um", "mV")
+    conversion, position, baseline = (
+        format_measured(value * scale, error * scale, unit)
+        for value, error, scale, unit in zip(
+            extra.coefficients, extra.errors, scales, units, strict=True
+        )
+    )
+    meaning = (
+        "Fall of chi-square by differences between approach and retreat (approach minus retreat): "
+        f"of A, here {conversion}, of the centre's position along the scan, {position}, and of the "
+        f"baseline, {baseline}. A failure means that A and G are means over two different scans: "
+        "the film relaxes or adheres, the stage has play, or the amplifier drifts. Wait longer "
+        "before each reading, move to each position from the same side, or calibrate with one "
+        "branch alone."
+    )
+    return [_added("hysteresis", extra, meaning)]
+
+
 def _added(name: str, extra: ExtraColumns, meaning: str) -> QualityCheck:
     p_value = float(chdtrc(extra.count, extra.fall))
     return check(name, extra.fall, chi_square_limit(extra.count), meaning, p_value)
@@ -248,6 +272,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
         _bayes_factor(estimate),
         _symmetry(estimate),
         *_linearity(estimate),
+        *_hysteresis(estimate),
         *_held_out(estimate),
         *_saturation(estimate),
     )

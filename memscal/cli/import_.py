@@ -134,8 +134,8 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 """
 
 _SCAN_NAMES = [
-    *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "u_xz", "u_yz"),
-    *("load_column", "load_unit", "load_uncertainty", "title"),
+    *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "branch", "u_xz"),
+    *("u_yz", "load_column", "load_unit", "load_uncertainty", "title"),
     *("lubrication", "lubricant"),
 ]
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
@@ -163,6 +163,10 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @option("--repeat", metavar="COLUMN", multiple=True)(
     "Scan: column that numbers the repeats. Repeated: each combination of the columns is a "
     "line, such as of the load that was set and of the pass."
+)
+@option("--branch", metavar="COLUMN")(
+    "Scan: column that says approach (or 1) where the indenter was loaded, retreat (or 2) where "
+    "it was unloaded."
 )
 @option("--u-xz", metavar="COLUMN")("Scan: column of the channel xz.")
 @option("--u-yz", metavar="COLUMN")("Scan: column of the channel yz.")

@@ -162,6 +162,27 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     return _add(estimate, (signal * (load - mean) / mean)[:, None])
 
 
+def hysteresis_test(estimate: ProfileEstimate) -> ExtraColumns | None:
+    """Compare approach and retreat within each scan that has both; ``None`` without any.
+
+    The columns are the relative difference of A, that of the position along the scan in m (of the
+    sensor's centre), and that of the baseline in V: each is approach minus retreat.
+    """
+    # A step of the baseline between the branches would else be taken for a difference of A.
+    points, model = estimate.points, estimate.model
+    sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)
+    for scan in range(points.scans):
+        if np.ptp(sign[inside := points.scan == scan]) < 1:
+            sign[inside] = 0
+    if not sign.any():
+        return None
+    shift = model.shift_derivative(model.geometry(estimate.centres), estimate.kernel)
+    along = np.argmax(points.free[points.scan], axis=1), range(sign.size)
+    signal = estimate.predicted - estimate.background
+    columns = np.stack([signal, shift[along], np.ones_like(sign)], axis=1)
+    return _add(estimate, sign[:, None] * columns)
+
+
 def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArray:
     """Profiles of Gaussians of several widths, shape (n, factors): smooth test functions."""
     model, fit = estimate.model, estimate.gaussian
@@ -184,7 +205,11 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     free = scaled - base @ (base.T @ scaled)
     information = np.linalg.pinv(free.T @ free, hermitian=True)
     coefficients = information @ (free.T @ residual)
-    fall, errors = float(residual @ free @ coefficients), np.sqrt(np.diag(information))
+    fall = float(residual @ free @ coefficients)
+    # The adopted noise counts what the columns explain, but it is no less than the stated one.
+    least = 0.0 if estimate.points.u_errors is None else estimate.noise_scale**-2
+    left = max(1 - fall / max(float(residual @ residual), np.finfo(float).tiny), least)
+    errors = np.sqrt(left * np.diag(information))
     size = float(np.abs(columns @ coefficients).max() / estimate.largest_signal)
     return ExtraColumns(fall, columns.shape[1], coefficients / scale, errors / scale, size)
 

@@ -90,6 +90,7 @@ class ScanPoints:
     u_errors: FloatArray | None  # (n,): stated standard uncertainty of each voltage, in V
     x_errors: FloatArray  # (n,): standard uncertainty of each position along the scan, in m
     repeat: NDArray[np.intp]  # (n,): number of each point's repeat, counted through all scans
+    branch: NDArray[np.int64]  # (n,): 1 where the indenter approached, 2 where it retreated, or 0
     scan: NDArray[np.intp]  # (n,): number of each point's scan
     free: NDArray[np.bool_]  # (scans, 2): along x and y, whether the centre is a free parameter
     missing: int  # how many points were missing
@@ -193,6 +194,7 @@ def measured_points(scan: Scan, channel: str = "zz") -> ScanPoints:
     arrays = {"x": x, "y": y, "u": u, "load": load, "repeat": scan.passes}
     x_errors = np.zeros(()) if scan.x_errors is None else scan.x_errors
     arrays["x_errors"] = np.broadcast_to(x_errors, u.shape)
+    arrays["branch"] = np.zeros(u.shape, np.int64) if scan.branch is None else scan.branch
     columns: dict[str, Any] = {name: values[keep] for name, values in arrays.items()}
     points = ScanPoints(
         **columns,
@@ -230,7 +232,7 @@ def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     numbers = [np.full(points.u.size, i, dtype=np.intp) for i, points in enumerate(scans)]
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(points, name) for points in scans])
-        for name in ("x", "y", "u", "load", "x_errors", "free")
+        for name in ("x", "y", "u", "load", "x_errors", "branch", "free")
     }
     return ScanPoints(
         **columns,

@@ -37,7 +37,7 @@ from memscal.formats.values import (
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import by_name
-from memscal.model.scan import Scan
+from memscal.model.scan import BRANCHES, Scan, branch_numbers
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
@@ -50,6 +50,7 @@ _OF_ONE_SHAPE = {"x", "y", "x_errors", "y_errors", "u_zz_correlation"}
 _POINTS = ("point",)
 # One name for each axis of the correlation: netCDF tools need each dimension once.
 _PAIRS = ("point", "point_prime")
+_BRANCHES = ", ".join(["0 not stated", *(f"{i} {name}" for name, i in BRANCHES.items())])
 _SYNTHETIC = (
     "The data of this file are synthetic: calculated from the known truth below, not measured."
 )
@@ -103,6 +104,8 @@ def scan_from(file: SafeFile) -> Scan:
     arrays = _read_arrays(file, along)
     # Each point has the number of its pass; elsewhere ``repeat`` only counts rows.
     numbered = axes == _POINTS and file.has(f"{_DATA}/repeat")
+    if "branch" in arrays:
+        arrays["branch"] = branch_numbers(file.where(f"{_DATA}/branch"), arrays["branch"])
     reference = None
     if file.has("/entry/reference"):
         reference = groups.read_profile(file, load=load["load"], film=film, indenter=indenter)
@@ -193,6 +196,8 @@ def _data_group(scan: Scan) -> Group:
         data["repeat"] = Number(scan.repeat, "1", axes)
     elif scan.kind == "repeats":
         data["repeat"] = index_axis("repeat", scan.u_zz.shape[0])
+    if scan.branch is not None:
+        data["branch"] = Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(positions, axes if points else (along,))
     if scan.position_scale_uncertainty is not None:

@@ -61,6 +61,7 @@ SCAN_DATA = record(
     Quantity("x", _L, "position along x", "x", _X),
     Quantity("y", _L, "position along y", "y", ("y",)),
     Quantity("repeat", _ONE, "repeat", axes=("repeat",)),
+    Quantity("branch", _ONE, "approach (1) or retreat (2) of the indenter", axes=_X),
     Quantity("x_errors", _L, "standard uncertainty of x", axes=_X),
     Quantity("y_errors", _L, "standard uncertainty of y", axes=("y",)),
     Quantity("u_zz", _U, "voltage of the normal channel", "U_zz", _X, required=True),

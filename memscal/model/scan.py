@@ -186,6 +186,9 @@ def _typical_step(values: FloatArray, cluster: IntArray) -> float:
 LUBRICATIONS = ("", "dry", "lubricated")
 """States of lubrication; empty where a scan states none."""
 
+BRANCHES = {"approach": 1, "retreat": 2}
+"""Numbers of the indenter's branches; 0 where none is stated."""
+
 #: A combination of voltages with less of the noise than this would outweigh all others.
 _LEAST_EIGENVALUE = 1e-8
 #: Points that spread by less of their length across it are a line.
@@ -230,6 +233,23 @@ def require_contacts(scan: _Contacts) -> None:
             f"The scan names a lubricant, {scan.lubricant!r}, but its lubrication is {stated}.",
             cure="Give the lubrication 'lubricated', or leave the lubricant out.",
         )
+
+
+def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
+    """Return branches, given by number or by word, as an array of numbers."""
+    values = np.asarray(stated)
+    named = {"": 0, **BRANCHES}
+    numbers = np.array(
+        [named.get(v.strip().lower(), -1) if isinstance(v, str) else v for v in values.flat]
+    ).reshape(values.shape)
+    known = np.isin(numbers, list(named.values()))
+    if not known.all():
+        raise InputError(
+            f"{name} holds {values[~known][0]}, which names no branch.",
+            why="It says whether the indenter approached (was loaded) or retreated (was unloaded).",
+            cure="Give 1 or 'approach', 2 or 'retreat', and 0 where it is not known.",
+        )
+    return numbers.astype(np.int64)
 
 
 def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
@@ -312,6 +332,10 @@ class Scan:
         Second axis of a raster, or second position of each point, in m.
     repeat : ndarray of int, shape (n,), optional
         Which pass each of the points belongs to: any whole numbers.
+    branch : ndarray of int, shape of ``u_zz``, optional
+        1 where the indenter approached (was loaded), 2 where it retreated (was unloaded), 0 where
+        that is not known; the words ``"approach"`` and ``"retreat"``, and one value for each row
+        of a ``u_zz`` of two axes, are accepted.
     u_zz_errors : ndarray, shape of ``u_zz``, optional
         Standard uncertainty of each voltage (electronic noise), in V.
     normal_load, normal_load_errors : ndarray, shape of ``u_zz``, optional
@@ -361,6 +385,7 @@ class Scan:
     sensor: StressSensor = field(default_factory=StressSensor)
     y: FloatArray | None = None
     repeat: NDArray[np.int64] | None = None
+    branch: NDArray[np.int64] | None = None
     u_zz_errors: FloatArray | None = None
     normal_load: FloatArray | None = None
     normal_load_errors: FloatArray | None = None
@@ -391,6 +416,11 @@ class Scan:
         for name in ("u_zz_errors", "normal_load", "normal_load_errors"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, self._like_signal(name, getattr(self, name)))
+        if self.branch is not None:
+            branch = branch_numbers("branch of the scan", self.branch)
+            if branch.shape == self.u_zz.shape[:-1] != ():
+                branch = np.broadcast_to(branch[:, None], self.u_zz.shape)
+            object.__setattr__(self, "branch", self._like_signal("branch", branch, np.int64))
         channels = {name: self._like_signal(name, u) for name, u in self.channels.items()}
         object.__setattr__(self, "channels", MappingProxyType(channels))
         self._check_values()
@@ -457,7 +487,7 @@ class Scan:
                     changes[name] = values[keep]
             if self.u_zz_correlation is not None:
                 changes["u_zz_correlation"] = self.u_zz_correlation[np.ix_(keep, keep)]
-        for name in ("u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
+        for name in ("branch", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors"):
             if (values := getattr(self, name)) is not None:
                 changes[name] = values[keep]
         channels = {name: values[keep] for name, values in self.channels.items()}
@@ -483,8 +513,8 @@ class Scan:
         if self.kind == "points" and self.y is not None:
             require_plane(self.x, self.y)
 
-    def _like_signal(self, name: str, values: FloatArray) -> FloatArray:
-        array = frozen_array(values)
+    def _like_signal(self, name: str, values: ArrayLike, dtype: Any = np.float64) -> FloatArray:
+        array = frozen_array(values, dtype=dtype)
         if array.shape != self.u_zz.shape:
             raise InputError(f"{name} has shape {array.shape}, but u_zz has {self.u_zz.shape}.")
         return array

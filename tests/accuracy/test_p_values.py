@@ -102,7 +102,7 @@ def test_runs_are_rejected_no_more_often_than_their_level() -> None:
 def test_clean_scans_hardly_ever_fail_a_check() -> None:
     settings = [
         {}, {"noise": 0.02}, {"noise": 0.001}, {"state_noise": False}, {"repeats": 3, "points": 33},
-        {"load": [0.5, 1.0, 1.5], "points": 33},
+        {"load": [0.5, 1.0, 1.5], "points": 33}, {"repeats": 2, "points": 33, "branch": [1, 2]},
     ]  # fmt: skip
     failed = run = 0
     for seed in range(SEEDS):

@@ -26,7 +26,7 @@ def test_the_table_of_checks_lists_those_that_there_are_and_which_have_p_values(
     listed = exact | {"reconvolution": False, "constraint": False}
     assert len(rows) == len(listed)
     scans = [
-        simulated(load=[0.5, 1.5], repeats=2, points=33),
+        simulated(load=[0.5, 1.5], repeats=2, points=33, branch=[1, 2, 1, 2]),
         simulated(raster=True, points=17),
         [simulated(points=33, seed=1), simulated(points=33, seed=2)],
     ]

@@ -87,6 +87,20 @@ def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
         np.testing.assert_allclose(line.u_zz, voltage)
 
 
+@pytest.mark.parametrize(("first", "repeat", "branch"), [
+    ("approach", ["--repeat", 3], [[1, 1, 1, 1], [2, 2, 2, 2]]),
+    ("", [], [0, 2, 1, 2, 1, 2, 1, 2]),
+])  # fmt: skip
+def test_branches_are_words_or_numbers(run: Run, folder: Path, first, repeat, branch):
+    words = [first, "Retreat", "1", "2", "APPROACH", "2.0", "approach", "retreat"]
+    rows = [f"{i // 2},{i},{word}\n" for i, word in enumerate(words)]
+    (folder / "scan.csv").write_text("".join(rows), encoding="utf-8")
+    columns = ["--x", 1, "--x-unit", "mm", "--u", 2, "--u-unit", "mV", "--branch", 3, *repeat]
+    done = run("import", "scan.csv", "-o", "scan.h5", *columns, *SET_UP).exits(0)
+    assert "readings on approach, 4 on retreat" in done.out
+    assert memscal.read_scan("scan.h5").branch.tolist() == branch
+
+
 def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: Run, folder: Path):
     rows = np.array([(s, place, s) for s in (0.5, 2.0) for place in range(9)])
     write_table(folder / "mixed.csv", "set,position,voltage", rows[[0, 10, 2, 12, 4, 14]])
@@ -113,6 +127,9 @@ def test_a_fem_table_becomes_a_reference(run: Run, folder: Path):
     np.testing.assert_allclose(found.sigma_zz, profile.sigma_zz, rtol=1e-12, atol=1e-9)
     assert found.solver == "a FEM program"
     assert found.film is None
+    warned = ["import", "fem.csv", "--format", "reference", "-o", "w.h5", "--sign", "-1", *columns]
+    done = run(*warned[:-1], 1.1).exits(0, "Warning: the table's force differs from the load")
+    assert "Warning" not in done.out
     lossy = run(
         "import", "fem.csv", "--format", "reference", "-o", "kilo.h5", *columns[:-3], "kPa",
         "--load", 1, "--sign", "-1",
@@ -181,15 +198,3 @@ def test_the_table_itself_is_never_replaced(run: Run, table: Path):
     before = table.read_bytes()
     run("import", table, "-o", table, *COLUMNS, *SET_UP, "--force").exits(4)
     assert table.read_bytes() == before
-
-
-def test_a_force_that_is_not_the_load_is_warned_of_beside_the_results(run: Run, folder: Path):
-    r = np.linspace(0, 8, 200)
-    sigma = np.exp(-(r**2) / 2) / (2 * np.pi)  # 1 N, in MPa and mm
-    write_table(folder / "fem.csv", "r,s", np.stack([r, sigma], axis=1))
-    done = run(
-        "import", "fem.csv", "--format", "reference", "-o", "fem.h5", "--load", 1.1,
-        "--r", "r", "--r-unit", "mm", "--sigma", "s", "--sigma-unit", "MPa",
-    )  # fmt: skip
-    done.exits(0, "Warning: the table's force differs from the load")
-    assert "Warning" not in done.out

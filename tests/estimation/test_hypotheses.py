@@ -1,19 +1,30 @@
-"""The tests of symmetry, linearity and roundness: rare false alarms, and real departures found."""
+"""The model's assumptions: false alarms are as rare as stated, and real departures are found."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import estimated, simulated
+from helpers.scans import CENTRE, CONVERSION, as_points, estimated, simulated
 from scipy.stats import binom, chi2
 
-from memscal.estimation.assumptions import axisymmetry_test, linearity_test, symmetry_test
-from memscal.model.checks import chi_square_limit
-
-
-@pytest.mark.parametrize(
-    ("test", "options"), [(symmetry_test, {}), (linearity_test, {"load": [0.5, 1.5], "points": 33})]
+from memscal.estimation.assumptions import (
+    axisymmetry_test,
+    hysteresis_test,
+    linearity_test,
+    symmetry_test,
 )
+from memscal.model.checks import chi_square_limit
+from memscal.model.scan import Scan
+
+BOTH = {"repeats": 2, "points": 33, "branch": ["approach", "retreat"]}
+
+
+@pytest.mark.parametrize(("test", "options"), [
+    (symmetry_test, {}),
+    (linearity_test, {"load": [0.5, 1.5], "points": 33}),
+    (hysteresis_test, BOTH),
+    (hysteresis_test, BOTH | {"state_noise": False}),
+])  # fmt: skip
 def test_a_true_hypothesis_is_rejected_as_rarely_as_chance_demands(test, options) -> None:
     scans = 80
     extra = [test(estimated(simulated(seed=seed, **options))) for seed in range(scans)]
@@ -31,8 +42,37 @@ def test_a_tilted_rod_is_found() -> None:
     assert odd.fall > chi_square_limit(odd.count)
 
 
-def test_linearity_is_tested_only_where_loads_differ() -> None:
+def test_linearity_and_hysteresis_are_tested_only_where_loads_and_branches_differ() -> None:
     assert linearity_test(estimated(simulated())) is None
+    for branch in (["approach", ""], ["retreat", "retreat"]):
+        assert hysteresis_test(estimated(simulated(**BOTH | {"branch": branch}))) is None
+
+
+def hysteretic(seed: int, conversion: float = 0.0, play: float = 0.0, step: float = 0.0) -> Scan:
+    """Two scans, of sensors that differ in A and centre, as approach and retreat of one."""
+    rows = [
+        simulated(
+            seed=2 * seed + i, noise=0.002, baseline=0.0, drift=0.0,
+            conversion_constant=CONVERSION * (1 + side * conversion),
+            centre=(CENTRE + side * play, 0.0),
+        )
+        for i, side in enumerate((0.5, -0.5))
+    ]  # fmt: skip
+    u, errors = (np.stack([getattr(row, name) for row in rows]) for name in ("u_zz", "u_zz_errors"))
+    u += np.array([[0.5], [-0.5]]) * step
+    return replace(rows[0], u_zz=u, u_zz_errors=errors, branch=BOTH["branch"])
+
+
+@pytest.mark.parametrize("differences", [(0.01, 0.0, 0.0), (0.0, -20e-6, 0.0), (0.0, 0.0, 1e-4)])
+def test_a_hysteresis_is_found_and_measured_within_its_uncertainty(differences) -> None:
+    scans = 40
+    extra = [hysteresis_test(estimated(hysteretic(seed, *differences))) for seed in range(scans)]
+    assert all(columns.fall > chi_square_limit(3) for columns in extra)
+    z = np.array([(columns.coefficients - differences) / columns.errors for columns in extra])
+    low, high = chi2.ppf([1e-6, 1 - 1e-6], scans)
+    assert np.all((low < np.sum(z**2, axis=0)) & (np.sum(z**2, axis=0) < high))
+    found = hysteresis_test(estimated(as_points(hysteretic(0, *differences))))
+    np.testing.assert_allclose(found.coefficients, extra[0].coefficients, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("eta", [-0.05, 0.1])

@@ -7,7 +7,7 @@ import pytest
 from helpers.scans import simulated
 
 from memscal.errors import FitError, InputError
-from memscal.estimation.points import measured_points
+from memscal.estimation.points import joined_points, measured_points
 
 
 def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
@@ -30,9 +30,10 @@ def test_a_raster_keeps_both_coordinates_of_every_point() -> None:
 
 
 def test_repeats_share_positions_and_know_their_row() -> None:
-    points = measured_points(simulated(points=11, repeats=3))
+    points = measured_points(simulated(points=11, repeats=3, branch=["approach", "retreat", ""]))
     assert np.array_equal(points.x[:11], points.x[11:22])
     assert np.array_equal(np.unique(points.repeat), [0, 1, 2])
+    assert np.array_equal(joined_points([points, points]).branch, np.tile([1, 2, 0], 2).repeat(11))
 
 
 @pytest.mark.parametrize(("change", "error", "words"), [

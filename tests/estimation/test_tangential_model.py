@@ -22,7 +22,7 @@ def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
     n = x.size
     return ScanPoints(
         x=x, y=y, u=np.zeros(n), load=np.full(n, 2.0), u_errors=None, x_errors=np.zeros(n),
-        repeat=np.zeros(n, dtype=np.intp), scan=np.zeros(n, dtype=np.intp),
+        repeat=np.zeros(n, np.intp), branch=np.zeros(n, np.int64), scan=np.zeros(n, np.intp),
         free=np.array([[True, True]]), missing=0, channel=channel,
     )  # fmt: skip
 

@@ -32,10 +32,10 @@ EXACT_FILM = replace(
 EXACT_ROD = replace(PAPER_ROD, radius_uncertainty=None)
 
 
-def simulated(**options: Any) -> Scan:
-    """Simulate a scan whose film, rod and load are exact."""
+def simulated(branch: Any = None, **options: Any) -> Scan:
+    """Simulate a scan whose film, rod and load are exact; its branches may be named."""
     exact = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
-    return memscal.simulate(**(exact | options))
+    return replace(memscal.simulate(**(exact | options)), branch=branch)
 
 
 def estimated(scan: Scan) -> ProfileEstimate:
@@ -57,7 +57,7 @@ def as_points(scan: Scan, seed: int = 0) -> Scan:
     order = np.random.default_rng(seed).permutation(scan.u_zz.size)
     x, y = (positions.ravel()[order] for positions in scan.positions)
     along = y if scan.direction == "y" else x
-    names = ("u_zz", "u_zz_errors", "normal_load", "normal_load_errors")
+    names = ("branch", "u_zz", "u_zz_errors", "normal_load", "normal_load_errors")
     values = {name: getattr(scan, name) for name in names if getattr(scan, name) is not None}
     if scan.x_errors is not None:
         values["x_errors"] = np.broadcast_to(scan.x_errors, scan.u_zz.shape)

@@ -19,6 +19,7 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
         normal_load=scan.normal_load[one], channels={},
     )  # fmt: skip
     assert single.kind == "repeats"
+    assert set(replace(scan, branch=["Approach", "", "retreat"]).only_passes(2).branch.flat) == {2}
 
 
 @pytest.mark.parametrize(("kind", "changes", "problem"), [
@@ -43,10 +44,12 @@ def test_a_line_that_is_repeated_once_is_still_repeats() -> None:
     ("line", {"u_zz": np.full(33, np.inf)}, "infinite voltage"),
     ("line", {"u_zz_errors": np.full(33, -1e-6)}, "negative or infinite"),
     ("line", {"load": 0.0}, "load of the scan is 0 N"),
-    ("line", {"load": -1.0}, "load of the scan is -1 N"),
     ("line", {"load": float("nan")}, "load of the scan is nan N"),
     ("line", {"load": float("inf")}, "load of the scan is inf N"),
     ("line", {"load_uncertainty": -0.01}, "standard uncertainty of the load"),
+    ("line", {"branch": [1, 2]}, r"branch has shape \(2,\)"),
+    ("line", {"branch": np.full(33, 3)}, "branch of the scan holds 3,"),
+    ("repeats", {"branch": ["approach", "retreat", "up"]}, "branch of the scan holds up,"),
     ("line", {"normal_load_errors": np.ones(3)}, "normal_load_errors has shape"),
     ("line", {"normal_load_errors": np.full(33, -0.01)}, "negative or infinite"),
     ("line", {"normal_load_errors": np.full(33, np.inf)}, "negative or infinite"),

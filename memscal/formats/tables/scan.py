@@ -15,7 +15,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
-from memscal.model.scan import Scan, StressSensor, places_of
+from memscal.model.scan import BRANCHES, Scan, StressSensor, branch_numbers, places_of
 
 Column = str | int
 
@@ -46,6 +46,7 @@ def read_scan_table(
     load: float | None = None,
     y: Column | None = None,
     repeat: Column | Sequence[Column] | None = None,
+    branch: Column | None = None,
     u_xz: Column | None = None,
     u_yz: Column | None = None,
     load_column: Column | None = None,
@@ -92,6 +93,9 @@ def read_scan_table(
         columns["y"] = to_si(table.column(y), x_unit, "length", table.where(y))
     if repeat is not None:
         columns["repeat"] = _lines(table, repeat, notes)
+    if branch is not None:
+        stated = np.nan_to_num(table.column(branch, BRANCHES))
+        columns["branch"] = branch_numbers(table.where(branch), stated).astype(np.float64)
     columns = _placed(columns, notes)
     notes += _counted(columns)
     messages = import_notes(notes)
@@ -103,6 +107,7 @@ def read_scan_table(
         x=arrays["x"],
         y=arrays.get("y"),
         repeat=None if "repeat" not in arrays else arrays["repeat"].astype(np.int64),
+        branch=None if branch is None else arrays["branch"].astype(np.int64),
         x_errors=None if x_error is None else np.full(arrays["x"].size, x_error),
         u_zz=arrays["u_zz"],
         normal_load=loads,
@@ -125,7 +130,7 @@ def read_scan_table(
 def _lines(table: Table, repeat: Column | Sequence[Column], notes: list[str]) -> FloatArray:
     """Number the line of each row: by one column, or by the combinations of several."""
     columns = [repeat] if isinstance(repeat, str | int) else list(repeat)
-    values = np.stack([table.column(column) for column in columns])
+    values = np.stack([table.column(column, BRANCHES) for column in columns])
     if len(columns) == 1:
         return np.asarray(values[0])
     finite = np.isfinite(values).all(axis=0)
@@ -166,6 +171,10 @@ def _counted(columns: Mapping[str, FloatArray]) -> list[str]:
         if name in columns
     )
     notes = [f"{x.size} readings{in_repeats} at {places.count} places{apart}; {reach}."]
+    if "branch" in columns:
+        counts = [int((columns["branch"] == number).sum()) for number in (1, 2, 0)]
+        words = "{} readings on approach, {} on retreat, {} of neither branch."
+        notes.append(words.format(*counts))
     missing = {name: int(np.isnan(values).sum()) for name, values in columns.items()}
     notes += [
         f"{count} values of {name} are missing (NaN)." for name, count in missing.items() if count

@@ -7,7 +7,7 @@ import hashlib
 import itertools
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Profile
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
+from memscal.model.scan import BRANCHES
 
 _MAX_COLUMNS = 1000
 _DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "space"}
@@ -39,12 +40,14 @@ class Table:
     decimal: str
     notes: tuple[str, ...]
 
-    def column(self, column_name: str | int) -> FloatArray:
-        """Return a column as numbers, NaN where a cell is empty."""
+    def column(
+        self, column_name: str | int, words: Mapping[str, float] | None = None
+    ) -> FloatArray:
+        """Return a column as numbers, NaN where a cell is empty; words stand for their numbers."""
         i = self._index(column_name)
         values = np.empty(len(self.rows))
         for k, row in enumerate(self.rows):
-            values[k] = self._number(row[i] if i < len(row) else "", k, column_name)
+            values[k] = self._number(row[i] if i < len(row) else "", k, column_name, words or {})
         return values
 
     def where(self, column_name: str | int) -> str:
@@ -68,7 +71,11 @@ class Table:
             )
         return number - 1
 
-    def _number(self, cell: str, k: int, column_name: str | int) -> float:
+    def _number(
+        self, cell: str, k: int, column_name: str | int, words: Mapping[str, float]
+    ) -> float:
+        if cell.lower() in words:
+            return words[cell.lower()]
         if cell.lower() in _MISSING:
             return float("nan")
         text = cell.replace(self.decimal, ".") if self.decimal != "." else cell
@@ -77,7 +84,7 @@ class Table:
         except ValueError as error:
             raise FormatError(
                 f"{self.where(column_name)}, data row {k + 1}: "
-                f"{printable(cell, _MAX_NAME)!r} is not a number.",
+                f"{printable(cell, _MAX_NAME)!r} is not {' or '.join(['a number', *words])}.",
                 cure="Correct or remove this row, or state the decimal mark.",
             ) from error
 
@@ -106,7 +113,7 @@ def read_table(
     notes += _head_comments(written)
     delimiter = delimiter or _find_delimiter(lines)
     rows = _split(name, lines, delimiter)
-    headed = not all(_NUMBER.fullmatch(c) or c.lower() in _MISSING for c in rows[0])
+    headed = not all(_NUMBER.fullmatch(c) or c.lower() in _MISSING | {*BRANCHES} for c in rows[0])
     width = max(len(row) for row in rows)
     header = rows[0] if headed else tuple(str(i + 1) for i in range(width))
     body = tuple(rows[1:] if headed else rows)
