@@ -197,7 +197,7 @@ def _centres(solution: Solution) -> list[Message]:
     apart = max(float(np.ptp(centres[owners == i], axis=0).max()) for i in set(owners))
     test, way = solution.apart, "as asked for (--centre per-repeat)"
     if test is not None:
-        way = f"for one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
+        way = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
     text = (
         f"Each of the {owners.size} repeats has its own centre, baseline and drift, {way}. The "
         f"centres are up to {apart * 1e6:.3g} um apart."

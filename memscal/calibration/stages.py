@@ -208,8 +208,8 @@ class Solution:
     deconvolution: Deconvolution  # A and G by the method, and their misfit
     other: Deconvolution | None  # by the other route
     gaussian_misfit: Misfit  # the Gaussian fitted in data space against the scan
-    owners: tuple[int, ...]  # which of the scans that were given each is, or is a repeat of
-    apart: CentresApart | None  # test of a common centre for the repeats, where it was made
+    owners: tuple[int, ...] = (0,)  # which of the scans that were given each is, or is a repeat of
+    apart: CentresApart | None = None  # test of a common centre for the repeats, where it was made
 
     @property
     def per_repeat(self) -> bool:

@@ -227,8 +227,8 @@ def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], t
                 f"for a centre of its own it needs {MINIMUM_POSITIONS}.",
                 cure='Take one centre for all (centre="common", --centre common).',
             )
-        correlated = scan.u_zz_correlation is not None and scan.kind == "points"
-        if correlated and scan.u_zz_correlation[np.not_equal.outer(passes, passes)].any():
+        between = scan.u_zz_correlation if scan.kind == "points" else None
+        if between is not None and between[np.not_equal.outer(passes, passes)].any():
             raise InputError(
                 "u_zz_correlation correlates the noise of one repeat with that of another.",
                 why="Repeats with centres of their own are fitted as separate measurements.",
