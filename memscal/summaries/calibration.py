@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -96,7 +96,8 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
     }
-    if choice := apparatus.process.configuration.get("centre"):
+    choice = apparatus.process.configuration.get("centre")
+    if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]
         values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
     if isinstance(result, Calibration):
