@@ -15,7 +15,7 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import draw_count, drawn_scatter, is_linear
-from memscal.calibration.stages import Deconvolution, Solution, solve
+from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
@@ -40,6 +40,7 @@ from memscal.model.apparatus import (
 from memscal.model.checks import (
     NOISE_UNSTATED,
     OUTLIER_WEIGHT,
+    REPEAT_CENTRES,
     Message,
     QualityCheck,
     failed_check_messages,
@@ -73,8 +74,10 @@ def assemble(
         "grid": dict(solution.choice.reasons),
         "relevant_wavenumber_rad_per_mm": solution.band.relevant * 1e-3,
     }
-    if len(solution.scans) > 1:
-        sources = [further.source for further in solution.scans[1:]]
+    if max(solution.owners) > 0:
+        # Repeats that are fitted as scans have the source of the scan that they belong to.
+        of_scans = dict(zip(solution.owners, solution.scans, strict=True))
+        sources = [of_scans[i].source for i in range(1, len(of_scans))]
         record["further_scans"] = [
             s and {"file_name": s.file_name, "sha256": s.sha256} for s in sources
         ]
@@ -138,7 +141,11 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     # A raster is shown against the distance from the centre, a line against the position.
     along = points.x if points.free[0, 0] else points.y
     place = estimate.distance if points.planar or points.scans > 1 else along
-    if points.scans > 1 and estimate.model.order:
+    if solution.per_repeat and not points.planar and max(solution.owners) == 0:
+        # Repeats of one line are shown with their centres at that of the first.
+        axis = int(np.argmax(points.free[0]))
+        place = estimate.offset[axis] + estimate.centre[axis]
+    elif points.scans > 1 and estimate.model.order:
         # The sign of a shear depends on the side.
         place = estimate.offset[estimate.model.axis]
     order = np.argsort(place, kind="stable")
@@ -176,12 +183,28 @@ def calibration_messages(
             f"sensor towards larger {channel[0]}."
         )
         messages.append(Message("experimental", text))
-    messages += _points(solution.estimate) + _tails(solution.estimate)
+    messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
     messages += _method(solution) + _reference(solution)
     messages += _unstated(scan)
     if scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
+
+
+def _centres(solution: Solution) -> list[Message]:
+    """Return that repeats have centres of their own, and why."""
+    if not solution.per_repeat:
+        return []
+    owners, centres = np.array(solution.owners), solution.estimate.centres
+    apart = max(float(np.ptp(centres[owners == i], axis=0).max()) for i in set(owners))
+    test, way = solution.apart, "as asked for (--centre per-repeat)"
+    if test is not None:
+        way = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
+    text = (
+        f"Each of the {owners.size} repeats has its own centre, baseline and drift, {way}. The "
+        f"centres are up to {apart * 1e6:.3g} um apart."
+    )
+    return [Message(REPEAT_CENTRES, text)]
 
 
 def _points(estimate: ProfileEstimate) -> list[Message]:
@@ -369,6 +392,7 @@ def calibrate(
     alternative: Reference | Sequence[Reference] = None,
     channel: str = "zz",
     method: str | Method = "white-noise",
+    centre: str | None = None,
     correlations: Mapping[tuple[str, str], float] | None = None,
     seed: int = 0,
     **options: Any,
@@ -398,6 +422,10 @@ def calibrate(
         smoothed voltages; :func:`memscal.deconvolution.division.regulariser_names` lists other
         divisions.  ``"bayesian"`` takes A and G from the scan's points: the smaller error, for
         friction.  ``.apparatus.other`` is the estimate by the other route.
+    centre : str, optional
+        ``"common"``: one centre for all repeats of a scan; ``"per-repeat"``: a centre, baseline and
+        drift for each.  By default the latter only for lines whose repeats have no common centre,
+        by an F test at 1/1000 (check ``repeat_centres``); a message says so.
     correlations : mapping of (str, str) to float, optional
         Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
     seed : int, default 0
@@ -430,7 +458,10 @@ def calibrate(
     references = _references(reference, scans)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     chosen = chosen_method(method, options, seed=seed)
-    solution = solve(scans, stresses, chosen, channel)
+    if centre not in (None, COMMON, PER_REPEAT):
+        problem = f"There is no choice of centre {centre!r}."
+        raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
+    solution = solve(scans, stresses, chosen, channel, centre=centre)
     effects = _effects(solution, None if alternative is None else _references(alternative, scans))
     results = uncertainties(solution, solution.deconvolution, effects, pairs)
     beside = solution.other
@@ -442,6 +473,11 @@ def calibrate(
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
     if channel != "zz":
         configuration["channel"] = channel
+    if centre is not None or solution.apart is not None:
+        choice = PER_REPEAT if solution.per_repeat else COMMON
+        configuration["centre"] = {"choice": choice, "chosen_by": "option" if centre else "test"}
+        if solution.apart is not None:
+            configuration["centre"]["p_value"] = solution.apart.p_value
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
     apparatus = assemble(solution, results, other, checks, messages, configuration)
@@ -481,8 +517,8 @@ def _effects(
     scans, estimate = solution.scans, solution.estimate
     spectra = None
     if alternatives is not None:
-        pairs = zip(alternatives, solution.stresses, strict=True)
-        stresses = [stress if other is None else other for other, stress in pairs]
+        pairs = zip(solution.owners, solution.stresses, strict=True)
+        stresses = [alternatives[i] or stress for i, stress in pairs]
         points = [estimate.points.only(i) for i in range(len(scans))]
         spectra = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
     return input_effects(scans, solution.stresses, estimate, spectra)

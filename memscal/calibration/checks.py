@@ -190,15 +190,29 @@ def _added(name: str, extra: ExtraColumns, meaning: str) -> QualityCheck:
     return check(name, extra.fall, chi_square_limit(extra.count), meaning, p_value)
 
 
-def _held_out(estimate: ProfileEstimate) -> list[QualityCheck]:
+def _repeat_centres(solution: Solution) -> list[QualityCheck]:
+    apart = None if solution.per_repeat else solution.apart
+    if apart is None:
+        return []
+    meaning = (
+        "Fall of the squared residuals by a centre for each repeat, over the scatter that is left: "
+        f"an F ratio. The centres are up to {apart.distance * 1e6:.3g} um apart. A failure means "
+        "that stage or sensor moved from repeat to repeat, and that the one centre widens G: "
+        "take a centre per repeat (--centre per-repeat)."
+    )
+    return [check("repeat_centres", apart.value, apart.limit, meaning, apart.p_value)]
+
+
+def _held_out(solution: Solution) -> list[QualityCheck]:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
-    points, load = estimate.points, load_groups(estimate.points.load)
+    estimate, points = solution.estimate, solution.estimate.points
+    load, scan = load_groups(points.load), np.array(solution.owners)[points.scan]
     # Where every repeat has a load, or a scan, of its own, it is held out under that name.
-    repeat = not _same(points.repeat, load) and not _same(points.repeat, points.scan)
+    repeat = not _same(points.repeat, load) and not _same(points.repeat, scan)
     checks = [
         _prediction(estimate, "repeat", points.repeat) if repeat else None,
-        _prediction(estimate, "load", load) if not _same(load, points.scan) else None,
-        _prediction(estimate, "scan", points.scan) if points.scans > 1 else None,
+        _prediction(estimate, "load", load) if not _same(load, scan) else None,
+        _prediction(estimate, "scan", scan) if np.ptp(scan) else None,
     ]
     return [outcome for outcome in checks if outcome is not None]
 
@@ -273,7 +287,8 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
         _symmetry(estimate),
         *_linearity(estimate),
         *_hysteresis(estimate),
-        *_held_out(estimate),
+        *_repeat_centres(solution),
+        *_held_out(solution),
         *_saturation(estimate),
     )
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import j1
 
-from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
 from memscal.deconvolution.division import Method, WhiteNoise
 from memscal.deconvolution.fourier_ratio import (
@@ -23,18 +22,27 @@ from memscal.deconvolution.fourier_ratio import (
     normalise,
     reconvolve,
 )
-from memscal.errors import FitError, InputError
+from memscal.errors import FitError, InputError, MemscalError
+from memscal.estimation.assumptions import CentresApart, repeat_centres_test
 from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.points import ScanPoints, channel_order, joined_points, measured_points
+from memscal.estimation.points import (
+    channel_order,
+    joined_points,
+    measured_points,
+    scans_of_repeats,
+)
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
+from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
+#: Whose centre is fitted: a scan's, or each repeat's.
+COMMON, PER_REPEAT = "common", "per-repeat"
 #: A shear's integral is summed out to this multiple of the scan's reach, at this many radii.
 _FAR = 2.0
 _RADII = 2001
@@ -47,12 +55,27 @@ def solve(
     channel: str = "zz",
     *,
     both: bool = True,
+    centre: str | None = COMMON,
 ) -> Solution:
-    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back."""
+    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back.
+
+    ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test.
+    """
     require_channel_method(channel, method)
-    points = [measured_points(scan, channel) for scan in scans]
-    references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
-    estimate = require_profile(scans, stresses, points, references)
+    owners, apart = tuple(range(len(scans))), None
+    if centre != PER_REPEAT:
+        estimate = require_profile(scans, stresses, channel)
+        apart = repeat_centres_test(estimate)
+    if centre == PER_REPEAT or (centre is None and apart and apart.p_value < FALSE_ALARM):
+        try:
+            separate, numbers = scans_of_repeats(scans, channel)
+            of_repeats = [stresses[i] for i in numbers]
+            estimate = require_profile(separate, of_repeats, channel)
+            scans, stresses, owners = separate, of_repeats, numbers
+        except MemscalError:
+            # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
+            if centre == PER_REPEAT:
+                raise
     smoothed = None if estimate.model.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
@@ -63,16 +86,17 @@ def solve(
     result = deconvolve(estimate, band, fields, method)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
     steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
-    return Solution(*steps, result, beside, gaussian)
+    return Solution(*steps, result, beside, gaussian, owners, apart)
 
 
 def require_profile(
     scans: Sequence[Scan],
     stresses: Sequence[StressProfile | Contact],
-    points: Sequence[ScanPoints],
-    references: Sequence[RadialSpectrum],
+    channel: str,
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
+    points = [measured_points(scan, channel) for scan in scans]
+    references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
     outcome: ProfileEstimate | Exception
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
@@ -184,6 +208,13 @@ class Solution:
     deconvolution: Deconvolution  # A and G by the method, and their misfit
     other: Deconvolution | None  # by the other route
     gaussian_misfit: Misfit  # the Gaussian fitted in data space against the scan
+    owners: tuple[int, ...] = (0,)  # which of the scans that were given each is, or is a repeat of
+    apart: CentresApart | None = None  # test of a common centre for the repeats, where it was made
+
+    @property
+    def per_repeat(self) -> bool:
+        """Whether the scans are repeats, each with a centre of its own."""
+        return len(set(self.owners)) < len(self.owners)
 
     @property
     def scan(self) -> Scan:

@@ -186,6 +186,10 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "wiener, unsupervised-wiener, richardson-lucy, or a plug-in's. The other of bayesian and "
     "division is computed, too, and stands beside it.  [default: white-noise]"
 )
+@option("--centre", click.Choice(("common", "per-repeat")))(
+    "Whether the repeats of a scan share their centre, or each has a centre, baseline and drift of "
+    "its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
+)
 @option("--option options", multiple=True, metavar="NAME=VALUE")(
     "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
     "the rule chooses). May be repeated."
@@ -219,6 +223,7 @@ def command(
     correlations: tuple[str, ...],
     channel: str,
     method: str | None,
+    centre: str | None,
     options: tuple[str, ...],
     seed: int | None,
     as_json: bool,
@@ -252,7 +257,7 @@ def command(
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs.paths, force=force, inputs=inputs)
     if dry_run:
-        _rehearse(data, profile, channel, regulariser, outputs, as_json)
+        _rehearse(data, profile, channel, regulariser, outputs, as_json, centre)
         return DONE
 
     from memscal.calibration.calibrate import calibrate
@@ -264,6 +269,7 @@ def command(
             alternative=other,
             channel=channel,
             method=regulariser,
+            centre=centre,
             correlations=dict(pairs),
             seed=seed or 0,
         )
@@ -318,10 +324,11 @@ def _rehearse(
     regulariser: Method,
     outputs: Outputs,
     as_json: bool,
+    centre: str | None,
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.stages import require_channel_method
-    from memscal.estimation.points import joined_points, measured_points
+    from memscal.estimation.points import joined_points, measured_points, scans_of_repeats
     from memscal.estimation.reference import (
         reference_profile,
         reference_spectra,
@@ -331,6 +338,8 @@ def _rehearse(
 
     require_one_sensor(scans)
     require_channel_method(channel, regulariser)
+    if centre == "per-repeat":
+        scans = scans_of_repeats(scans, channel)[0]
     readings = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
     reference_spectra(stresses, readings, [scan.film.thickness for scan in scans])

@@ -16,8 +16,15 @@ from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
 from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_departures
 from memscal.estimation.gaussian import fit_gaussian_to_points
+from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, free_model, orthonormal
+from memscal.estimation.residuals import (
+    FEWEST_RESIDUALS,
+    FreeModel,
+    TestOutcome,
+    free_model,
+    orthonormal,
+)
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
@@ -97,6 +104,52 @@ def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:
     basis = orthonormal(design)
     rest = data - basis @ (basis.T @ data)
     return float(rest @ rest), int(data.size - basis.shape[1])
+
+
+@dataclass(frozen=True)
+class CentresApart(TestOutcome):
+    """Test of whether the repeats of a line have centres of their own: an F ratio."""
+
+    distance: float  # of the two repeats of a scan that are farthest apart, in m
+
+
+def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
+    """Shift each repeat of line scans, whatever G; ``None`` without repeats that can be shifted."""
+    points = estimate.points
+    repeats, first, size = np.unique(points.repeat, return_index=True, return_counts=True)
+    scan = points.scan[first]
+    if points.planar or repeats.size == points.scans or size.min() < MINIMUM_POSITIONS:
+        return None
+    model = free_model(estimate, clip_outliers=True)
+    inside = (points.repeat[:, None] == repeats).astype(np.float64)
+    axis = np.argmax(points.free[points.scan], axis=1)
+    along = np.where(axis == 0, points.x, points.y)
+    shift = estimate.model.shift_derivative(estimate.gaussian.geometry, estimate.kernel)
+    # The first repeat of each scan has the scan's centre, the others are shifted from it.
+    shifted = np.diff(scan, prepend=-1) == 0
+    moved = inside[:, shifted] * shift[axis, np.arange(axis.size)][:, None]
+    # Each has a baseline and a drift of its own, as it has where it has a centre of its own.
+    columns = np.hstack([inside, inside * (along / np.abs(along).max())[:, None], moved])
+    weights = estimate.weights / estimate.outlier_weight
+    columns = points.standardised(columns, weights)[model.point]
+    own, moved = np.split(columns, [2 * repeats.size], axis=1)
+    base = orthonormal(np.hstack([model.design, own]))
+    rest, free = (values - base @ (base.T @ values) for values in (model.data, moved))
+    shifts, _, count, _ = np.linalg.lstsq(free, rest, rcond=None)
+    degrees = rest.size - base.shape[1] - int(count)
+    left = float(np.sum((rest - free @ shifts) ** 2))
+    if degrees < FEWEST_RESIDUALS or not count or left == 0.0:
+        return None
+    places = np.zeros(repeats.size)
+    places[shifted] = shifts
+    # Over the scatter that is left: exact whether the noise is stated or not.
+    value = max(float(rest @ rest) - left, 0.0) / count / (left / degrees)
+    return CentresApart(
+        value=value,
+        limit=float(fdtri(count, degrees, 1 - FALSE_ALARM)),
+        p_value=float(fdtrc(count, degrees, value)),
+        distance=float(max(np.ptp(places[scan == i]) for i in range(points.scans))),
+    )
 
 
 #: Posterior probabilities are cut off at this and one minus this.

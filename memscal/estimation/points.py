@@ -216,6 +216,37 @@ def measured_mask(scan: Scan, channel: str = "zz") -> NDArray[np.bool_]:
     return np.asarray(np.all([np.isfinite(values) for values in stated], axis=0))
 
 
+def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], tuple[int, ...]]:
+    """Return each repeat as a scan of its own, and the number of the scan that it belongs to."""
+    separate: list[Scan] = []
+    owners: list[int] = []
+    for i, scan in enumerate(scans):
+        passes = scan.passes
+        measured, readings = np.unique(passes[measured_mask(scan, channel)], return_counts=True)
+        if measured.size and readings.min() < MINIMUM_POSITIONS:
+            raise InputError(
+                f"Repeat {measured[readings.argmin()] + 1} has {readings.min()} measured readings; "
+                f"for a centre of its own it needs {MINIMUM_POSITIONS}.",
+                cure='Take one centre for all (centre="common", --centre common).',
+            )
+        between = scan.u_zz_correlation if scan.kind == "points" else None
+        if between is not None and between[np.not_equal.outer(passes, passes)].any():
+            raise InputError(
+                "u_zz_correlation correlates the noise of one repeat with that of another.",
+                why="Repeats with centres of their own are fitted as separate measurements.",
+                cure='Take one centre for all (centre="common", --centre common).',
+            )
+        separate += [scan.only_passes(number) for number in measured]
+        owners += [i] * measured.size
+    if len(separate) <= len(scans):
+        raise InputError(
+            "The scan has one repeat, to which a centre per repeat changes nothing.",
+            cure="Leave it out (centre, --centre); or give the number of each reading's repeat "
+            "(memscal import --repeat COLUMN).",
+        )
+    return separate, tuple(owners)
+
+
 def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     """Join the points of several scans, of which all state their noise, or none."""
     if len(scans) == 1:

@@ -16,6 +16,7 @@ from memscal.figures.style import (
 )
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray
+from memscal.model.checks import REPEAT_CENTRES
 from memscal.model.quantities import KPA, MM, MV
 
 _EXPANDED = 2.0  # coverage factor of everything that is drawn as a band or a limit
@@ -63,7 +64,8 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     _draw_indenter(axes, data)
     limit_to_scan(axes, scan.x)
     along = "distance from the centre $r$" if _by_distance(data) else "position $x$"
-    axes.set_xlabel(f"{along} (mm)")
+    aligned = ", repeats moved to one centre" if _aligned(data) and not _by_distance(data) else ""
+    axes.set_xlabel(f"{along} (mm){aligned}")
     bar = "|" if _tangential(data) else ""
     axes.set_ylabel(f"{bar}$U_{{{channel_indices(data)}}}$ less baseline{bar} (mV)")
     _stress_axis(axes, data, baseline=0.0)
@@ -99,7 +101,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
             curve = _turned(data, x) * curve
             curve = np.where(curve > 0, curve, np.nan)
         single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
-        line_like = single_valued and not _joint(data)
+        line_like = single_valued and not _joint(data) and not _aligned(data)
         (line,) = axes.plot(x / MM, curve / MV, style, color=COLOURS[name], label=label, zorder=3)
         if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
             line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
@@ -120,6 +122,11 @@ def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _joint(data: ApparatusData) -> bool:
     """Whether several scans were fitted together: their points mix along x."""
     return "further_scans" in data.process.configuration
+
+
+def _aligned(data: ApparatusData) -> bool:
+    """Whether repeats with centres of their own are drawn about the first one's."""
+    return any(message.kind == REPEAT_CENTRES for message in data.process.messages)
 
 
 def _draw_reference(axes: Axes, data: ApparatusData, *, net: bool = False) -> None:

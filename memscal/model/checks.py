@@ -19,6 +19,7 @@ OUTLIER_WEIGHT = 0.5
 FAILED_CHECK = "failed_check"
 FAILED_CALIBRATION = "failed_calibration"
 NOISE_UNSTATED = "noise_unstated"
+REPEAT_CENTRES = "repeat_centres"
 
 
 @dataclass(frozen=True)

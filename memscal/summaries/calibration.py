@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -12,6 +12,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import Contact
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.checks import REPEAT_CENTRES, Message
 from memscal.model.quantities import MM, PER_MM, measured_text, parameter_quantity
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -34,7 +35,8 @@ _OF_GAUSSIAN = ("gaussian_misfit", "width_agreement")
 def tables(result: Calibrated) -> list[Table]:
     """Return the estimates with their standard uncertainties, and the quality checks."""
     apparatus = apparatus_of(result)
-    rows = estimate_rows(apparatus.parameters, apparatus.resolved_wavenumber)
+    messages = apparatus.process.messages
+    rows = estimate_rows(apparatus.parameters, apparatus.resolved_wavenumber, messages)
     if method := _method(apparatus):
         rows.insert(-1, ("method", "", method))
     if isinstance(result, Calibration):
@@ -94,6 +96,10 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
     }
+    choice = apparatus.process.configuration.get("centre")
+    if isinstance(choice, Mapping):
+        centres = [name for name in parameters.names if name.startswith("centre")]
+        values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
         values["reconvolution"] = {
@@ -129,10 +135,19 @@ def correlated(result: Calibrated) -> dict[str, Any]:
     return correlated_parameters(apparatus_of(result).parameters)
 
 
-def estimate_rows(parameters: ParameterSet, resolved: float) -> list[tuple[str, str, str]]:
+def estimate_rows(
+    parameters: ParameterSet, resolved: float, messages: Sequence[Message]
+) -> list[tuple[str, str, str]]:
     """Return words, symbol and value of each parameter and of the resolved wavenumber (rad/m)."""
-    band = ("resolved up to the wavenumber", "k", f"{resolved / PER_MM:.3g} rad/mm")
-    return [*_parameter_rows(parameters), band]
+    rows = _parameter_rows(parameters)
+    if any(message.kind == REPEAT_CENTRES for message in messages):
+        # Of further repeats the centre is shown.
+        rows = [
+            (words.replace(", scan ", ", repeat "), symbol, value)
+            for words, symbol, value in rows
+            if ", scan " not in words or words.startswith("centre")
+        ]
+    return [*rows, ("resolved up to the wavenumber", "k", f"{resolved / PER_MM:.3g} rad/mm")]
 
 
 def _parameter_rows(parameters: ParameterSet) -> list[tuple[str, str, str]]:

@@ -20,7 +20,7 @@ def tables(result: FleetCalibration) -> list[Table]:
     """Return the estimates and the quality checks, or the error."""
     if result.parameters is None or result.resolved_wavenumber is None:
         return [Table(f"Scan {result.index}", ("", ""), [("error", str(result.error))])]
-    rows = estimate_rows(result.parameters, result.resolved_wavenumber)
+    rows = estimate_rows(result.parameters, result.resolved_wavenumber, result.messages)
     title = f"Scan {result.index} (± standard uncertainty, k = 1)"
     return [Table(title, ("", "", ""), rows), checks_table(result.checks)]
 

@@ -206,3 +206,49 @@ def test_a_raster_scatters_by_no_more_than_is_stated() -> None:
         deviates.append([(p[n] - truth) / p.uncertainty(n) for n, truth in truths.items()])
     scatter = np.sqrt(np.mean(np.square(deviates), axis=0))
     assert (scatter < root_mean_square_limit(1.15, len(seeds), CHANCE)).all()
+
+
+PASSES = 200 if FULL else 10
+
+
+def of_repeats(noise: float, seed: int, shift: float, **options) -> memscal.ApparatusFunction:
+    """Calibrate with three passes over a Gaussian sensor, which moves from one to the next."""
+    passes = [scan_of("Gaussian", noise, 3 * seed + i) for i in range(3)]
+    moved = [scan.x + i * shift for scan, i in zip(passes, (-1, 0, 1), strict=True)]
+    u, number = np.concatenate([scan.u_zz for scan in passes]), np.repeat([0, 1, 2], 65)
+    scan = replace(passes[0], x=np.concatenate(moved), u_zz=u, repeat=number)
+    return memscal.calibrate(scan, **options).apparatus
+
+
+def test_repeats_that_share_their_centre_are_told_apart_as_rarely_as_is_said() -> None:
+    found = [of_repeats(0.005, seed, 0.0).process.configuration["centre"] for seed in range(PASSES)]
+    own = sum(choice["choice"] == "per-repeat" for choice in found)
+    assert own <= binom.ppf(1 - CHANCE, PASSES, 1e-3)
+    low, high = binom.ppf([CHANCE, 1 - CHANCE], PASSES, 0.4)
+    assert low <= sum(choice["p_value"] < 0.4 for choice in found) <= high
+
+
+def test_repeats_that_moved_have_centres_of_their_own_within_their_uncertainties() -> None:
+    shift, names = 40e-6, ("conversion_constant_gaussian", "gaussian_sigma", "centre", "centre_3")
+    truths = np.array([CONVERSION, WIDTHS[0.005], CENTRE - shift, CENTRE + shift])
+    deviates = []
+    for seed in range(PASSES):
+        own, one = (of_repeats(0.005, seed, shift, centre=choice) for choice in (None, "common"))
+        p = own.parameters
+        assert own.process.configuration["centre"]["choice"] == "per-repeat"
+        deviates.append([(p[n] - t) / p.uncertainty(n) for n, t in zip(names, truths, strict=True)])
+        # With one centre the flanks of the others count as noise and outliers.
+        assert p.uncertainty(names[0]) < 0.8 * one.parameters.uncertainty(names[0])
+        assert "repeat_centres" in {check.name for check in one.checks if not check.passed}
+    squares = np.sum(np.square(deviates), axis=0)
+    low, high = chi2.isf([1 - CHANCE, CHANCE], PASSES)
+    assert np.all((low < squares) & (squares < high))
+
+
+def test_one_centre_for_repeats_that_moved_blurs_the_gaussian() -> None:
+    shift, choices = 100e-6, ("common", "per-repeat")
+    pairs = [[of_repeats(0.02, s, shift, centre=c) for c in choices] for s in range(PASSES)]
+    widened = [one.gaussian_sigma - own.gaussian_sigma for one, own in pairs]
+    blur = np.hypot(WIDTHS[0.02], shift * np.sqrt(2 / 3)) - WIDTHS[0.02]
+    error = np.std(widened, ddof=1) / np.sqrt(PASSES)
+    assert max(4 * error, blur - 4 * error) < np.mean(widened) < blur + 4 * error

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, simulated
+from helpers.scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, as_points, simulated
 from scipy.stats import chi2
 
 import memscal
@@ -86,6 +86,47 @@ def test_scans_of_other_sensors_or_of_films_that_contradict_are_refused() -> Non
         joint([one, replace(two, u_zz_errors=None)])
     with pytest.raises(InputError, match="no scan"):
         joint([])
+
+
+def moved_repeats() -> Scan:
+    """Three passes over a sensor that moves between them."""
+    points = as_points(memscal.simulate(repeats=3, points=33, noise=0.003, seed=4))
+    return replace(points, x=points.x + 40e-6 * points.repeat)
+
+
+def test_repeats_with_centres_of_their_own_stay_one_scan_in_budget_file_and_draws(tmp_path) -> None:
+    path = tmp_path / "scan.h5"
+    memscal.write_scan(moved_repeats(), path)
+    own, common = (memscal.calibrate(path, centre=centre) for centre in (None, "common"))
+    for apparatus in (own.apparatus, common.apparatus):
+        budget = apparatus.budget["conversion_constant"]
+        assert set(budget) == {"noise", "regularisation", "window", *common.effects}
+        assert budget["load"] / apparatus.conversion_constant == pytest.approx(0.01, rel=1e-3)
+    own.apparatus.save(tmp_path / "sensor.h5")
+    saved = memscal.load_apparatus(tmp_path / "sensor.h5")
+    parameters, process = saved.parameters, saved.process
+    assert parameters["centre_3"] - parameters["centre"] == pytest.approx(80e-6, abs=1e-5)
+    assert process.input_scan.file_name == "scan.h5"
+    assert process.configuration["centre"]["chosen_by"] == "test"
+    assert "further_scans" not in process.configuration
+    assert "up to 8" in next(m.text for m in process.messages if m.kind == "repeat_centres")
+    assert saved.passed
+    names = {check.name for check in saved.checks}
+    assert "held_out_repeat" in names
+    assert not {"held_out_scan", "repeat_centres"} & names
+    # Drawn as one line about the first centre, by points that no line joins.
+    assert saved.reconvolution.x.min() < -7.9e-3
+    assert memscal.monte_carlo(own, draws=4).sources == ("noise", *common.effects)
+
+
+@pytest.mark.parametrize(("bad", "words"), [
+    ({"repeat": None}, "one repeat"),
+    ({"u_zz_correlation": 0.7 * np.eye(99) + 0.3}, "one repeat with that of another"),
+    ({"u_zz": np.where(np.arange(99) < 90, np.nan, 1e-3)}, "Repeat [123] has [1-5] measured"),
+])  # fmt: skip
+def test_a_centre_for_each_repeat_needs_repeats_that_stand_alone(bad, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        memscal.calibrate(replace(moved_repeats(), **bad), centre="per-repeat")
 
 
 def test_films_of_other_names_count_for_themselves_and_a_shared_film_once() -> None:
@@ -174,14 +215,8 @@ def test_correlated_inputs_combine_as_their_correlation_says() -> None:
 @pytest.mark.parametrize(("correlations", "words"), [
     ({("thickness", "weather"): 0.5}, "'thickness' and 'weather'"),
     ({("thickness", "poisson_ratio"): 1.5}, "outside -1 to 1"),
-    (
-        {
-            ("thickness", "poisson_ratio"): 0.9,
-            ("thickness", "load"): 0.9,
-            ("poisson_ratio", "load"): -0.9,
-        },
-        "contradict each other",
-    ),
+    ({("thickness", "poisson_ratio"): 0.9, ("thickness", "load"): 0.9,
+      ("poisson_ratio", "load"): -0.9}, "contradict each other"),
 ])  # fmt: skip
 def test_correlations_that_cannot_be_are_refused(correlations, words) -> None:
     with pytest.raises(InputError, match=words):

@@ -1,8 +1,10 @@
 """``memscal calibrate``: what it writes, prints and returns."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers.console import Run, names
 
@@ -136,6 +138,20 @@ def test_wrong_use_is_exit_code_2_with_a_hint(run: Run, scan: Path, folder: Path
     refused = run("calibrate", scan, *arguments).exits(2, hint, "--help")
     assert refused.out == ""
     assert names(folder) == ["scan.h5"]
+
+
+def test_repeats_that_moved_are_given_centres_of_their_own_and_that_is_said(run: Run, folder: Path):
+    scan = memscal.simulate(repeats=2, points=33)
+    x, repeat = np.append(scan.x, scan.x + 5e-5), np.repeat([0, 1], 33)
+    flat = {name: getattr(scan, name).ravel() for name in ("u_zz", "u_zz_errors")}
+    memscal.write_scan(replace(scan, x=x, repeat=repeat, **flat), "moved.h5")
+    done = run("calibrate", "moved.h5", "--figure", "a.svg").exits(0)
+    assert "centre of the scan, repeat 2" in done.out
+    assert "Each of the 2 repeats has its own centre" in done.err
+    assert b"repeats moved to one centre" in Path("a.svg").read_bytes()
+    failed = run("calibrate", "moved.h5", "--centre", "common", "--force", "--json").exits(1)
+    assert failed.json["centres"]["chosen_by"] == "option"
+    run("calibrate", "moved.h5", "--centre", "per-repeat", "--force", "--dry-run").exits(0)
 
 
 def test_a_sweep_is_drawn_and_given_as_json(run: Run, scan: Path, monkeypatch: pytest.MonkeyPatch):
