@@ -163,24 +163,24 @@ def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
     return [_added("load_linearity", linear, meaning)]
 
 
-def _hysteresis(estimate: ProfileEstimate) -> list[QualityCheck]:
-    extra = hysteresis_test(estimate)
+def _hysteresis(solution: Solution) -> list[QualityCheck]:
+    owner = np.array(solution.owners)[solution.estimate.points.scan]
+    extra = hysteresis_test(solution.estimate, owner)
     if extra is None:
         return []
-    scales, units = (1e2, 1e6, 1e3), ("%", "um", "mV")
-    conversion, position, baseline = (
-        format_measured(value * scale, error * scale, unit)
-        for value, error, scale, unit in zip(
-            extra.coefficients, extra.errors, scales, units, strict=True
+    scales = ("A", 1e2, "%"), ("the centre's position", 1e6, "um"), ("the baseline", 1e3, "mV")
+    differences = [
+        f"of {name} by {format_measured(value * scale, error * scale, unit)}"
+        for (name, scale, unit), value, error in zip(
+            scales, extra.coefficients, extra.errors, strict=False
         )
-    )
+    ]
     meaning = (
         "Fall of chi-square by differences between approach and retreat (approach minus retreat): "
-        f"of A, here {conversion}, of the centre's position along the scan, {position}, and of the "
-        f"baseline, {baseline}. A failure means that A and G are means over two different scans: "
-        "the film relaxes or adheres, the stage has play, or the amplifier drifts. Wait longer "
-        "before each reading, move to each position from the same side, or calibrate with one "
-        "branch alone."
+        f"{', '.join(differences)}. A failure means that A and G are means over two different "
+        "scans: the film relaxes or adheres, the stage has play, or the amplifier drifts. Wait "
+        "longer before each reading, move to each position from the same side, or calibrate with "
+        "one branch alone."
     )
     return [_added("hysteresis", extra, meaning)]
 
@@ -286,7 +286,7 @@ def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[Qualit
         _bayes_factor(estimate),
         _symmetry(estimate),
         *_linearity(estimate),
-        *_hysteresis(estimate),
+        *_hysteresis(solution),
         *_repeat_centres(solution),
         *_held_out(solution),
         *_saturation(estimate),

@@ -215,25 +215,31 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
     return _add(estimate, (signal * (load - mean) / mean)[:, None])
 
 
-def hysteresis_test(estimate: ProfileEstimate) -> ExtraColumns | None:
+def hysteresis_test(
+    estimate: ProfileEstimate, owner: NDArray[np.intp] | None = None
+) -> ExtraColumns | None:
     """Compare approach and retreat within each scan that has both; ``None`` without any.
 
     The columns are the relative difference of A, that of the position along the scan in m (of the
-    sensor's centre), and that of the baseline in V: each is approach minus retreat.
+    sensor's centre), and that of the baseline in V: each is approach minus retreat.  Where
+    repeats have centres and baselines of their own, it is A alone.  ``owner`` (n,): number of the
+    scan of each point, all repeats included.
     """
     # A step of the baseline between the branches would else be taken for a difference of A.
     points, model = estimate.points, estimate.model
+    owner = points.scan if owner is None else owner
     sign = 0.5 * (points.branch == 1) - 0.5 * (points.branch == 2)
-    for scan in range(points.scans):
-        if np.ptp(sign[inside := points.scan == scan]) < 1:
+    for scan in np.unique(owner):
+        if np.ptp(sign[inside := owner == scan]) < 1:
             sign[inside] = 0
     if not sign.any():
         return None
-    shift = model.shift_derivative(model.geometry(estimate.centres), estimate.kernel)
-    along = np.argmax(points.free[points.scan], axis=1), range(sign.size)
-    signal = estimate.predicted - estimate.background
-    columns = np.stack([signal, shift[along], np.ones_like(sign)], axis=1)
-    return _add(estimate, sign[:, None] * columns)
+    columns = [estimate.predicted - estimate.background]
+    if np.array_equal(owner, points.scan):
+        shift = model.shift_derivative(model.geometry(estimate.centres), estimate.kernel)
+        along = np.argmax(points.free[points.scan], axis=1), range(sign.size)
+        columns += [shift[along], np.ones_like(sign)]
+    return _add(estimate, sign[:, None] * np.stack(columns, axis=1))
 
 
 def _widened(estimate: ProfileEstimate, factors: tuple[float, ...]) -> FloatArray:
