@@ -29,7 +29,7 @@ PIXEL = 0.125e-3
 """Half the step of the scans: neither a finer nor a coarser plane brings the peers nearer to G."""
 
 RING_STEP, OUTERMOST_RING = 0.05e-3, 4e-3
-"""The rings of which DeerLab's G is made, in m."""
+"""The rings of which G is made where a program inverts a linear model, in m."""
 
 LARGEST_KH = 20.0
 """The film passes nothing of finer detail to its base."""
@@ -103,34 +103,78 @@ class Plane:
         return min(images, key=lambda image: plane_error(RADII, self.radial(image), wanted))
 
 
+@dataclass(frozen=True, eq=False)
+class RingModel:
+    """A scan as linear in the heights of the rings that G is made of, for programs that invert one.
+
+    ``response``: (points, rings); ``voltage``, ``noise``: as shares of the largest voltage.
+    """
+
+    ring: FloatArray
+    area: FloatArray
+    response: FloatArray
+    voltage: FloatArray
+    noise: float
+
+    @classmethod
+    def of(cls, scan: Scan) -> "RingModel":
+        ring = np.arange(round(OUTERMOST_RING / RING_STEP) + 1) * RING_STEP
+        area = 2 * np.pi * ring * RING_STEP
+        area[0] = np.pi * RING_STEP**2 / 4
+        distance, voltage = plain_points(scan)
+        contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+        reach = float(distance.max() + OUTERMOST_RING)
+        wavenumbers = Wavenumbers.covering(LARGEST_KH / scan.film.thickness, reach)
+        k = wavenumbers.k
+        # A unit ring of radius q has the transform J_0(kq).
+        spectra = (wavenumbers.weights * contact.base_spectrum(k))[:, None] * j0(np.outer(k, ring))
+        response = (j0(np.outer(distance, k)) @ spectra) * area
+        # DeerLab looks for its regularisation between 1e-8 and 1e3, for voltages and G near one.
+        response /= response.sum(axis=1).max()
+        noise = scan.synthetic["noise"] / np.sqrt(np.atleast_2d(scan.u_zz).shape[0])
+        return cls(ring, area, response, voltage / voltage.max(), noise / voltage.max())
+
+    def radial(self, heights: FloatArray) -> FloatArray:
+        """G at :data:`RADII` from heights of the rings in any unit."""
+        return np.interp(RADII, self.ring, heights) / (self.area @ heights)
+
+
 def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
     """DeerLab's non-negative least squares, smoothed by as much as Akaike's criterion asks for.
 
-    G is made of rings.  Neither slope nor height are asked for on the axis, where an operator that
-    includes the edges would hold G down.
+    Neither slope nor height are asked for on the axis, where an operator that includes the edges
+    would hold G down.
     """
     with others_warnings():
         import deerlab as dl
 
-    ring = np.arange(round(OUTERMOST_RING / RING_STEP) + 1) * RING_STEP
-    area = 2 * np.pi * ring * RING_STEP
-    area[0] = np.pi * RING_STEP**2 / 4
-    distance, voltage = plain_points(scan)
-    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
-    reach = float(distance.max() + OUTERMOST_RING)
-    wavenumbers = Wavenumbers.covering(LARGEST_KH / scan.film.thickness, reach)
-    k = wavenumbers.k
-    # A unit ring of radius q has the transform J_0(kq).
-    spectra = (wavenumbers.weights * contact.base_spectrum(k))[:, None] * j0(np.outer(k, ring))
-    response = (j0(np.outer(distance, k)) @ spectra) * area
-    # DeerLab looks for its regularisation between 1e-8 and 1e3, for voltages and G near one.
-    response /= response.sum(axis=1).max()
-    with others_warnings():
+        model = RingModel.of(scan)
         fit = dl.snlls(
-            voltage / voltage.max(), response, lbl=np.zeros(ring.size), reg=True, regparam="aic",
-            regop=dl.regoperator(ring / RING_STEP, 2), uq=False,
+            model.voltage, model.response, lbl=np.zeros(model.ring.size), reg=True, regparam="aic",
+            regop=dl.regoperator(model.ring / RING_STEP, 2), uq=False,
         )  # fmt: skip
-    return np.interp(RADII, ring, fit.lin) / (area @ fit.lin)
+    return model.radial(fit.lin)
+
+
+def inference_tools(scan: Scan, truth: Kernel) -> FloatArray:
+    """inference-tools' Gaussian process of the rings' heights, squared-exponential over the plane.
+
+    Height and correlation length (three to start from) have the largest marginal likelihood; of
+    the noise it is given the true size.
+    """
+    with others_warnings():
+        from inference.gp import GpLinearInverter
+
+    model = RingModel.of(scan)
+    inverter = GpLinearInverter(
+        model.voltage, np.full(model.voltage.size, model.noise), model.response,
+        parameter_spatial_positions=model.ring[:, None] * 1e3,
+    )  # fmt: skip
+    # Mean, logarithm of the height, logarithm of the length in mm.
+    starts = [np.array([0.0, 2.0, np.log(length)]) for length in (0.2, 0.5, 1.0)]
+    optima = [inverter.optimize_hyperparameters(start) for start in starts]
+    best = max(optima, key=inverter.marginal_likelihood)
+    return model.radial(inverter.calculate_posterior_mean(best))
 
 
 def tuned_wiener(scan: Scan, truth: Kernel) -> tuple[FloatArray, float]:
@@ -184,6 +228,7 @@ def pypher(scan: Scan, truth: Kernel) -> FloatArray:
 
 
 PEERS: dict[str, Peer] = {
-    "deerlab": deerlab, "skimage": scikit_image, "photutils": photutils, "pypher": pypher,
+    "deerlab": deerlab, "inference": inference_tools, "skimage": scikit_image,
+    "photutils": photutils, "pypher": pypher,
 }  # fmt: skip
 """By the name that is imported."""
