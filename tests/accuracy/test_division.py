@@ -1,27 +1,32 @@
 """The calibration over many scans: error of G and A by division, bands, both routes, the fit.
 
-The scans come from another forward calculation than the analysis: the base stress by finite
-elements, convolved with G on a raster of the plane.  Set MEMSCAL_FULL_STUDY for 200 seeds in
-place of 6, of a Gaussian 24.  With --log-cli-level=INFO the study tells medians, mean errors,
-coverage, and what scikit-image's Wiener filter, tuned on the truth, makes of the same scans.
+The scans come from another forward calculation than the analysis (helpers.direct).  Set
+MEMSCAL_FULL_STUDY for 200 seeds in place of 5, of a Gaussian 24.  With --log-cli-level=INFO the
+study tells medians, mean errors, coverage, and what scikit-image's Wiener filter, tuned on the
+truth, makes of the same scans.
 """
 
 import logging
-from dataclasses import replace
 from functools import lru_cache
 from zlib import crc32
 
 import numpy as np
 import pytest
 from helpers.bounds import FULL, cramer_rao, root_mean_square_limit
+from helpers.direct import direct_scan
 from helpers.estimation_study import least_median
 from helpers.peers import tuned_wiener
-from helpers.scans import CENTRE, CONVERSION, EXACT_FILM, EXACT_ROD, RING, SIGMA, TAILS
-
-from helpers.scans import added_ring, plane_error, simulated  # isort: skip
-from scipy.interpolate import make_interp_spline
-from scipy.signal import fftconvolve
-from scipy.stats import binom, chi2, f
+from helpers.scans import (
+    CENTRE,
+    CONVERSION,
+    RING,
+    SIGMA,
+    TAILS,
+    added_ring,
+    plane_error,
+    simulated,
+)
+from scipy.stats import binom, chi2, f, t
 
 import memscal
 
@@ -41,6 +46,14 @@ G_LIMITS = {
     "ring": (0.30, 0.30, 0.30),
 }  # fmt: skip
 A_LIMITS = (0.003, 0.015, 0.045)
+# The division keeps less of A than a fit that is told that G is a Gaussian.
+EFFICIENCY = {"reported": 2.2, "gaussian": 1.1}
+BAND_LIMITS = {
+    # Lowest coverage of all radii; RMS error over stated uncertainty; mean error over it, both of
+    # any radius.  The film hides the hole of a ring, of which the band counts half.
+    "Gaussian": (0.85, (0.1, 1.4), 1.2), "disc": (0.85, (0.1, 1.4), 1.2),
+    "tails": (0.80, (0.1, 1.4), 1.3), "ring": (0.25, (0.1, 2.1), 2.0),
+}  # fmt: skip
 KINDS = [(kind, noise) for kind in G_LIMITS for noise in NOISES]
 
 
@@ -49,40 +62,11 @@ def kernel_of(kind: str, noise: float) -> memscal.RadialKernel:
     return others.get(kind) or memscal.GaussianMixture((1.0,), (WIDTHS[noise],))
 
 
-def raster(step: float = 62.5e-6, pixels: int = 208) -> tuple[np.ndarray, np.ndarray]:
-    """Axis of a raster of the plane and the distances of its points, in m."""
-    axis = step * np.arange(-pixels, pixels + 1)
-    return axis, np.hypot.outer(axis, axis)
-
-
-@lru_cache
-def stress_by_elements() -> np.ndarray:
-    r = np.arange(0.0, 20e-3, 25e-6)
-    stress = memscal.indent(EXACT_FILM, EXACT_ROD, load=1.0, backend="fem").base_stress(r)
-    even = np.append(-r[:0:-1], r), np.append(stress[:0:-1], stress)
-    return np.asarray(make_interp_spline(*even, k=5)(raster()[1]))
-
-
-@lru_cache
-def departure(kernel: memscal.RadialKernel) -> np.ndarray:
-    """Voltages by direct convolution less those of the simulation by transforms, in V."""
-    axis, distance = raster()
-    image = kernel.radial(distance.ravel()).reshape(distance.shape)
-    middle = fftconvolve(stress_by_elements(), image, mode="same")[axis.size // 2]
-    usual = simulated(kernel=kernel, noise=0.0, baseline=0.0, drift=0.0)
-    voltage = CONVERSION * middle * (axis[1] - axis[0]) ** 2
-    difference = make_interp_spline(axis, voltage, k=5)(usual.x - CENTRE) - usual.u_zz
-    # Two calculations that share nothing but the film agree far below the least noise.
-    assert np.abs(difference).max() < 1e-5 * usual.u_zz.max()
-    return np.asarray(difference)
-
-
 def scan_of(kind: str, noise: float, seed: int) -> memscal.Scan:
     kernel = kernel_of(kind, noise)
     # The noise of a Gaussian sensor's scans is not stated: it is found from their scatter.
     options = {"state_noise": kind != "Gaussian", "seed": crc32(f"{kind} {noise}".encode()) + seed}
-    scan = simulated(kernel=kernel, noise=noise, **options)
-    return replace(scan, u_zz=scan.u_zz + departure(kernel))
+    return direct_scan(kernel, noise=noise, **options)
 
 
 def seeds_of(kind: str) -> int:
@@ -103,26 +87,28 @@ def study(kind: str, noise: float) -> dict[str, np.ndarray]:
         p, error = apparatus.parameters, apparatus.radial(R) - truth
         truths = {"baseline": scan.synthetic["baseline"], "centre": CENTRE}
         rows.append({
-            "error": error, "g": plane_error(R, apparatus.radial(R), truth),
+            "error": error, "u_g": apparatus.radial_uncertainty(R),
+            "g": plane_error(R, apparatus.radial(R), truth),
             "a": p["conversion_constant"] / CONVERSION - 1,
             "u": p.uncertainty("conversion_constant") / CONVERSION,
             "fit": [p["conversion_constant_gaussian"] / CONVERSION, p["gaussian_sigma"]],
             "u_fit": [p.uncertainty("conversion_constant_gaussian") / CONVERSION,
                       p.uncertainty("gaussian_sigma")],
             "nuisances": [(p[n] - truth) / p.uncertainty(n) for n, truth in truths.items()],
-            "covered": np.mean(np.abs(error) <= 1.96 * apparatus.radial_uncertainty(R)),
             "agreement": agreement(apparatus).value,
         })  # fmt: skip
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    a, mean = columns["a"], columns["error"].mean(axis=0)
+    columns["covered"] = np.abs(columns["error"]) <= 1.96 * columns["u_g"]
+    a, covered, mean = columns["a"], columns["covered"].mean(axis=0), columns["error"].mean(axis=0)
     told = (
         kind, noise, np.median(columns["g"]), plane_error(R, truth + mean, truth),
-        columns["covered"].mean(), np.sqrt(np.mean(a**2)), a.mean(),
+        covered.mean(), covered.min(), 1e3 * R[covered.argmin()], np.sqrt(np.mean(a**2)), a.mean(),
         np.sqrt(np.mean((a / columns["u"]) ** 2)), columns["agreement"].max(),
     )  # fmt: skip
     LOG.info(
-        "%s, noise %.3f: G median %.3f, mean error %.3f, covered %.3f; A rms %.4f, mean %+.4f, "
-        "error over uncertainty %.2f; largest difference of the routes %.2f", *told
+        "%s, noise %.3f: G median %.3f, mean error %.3f, covered %.3f, least %.3f at %.1f mm; "
+        "A rms %.4f, mean %+.4f, error over uncertainty %.2f; largest difference of the routes %.2f",
+        *told,
     )  # fmt: skip
     return columns
 
@@ -133,22 +119,41 @@ def test_g_and_a_are_found_and_a_is_as_uncertain_as_stated(kind: str, noise: flo
     assert least_median(columns["g"]) <= G_LIMITS[kind][place]
     a, u = columns["a"], columns["u"]
     assert np.sqrt(np.mean(a**2)) < root_mean_square_limit(A_LIMITS[place], seeds, CHANCE)
-    assert np.sqrt(np.mean((a / u) ** 2)) < root_mean_square_limit(1.15, seeds, CHANCE)
-    # What is systematic: of A less than its stated uncertainty, of G what window and spline hide.
-    assert abs(a.mean()) < (0.6 + 5 / np.sqrt(seeds)) * np.sqrt(np.mean(u**2))
-    truth = kernel_of(kind, noise).radial(R)
-    mean = plane_error(R, truth + columns["error"].mean(axis=0), truth)
-    assert mean <= max(columns["g"])
+    z = np.sqrt(np.mean((a / u) ** 2))
+    assert root_mean_square_limit(0.6, seeds, 1 - CHANCE) < z
+    assert z < root_mean_square_limit(1.15, seeds, CHANCE)
+    # What is systematic is less than the stated uncertainty.
+    least = abs(a.mean()) - t.isf(CHANCE, seeds - 1) * a.std(ddof=1) / np.sqrt(seeds)
+    assert least < 0.6 * np.sqrt(np.mean(u**2))
+
+
+@pytest.mark.parametrize(("kind", "noise"), KINDS)
+def test_g_is_as_uncertain_at_every_radius_as_stated(kind: str, noise: float) -> None:
+    columns, seeds = study(kind, noise), seeds_of(kind)
+    coverage, (low, high), bias = BAND_LIMITS[kind]
+    rare = CHANCE / R[::4].size
+    error, held = columns["error"][:, ::4], columns["covered"][:, ::4].sum(axis=0)
+    u = np.sqrt(np.mean(columns["u_g"][:, ::4] ** 2, axis=0))
+    assert (binom.cdf(held, seeds, coverage) >= rare).all()
+    ratio = np.sqrt(np.mean(error**2, axis=0)) / u
+    assert ratio.min() > root_mean_square_limit(low, seeds, 1 - rare)
+    assert ratio.max() < root_mean_square_limit(high, seeds, rare)
+    # On the axis the film hides much, and the band is wide; over the radii it is neither.
+    assert np.median(ratio) > root_mean_square_limit(0.6, seeds, 1 - rare)
+    assert np.median(ratio) < root_mean_square_limit(1.3, seeds, rare)
+    scatter = t.isf(rare, seeds - 1) * error.std(axis=0, ddof=1) / np.sqrt(seeds)
+    assert (np.abs(error.mean(axis=0)) - scatter < bias * u).all()
 
 
 @pytest.mark.parametrize("noise", NOISES)
-def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(noise: float) -> None:
+def test_the_fit_reaches_its_bound_and_the_division_is_not_far_from_it(noise: float) -> None:
     columns, seeds = study("Gaussian", noise), seeds_of("Gaussian")
     truth = [1.0, WIDTHS[noise]]
     error, stated = columns["fit"] / truth - 1, columns["u_fit"] / truth
     bound = cramer_rao(noise, sigma=WIDTHS[noise])
-    limit = root_mean_square_limit(1.1, seeds, CHANCE)
-    assert (np.sqrt(np.mean(error**2, axis=0)) < limit * np.array(bound)).all()
+    limit = root_mean_square_limit(1.0, seeds, CHANCE) * np.array(bound)
+    assert (np.sqrt(np.mean(error**2, axis=0)) < EFFICIENCY["gaussian"] * limit).all()
+    assert np.sqrt(np.mean(columns["a"] ** 2)) < EFFICIENCY["reported"] * limit[0]
     # The bound is what an efficient estimate truly scatters by, free of sampling error.
     assert np.sqrt(np.mean(stated**2, axis=0)) == pytest.approx(bound, rel=0.15)
     low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], seeds) / seeds)
@@ -161,7 +166,7 @@ def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(noise: float) 
 
 def test_the_bands_of_95_percent_hold_g_pooled_over_all_cases() -> None:
     covered = np.array([study(*case)["covered"].mean() for case in KINDS])
-    scatter = [study(*case)["covered"].std(ddof=1) for case in KINDS]
+    scatter = [study(*case)["covered"].mean(axis=1).std(ddof=1) for case in KINDS]
     spread = [s / np.sqrt(seeds_of(case[0])) for s, case in zip(scatter, KINDS, strict=True)]
     chance = 4 * np.linalg.norm(spread) / len(KINDS)
     assert 0.90 - chance < covered.mean() < 0.99 + chance
