@@ -107,7 +107,7 @@ def study(kind: str, noise: float) -> dict[str, np.ndarray]:
     )  # fmt: skip
     LOG.info(
         "%s, noise %.3f: G median %.3f, mean error %.3f, covered %.3f, least %.3f at %.1f mm; "
-        "A rms %.4f, mean %+.4f, error over uncertainty %.2f; largest difference of the routes %.2f",
+        "A rms %.4f, mean %+.4f, error over uncertainty %.2f; routes differ by at most %.2f",
         *told,
     )  # fmt: skip
     return columns
