@@ -74,13 +74,18 @@ def row(outcome: Outcome) -> str:
     return "| " + " | ".join([*cells, ", ".join(outcome.exceeded(case.goal))]) + " |"
 
 
-def by_radius(outcomes: list[Outcome]) -> list[str]:
-    """Return the coverage of each case's band of G at every radius, in %."""
-    radii = " | ".join(f"{1e3 * r:.1f}" for r in RADII)
-    lines = [f"| band of G (%) at (mm) | {radii} |", "|:---|" + "---:|" * RADII.size]
+def by_radius(outcomes: list[Outcome], kinds: bool) -> list[str]:
+    """Return the coverage (%) of the band of G at every radius, of the cases or of their kinds."""
+    rows: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
-        shares = " | ".join(f"{100 * share:.0f}" for share in outcome.coverage_by_radius)
-        lines.append(f"| {outcome.case.name} | {shares} |")
+        name = outcome.case.kind if kinds else outcome.case.name
+        rows.setdefault(name, []).append(outcome)
+    radii = " | ".join(f"{1e3 * r:.1f}" for r in RADII)
+    lines = [f"| G at (mm) | {radii} |", "|:---|" + "---:|" * RADII.size]
+    for name, together in rows.items():
+        coverage = np.mean([outcome.coverage_by_radius for outcome in together], axis=0)
+        shares = " | ".join(f"{100 * share:.0f}" for share in coverage)
+        lines.append(f"| {name} | {shares} |")
     return lines
 
 
@@ -103,7 +108,7 @@ def main(seeds: int, pattern: str) -> None:
     names = [name for name in CASES if re.search(pattern, name)]
     with get_context("spawn").Pool(PROCESSES) as pool:
         outcomes = pool.map(partial(study, seeds=seeds), names, chunksize=1)
-    lines = [*HEAD, *(row(outcome) for outcome in outcomes), "", *by_radius(outcomes)]
+    lines = [*HEAD, *(row(outcome) for outcome in outcomes), "", *by_radius(outcomes, not pattern)]
     if not pattern:
         lines += ["", *means(outcomes)]
     sys.stdout.write("\n".join(lines) + "\n")

@@ -56,7 +56,9 @@ class Limits:
     """
 
     error: tuple[float, float, float]
-    """Median error of G where the scan has the noise of :data:`TOLD`; the worst seed's is twice."""
+    """Median error of G where the scan has the noise of :data:`TOLD`."""
+    beyond: float = 0.0
+    """Share of seeds whose error is twice that, or more."""
     bias_g: float = 1.0
     """Mean error of G in its RMS stated uncertainty, largest of all radii."""
     coverage: float = 0.85
@@ -91,8 +93,48 @@ GOALS = {
 }
 """What is asked of a kind of kernel; the tables say where it does not hold."""
 
-EXCEPTIONS: dict[str, dict[str, Any]] = {}
-"""Wider limits where a goal is known not to hold, by how the names of the cases begin."""
+EXCEPTIONS: dict[str, dict[str, Any]] = {
+    # The band counts departures that the scan does not exclude, and a Gaussian has none; in a few
+    # draws the noise resembles one.
+    "Gaussian": {"beyond": 0.05, "ratio": (0.04, 1.36), "z_a": (0.4, 1.2), "z_fwhm": (0.05, 1.36)},
+    # Detail beside an edge is beyond what the film passes: the prior smooths it.
+    "disc": {
+        "error": (0.09, 0.11, 0.20), "beyond": 0.05, "bias_g": 1.7, "coverage": 0.50,
+        "ratio": (0.1, 1.8), "z_a": (0.5, 1.2), "z_fwhm": (0.3, 1.36),
+    },
+    # A wide tail cannot be told from the baseline.
+    "mixture": {
+        "beyond": 0.03, "bias_g": 1.2, "coverage": 0.60, "mean_coverage": 0.87,
+        "ratio": (0.15, 1.36), "bias_a": 1.0, "z_a": (0.6, 1.5), "z_fwhm": (0.2, 1.36),
+    },
+    # The hole of a narrow ring is hidden by the film.
+    "ring": {
+        "bias_g": 2.0, "coverage": 0.50, "ratio": (0.25, 2.0), "z_a": (0.6, 1.2),
+        "z_fwhm": (0.35, 1.36),
+    },
+    # No departure of the prior has an edge as sharp, a tail as wide, or these forms.
+    "sharp disc": {
+        "error": (0.40, 0.30, 0.36), "beyond": 0.05, "bias_g": 7.3, "coverage": 0.0,
+        "mean_coverage": 0.72, "ratio": (0.15, 7.3), "z_a": (0.5, 1.2), "z_fwhm": (0.76, 2.5),
+    },
+    "discs at random": {
+        "error": (0.15, 0.22, 0.25), "bias_g": 1.2, "coverage": 0.50, "mean_coverage": 0.87,
+        "ratio": (0.3, 2.9), "z_a": (0.7, 1.2),
+    },
+    "tail": {
+        "bias_g": 1.6, "coverage": 0.40, "mean_coverage": 0.88, "ratio": (0.2, 1.8),
+        "bias_a": 1.9, "z_a": (0.8, 2.2), "z_fwhm": (0.15, 1.36),
+    },
+    "cone": {
+        "error": (0.11, 0.13, 0.20), "bias_g": 4.4, "coverage": 0.0, "mean_coverage": 0.84,
+        "ratio": (0.15, 4.4), "bias_a": 0.5, "z_fwhm": (0.15, 1.36),
+    },
+    "paraboloid": {
+        "error": (0.14, 0.20, 0.20), "bias_g": 4.7, "coverage": 0.0, "mean_coverage": 0.81,
+        "ratio": (0.3, 4.7), "bias_a": 0.5, "z_a": (0.7, 1.2),
+    },
+}  # fmt: skip
+"""Wider limits where a goal is known not to hold, of a kind or of a case by its name."""
 
 
 @dataclass(frozen=True)
@@ -145,11 +187,7 @@ class Case:
     @property
     def limits(self) -> Limits:
         """The goal, where no exception is made."""
-        limits = self.goal
-        for start, wider in EXCEPTIONS.items():
-            if self.name.startswith(start):
-                limits = replace(limits, **wider)
-        return limits
+        return replace(self.goal, **(EXCEPTIONS.get(self.kind, {}) | EXCEPTIONS.get(self.name, {})))
 
     def largest_error(self, limits: Limits) -> float:
         """Limit of the median error of G; of the worst seed, twice this."""
@@ -374,7 +412,8 @@ class Outcome:
         # One of many radii may exceed a limit by chance.
         rare = luck / RADII.size
         yield "error of G", least_median(self.g) <= self.case.largest_error(limits)
-        yield "worst", self.beyond(limits) == 0
+        few = binom.sf(self.beyond(limits) - 1, seeds, limits.beyond)
+        yield "worst", bool(few >= luck)
         mean, error = self.bias_g
         least = np.abs(mean) - t.isf(rare / 2, seeds - 1) * error
         yield "bias of G", bool((least <= limits.bias_g).all())
