@@ -81,7 +81,7 @@ def test_a_band_or_an_uncertainty_that_is_far_off_is_told() -> None:
     ).exceeded(limits) for scale in (0.01, 100.0)}  # fmt: skip
     assert {"u of G small", "band of G", "u of A small", "u of FWHM small"} <= {*sizes[0.01]}
     assert {"u of G large", "u of A large", "u of σ large", "u of FWHM large"} <= {*sizes[100.0]}
-    shifted = replace(outcome, a=outcome.a + outcome.u_a, error=outcome.error + 2 * outcome.u)
+    shifted = replace(outcome, a=outcome.a + 3 * outcome.u_a, error=outcome.error + 5 * outcome.u)
     assert {"bias of G", "bias of A"} <= {*shifted.exceeded(limits)}
 
 
