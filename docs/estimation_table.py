@@ -27,6 +27,7 @@ from helpers.estimation_study import (
     RADII,
     mean_coverage,
     mean_efficiency,
+    root_mean_square,
     study,
 )
 
@@ -52,25 +53,25 @@ def setting(case: Case) -> list[str]:
 
 def row(outcome: Outcome) -> str:
     """Return the row of a case."""
-    case, held, ratio = outcome.case, outcome.coverage_by_radius, outcome.ratio
+    case, ratio, held = outcome.case, outcome.ratio, outcome.held.mean(axis=0)
     beyond = outcome.beyond(case.goal)
     cells = [
         *setting(case),
-        f"{outcome.median:.3f}",
+        f"{np.median(outcome.g):.3f}",
         f"{case.largest_error(case.goal):g}",
-        f"{outcome.worst:.3f}" + (f" ({beyond})" if beyond else ""),
+        f"{outcome.g.max():.3f}" + (f" ({beyond})" if beyond else ""),
         f"{np.abs(outcome.bias_g[0]).max():.2f}",
         f"{ratio.min():.2f} to {ratio.max():.2f}",
         *(f"{100 * share:.1f}" for share in (held.mean(), held.min())),
         f"{1e3 * RADII[held.argmin()]:.1f}",
         f"{100 * outcome.a.mean():+.2f}",
-        f"{outcome.bias:+.2f}",
-        "" if case.bound is None else f"{outcome.rms / case.bound:.2f}",
+        f"{outcome.z['A'].mean():+.2f}",
+        "" if case.bound is None else f"{root_mean_square(outcome.a) / case.bound:.2f}",
     ]
     for band in BANDS:
         stated = band in outcome.z
         cells.append(f"{100 * outcome.coverage(band)[0]:.1f}" if stated else "")
-        cells.append(f"{outcome.rms_z(band):.2f}" if stated else "")
+        cells.append(f"{root_mean_square(outcome.z[band]):.2f}" if stated else "")
     return "| " + " | ".join([*cells, ", ".join(outcome.exceeded(case.goal))]) + " |"
 
 
@@ -83,7 +84,7 @@ def by_radius(outcomes: list[Outcome], kinds: bool) -> list[str]:
     radii = " | ".join(f"{1e3 * r:.1f}" for r in RADII)
     lines = [f"| G at (mm) | {radii} |", "|:---|" + "---:|" * RADII.size]
     for name, together in rows.items():
-        coverage = np.mean([outcome.coverage_by_radius for outcome in together], axis=0)
+        coverage = np.mean([outcome.held.mean(axis=0) for outcome in together], axis=0)
         shares = " | ".join(f"{100 * share:.0f}" for share in coverage)
         lines.append(f"| {name} | {shares} |")
     return lines
