@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
-from helpers.direct import Kernel, Tapered, direct_scan, quadrature
+from helpers.direct import direct_scan
 from helpers.estimation_study import (
     CASES,
     EFFICIENCY,
@@ -27,7 +27,7 @@ from helpers.estimation_study import (
     mean_efficiency,
     study,
 )
-from helpers.scans import TAILS, simulated
+from helpers.scans import RING, TAILS, simulated
 from scipy.stats import norm
 
 import memscal
@@ -112,7 +112,7 @@ def test_the_seeds_of_two_cases_have_no_noise_in_common() -> None:
     assert len(drawn) == 6
 
 
-@pytest.mark.parametrize("kernel", [DISC, TAILS])
+@pytest.mark.parametrize("kernel", [DISC, TAILS, RING])
 def test_scans_of_the_study_are_those_of_the_simulation_far_below_their_noise(
     kernel: memscal.RadialKernel,
 ) -> None:
@@ -123,13 +123,7 @@ def test_scans_of_the_study_are_those_of_the_simulation_far_below_their_noise(
     assert np.abs(ours.u_zz_errors / theirs.u_zz_errors - 1).max() < 1e-5
 
 
-@pytest.mark.parametrize("kernel", [Tapered(1.2e-3, 1), Tapered(1.2e-3, 2)])
-def test_a_tapered_kernel_has_unit_integral(kernel: Kernel) -> None:
-    q, weights = quadrature()
-    assert weights @ kernel.radial(q) == pytest.approx(1, rel=1e-9)
-
-
 @pytest.mark.parametrize("sigma", [0.45e-3, 0.75e-3])
 def test_the_true_width_at_half_maximum_is_that_of_a_gaussian(sigma: float) -> None:
     width = half_width(memscal.GaussianMixture((1.0,), (sigma,)))
-    assert width == pytest.approx(2 * np.sqrt(2 * np.log(2)) * sigma, rel=1e-9)
+    assert width == pytest.approx(2 * np.sqrt(2 * np.log(2)) * sigma, rel=1e-6)

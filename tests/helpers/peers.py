@@ -103,40 +103,21 @@ class Plane:
         return min(images, key=lambda image: plane_error(RADII, self.radial(image), wanted))
 
 
-@dataclass(frozen=True, eq=False)
-class RingModel:
-    """A scan as linear in the heights of the rings that G is made of, for programs that invert one.
-
-    ``response``: (points, rings); ``voltage``, ``noise``: as shares of the largest voltage.
-    """
-
-    ring: FloatArray
-    area: FloatArray
-    response: FloatArray
-    voltage: FloatArray
-    noise: float
-
-    @classmethod
-    def of(cls, scan: Scan) -> "RingModel":
-        ring = np.arange(round(OUTERMOST_RING / RING_STEP) + 1) * RING_STEP
-        area = 2 * np.pi * ring * RING_STEP
-        area[0] = np.pi * RING_STEP**2 / 4
-        distance, voltage = plain_points(scan)
-        contact = memscal.indent(scan.film, scan.indenter, load=1.0)
-        reach = float(distance.max() + OUTERMOST_RING)
-        wavenumbers = Wavenumbers.covering(LARGEST_KH / scan.film.thickness, reach)
-        k = wavenumbers.k
-        # A unit ring of radius q has the transform J_0(kq).
-        spectra = (wavenumbers.weights * contact.base_spectrum(k))[:, None] * j0(np.outer(k, ring))
-        response = (j0(np.outer(distance, k)) @ spectra) * area
-        # DeerLab looks for its regularisation between 1e-8 and 1e3, for voltages and G near one.
-        response /= response.sum(axis=1).max()
-        noise = scan.synthetic["noise"] / np.sqrt(np.atleast_2d(scan.u_zz).shape[0])
-        return cls(ring, area, response, voltage / voltage.max(), noise / voltage.max())
-
-    def radial(self, heights: FloatArray) -> FloatArray:
-        """G at :data:`RADII` from heights of the rings in any unit."""
-        return np.interp(RADII, self.ring, heights) / (self.area @ heights)
+def linear_model(scan: Scan) -> tuple[FloatArray, ...]:
+    """Voltages as shares of the largest, responses (points, rings) to a ring, rings and areas."""
+    ring = np.arange(round(OUTERMOST_RING / RING_STEP) + 1) * RING_STEP
+    area = 2 * np.pi * ring * RING_STEP
+    area[0] = np.pi * RING_STEP**2 / 4
+    distance, voltage = plain_points(scan)
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    reach = float(distance.max() + OUTERMOST_RING)
+    wavenumbers = Wavenumbers.covering(LARGEST_KH / scan.film.thickness, reach)
+    k = wavenumbers.k
+    # A unit ring of radius q has the transform J_0(kq).
+    spectra = (wavenumbers.weights * contact.base_spectrum(k))[:, None] * j0(np.outer(k, ring))
+    response = (j0(np.outer(distance, k)) @ spectra) * area
+    # DeerLab looks for its regularisation between 1e-8 and 1e3, for voltages and G near one.
+    return voltage / voltage.max(), response / response.sum(axis=1).max(), ring, area
 
 
 def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
@@ -148,33 +129,32 @@ def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
     with others_warnings():
         import deerlab as dl
 
-        model = RingModel.of(scan)
+        voltage, response, ring, area = linear_model(scan)
         fit = dl.snlls(
-            model.voltage, model.response, lbl=np.zeros(model.ring.size), reg=True, regparam="aic",
-            regop=dl.regoperator(model.ring / RING_STEP, 2), uq=False,
+            voltage, response, lbl=np.zeros(ring.size), reg=True, regparam="aic",
+            regop=dl.regoperator(ring / RING_STEP, 2), uq=False,
         )  # fmt: skip
-    return model.radial(fit.lin)
+    return np.interp(RADII, ring, fit.lin) / (area @ fit.lin)
 
 
 def inference_tools(scan: Scan, truth: Kernel) -> FloatArray:
-    """inference-tools' Gaussian process of the rings' heights, squared-exponential over the plane.
+    """inference-tools' Gaussian process of the rings' heights, at the true noise.
 
-    Height and correlation length (three to start from) have the largest marginal likelihood; of
-    the noise it is given the true size.
+    Mean, height and length of its squared-exponential covariance have the largest marginal
+    likelihood, of three lengths to start from.
     """
     with others_warnings():
         from inference.gp import GpLinearInverter
 
-    model = RingModel.of(scan)
-    inverter = GpLinearInverter(
-        model.voltage, np.full(model.voltage.size, model.noise), model.response,
-        parameter_spatial_positions=model.ring[:, None] * 1e3,
-    )  # fmt: skip
-    # Mean, logarithm of the height, logarithm of the length in mm.
-    starts = [np.array([0.0, 2.0, np.log(length)]) for length in (0.2, 0.5, 1.0)]
+    voltage, response, ring, area = linear_model(scan)
+    noise = scan.synthetic["noise"] / plain_points(scan)[1].max()
+    noises = np.full(voltage.size, noise / np.sqrt(scan.u_zz.size / voltage.size))
+    inverter = GpLinearInverter(voltage, noises, response, ring[:, None] * 1e3)
+    starts = [np.array([0.0, 2.0, np.log(length)]) for length in (0.2, 0.5, 1.0)]  # in mm
     optima = [inverter.optimize_hyperparameters(start) for start in starts]
     best = max(optima, key=inverter.marginal_likelihood)
-    return model.radial(inverter.calculate_posterior_mean(best))
+    heights = inverter.calculate_posterior_mean(best)
+    return np.interp(RADII, ring, heights) / (area @ heights)
 
 
 def tuned_wiener(scan: Scan, truth: Kernel) -> tuple[FloatArray, float]:
@@ -213,22 +193,8 @@ def photutils(scan: Scan, truth: Kernel) -> FloatArray:
     return plane.radial(plane.best(kernels, truth))
 
 
-def pypher(scan: Scan, truth: Kernel) -> FloatArray:
-    """PyPHER's homogenisation kernel with the best of 25 regularisations."""
-    with others_warnings():
-        from pypher.pypher import homogenization_kernel
-
-    plane = Plane(scan)
-    target, source = plane.voltage / plane.voltage.sum(), plane.stress / plane.stress.sum()
-    kernels = (
-        homogenization_kernel(target, source, reg_fact=weight)[0]
-        for weight in np.logspace(-9, 3, 25)
-    )
-    return plane.radial(plane.best(kernels, truth))
-
-
 PEERS: dict[str, Peer] = {
     "deerlab": deerlab, "inference": inference_tools, "skimage": scikit_image,
-    "photutils": photutils, "pypher": pypher,
+    "photutils": photutils,
 }  # fmt: skip
 """By the name that is imported."""
