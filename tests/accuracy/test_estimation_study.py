@@ -106,12 +106,6 @@ def test_departures_that_are_allowed_for_cost_a_gaussian_little_of_a() -> None:
     assert ratio < root_mean_square_limit(EFFICIENCY, count, chance(SEEDS))
 
 
-def test_the_seeds_of_two_cases_have_no_noise_in_common() -> None:
-    first, second = list(CASES.values())[:2]
-    drawn = {case.scan(seed).synthetic["seed"] for case in (first, second) for seed in range(3)}
-    assert len(drawn) == 6
-
-
 @pytest.mark.parametrize("kernel", [DISC, TAILS, RING])
 def test_scans_of_the_study_are_those_of_the_simulation_far_below_their_noise(
     kernel: memscal.RadialKernel,

@@ -10,7 +10,6 @@ Set MEMSCAL_FULL_STUDY for 40 seeds in place of 12, of discs drawn at random 100
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 from time import perf_counter
@@ -18,8 +17,9 @@ from time import perf_counter
 import numpy as np
 import pytest
 from helpers.bounds import FULL
+from helpers.direct import Kernel
 from helpers.estimation_study import CASES as STUDIED
-from helpers.peers import PEERS, RADII, Kernel
+from helpers.peers import PEERS, RADII
 from helpers.scans import plane_error
 
 import memscal
@@ -29,7 +29,6 @@ from memscal.model.scan import Scan
 pytestmark = pytest.mark.benchmark
 LOG = logging.getLogger(__name__)
 
-METHOD = "evidence"
 # A disc's error has two humps, where it is taken for a Gaussian and where it is not: few seeds
 # tell neither.
 SEEDS = {"discs at random": 100 if FULL else 24, "disc": 40 if FULL else 24}
@@ -37,8 +36,6 @@ FACTORS = {"discs at random": 1.2}
 """How much larger than a peer's our error may be: of sharp edges that the film hides most of."""
 OURS = "memscal"
 INSTALLED = [peer for peer in PEERS if find_spec(peer)]
-
-
 OTHERS = ("mixture", "ring", "disc", "discs at random")
 NAMES = [
     *list(STUDIED)[:9],
@@ -47,30 +44,18 @@ NAMES = [
 """Gaussians of three widths at three noises, and one sensor of each other kind."""
 
 
-def seeds_of(name: str) -> int:
-    return SEEDS.get(STUDIED[name].kind, 40 if FULL else 12)
-
-
 def ours(scan: Scan, truth: Kernel) -> FloatArray:
-    return memscal.calibrate(scan, method=METHOD).apparatus.radial(RADII)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Medians over the seeds."""
-
-    error: float
-    seconds: float
+    return memscal.calibrate(scan, method="bayesian").apparatus.radial(RADII)
 
 
 @lru_cache
-def study(name: str) -> dict[str, Outcome]:
-    """Ours and every installed peer on the scans of a case, taking turns."""
+def study(name: str) -> dict[str, tuple[float, float]]:
+    """Median error and time of ours and every installed peer on a case's scans, taking turns."""
     case = STUDIED[name]
     runners: dict[str, Callable[[Scan, Kernel], FloatArray]] = {OURS: ours}
     runners |= {peer: PEERS[peer] for peer in INSTALLED}
     rows: dict[str, list[tuple[float, float]]] = {runner: [] for runner in runners}
-    for seed in (0, *range(seeds_of(name))):
+    for seed in (0, *range(SEEDS.get(case.kind, 40 if FULL else 12))):
         scan, kernel = case.scan(seed), case.drawn(seed)[0]
         for runner, find in runners.items():
             start = perf_counter()
@@ -78,9 +63,10 @@ def study(name: str) -> dict[str, Outcome]:
             seconds = perf_counter() - start
             rows[runner].append((plane_error(RADII, found, kernel.radial(RADII)), seconds))
     # The first round warms up: it imports and fills caches.
-    found = {runner: Outcome(*np.median(row[1:], axis=0)) for runner, row in rows.items()}
-    cells = [f"{runner} {o.error:.3f} ({o.seconds / found[OURS].seconds:.1f})"
-             for runner, o in found.items()]  # fmt: skip
+    found = {runner: tuple(np.median(row[1:], axis=0)) for runner, row in rows.items()}
+    cells = [
+        f"{runner} {g:.3f} ({time / found[OURS][1]:.1f})" for runner, (g, time) in found.items()
+    ]
     LOG.info("%s: %s", name, ", ".join(cells))
     return found
 
@@ -90,4 +76,4 @@ def study(name: str) -> dict[str, Outcome]:
 def test_g_is_found_better_than_by(peer: str, name: str) -> None:
     pytest.importorskip(peer, reason=f"{peer}, a program to compare with, is not installed")
     found = study(name)
-    assert found[OURS].error < FACTORS.get(STUDIED[name].kind, 1.0) * found[peer].error
+    assert found[OURS][0] < FACTORS.get(STUDIED[name].kind, 1.0) * found[peer][0]

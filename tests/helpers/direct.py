@@ -58,14 +58,9 @@ def mean_stress(points: int, centre: float) -> FloatArray:
     even = np.append(-table[:0:-1], table), np.append(stress[:0:-1], stress)
     at = make_interp_spline(*even, k=5)
     q, cosine = quadrature()[0][:, None], np.cos((np.arange(ANGLES) + 0.5) * np.pi / ANGLES)
-    distances = np.abs(positions(points) - centre)
+    distances = np.abs(np.linspace(-HALF_RANGE, HALF_RANGE, points) - centre)
     rows = [at(np.sqrt(R**2 + q**2 - 2 * R * q * cosine)).mean(axis=1) for R in distances]
     return np.array(rows)
-
-
-def positions(points: int) -> FloatArray:
-    """Positions of a scan, in m."""
-    return np.linspace(-HALF_RANGE, HALF_RANGE, points)
 
 
 @lru_cache
@@ -94,7 +89,7 @@ def direct_scan(
 
     ``noise``, ``baseline`` and ``drift`` are shares of the largest signal.
     """
-    x, signal = positions(points), voltages(kernel, points, centre)
+    x, signal = np.linspace(-HALF_RANGE, HALF_RANGE, points), voltages(kernel, points, centre)
     top = float(signal.max())
     clean = signal + top * (baseline + 0.5 * drift * x / HALF_RANGE)
     shape = (repeats, points) if repeats > 1 else (points,)

@@ -18,10 +18,10 @@ from helpers.scans import CONVERSION
 from scipy.stats import binom, t
 
 import memscal
-from memscal import Scan
+from memscal import ApparatusFunction, Scan
 from memscal.model.arrays import FloatArray
 
-METHOD = "evidence"
+METHOD = "bayesian"
 FULL_SEEDS, FEW_SEEDS = 200, 12
 SEEDS = FULL_SEEDS if FULL else FEW_SEEDS
 R = np.linspace(0.0, 3e-3, 121)
@@ -261,11 +261,8 @@ def _strangers() -> Iterator[Case]:
 STRANGERS = tuple(case.name for case in _strangers())
 CASES = {case.name: case for case in (*_cases(), *_strangers())}
 
-REDUCED = [
-    name
-    for i, name in enumerate(CASES)
-    if i in (0, 1, 5, 9, 12, 15, 16, 17, 18, 20, 24, 29) or name in STRANGERS[::3]
-]
+_SHORT = (0, 1, 5, 9, 12, 15, 16, 17, 18, 20, 24, 29)
+REDUCED = [name for i, name in enumerate(CASES) if i in _SHORT or name in STRANGERS[::3]]
 """The cases that run where time is short: every kind, noise, step and number of repeats."""
 
 
@@ -378,28 +375,26 @@ def least_median(errors: FloatArray) -> float:
     return float(np.sort(errors)[int(binom.ppf(chance(errors.size), errors.size, 0.5))])
 
 
+def errors_of(case: Case, seed: int, apparatus: ApparatusFunction) -> dict[str, Any]:
+    """Errors of one seed's estimate, by the names of an outcome."""
+    truth, a = case.drawn(seed)[0].radial(R), apparatus.parameters["conversion_constant"]
+    size = plane_norm(truth)
+    g, u = apparatus.radial(R), apparatus.radial_uncertainty(R)
+    return {"error": (g - truth) / size, "u": u / size, "a": a / CONVERSION - 1}
+
+
 @lru_cache
 def study(name: str, seeds: int = SEEDS) -> Outcome:
     """Calibrate every seed's scan of a case."""
-    case = CASES[name]
-    error, u = np.empty((2, seeds, R.size))
-    a = np.empty(seeds)
-    z = {band: np.empty(seeds) for band in BANDS if band != "σ" or case.sigma is not None}
+    case, rows, z = CASES[name], [], []
     for seed in range(seeds):
-        kernel = case.drawn(seed)[0]
         apparatus = memscal.calibrate(case.scan(seed), method=METHOD).apparatus
-        p, truth = apparatus.parameters, kernel.radial(R)
-        error[seed] = (apparatus.radial(R) - truth) / plane_norm(truth)
-        u[seed] = apparatus.radial_uncertainty(R) / plane_norm(truth)
-        a[seed] = p["conversion_constant"] / CONVERSION - 1
-        truths = {
-            "A": ("conversion_constant", CONVERSION), "σ": ("gaussian_sigma", case.sigma),
-            "FWHM": ("fwhm", half_width(kernel)),
-        }  # fmt: skip
-        for band in z:
-            name, value = truths[band]
-            z[band][seed] = (p[name] - value) / p.uncertainty(name)
-    return Outcome(case, error, u, a, z)
+        rows.append(errors_of(case, seed, apparatus))
+        p, width = apparatus.parameters, half_width(case.drawn(seed)[0])
+        truths = {"conversion_constant": CONVERSION, "fwhm": width, "gaussian_sigma": case.sigma}
+        z.append([(p[n] - t) / p.uncertainty(n) for n, t in truths.items() if t is not None])
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return Outcome(case, **columns, z=dict(zip(("A", "FWHM", "σ"), np.array(z).T, strict=False)))
 
 
 def mean_efficiency(outcomes: list[Outcome]) -> tuple[float, int]:

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
+from helpers.direct import Kernel
 from helpers.scans import plane_error
 from scipy.special import j0
 
@@ -33,12 +33,6 @@ RING_STEP, OUTERMOST_RING = 0.05e-3, 4e-3
 
 LARGEST_KH = 20.0
 """The film passes nothing of finer detail to its base."""
-
-
-class Kernel(Protocol):
-    """A radial function of unit integral over the plane, in 1/m^2."""
-
-    def radial(self, r: FloatArray) -> FloatArray: ...
 
 
 Peer = Callable[[Scan, Kernel], FloatArray]
@@ -171,11 +165,6 @@ def tuned_wiener(scan: Scan, truth: Kernel) -> tuple[FloatArray, float]:
     return plane.radial(image), float(image.sum() / (scan.load * stress))
 
 
-def scikit_image(scan: Scan, truth: Kernel) -> FloatArray:
-    """G of :func:`tuned_wiener`."""
-    return tuned_wiener(scan, truth)[0]
-
-
 def photutils(scan: Scan, truth: Kernel) -> FloatArray:
     """The kernel of photutils that turns the stress into the voltage, with the best of 49 windows.
 
@@ -194,7 +183,7 @@ def photutils(scan: Scan, truth: Kernel) -> FloatArray:
 
 
 PEERS: dict[str, Peer] = {
-    "deerlab": deerlab, "inference": inference_tools, "skimage": scikit_image,
-    "photutils": photutils,
+    "deerlab": deerlab, "inference": inference_tools, "photutils": photutils,
+    "skimage": lambda scan, truth: tuned_wiener(scan, truth)[0],
 }  # fmt: skip
 """By the name that is imported."""
