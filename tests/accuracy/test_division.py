@@ -47,8 +47,7 @@ LIMITS = {
         "coverage": 0.25, "mean_coverage": 0.80, "bias_g": 2.0, "ratio": (0.1, 2.1),
     }),
 }  # fmt: skip
-A_LIMITS = dict(zip(NOISES, (0.003, 0.015, 0.045), strict=True))
-"""RMS error of A."""
+A_LIMITS = dict(zip(NOISES, (0.003, 0.015, 0.045), strict=True))  # RMS error
 
 
 def case_of(kind: str, noise: float) -> Case:

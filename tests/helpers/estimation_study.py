@@ -37,11 +37,7 @@ EFFICIENCY = 1.15
 
 
 def chance(seeds: int) -> float:
-    """Probability to leave to the choice of seeds: that a limit that holds is found exceeded.
-
-    Few seeds are given more room: now and then noise is taken for a departure, and errors with
-    such tails are normal only in their sum.
-    """
+    """Probability to leave to the seeds: few, and errors with tails, are given more room."""
     return 0.01 if seeds >= FULL_SEEDS else 1e-4
 
 
@@ -110,18 +106,14 @@ EXCEPTIONS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Case:
-    """A kernel, and what its scans are taken with.
-
-    ``noise`` as a share of the largest signal; ``step`` in m; ``off``: whether centre (0.14 mm),
-    baseline (1 %) and drift (0.5 %) are off.
-    """
+    """A kernel, and what its scans are taken with."""
 
     label: str
     kernel: Kernel
-    noise: float
-    step: float
+    noise: float  # as a share of the largest signal
+    step: float  # in m
     repeats: int
-    off: bool
+    off: bool  # whether centre (0.14 mm), baseline (1 %) and drift (0.5 %) are off
     state_noise: bool = True
 
     @property
@@ -326,10 +318,8 @@ class Outcome:
         return tuple(x[::4] / root_mean_square(self.u)[::4] for x in (self.error.mean(0), scatter))
 
     def coverage(self, band: str) -> tuple[float, float]:
-        """How often a band held the truth, and its standard error over the seeds.
-
-        The points of G(r) of one seed err together: the seeds are what is independent.
-        """
+        """How often a band held the truth, and its standard error over the seeds."""
+        # The points of G(r) of one seed err together: the seeds are what is independent.
         held = self.held.mean(axis=1) if band == "G" else np.abs(self.z[band]) <= K95
         return float(held.mean()), float(held.std(ddof=1) / np.sqrt(held.size))
 
@@ -366,10 +356,7 @@ class Outcome:
 
 
 def least_median(errors: FloatArray) -> float:
-    """Median of all seeds; of few, the smallest that the true median may well be.
-
-    The count of seeds below the true median is binomial, whatever their distribution.
-    """
+    """Median of all seeds; of few, the smallest that the true median may well be."""
     if errors.size >= FULL_SEEDS:
         return float(np.median(errors))
     return float(np.sort(errors)[int(binom.ppf(chance(errors.size), errors.size, 0.5))])
