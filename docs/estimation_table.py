@@ -1,11 +1,13 @@
-"""Print the table of the estimator's accuracy that stands in docs/estimation.md.
+"""Print the tables of the estimator's accuracy that stand in docs/estimation.md.
 
 Run it in a checkout where memscal and its tests' requirements are installed:
-``python docs/estimation_table.py``.  A number after it is how many seeds each case has.
+``python docs/estimation_table.py [seeds] [pattern]``: how many seeds each case has, and a regular
+expression for the names of the cases to run; the averages are of all cases only.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from functools import partial
 from multiprocessing import get_context
@@ -15,14 +17,17 @@ from typing import TYPE_CHECKING
 # The cases are the tests' own, so that the table and the tests speak of the same scans.
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
+import numpy as np
 from helpers.estimation_study import (
     BANDS,
     CASES,
     EFFICIENCY,
     FULL_SEEDS,
     MEAN_COVERAGE,
+    RADII,
     mean_coverage,
     mean_efficiency,
+    root_mean_square,
     study,
 )
 
@@ -32,59 +37,86 @@ if TYPE_CHECKING:
 PROCESSES = 2
 HEAD = (
     "| G (lengths in mm) | noise (%) | step (mm) | repeats | off | error of G | limit | worst "
-    "| bias of A (u) | RMS of A / bound | "
-    + " | ".join(f"{band} (%)" for band in BANDS)
+    "| bias of G (u) | error / u of G | G (%) | lowest (%) | at (mm) "
+    "| bias of A (%) | bias of A (u) | RMS of A / bound | "
+    + " | ".join(f"{band} (%) | z of {band}" for band in BANDS)
     + " | does not hold |",
-    "|:---|" + "---:|" * 3 + ":---:|" + "---:|" * (5 + len(BANDS)) + ":---|",
+    "|:---|" + "---:|" * 3 + ":---:|" + "---:|" * (11 + 2 * len(BANDS)) + ":---|",
 )
 
 
 def setting(case: Case) -> list[str]:
     """Return the cells that say what a case is."""
-    numbers = [f"{x:g}" for x in (case.noise * 100, case.step * 1e3, case.repeats)]
-    return [case.label, *numbers, "yes" if case.off else "no"]
+    numbers = [f"{x:g}" for x in (case.step * 1e3, case.repeats)]
+    return [case.label, case.percent, *numbers, "yes" if case.off else "no"]
 
 
 def row(outcome: Outcome) -> str:
     """Return the row of a case."""
-    case = outcome.case
+    case, ratio, held = outcome.case, outcome.ratio, outcome.held.mean(axis=0)
+    beyond = outcome.beyond(case.goal)
     cells = [
         *setting(case),
-        f"{outcome.median:.3f}",
-        "" if case.limit is None else f"{case.limit:g}",
-        f"{outcome.worst:.3f}" + (f" ({outcome.beyond})" if outcome.beyond else ""),
-        f"{outcome.bias:+.2f}",
-        "" if case.bound is None else f"{outcome.rms / case.bound:.2f}",
-        *(
-            f"{100 * outcome.coverage(band)[0]:.1f}" if band in outcome.covered else ""
-            for band in BANDS
-        ),
-        ", ".join(sorted(outcome.exceeded())),
+        f"{np.median(outcome.g):.3f}",
+        f"{case.largest_error(case.goal):g}",
+        f"{outcome.g.max():.3f}" + (f" ({beyond})" if beyond else ""),
+        f"{np.abs(outcome.bias_g[0]).max():.2f}",
+        f"{ratio.min():.2f} to {ratio.max():.2f}",
+        *(f"{100 * share:.1f}" for share in (held.mean(), held.min())),
+        f"{1e3 * RADII[held.argmin()]:.1f}",
+        f"{100 * outcome.a.mean():+.2f}",
+        f"{outcome.z['A'].mean():+.2f}",
+        "" if case.bound is None else f"{root_mean_square(outcome.a) / case.bound:.2f}",
     ]
-    return "| " + " | ".join(cells) + " |"
+    for band in BANDS:
+        stated = band in outcome.z
+        cells.append(f"{100 * outcome.coverage(band)[0]:.1f}" if stated else "")
+        cells.append(f"{root_mean_square(outcome.z[band]):.2f}" if stated else "")
+    return "| " + " | ".join([*cells, ", ".join(outcome.exceeded(case.goal))]) + " |"
+
+
+def by_radius(outcomes: list[Outcome], kinds: bool) -> list[str]:
+    """Return the coverage (%) of the band of G at every radius, of the cases or of their kinds."""
+    rows: dict[str, list[Outcome]] = {}
+    for outcome in outcomes:
+        name = outcome.case.kind if kinds else outcome.case.name
+        rows.setdefault(name, []).append(outcome)
+    radii = " | ".join(f"{1e3 * r:.1f}" for r in RADII)
+    lines = [f"| G at (mm) | {radii} |", "|:---|" + "---:|" * RADII.size]
+    for name, together in rows.items():
+        coverage = np.mean([outcome.held.mean(axis=0) for outcome in together], axis=0)
+        shares = " | ".join(f"{100 * share:.0f}" for share in coverage)
+        lines.append(f"| {name} | {shares} |")
+    return lines
 
 
 def means(outcomes: list[Outcome]) -> list[str]:
     """Return what holds of all cases together: coverage of each band, and efficiency of A."""
     rows = ["| of all cases together | found | limit | does not hold |", "|:---|---:|---:|:---|"]
-    low, high = (100 * share for share in MEAN_COVERAGE)
-    for band in BANDS:
+    for band, (low, high) in MEAN_COVERAGE.items():
         share = 100 * mean_coverage(outcomes, band)[0]
-        fault = "too narrow" if share < low else "too wide" if share > high else ""
-        rows.append(f"| coverage of {band} (%) | {share:.1f} | {low:g} to {high:g} | {fault} |")
+        fault = "too narrow" if share < 100 * low else "too wide" if share > 100 * high else ""
+        limit = f"{100 * low:g} to {100 * high:g}"
+        rows.append(f"| coverage of {band} (%) | {share:.1f} | {limit} | {fault} |")
     ratio, _ = mean_efficiency(outcomes)
     fault = "above" if ratio > EFFICIENCY else ""
     rows.append(f"| RMS of A / bound, G Gaussian | {ratio:.2f} | {EFFICIENCY:g} | {fault} |")
     return rows
 
 
-def main(seeds: int) -> None:
-    """Calibrate all scans of all cases, and print the table and the averages."""
+def main(seeds: int, pattern: str) -> None:
+    """Calibrate all scans of the cases, and print the tables."""
+    names = [name for name in CASES if re.search(pattern, name)]
     with get_context("spawn").Pool(PROCESSES) as pool:
-        outcomes = pool.map(partial(study, seeds=seeds), CASES, chunksize=1)
-    lines = [*HEAD, *(row(outcome) for outcome in outcomes), "", *means(outcomes)]
+        outcomes = pool.map(partial(study, seeds=seeds), names, chunksize=1)
+    lines = [*HEAD, *(row(outcome) for outcome in outcomes), "", *by_radius(outcomes, not pattern)]
+    if not pattern:
+        lines += ["", *means(outcomes)]
     sys.stdout.write("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else FULL_SEEDS)
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else FULL_SEEDS,
+        sys.argv[2] if len(sys.argv) > 2 else "",
+    )

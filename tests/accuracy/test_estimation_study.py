@@ -1,20 +1,23 @@
 """The estimator over many kernels, scans and noise draws: errors of G and A, truth of its bands.
 
-Set MEMSCAL_FULL_STUDY for all cases of docs/estimation.md and 200 seeds in place of 12.  Its table
-says which limits a case does not keep; no other may be exceeded, and no other kind may be listed.
+Set MEMSCAL_FULL_STUDY for all cases of docs/estimation.md and 200 seeds in place of 12.  Limits are
+those of helpers.estimation_study; the page is only compared with what its script prints.
 """
 
+import re
 import runpy
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.bounds import FULL, root_mean_square_limit
+from helpers.direct import direct_scan
 from helpers.estimation_study import (
-    BANDS,
     CASES,
     EFFICIENCY,
+    EXCEPTIONS,
     MEAN_COVERAGE,
     REDUCED,
     SEEDS,
@@ -24,6 +27,7 @@ from helpers.estimation_study import (
     mean_efficiency,
     study,
 )
+from helpers.scans import RING, TAILS, simulated
 from scipy.stats import norm
 
 import memscal
@@ -32,25 +36,15 @@ pytestmark = pytest.mark.accuracy
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 NAMES = list(CASES) if FULL else REDUCED
-
-ADMITTED = {
-    "Gaussian": {"worst"}, "disc": {"error of G", "worst"},
-    "mixture": {"worst", "bias of A", "band of A"}, "ring": set(),
-}  # fmt: skip
-"""What the table may say that a kind of kernel does not keep."""
+DISC = memscal.SmoothedDisc(0.8e-3, 0.05e-3)
 
 
 @lru_cache
 def stated() -> list[list[str]]:
     """Cells of the rows of the cases that stand in docs/estimation.md."""
     text = (DOCS / "estimation.md").read_text(encoding="utf-8")
-    rows = [line for line in text.splitlines() if line.startswith("|")]
-    (first,) = (i for i, line in enumerate(rows) if line == script()["HEAD"][0])
-    assert rows[first + 1] == script()["HEAD"][1]
-    return [
-        [cell.strip() for cell in line.split("|")[1:-1]]
-        for line in rows[first + 2 : first + 2 + len(CASES)]
-    ]
+    lines = text.split("\n".join(script()["HEAD"]))[1].split("\n\n")[0].splitlines()[1:]
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
 
 
 @lru_cache
@@ -58,16 +52,9 @@ def script() -> dict[str, object]:
     return runpy.run_path(str(DOCS / "estimation_table.py"))
 
 
-def not_kept(name: str) -> set[str]:
-    """Limits that the table says the case does not keep."""
-    return set(filter(None, stated()[list(CASES).index(name)][-1].split(", ")))
-
-
 def test_the_table_has_the_cases_of_the_study() -> None:
     setting = script()["setting"]
     assert [row[:5] for row in stated()] == [setting(case) for case in CASES.values()]
-    for name, case in CASES.items():
-        assert not_kept(name) <= ADMITTED[case.label.split()[0]]
 
 
 @pytest.mark.full_study
@@ -76,25 +63,42 @@ def test_the_table_is_what_its_script_prints(name: str) -> None:
     printed = [cell.strip() for cell in script()["row"](study(name)).split("|")[1:-1]]
     for ours, theirs in zip(printed[5:-1], stated()[list(CASES).index(name)][5:-1], strict=True):
         # Another processor may round differently, and a seed cross a limit by it.
-        numbers = [[float(x) for x in cell.split("(")[0].split()] for cell in (ours, theirs)]
+        numbers = [[float(x) for x in re.findall(r"[-+.\d]+", cell.split("(")[0])]
+                   for cell in (ours, theirs)]  # fmt: skip
         assert numbers[0] == pytest.approx(numbers[1], rel=0.01, abs=0.0101)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_case_keeps_the_limits_that_it_is_said_to_keep(name: str) -> None:
-    assert study(name).exceeded() <= not_kept(name)
+def test_errors_and_bands_of_a_case_keep_their_limits(name: str) -> None:
+    assert study(name).exceeded(CASES[name].limits) == []
 
 
-@pytest.mark.parametrize("band", BANDS)
-def test_bands_of_95_percent_hold_the_truth_often_enough(band: str) -> None:
-    # Those of G, A and FWHM hold it more often than the limit says: docs/estimation.md.
+def test_a_band_or_an_uncertainty_that_is_far_off_is_told() -> None:
+    outcome = study(REDUCED[0])
+    limits = outcome.case.limits
+
+    def told(scale: float, shift: float = 0.0) -> set[str]:
+        z = {band: z / scale + shift for band, z in outcome.z.items()}
+        error = outcome.error + shift * outcome.u
+        return {*replace(outcome, error=error, u=scale * outcome.u, z=z).exceeded(limits)}
+
+    assert told(0.01) >= {"u of G small", "band of G", "u of A small", "u of FWHM small"}
+    assert told(100.0) >= {"u of G large", "u of A large", "u of σ large", "u of FWHM large"}
+    assert told(1.0, shift=5.0) >= {"bias of G", "bias of A"}
+
+
+@pytest.mark.full_study
+@pytest.mark.parametrize("of", EXCEPTIONS)
+def test_an_exception_is_made_only_where_a_goal_does_not_hold(of: str) -> None:
+    cases = [case for case in CASES.values() if of in (case.kind, case.name)]
+    assert any(study(case.name).exceeded(case.goal) for case in cases)
+
+
+@pytest.mark.parametrize("band", MEAN_COVERAGE)
+def test_bands_of_95_percent_hold_the_truth_as_often_as_is_said(band: str) -> None:
     share, error = mean_coverage([study(name) for name in NAMES], band)
-    assert share + norm.isf(chance(SEEDS)) * error > MEAN_COVERAGE[0]
-
-
-def test_the_band_of_a_gaussian_width_is_not_too_wide() -> None:
-    share, error = mean_coverage([study(name) for name in NAMES], "σ")
-    assert share - norm.isf(chance(SEEDS)) * error < MEAN_COVERAGE[1]
+    low, high = MEAN_COVERAGE[band]
+    assert low - norm.isf(chance(SEEDS)) * error < share < high + norm.isf(chance(SEEDS)) * error
 
 
 def test_departures_that_are_allowed_for_cost_a_gaussian_little_of_a() -> None:
@@ -102,13 +106,18 @@ def test_departures_that_are_allowed_for_cost_a_gaussian_little_of_a() -> None:
     assert ratio < root_mean_square_limit(EFFICIENCY, count, chance(SEEDS))
 
 
-def test_the_seeds_of_two_cases_have_no_noise_in_common() -> None:
-    first, second = list(CASES.values())[:2]
-    drawn = {case.scan(seed).synthetic["seed"] for case in (first, second) for seed in range(3)}
-    assert len(drawn) == 6
+@pytest.mark.parametrize("kernel", [DISC, TAILS, RING])
+def test_scans_of_the_study_are_those_of_the_simulation_far_below_their_noise(
+    kernel: memscal.RadialKernel,
+) -> None:
+    # Finite elements and a direct sum on one side, transforms on the other.
+    setting = {"kernel": kernel, "noise": 1e-3, "repeats": 2, "points": 33, "seed": 5}
+    ours, theirs = direct_scan(**setting), simulated(**setting)
+    assert np.abs(ours.u_zz - theirs.u_zz).max() < 1e-5 * theirs.u_zz.max()
+    assert np.abs(ours.u_zz_errors / theirs.u_zz_errors - 1).max() < 1e-5
 
 
 @pytest.mark.parametrize("sigma", [0.45e-3, 0.75e-3])
 def test_the_true_width_at_half_maximum_is_that_of_a_gaussian(sigma: float) -> None:
     width = half_width(memscal.GaussianMixture((1.0,), (sigma,)))
-    assert width == pytest.approx(2 * np.sqrt(2 * np.log(2)) * sigma, rel=1e-9)
+    assert width == pytest.approx(2 * np.sqrt(2 * np.log(2)) * sigma, rel=1e-6)

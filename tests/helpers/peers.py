@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
+from helpers.direct import Kernel
 from helpers.scans import plane_error
 from scipy.special import j0
 
@@ -29,16 +29,10 @@ PIXEL = 0.125e-3
 """Half the step of the scans: neither a finer nor a coarser plane brings the peers nearer to G."""
 
 RING_STEP, OUTERMOST_RING = 0.05e-3, 4e-3
-"""The rings of which DeerLab's G is made, in m."""
+"""The rings of which G is made where a program inverts a linear model, in m."""
 
 LARGEST_KH = 20.0
 """The film passes nothing of finer detail to its base."""
-
-
-class Kernel(Protocol):
-    """A radial function of unit integral over the plane, in 1/m^2."""
-
-    def radial(self, r: FloatArray) -> FloatArray: ...
 
 
 Peer = Callable[[Scan, Kernel], FloatArray]
@@ -103,15 +97,8 @@ class Plane:
         return min(images, key=lambda image: plane_error(RADII, self.radial(image), wanted))
 
 
-def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
-    """DeerLab's non-negative least squares, smoothed by as much as Akaike's criterion asks for.
-
-    G is made of rings.  Neither slope nor height are asked for on the axis, where an operator that
-    includes the edges would hold G down.
-    """
-    with others_warnings():
-        import deerlab as dl
-
+def linear_model(scan: Scan) -> tuple[FloatArray, ...]:
+    """Voltages as shares of the largest, responses (points, rings) to a ring, rings and areas."""
     ring = np.arange(round(OUTERMOST_RING / RING_STEP) + 1) * RING_STEP
     area = 2 * np.pi * ring * RING_STEP
     area[0] = np.pi * RING_STEP**2 / 4
@@ -124,13 +111,44 @@ def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
     spectra = (wavenumbers.weights * contact.base_spectrum(k))[:, None] * j0(np.outer(k, ring))
     response = (j0(np.outer(distance, k)) @ spectra) * area
     # DeerLab looks for its regularisation between 1e-8 and 1e3, for voltages and G near one.
-    response /= response.sum(axis=1).max()
+    return voltage / voltage.max(), response / response.sum(axis=1).max(), ring, area
+
+
+def deerlab(scan: Scan, truth: Kernel) -> FloatArray:
+    """DeerLab's non-negative least squares, smoothed by as much as Akaike's criterion asks for.
+
+    Neither slope nor height are asked for on the axis, where an operator that includes the edges
+    would hold G down.
+    """
     with others_warnings():
+        import deerlab as dl
+
+        voltage, response, ring, area = linear_model(scan)
         fit = dl.snlls(
-            voltage / voltage.max(), response, lbl=np.zeros(ring.size), reg=True, regparam="aic",
+            voltage, response, lbl=np.zeros(ring.size), reg=True, regparam="aic",
             regop=dl.regoperator(ring / RING_STEP, 2), uq=False,
         )  # fmt: skip
     return np.interp(RADII, ring, fit.lin) / (area @ fit.lin)
+
+
+def inference_tools(scan: Scan, truth: Kernel) -> FloatArray:
+    """inference-tools' Gaussian process of the rings' heights, at the true noise.
+
+    Mean, height and length of its squared-exponential covariance have the largest marginal
+    likelihood, of three lengths to start from.
+    """
+    with others_warnings():
+        from inference.gp import GpLinearInverter
+
+    voltage, response, ring, area = linear_model(scan)
+    noise = scan.synthetic["noise"] / plain_points(scan)[1].max()
+    noises = np.full(voltage.size, noise / np.sqrt(scan.u_zz.size / voltage.size))
+    inverter = GpLinearInverter(voltage, noises, response, ring[:, None] * 1e3)
+    starts = [np.array([0.0, 2.0, np.log(length)]) for length in (0.2, 0.5, 1.0)]  # in mm
+    optima = [inverter.optimize_hyperparameters(start) for start in starts]
+    best = max(optima, key=inverter.marginal_likelihood)
+    heights = inverter.calculate_posterior_mean(best)
+    return np.interp(RADII, ring, heights) / (area @ heights)
 
 
 def tuned_wiener(scan: Scan, truth: Kernel) -> tuple[FloatArray, float]:
@@ -145,11 +163,6 @@ def tuned_wiener(scan: Scan, truth: Kernel) -> tuple[FloatArray, float]:
     )
     image = plane.best(images, truth)
     return plane.radial(image), float(image.sum() / (scan.load * stress))
-
-
-def scikit_image(scan: Scan, truth: Kernel) -> FloatArray:
-    """G of :func:`tuned_wiener`."""
-    return tuned_wiener(scan, truth)[0]
 
 
 def photutils(scan: Scan, truth: Kernel) -> FloatArray:
@@ -169,21 +182,8 @@ def photutils(scan: Scan, truth: Kernel) -> FloatArray:
     return plane.radial(plane.best(kernels, truth))
 
 
-def pypher(scan: Scan, truth: Kernel) -> FloatArray:
-    """PyPHER's homogenisation kernel with the best of 25 regularisations."""
-    with others_warnings():
-        from pypher.pypher import homogenization_kernel
-
-    plane = Plane(scan)
-    target, source = plane.voltage / plane.voltage.sum(), plane.stress / plane.stress.sum()
-    kernels = (
-        homogenization_kernel(target, source, reg_fact=weight)[0]
-        for weight in np.logspace(-9, 3, 25)
-    )
-    return plane.radial(plane.best(kernels, truth))
-
-
 PEERS: dict[str, Peer] = {
-    "deerlab": deerlab, "skimage": scikit_image, "photutils": photutils, "pypher": pypher,
+    "deerlab": deerlab, "inference": inference_tools, "photutils": photutils,
+    "skimage": lambda scan, truth: tuned_wiener(scan, truth)[0],
 }  # fmt: skip
 """By the name that is imported."""

@@ -1,0 +1,104 @@
+r"""Scans whose voltages share nothing with the analysis but the film: direct convolution.
+
+The base stress is that of the finite elements.  Convolved with a radial G it is at distance R
+
+.. math::
+
+    \int_0^\infty G(q)\,q \int_0^{2\pi} \sigma(\sqrt{R^2 + q^2 - 2Rq\cos\theta})\,d\theta\,dq :
+
+the inner integral is the same for all G, the outer one has panels narrower than any blur.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from helpers.scans import CENTRE, CONVERSION, EXACT_FILM, EXACT_ROD, SENSOR
+from scipy.interpolate import make_interp_spline
+
+import memscal
+from memscal.model.arrays import FloatArray
+
+HALF_RANGE = 8e-3
+PANEL, NODES, OUTERMOST = 0.05e-3, 8, 10e-3
+"""Panels of the radius of G and where it ends, in m; Gauss nodes of each."""
+ANGLES = 96
+
+
+@dataclass(frozen=True)
+class Tapered:
+    """G that falls to zero at a radius (m): a cone, a paraboloid, as (1 - (r/a)^power)."""
+
+    radius: float
+    power: float
+
+    def radial(self, r: FloatArray) -> FloatArray:
+        """G at radii ``r`` (m), in 1/m^2."""
+        height = (self.power + 2) / (self.power * np.pi * self.radius**2)
+        return np.asarray(height * np.clip(1 - (r / self.radius) ** self.power, 0.0, None))
+
+
+Kernel = memscal.RadialKernel | Tapered
+
+
+@lru_cache
+def quadrature() -> tuple[FloatArray, FloatArray]:
+    """Radii (m), and weights (m^2) that integrate a radial function over the plane."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    starts = np.arange(0.0, OUTERMOST - PANEL / 2, PANEL)[:, None]
+    radius = (starts + PANEL * (nodes + 1) / 2).ravel()
+    return radius, 2 * np.pi * radius * np.tile(weights * PANEL / 2, starts.size)
+
+
+@lru_cache
+def mean_stress(points: int, centre: float) -> FloatArray:
+    """Base stress of 1 N, averaged over circles about each position of the scan, in Pa."""
+    table = np.arange(0.0, 20e-3, 25e-6)
+    stress = memscal.indent(EXACT_FILM, EXACT_ROD, load=1.0, backend="fem").base_stress(table)
+    even = np.append(-table[:0:-1], table), np.append(stress[:0:-1], stress)
+    at = make_interp_spline(*even, k=5)
+    q, cosine = quadrature()[0][:, None], np.cos((np.arange(ANGLES) + 0.5) * np.pi / ANGLES)
+    distances = np.abs(np.linspace(-HALF_RANGE, HALF_RANGE, points) - centre)
+    rows = [at(np.sqrt(R**2 + q**2 - 2 * R * q * cosine)).mean(axis=1) for R in distances]
+    return np.array(rows)
+
+
+@lru_cache
+def voltages(kernel: Kernel, points: int, centre: float) -> FloatArray:
+    """Voltages without noise, baseline and drift at 1 N, in V."""
+    q, weights = quadrature()
+    share = weights * kernel.radial(q)
+    # The quadrature resolves G: nothing of it is lost.
+    assert abs(share.sum() - 1) < 1e-9
+    return np.asarray(CONVERSION * (mean_stress(points, centre) @ share))
+
+
+def direct_scan(
+    kernel: Kernel,
+    *,
+    noise: float,
+    seed: int = 0,
+    points: int = 65,
+    repeats: int = 1,
+    centre: float = CENTRE,
+    baseline: float = 0.01,
+    drift: float = 0.005,
+    state_noise: bool = True,
+) -> memscal.Scan:
+    """Scan as ``memscal.simulate`` does, with the same noise for a seed, by direct convolution.
+
+    ``noise``, ``baseline`` and ``drift`` are shares of the largest signal.
+    """
+    x, signal = np.linspace(-HALF_RANGE, HALF_RANGE, points), voltages(kernel, points, centre)
+    top = float(signal.max())
+    clean = signal + top * (baseline + 0.5 * drift * x / HALF_RANGE)
+    shape = (repeats, points) if repeats > 1 else (points,)
+    u = clean + np.random.default_rng(seed).normal(0.0, noise * top, (repeats, points))
+    shares = {"noise": noise, "baseline": baseline, "drift": drift}
+    return memscal.Scan(
+        x=x, u_zz=u.reshape(shape),
+        u_zz_errors=np.full(shape, noise * top) if state_noise and noise > 0 else None,
+        load=1.0, indenter=EXACT_ROD, film=EXACT_FILM, sensor=SENSOR,
+        synthetic={"centre": centre, "conversion_constant": CONVERSION, "seed": float(seed)}
+        | {name: share * top for name, share in shares.items()},
+    )  # fmt: skip
