@@ -29,7 +29,7 @@ _LOG_DECADES = 4.0
 
 
 def draw_radial(axes: Axes, data: ApparatusData) -> None:
-    """Draw G(r) with its expanded uncertainty (k = 2) and the Gaussian, linear."""
+    """Draw G(r), twice its standard uncertainty and the Gaussian, linear."""
     radial = data.radial_profile
     axes.axhline(0.0, color="0.4", lw=0.6)
     _draw_band(axes, radial, floor=-np.inf)
@@ -73,7 +73,9 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     band = _EXPANDED * transfer.modulus_errors
     blue = COLOURS["deconvolved"]
     low, high = np.maximum(transfer.modulus - band, 0.0), transfer.modulus + band
-    axes.fill_between(k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2)")
+    axes.fill_between(
+        k, low, high, color=blue, alpha=0.25, lw=0, label="±2u: noise, and what the film hides"
+    )
     axes.plot(k, transfer.modulus, "-", color=blue, label="modulus for G")
     sigma = data.gaussian_sigma
     gaussian = np.exp(-0.5 * (sigma * transfer.k) ** 2)
@@ -91,7 +93,9 @@ def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
     spread = _EXPANDED * radial.g_errors
     low, high = (np.maximum(radial.g + side * spread, floor) / PER_MM2 for side in (-1, 1))
     blue, r = COLOURS["deconvolved"], radial.r / MM
-    axes.fill_between(r, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2)")
+    axes.fill_between(
+        r, low, high, color=blue, alpha=0.25, lw=0, label="±2u: noise, and what the film hides"
+    )
 
 
 def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:

@@ -111,14 +111,26 @@ FIELD = record(
     Quantity("x", _L, "position along x", "x", _X, required=True),
     Quantity("y", _L, "position along y", "y", ("y",), required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _YX, required=True),
-    Quantity("g_errors", _PER_AREA, "standard uncertainty of G", axes=_YX, required=True),
+    Quantity(
+        "g_errors",
+        _PER_AREA,
+        "standard uncertainty of G, with detail that the film hides",
+        axes=_YX,
+        required=True,
+    ),
     signal="g",
 )
 RADIAL = record(
     "NXdata",
     Quantity("r", _L, "distance from the sensor", "r", _R, required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _R, required=True),
-    Quantity("g_errors", _PER_AREA, "standard uncertainty of G", axes=_R, required=True),
+    Quantity(
+        "g_errors",
+        _PER_AREA,
+        "standard uncertainty of G, with detail that the film hides",
+        axes=_R,
+        required=True,
+    ),
     Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan", axes=_R, required=True),
     Quantity("conversion_correlation", _ONE, "correlation of the errors of G and A", axes=_R),
     signal="g",
