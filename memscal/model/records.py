@@ -6,6 +6,7 @@ from memscal.model.quantities import Quantity, Record, measured, record
 
 _L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"
 _A, _W, _PER_AREA = "voltage per stress", "wavenumber", "per area"
+_OF_G = "standard uncertainty of G, with detail that the film hides"
 _R, _X, _YX, _K = ("r",), ("x",), ("y", "x"), ("k",)
 # The second axis of a covariance has a name of its own: netCDF tools want each dimension once.
 _RR = ("r", "r_prime")
@@ -111,26 +112,14 @@ FIELD = record(
     Quantity("x", _L, "position along x", "x", _X, required=True),
     Quantity("y", _L, "position along y", "y", ("y",), required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _YX, required=True),
-    Quantity(
-        "g_errors",
-        _PER_AREA,
-        "standard uncertainty of G, with detail that the film hides",
-        axes=_YX,
-        required=True,
-    ),
+    Quantity("g_errors", _PER_AREA, _OF_G, axes=_YX, required=True),
     signal="g",
 )
 RADIAL = record(
     "NXdata",
     Quantity("r", _L, "distance from the sensor", "r", _R, required=True),
     Quantity("g", _PER_AREA, "apparatus function", "G", _R, required=True),
-    Quantity(
-        "g_errors",
-        _PER_AREA,
-        "standard uncertainty of G, with detail that the film hides",
-        axes=_R,
-        required=True,
-    ),
+    Quantity("g_errors", _PER_AREA, _OF_G, axes=_R, required=True),
     Quantity("g_gaussian", _PER_AREA, "Gaussian fitted to the scan", axes=_R, required=True),
     Quantity("conversion_correlation", _ONE, "correlation of the errors of G and A", axes=_R),
     signal="g",

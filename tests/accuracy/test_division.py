@@ -7,6 +7,7 @@ truth, makes of the same scans.
 """
 
 import logging
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -22,7 +23,9 @@ from helpers.estimation_study import (
     root_mean_square,
 )
 from helpers.peers import tuned_wiener
-from helpers.scans import CONVERSION, RING, SIGMA, TAILS, added_ring, plane_error, simulated
+from helpers.scans import CENTRE, CONVERSION, RING, SIGMA, TAILS
+
+from helpers.scans import added_ring, plane_error, simulated  # isort: skip
 from scipy.stats import binom, chi2, f
 
 import memscal
@@ -171,7 +174,7 @@ PASSES = 200 if FULL else 10
 
 def of_repeats(noise: float, seed: int, shift: float, **options) -> memscal.ApparatusFunction:
     """Calibrate with three passes over a Gaussian sensor, which moves from one to the next."""
-    passes = [scan_of("Gaussian", noise, 3 * seed + i) for i in range(3)]
+    passes = [case_of("Gaussian", noise).scan(3 * seed + i) for i in range(3)]
     moved = [scan.x + i * shift for scan, i in zip(passes, (-1, 0, 1), strict=True)]
     u, number = np.concatenate([scan.u_zz for scan in passes]), np.repeat([0, 1, 2], 65)
     scan = replace(passes[0], x=np.concatenate(moved), u_zz=u, repeat=number)
