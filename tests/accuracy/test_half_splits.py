@@ -60,14 +60,11 @@ def deviates(kind: str, noise: float, split: str) -> FloatArray:
     return np.array(rows)
 
 
-def require_unit(deviates: FloatArray, route: str) -> None:
+def require_unit(deviates: FloatArray, route: str, least_of_shape: float = 0.8) -> None:
     ratio, count = np.sqrt(np.mean(deviates[:, ROUTES.index(route)] ** 2, axis=0)), len(deviates)
     low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count) / count)
     least = np.full(ratio.size, 0.8)
-    if route == "bayesian":
-        # Probabilities that follow the data bend the estimate of a shape: the mean square of its
-        # slope exceeds the variance (Poincare's inequality), of a Gaussian's by up to three times.
-        least[NUMBERS.index("fwhm") :] = 0.5
+    least[NUMBERS.index("fwhm") :] = least_of_shape
     assert (least * low < ratio).all(), ratio
     assert (ratio < 1.2 * high).all(), ratio
 
@@ -75,7 +72,9 @@ def require_unit(deviates: FloatArray, route: str) -> None:
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_halves_of_a_scan_differ_as_their_noise_predicts(case, route: str) -> None:
-    require_unit(deviates(*case), route)
+    # Probabilities that follow the data bend the posterior mean, whose squared slope exceeds the
+    # variance on average (Poincare's inequality): where a departure is in doubt, up to threefold.
+    require_unit(deviates(*case), route, 0.8 if route == "division" else 0.6)
 
 
 @pytest.mark.parametrize("route", ROUTES)
