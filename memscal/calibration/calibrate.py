@@ -466,7 +466,7 @@ def calibrate(
     results = uncertainties(solution, solution.deconvolution, effects, pairs)
     beside = solution.other
     other = None if beside is None else uncertainties(solution, beside, effects, pairs)
-    checks = quality_checks(solution, results.parameters)
+    checks = quality_checks(solution, results)
     messages = calibration_messages(solution, checks)
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}

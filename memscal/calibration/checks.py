@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Misfit, Solution
-from memscal.calibration.uncertainty import route_difference
+from memscal.calibration.uncertainty import Results, route_difference
 from memscal.estimation.assumptions import (
     ExtraColumns,
     axisymmetry_test,
@@ -271,15 +271,15 @@ _WIDTHS = ("gaussian_sigma", "gaussian_sigma_deconvolved")
 _MOST_NAMED = 12
 
 
-def quality_checks(solution: Solution, parameters: ParameterSet) -> tuple[QualityCheck, ...]:
+def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
     estimate, residuals = solution.estimate, residuals_of(solution.estimate)
     enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
         *_constraint(solution),
-        *_agreements(solution, parameters),
-        *_shape(solution, parameters),
+        *_agreements(solution, results),
+        *_shape(solution, results.parameters),
         *_set_up(solution),
         *_noise(estimate),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
@@ -336,7 +336,7 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
     return [check("constraint", rise, limit, meaning)]
 
 
-def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityCheck]:
+def _agreements(solution: Solution, results: Results) -> list[QualityCheck]:
     """Compare division and Bayesian estimate, and the deconvolved G with the Gaussian."""
     difference = route_difference(solution)
     routes = []
@@ -354,9 +354,12 @@ def _agreements(solution: Solution, parameters: ParameterSet) -> list[QualityChe
         "uncertainty. A failure means that G is not Gaussian, so that its width depends on how "
         "it is read off. Look at both reconvolutions."
     )
+    parameters = results.parameters
     i, j = (parameters.names.index(name) for name in _WIDTHS)
     c, (fitted, deconvolved) = parameters.covariance, parameters.values[[i, j]]
-    variance = max(c[i, i] + c[j, j] - 2 * c[i, j], 0.0)
+    # The misfit is what is looked for: no allowance is made for it.
+    variance = c[i, i] + c[j, j] - 2 * c[i, j] - results.budget[_WIDTHS[0]]["misfit"] ** 2
+    variance = max(variance, 0.0)
     # Differences below a fifth of a percent are negligible, however small their noise.
     allowed = np.hypot(np.sqrt(variance), _NEGLIGIBLE_DIFFERENCE * fitted)
     return [*routes, check("width_agreement", abs(deconvolved - fitted) / allowed, 3.0, meaning)]

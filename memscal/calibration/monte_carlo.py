@@ -483,8 +483,9 @@ def _messages(
     if hidden:
         text = (
             "Not all of the stated uncertainty scatters: of its square, what regularisation or "
-            f"window hides makes up {', '.join(hidden)}. It is the same error in every draw, so it "
-            "is counted, but not drawn; the comparison is with the rest."
+            "window hides, or a Gaussian that misfits changes with the positions, makes up "
+            f"{', '.join(hidden)}. It is the same error in every draw, so it is counted, but not "
+            "drawn; the comparison is with the rest."
         )
         yield Message("regularisation", text)
     if (calibration.solution.estimate.outlier_weight < OUTLIER_WEIGHT).any():

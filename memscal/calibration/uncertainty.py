@@ -8,6 +8,13 @@ window and smoothing hide of the posterior is stated apart (``window``).
 Method ``bayesian`` is a linear function of the posterior of the profile's parameters: what
 scatters from scan to scan is ``noise``, the rest of the expected squared error ``regularisation``.
 
+A Gaussian that misfits depends on where the points lie.  Where points beyond a share f of the reach
+R count for nothing, its parameters change to first order by :math:`-\sum_{r_i > fR} g_i d_i`, with
+the gain g of its fit and the misfit d, posterior mean less Gaussian.  ``misfit`` is the root mean
+square of that for f from a half to one: the sandwich :math:`\sum_{ij} g_i d_i K_{ij} d_j g_j` of
+a misspecified model (White, Econometrica 50 (1982) 1; Conley, J. Econometrics 92 (1999) 1) with
+:math:`K_{ij}` the share of those f below both :math:`r_i/R` and :math:`r_j/R`.
+
 Inputs add one column each, the change of all results by one standard uncertainty.  An input that
 is larger than stated changes the results as voltages would: by :math:`-A\,G\otimes\delta
 \sigma_{zz}` for the base stress, by :math:`-U'(R)\,\delta R` for the positions.  A change of the
@@ -51,8 +58,17 @@ BUDGETED = (
     "fwhm",
     "noise_equivalent_area",
 )
-#: Sources that are the same error in every scan.
-NOT_RANDOM = ("regularisation", "window")
+#: Parameters of the Gaussian fit, which a shape that is none changes.
+_OF_GAUSSIAN = (
+    "gaussian_sigma",
+    "conversion_constant_gaussian",
+    "ellipticity",
+    "ellipticity_diagonal",
+)
+#: Other scans of one sensor reach from this share of a scan's reach on.
+_LEAST_REACH = 0.5
+#: Sources that are the same error in every scan at the same positions.
+NOT_RANDOM = ("regularisation", "window", "misfit")
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,6 +289,10 @@ def propagate(
         "regularisation": np.vstack([part.by_state for part in parts]) @ _fixed_root(estimate),
         "window": np.vstack([part.hidden for part in parts]),
     }
+    gaussian = np.zeros_like(by_voltage)
+    rows = [names.index(name) for name in _OF_GAUSSIAN if name in names]
+    gaussian[rows] = by_voltage[rows]
+    columns["misfit"] = _misfit_columns(estimate, gaussian)
     if drawn is not None:
         columns["noise"] = _drawn_columns(by_voltage, names, columns["noise"], drawn)
     independent = list(columns.values())
@@ -513,6 +533,19 @@ def _drawn_columns(
         columns[names.index(name)] = column
     columns[len(names) :] = np.vstack([drawn.radial, drawn.transfer])
     return np.asarray(columns)
+
+
+def _misfit_columns(estimate: ProfileEstimate, gain: FloatArray) -> FloatArray:
+    """Changes of the Gaussian fit, of this gain, with the reach of its scans; mean square: sum."""
+    points, distance = estimate.points, estimate.distance
+    reach = np.array([distance[points.scan == i].max() for i in range(points.scans)])
+    share = distance / reach[points.scan]
+    inwards = np.argsort(-share)
+    misfit = estimate.predicted - estimate.gaussian.predicted
+    changes = np.cumsum((gain * misfit)[:, inwards], axis=1)
+    # From the least reach to the full one, each change holds until the next point is left out.
+    ends = np.clip(np.append(share[inwards], 0.0), _LEAST_REACH, 1.0)
+    return np.asarray(changes * np.sqrt(-np.diff(ends) / (1 - _LEAST_REACH)))
 
 
 def _fixed_root(estimate: ProfileEstimate) -> FloatArray:

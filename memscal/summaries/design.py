@@ -33,6 +33,7 @@ _NEGLIGIBLE = 5e-3
 _WORDS = {
     "regularisation": "what the film hides of G",
     "window": "what the window hides of G",
+    "misfit": "misfit of the Gaussian",
     "thickness": "film thickness",
     "poisson_ratio": "Poisson's ratio",
     "young_modulus": "Young's modulus",

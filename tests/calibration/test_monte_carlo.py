@@ -114,15 +114,6 @@ def test_youngs_modulus_does_not_matter_at_a_given_load() -> None:
     np.testing.assert_allclose(many, few, rtol=1e-9)
 
 
-def test_an_uncertain_load_scatters_a_by_its_own_share_and_no_width() -> None:
-    film, rod = EXACT_FILM, EXACT_ROD
-    calibration = uncertain(film=film, rod=rod, load_uncertainty=0.05, noise=1e-4)
-    found = memscal.monte_carlo(calibration, draws=50)
-    a, width = found["conversion_constant"], found["gaussian_sigma"]
-    assert a.uncertainty / a.value == pytest.approx(0.05, rel=spread_limit(50))
-    assert width.uncertainty / width.value < 0.001
-
-
 # The noise-equivalent area squares the noise of G, of which a division has more.
 @pytest.mark.parametrize(
     ("method", "number"),

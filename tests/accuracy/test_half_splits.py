@@ -1,0 +1,114 @@
+"""Differences between halves of one scan, and between runs of one sensor, over their prediction.
+
+Halves share film, rod, load, and what prior, window and smoothing hide: their difference is noise.
+Set MEMSCAL_FULL_STUDY for 200 scans in place of 5, and 200 runs in place of 16.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from accuracy.test_division import KINDS, kernel_of, scan_of
+from helpers.bounds import FULL
+from helpers.scans import simulated
+from scipy.stats import chi2
+
+import memscal
+from memscal.calibration.calibrate import uncertainties
+from memscal.calibration.stages import solve
+from memscal.deconvolution.division import WhiteNoise
+from memscal.model.arrays import FloatArray
+
+pytestmark = pytest.mark.accuracy
+
+CHANCE = 1e-5 if FULL else 1e-3
+SCANS, RUNS = (200, 200) if FULL else (5, 16)
+NUMBERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "fwhm")
+RADII = np.linspace(0.0, 2e-3, 9)
+ROUTES = ("division", "bayesian")
+CASES = [*((kind, noise, "points") for kind, noise in KINDS), ("disc", 0.005, "repeats")]
+
+
+def estimates(scan: memscal.Scan) -> FloatArray:
+    """By division and by model averaging: NUMBERS and G at RADII, and the noise of each."""
+    contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
+    solution, rows = solve([scan], [contact], WhiteNoise()), []
+    for route in (solution.deconvolution, solution.other):
+        assert route is not None
+        results, r = uncertainties(solution, route, {}, {}), route.g.r
+        noises = [results.budget[name]["noise"] for name in NUMBERS]
+        of_g = (np.interp(RADII, r, y) for y in (route.g.radial, results.radial_scatter))
+        values = [results.parameters[name] for name in NUMBERS]
+        rows.append([np.append(*pair) for pair in zip((values, noises), of_g, strict=True)])
+    return np.array(rows)
+
+
+@lru_cache
+def deviates(kind: str, noise: float, split: str) -> FloatArray:
+    """Differences between halves over their predicted deviation: (scans, routes, numbers)."""
+    rows = []
+    for seed in range(1000, 1000 + 2 * SCANS, 2):
+        # Two scans are two repeats of one.
+        scans = [scan_of(kind, noise, seed + i) for i in range(2)]
+        if split == "points":
+            whole = {name: getattr(scans[0], name) for name in ("x", "u_zz", "u_zz_errors")}
+            halves = ({n: v if v is None else v[i::2] for n, v in whole.items()} for i in range(2))
+            scans = [replace(scans[0], **half) for half in halves]
+        (one, of_one), (other, of_other) = (estimates(s).swapaxes(0, 1) for s in scans)
+        rows.append((one - other) / np.hypot(of_one, of_other))
+    return np.array(rows)
+
+
+def require_unit(deviates: FloatArray, route: str, least_of_shape: float = 0.8) -> None:
+    ratio, count = np.sqrt(np.mean(deviates[:, ROUTES.index(route)] ** 2, axis=0)), len(deviates)
+    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count) / count)
+    least = np.full(ratio.size, 0.8)
+    least[NUMBERS.index("fwhm") :] = least_of_shape
+    assert (least * low < ratio).all(), ratio
+    assert (ratio < 1.2 * high).all(), ratio
+
+
+@pytest.mark.parametrize("route", ROUTES)
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_halves_of_a_scan_differ_as_their_noise_predicts(case, route: str) -> None:
+    # Probabilities that follow the data bend the posterior mean, whose squared slope exceeds the
+    # variance on average (Poincare's inequality): where a departure is in doubt, up to threefold.
+    require_unit(deviates(*case), route, 0.8 if route == "division" else 0.6)
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_halves_of_all_cases_together_differ_as_predicted(route: str) -> None:
+    require_unit(np.concatenate([deviates(*case) for case in CASES]), route)
+
+
+def scatter(values: np.ndarray, stated: np.ndarray) -> float:
+    """RMS of the values about their weighted mean, in stated uncertainties."""
+    mean = np.average(values, weights=stated**-2)
+    return float(np.sqrt(np.sum(((values - mean) / stated) ** 2) / (values.size - 1)))
+
+
+@pytest.mark.parametrize(("kind", "noise"), [case for case in KINDS if case[1] < 0.01])
+def test_runs_of_other_reach_and_step_differ_as_stated(kind: str, noise: float) -> None:
+    rng, rows = np.random.default_rng(3), []
+    for seed in range(RUNS):
+        half_range, step = rng.uniform(5e-3, 10e-3), rng.uniform(0.2e-3, 0.5e-3)
+        scan = simulated(
+            kernel=kernel_of(kind, noise), noise=noise, seed=seed, half_range=half_range,
+            points=int(2 * half_range / step), centre=(rng.uniform(-1e-3, 1e-3), 0.0),
+            repeats=int(rng.integers(1, 4)),
+        )  # fmt: skip
+        apparatus = memscal.calibrate(scan, method="bayesian").apparatus
+        p, budget = apparatus.parameters, apparatus.budget["gaussian_sigma"]
+        names = "gaussian_sigma", "conversion_constant_gaussian"
+        rows.append(
+            [budget["noise"], *(n for name in names for n in (p[name], p.uncertainty(name)))]
+        )
+    by_noise, width, u_width, a, u_a = np.array(rows).T
+    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], RUNS - 1) / (RUNS - 1))
+    for ratio in (scatter(width, u_width), scatter(a, u_a)):
+        assert 0.7 * low < ratio < 1.3 * high
+    if kind == "Gaussian":
+        assert np.mean(u_width) < 1.02 * np.mean(by_noise)
+    elif kind == "tails" and noise == 0.001:
+        assert scatter(width, by_noise) > 1.2
