@@ -9,8 +9,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from accuracy.test_division import KINDS, kernel_of, scan_of
+from accuracy.test_division import CASES as SENSORS
 from helpers.bounds import FULL
+from helpers.estimation_study import Case
 from helpers.scans import simulated
 from scipy.stats import chi2
 
@@ -27,7 +28,7 @@ SCANS, RUNS = (200, 200) if FULL else (5, 16)
 NUMBERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved", "fwhm")
 RADII = np.linspace(0.0, 2e-3, 9)
 ROUTES = ("division", "bayesian")
-CASES = [*((kind, noise, "points") for kind, noise in KINDS), ("disc", 0.005, "repeats")]
+SPLITS = [*((case, "points") for case in SENSORS), (SENSORS[4], "repeats")]
 
 
 def estimates(scan: memscal.Scan) -> FloatArray:
@@ -45,12 +46,12 @@ def estimates(scan: memscal.Scan) -> FloatArray:
 
 
 @lru_cache
-def deviates(kind: str, noise: float, split: str) -> FloatArray:
+def deviates(case: Case, split: str) -> FloatArray:
     """Differences between halves over their predicted deviation: (scans, routes, numbers)."""
     rows = []
     for seed in range(1000, 1000 + 2 * SCANS, 2):
         # Two scans are two repeats of one.
-        scans = [scan_of(kind, noise, seed + i) for i in range(2)]
+        scans = [case.scan(seed + i) for i in range(2)]
         if split == "points":
             whole = {name: getattr(scans[0], name) for name in ("x", "u_zz", "u_zz_errors")}
             halves = ({n: v if v is None else v[i::2] for n, v in whole.items()} for i in range(2))
@@ -70,16 +71,16 @@ def require_unit(deviates: FloatArray, route: str, least_of_shape: float = 0.8) 
 
 
 @pytest.mark.parametrize("route", ROUTES)
-@pytest.mark.parametrize("case", CASES, ids=str)
-def test_halves_of_a_scan_differ_as_their_noise_predicts(case, route: str) -> None:
+@pytest.mark.parametrize("pair", SPLITS, ids=lambda pair: f"{pair[0].name}, {pair[1]}")
+def test_halves_of_a_scan_differ_as_predicted(pair: tuple[Case, str], route: str) -> None:
     # Probabilities that follow the data bend the posterior mean, whose squared slope exceeds the
     # variance on average (Poincare's inequality): where a departure is in doubt, up to threefold.
-    require_unit(deviates(*case), route, 0.8 if route == "division" else 0.6)
+    require_unit(deviates(*pair), route, 0.8 if route == "division" else 0.6)
 
 
 @pytest.mark.parametrize("route", ROUTES)
 def test_halves_of_all_cases_together_differ_as_predicted(route: str) -> None:
-    require_unit(np.concatenate([deviates(*case) for case in CASES]), route)
+    require_unit(np.concatenate([deviates(*pair) for pair in SPLITS]), route)
 
 
 def scatter(values: np.ndarray, stated: np.ndarray) -> float:
@@ -88,13 +89,13 @@ def scatter(values: np.ndarray, stated: np.ndarray) -> float:
     return float(np.sqrt(np.sum(((values - mean) / stated) ** 2) / (values.size - 1)))
 
 
-@pytest.mark.parametrize(("kind", "noise"), [case for case in KINDS if case[1] < 0.01])
-def test_runs_of_other_reach_and_step_differ_as_stated(kind: str, noise: float) -> None:
+@pytest.mark.parametrize("case", [c for c in SENSORS if c.noise < 0.01], ids=lambda c: c.name)
+def test_runs_of_other_reach_and_step_differ_as_stated(case: Case) -> None:
     rng, rows = np.random.default_rng(3), []
     for seed in range(RUNS):
         half_range, step = rng.uniform(5e-3, 10e-3), rng.uniform(0.2e-3, 0.5e-3)
         scan = simulated(
-            kernel=kernel_of(kind, noise), noise=noise, seed=seed, half_range=half_range,
+            kernel=case.kernel, noise=case.noise, seed=seed, half_range=half_range,
             points=int(2 * half_range / step), centre=(rng.uniform(-1e-3, 1e-3), 0.0),
             repeats=int(rng.integers(1, 4)),
         )  # fmt: skip
@@ -108,7 +109,7 @@ def test_runs_of_other_reach_and_step_differ_as_stated(kind: str, noise: float) 
     low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], RUNS - 1) / (RUNS - 1))
     for ratio in (scatter(width, u_width), scatter(a, u_a)):
         assert 0.7 * low < ratio < 1.3 * high
-    if kind == "Gaussian":
+    if case.sigma is not None:
         assert np.mean(u_width) < 1.02 * np.mean(by_noise)
-    elif kind == "tails" and noise == 0.001:
+    elif case.kind == "mixture" and case.noise == 0.001:
         assert scatter(width, by_noise) > 1.2
