@@ -8,9 +8,11 @@ amplitudes; each has a closed form on both sides of the Hankel transform,
     a\,(\delta_q \otimes g_b)(r) = \frac{a}{2\pi b^2}\,e^{-(r^2+q^2)/2b^2} I_0(rq/b^2),
     \qquad a\,J_0(kq)\,e^{-b^2k^2/2} .
 
-Lengths are in units of the width of the best Gaussian; the strength is the expected size over
-the Gaussian's, both as L2 norms over the plane.  For a shape and strength (a hypothesis) the
-model is linear, with Gaussian priors for the amplitudes and flat ones for the nuisance parameters:
+Lengths are in units of the width of the best Gaussian; the strength is the expected size over the
+Gaussian's, both as L2 norms over the plane.  Families (blurred discs, wide tails, rings) are no
+small departures: the sensor of each that fits best stands in the Gaussian's place.  For a sensor,
+shape and strength (a hypothesis) the model is linear, with Gaussian priors for the amplitudes and
+flat ones for ln A, ln(width) and the nuisance parameters:
 marginal likelihood and posterior are in closed form.  With the flat columns projected out
 (restricted likelihood: Patterson and Thompson, Biometrika 58, 1971), singular values :math:`s_j` of
 what is left of the shape's columns, data :math:`p_j` along its singular vectors and their rest
@@ -21,9 +23,10 @@ what is left of the shape's columns, data :math:`p_j` along its singular vectors
     -2\log p(u \mid \tau) = \nu\log\hat\sigma^2 + \sum_j\log(1+\tau^2 s_j^2/\hat\sigma^2), \qquad
     \nu\hat\sigma^2 = \rho + \sum_j \frac{p_j^2}{1+\tau^2 s_j^2/\hat\sigma^2} .
 
-Of a scan that is only planned, expected squares take the place of the data's.  The estimate is the
-posterior mean with a prior probability of 0.4 for the Gaussian itself; its uncertainty is the mean
-squared error with priors that allow departures only, rougher ones among them.
+and less ln of the determinant of the flat columns X, :math:`\log|X^TX|^{1/2}`.  Where noise is
+stated, :math:`\hat\sigma` is at least that.  Of a scan that is only planned, expected squares take
+the place of the data's.  The estimate is the posterior mean with a prior probability of 0.4 for the
+Gaussian itself; its uncertainty is the mean squared error with priors that allow no Gaussian.
 """
 
 from __future__ import annotations
@@ -304,27 +307,18 @@ class _Conditional:
         plain = linear.inverse @ linear.inverse.T / np.outer(linear.scale, linear.scale)
         gain, covariance = fitted, self.variance * plain
         if design is not None:
-            prior = self.strength**2
-            shrink = prior * design.singular / (self.variance + prior * design.singular**2)
-            amplitudes = (design.right.T * shrink) @ design.left.T
-            carried = fitted @ design.columns
-            spread = self._amplitude_covariance(design)
+            prior, right, carried = self.strength**2, design.right, fitted @ design.columns
+            # Posterior variances along the singular vectors; in all other directions the prior's.
+            left = prior * self.variance / (self.variance + prior * design.singular**2)
+            amplitudes = (right.T * (left * design.singular / self.variance)) @ design.left.T
+            spread = (right.T * (left - prior)) @ right + prior * np.eye(right.shape[1])
             gain = np.vstack([fitted - carried @ amplitudes, amplitudes])
-            both = np.vstack([-carried, np.eye(spread.shape[0])])
+            both = np.vstack([-carried, np.eye(right.shape[1])])
             whole = both @ spread @ both.T
             whole[: len(plain), : len(plain)] += covariance
             covariance, places = whole, np.hstack([places, design.places])
         mean = linear.start + places @ (gain @ linear.data)
         return mean, places @ gain, places @ covariance @ places.T
-
-    def _amplitude_covariance(self, design: _Design) -> FloatArray:
-        prior, right = self.strength**2, design.right
-        left_over = prior * self.variance / (self.variance + prior * design.singular**2)
-        determined = (right.T * left_over) @ right
-        if right.shape[0] == right.shape[1]:
-            return np.asarray(determined)
-        # Fewer points than components leave the prior as it was in all other directions.
-        return np.asarray(determined + prior * (np.eye(right.shape[1]) - right.T @ right))
 
 
 @dataclass(frozen=True, eq=False)
@@ -462,9 +456,7 @@ class WeighedFit:
     noise: float  # noise of a point of weight one: in V, or a factor on the stated uncertainties
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
-    change_of_a: (
-        FloatArray  # (h,): what each hypothesis alone changes in A, in V/Pa; NaN if unlikely
-    )
+    change_of_a: FloatArray  # (h,): by each hypothesis, in V/Pa; NaN where it is unlikely
     log_marginal_likelihood: float = 0.0  # of all hypotheses, up to a constant of the scan
 
     @property
@@ -549,7 +541,6 @@ def _average(
     conditionals: list[_Conditional | None], added: float, integrals: FloatArray
 ) -> WeighedFit:
     """Average mean and gain by one set of probabilities, squared errors by the other."""
-    # The gain is that of the standardised data.
     log_marginal = np.array([-np.inf if c is None else c.log_marginal for c in conditionals])
     prior = np.array([h.estimate for h in HYPOTHESES])
     estimate = _posterior(log_marginal, prior)
@@ -572,12 +563,9 @@ def _average(
     scatter = np.array([0.0 if c is None else c.scatter for c in conditionals])
     possible = (prior > 0) & np.isfinite(log_marginal)
     likelihood = float(np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible])))
-    noise = float(np.sqrt(estimate @ scatter))
-    # The residual is left to be computed.
-    unknown = np.zeros(0)
-    return WeighedFit(
-        mean, covariance, gain + moving, noise, estimate, unknown, change_of_a, likelihood
-    )
+    noise, gain = float(np.sqrt(estimate @ scatter)), gain + moving
+    # The gain is that of the standardised data, and the residual is left to be computed.
+    return WeighedFit(mean, covariance, gain, noise, estimate, mean, change_of_a, likelihood)
 
 
 def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:
