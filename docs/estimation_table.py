@@ -109,7 +109,8 @@ def main(seeds: int, pattern: str) -> None:
     names = [name for name in CASES if re.search(pattern, name)]
     with get_context("spawn").Pool(PROCESSES) as pool:
         outcomes = pool.map(partial(study, seeds=seeds), names, chunksize=1)
-    lines = [*HEAD, *(row(outcome) for outcome in outcomes), "", *by_radius(outcomes, not pattern)]
+    lines = [f"{seeds} draws in each row.", "", *HEAD, *(row(outcome) for outcome in outcomes)]
+    lines += ["", *by_radius(outcomes, not pattern)]
     if not pattern:
         lines += ["", *means(outcomes)]
     sys.stdout.write("\n".join(lines) + "\n")

@@ -45,9 +45,9 @@ LIMITS = {
     "Gaussian": Limits((0.06, 0.145, 0.15), beyond=0.05, **BANDS),
     "disc": Limits((0.15, 0.15, 0.23), **BANDS),
     "mixture": Limits((0.15, 0.16, 0.26), **BANDS),
-    # The film hides the hole of a ring, of which the band counts half.
+    # The film hides the hole of a ring, of which the band counts less than half.
     "ring": Limits((0.30, 0.30, 0.30), **BANDS | {
-        "coverage": 0.25, "mean_coverage": 0.80, "bias_g": 2.0, "ratio": (0.1, 2.1),
+        "coverage": 0.25, "mean_coverage": 0.80, "bias_g": 2.3, "ratio": (0.1, 2.4),
     }),
 }  # fmt: skip
 A_LIMITS = dict(zip(NOISES, (0.003, 0.015, 0.045), strict=True))  # RMS error
