@@ -109,8 +109,7 @@ def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArra
     """Return x, exp(-2x), 2 exp(-2x) D and kappa."""
     x = np.minimum(np.asarray(x, dtype=np.float64), _LARGEST_X)
     kappa, decay = 3 - 4 * nu, np.exp(-2 * x)
-    denominator = kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1)
-    return x, decay, denominator, kappa
+    return x, decay, kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1), kappa
 
 
 def _x_cosh_minus_sinh(x: FloatArray, decay: FloatArray) -> FloatArray:

@@ -94,10 +94,7 @@ class ShearChannel:
     def recorded(
         self, stress: FloatArray, x: FloatArray, disturbed: Disturbances
     ) -> tuple[dict[str, FloatArray], dict[str, float | str]]:
-        """Return the channel's voltages, and its truth by names that end in ``_xz``.
-
-        ``stress`` (..., n): the blurred shear along x, in Pa; ``x`` (n,): positions, in m.
-        """
+        """Return voltages of the blurred shear along x (..., n), in Pa, and their truth (_xz)."""
         clean = self.conversion_constant * stress
         largest = float(np.abs(clean).max())
         draws = np.random.default_rng([disturbed.seed, 1]).standard_normal(clean.shape)
