@@ -41,11 +41,8 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
 def blurred_stress(
     contacts: Sequence[Contact], kernel: RadialKernel, radius: FloatArray, *, order: int = 0
 ) -> FloatArray:
-    r"""Return :math:`G \otimes \sigma_{zz}` in Pa of contacts on one film, by Hankel transforms.
-
-    Shape (contacts, *radius.shape) at distances ``radius`` (m) from the axis; of order one, the
-    radial component of the blurred base shear.
-    """
+    r"""Return :math:`G \otimes \sigma_{zz}` in Pa at ``radius`` (m), a row for each contact."""
+    # Of order one: the radial component of the blurred base shear.
     nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, float(radius.max()))
     transforms = [(c.base_shear_spectrum if order else c.base_spectrum)(nodes.k) for c in contacts]
     spectra = np.stack(transforms, axis=1) * kernel.transform(nodes.k)[:, None]

@@ -108,7 +108,6 @@ _NEAR = 4.0
 # Growth of the sides with the distance from where the surface is folded around the rod's edge.
 _SLOPE = 0.7
 
-
 # Thickness and radius in mm, and how many times finer than by default the mesh is.
 FilmSize = tuple[float, float, float]
 
@@ -150,12 +149,10 @@ def _tensor(even: FloatArray, side: float, near: float, size: FilmSize) -> Any:
     r, step = [contact], side
     while r[-1] < radius:
         step = min(step * grow, near if r[-1] < contact + _NEAR * thickness else far)
-        left = radius - r[-1]
-        r.append(radius if left < 1.5 * step else r[-1] + step)
+        r.append(radius if radius - r[-1] < 1.5 * step else r[-1] + step)
     depth, step = [0.0], side
     while depth[-1] < thickness:
-        left = thickness - depth[-1]
-        depth.append(thickness if left < 1.5 * step else depth[-1] + step)
+        depth.append(thickness if thickness - depth[-1] < 1.5 * step else depth[-1] + step)
         step = min(step * grow, near)
     heights = thickness - np.array(depth[::-1])
     heights[0] = 0.0
