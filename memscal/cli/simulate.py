@@ -282,8 +282,7 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
     from memscal.formats.scan import ensure_folder_writable, write_scans
 
     ensure_folder_writable(folder, FILES, overwrite=force)
-    experiment = _experiment_from(options)
-    scans = {folder / f"{name}.h5": scan for name, scan in experiment.scans.items()}
+    scans = {folder / f"{name}.h5": s for name, s in _experiment_from(options).scans.items()}
     write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
     if as_json:
         described = [_described(scan, path) for path, scan in scans.items()]

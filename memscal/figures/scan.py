@@ -42,8 +42,7 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     clear = (signal > _EXPANDED * errors) & (signal > 0)
     limit = np.where(clear, np.nan, np.maximum(signal, 0.0) + _EXPANDED * errors)
     limit[~(limit > 0)] = np.nan
-    shown = np.where(clear, signal, np.nan)
-    _draw_measured(axes, scan.x, shown, errors, label="_measured")
+    _draw_measured(axes, scan.x, np.where(clear, signal, np.nan), errors, label="_measured")
     if np.any(np.isfinite(limit)):
         (limits,) = axes.plot(scan.x / MM, limit / MV, "v", mfc="none", mew=0.7)
         limits.set(color=COLOURS["muted"], markersize=0.8 * style.marker_size(scan.x.size))
@@ -163,8 +162,7 @@ def _seen_stress(data: ApparatusData) -> FloatArray | None:
 
 def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
     """One; of a tangential channel -1 where the indenter stands beyond the sensor."""
-    beyond = (x > _centre(data)) & _tangential(data)
-    return np.where(beyond, -1.0, 1.0)
+    return np.where((x > _centre(data)) & _tangential(data), -1.0, 1.0)
 
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:

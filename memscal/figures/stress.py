@@ -208,8 +208,7 @@ def _shades(count: int) -> list[str]:
 
 
 def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
-    widest = max(contact.contact_radius for contact in contacts)
-    r = np.linspace(0.0, 1.15 * widest, _RADII)
+    r = np.linspace(0.0, 1.15 * max(contact.contact_radius for contact in contacts), _RADII)
     highest = 0.0
     for i, (contact, colour) in enumerate(zip(contacts, colours, strict=True)):
         pressure = contact.interface_pressure(r)

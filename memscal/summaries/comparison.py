@@ -291,11 +291,10 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
     friction = [_friction_table(comparison, loading) for loading in comparison.loadings]
     if isinstance(comparison, ShearComparison):
         return [*friction, _budget_table(comparison)]
-    fits = [table for way in comparison.loadings for table in _chi_square_tables(comparison, way)]
     return [
         _maxima_table(comparison),
         *friction,
-        *fits,
+        *(table for way in comparison.loadings for table in _chi_square_tables(comparison, way)),
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
@@ -474,6 +473,5 @@ def _lubrication_table(comparison: FrictionComparison) -> Table:
         ]
         for pair in comparison.dry_against_lubricated
     ]
-    words = (load.heading, maximum.heading, relative.words)
-    head = [*words, "χ²/ν of no difference", "p"]
+    head = [load.heading, maximum.heading, relative.words, "χ²/ν of no difference", "p"]
     return Table("Dry less lubricated stress (± standard uncertainty)", head, rows)

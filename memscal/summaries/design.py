@@ -54,10 +54,9 @@ def tables(planned: Design) -> list[Table]:
     ]
     title = f"A planned scan (nothing was measured), for method {planned.method}"
     head = ("", "value", "uncertainty", "relative")
-    expected = "Expected, with standard uncertainties (k = 1)"
     return [
         Table(title, ("", ""), rows),
-        Table(expected, head, _expected_rows(planned)),
+        Table("Expected, with standard uncertainties (k = 1)", head, _expected_rows(planned)),
         _contributions_table(planned),
     ]
 

@@ -53,9 +53,8 @@ def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
 
 def _centre(profile: MeasuredProfile) -> dict[str, Any]:
     """Return the centre along the scan, in m."""
-    axis = profile.axis
-    u = profile.centre_uncertainty[axis]
-    return {"centre": profile.centre[axis], "centre_uncertainty": u}
+    u = profile.centre_uncertainty[profile.axis]
+    return {"centre": profile.centre[profile.axis], "centre_uncertainty": u}
 
 
 def tables(stress: MeasuredStress) -> list[Table]:
