@@ -75,8 +75,7 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     low, high = np.maximum(transfer.modulus - band, 0.0), transfer.modulus + band
     axes.fill_between(k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2), with hidden detail")
     axes.plot(k, transfer.modulus, "-", color=blue, label="modulus for G")
-    sigma = data.gaussian_sigma
-    gaussian = np.exp(-0.5 * (sigma * transfer.k) ** 2)
+    gaussian = np.exp(-0.5 * (data.gaussian_sigma * transfer.k) ** 2)
     axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
     axes.plot(k, transfer.window, ":", color=COLOURS["window"], label="window")
     _shade_unresolved(axes, limit, end)
@@ -224,5 +223,4 @@ def _write_lines(figure: Figure, lines: list[tuple[str, str, str]]) -> None:
         text.set_in_layout(False)
         # Lines are broken by their number of characters; one of wide letters is set smaller.
         available = (1 - 3 * _MARGIN) * figure.bbox.width
-        width = text.get_window_extent().width
-        text.set_fontsize(size * min(1.0, available / max(width, 1.0)))
+        text.set_fontsize(size * min(1.0, available / max(text.get_window_extent().width, 1.0)))
