@@ -55,12 +55,10 @@ def test_wrong_use_is_told_before_anything_is_computed(run: Run, arguments, told
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
-    (["--want", "colour=1%", "--vary", "step"], "no known target"),
-    (["--step", 4], "positions"),
+    (["--want", "colour=1%", "--vary", "step"], "no known target"), (["--step", 4], "positions"),
     (["--half-range", 2, "--centre", 3], "not passed over"),
     (["--half-range", 0.8, "--step", 0.1, "--noise", 1], "not distinct from zero"),
-    (["--radius", 1.5], "rod's width is 3 mm"),
-    (["--method", "magic"], "magic"),
+    (["--radius", 1.5], "rod's width is 3 mm"), (["--method", "magic"], "magic"),
 ])  # fmt: skip
 def test_a_plan_that_cannot_be_is_refused(run: Run, arguments, told):
     failed = run("design", *arguments)

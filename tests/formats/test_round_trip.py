@@ -57,8 +57,7 @@ def test_a_scan_comes_back_with_its_source_named(tmp_path: Path, kind):
     found = read_scan(path)
     assert_same(found, make_scan(kind), but=("source",))
     assert found.kind == kind
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    assert found.source == SourceFile("scan.h5", digest)
+    assert found.source == SourceFile("scan.h5", hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 @pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])

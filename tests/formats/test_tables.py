@@ -98,8 +98,7 @@ def test_equal_positions_without_a_column_of_repeats_are_one_line(tmp_path: Path
 def test_a_line_has_no_note_of_repeats(tmp_path_factory: pytest.TempPathFactory, seed, spread):
     rng = np.random.default_rng(seed)
     x = rng.permutation(np.arange(33.0) + spread * rng.uniform(-1, 1, 33))
-    text = rows(x.tolist(), [1.0] * 33, header="x,u")
-    found = scan_table(tmp_path_factory.mktemp("t"), text)
+    found = scan_table(tmp_path_factory.mktemp("t"), rows(x.tolist(), [1.0] * 33, header="x,u"))
     assert not any("--repeat COLUMN" in note.text for note in found.notes)
 
 
@@ -168,12 +167,10 @@ def test_rows_without_a_position_are_left_out_and_counted_and_a_header_may_be(tm
 
 
 @pytest.mark.parametrize(("text", "decimal"), [
-    ("x;u\n0,5;1,25\n1,5;2,5\n", ","),
-    ("x\tu\n0.5\t1.25\n1.5\t2.5\n", "."),
+    ("x;u\n0,5;1,25\n1,5;2,5\n", ","), ("x\tu\n0.5\t1.25\n1.5\t2.5\n", "."),
     ("x u\n0.5   1.25\n 1.5 2.5\n", "."),
     ("# made by a stage\n% in mm\nx,u\n0.5,1.25\n1.5,2.5\n", "."),
-    ('"x","u"\n"0.5","1.25"\n"1.5","2.5"\n', "."),
-    ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", "."),
+    ('"x","u"\n"0.5","1.25"\n"1.5","2.5"\n', "."), ("\ufeffx,u\r\n0.5,1.25\r\n1.5,2.5\r\n", "."),
     ("x|u\n5D-1|1.25\n1.5|2.5d0\n", "."),
 ], ids=["German", "tabs", "spaces", "comments", "quotes", "Excel", "Fortran"])  # fmt: skip
 def test_every_dialect_gives_the_same_numbers(tmp_path: Path, text, decimal):

@@ -72,9 +72,8 @@ def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
             truth = float(blurred(profile.load, np.zeros(1))[0])
             z.append((profile.maximum - truth) / profile.maximum_uncertainty)
             z.append((profile.force - profile.load) / profile.force_uncertainty)
-    spread = np.sqrt(2 / len(z))
     # The force's uncertainty allows for shapes that a sphere does not have.
-    assert 0.3 < np.mean(np.square(z)) < 1 + 4 * spread
+    assert 0.3 < np.mean(np.square(z)) < 1 + 4 * np.sqrt(2 / len(z))
 
 
 def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum() -> None:
