@@ -200,11 +200,9 @@ def test_values_given_for_each_element_are_averaged_at_shared_nodes(tmp_path: Pa
         point_data={"S33": stress.ravel()},
     )
     found = imported(saved(apart, tmp_path / "film.vtu"), "S33")
-    inner = slice(1, -1)
     np.testing.assert_allclose(found.profile.r, 1e-3 * RADII, atol=1e-12)
-    np.testing.assert_allclose(
-        found.profile.sigma_zz[inner], 1e6 * pressure(RADII[inner]), rtol=1e-12
-    )
+    inner = found.profile.sigma_zz[1:-1]
+    np.testing.assert_allclose(inner, 1e6 * pressure(RADII[1:-1]), rtol=1e-12)
     assert any("39 nodes repeat a radius" in note.text for note in found.notes)
 
 
@@ -244,11 +242,8 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
             quads += [(a, a + 4, b + 4), (a, b + 4, b)]
     corners = np.array(quads)
     middles = [(flat[corners[:, a]] + flat[corners[:, b]]) / 2 for a, b in QUADRATIC]
-    points, index = np.unique(
-        np.round(np.concatenate([flat[corners.T.ravel()], *middles]), 12),
-        axis=0,
-        return_inverse=True,
-    )
+    nodes = np.round(np.concatenate([flat[corners.T.ravel()], *middles]), 12)
+    points, index = np.unique(nodes, axis=0, return_inverse=True)
     mesh = FieldMesh(
         points=1e-3 * points, triangles=index.reshape(6, -1).T, displacement=1e-6 * points,
         stress=1e6 * tensor(*points.T),

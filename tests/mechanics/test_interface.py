@@ -73,9 +73,8 @@ def test_the_rigid_contact_returns_as_the_roughness_vanishes(rough, mu) -> None:
 
 
 def test_zero_compliances_are_the_rigid_interface_itself() -> None:
-    none = Interface(
-        normal=GreenwoodTripp(roughness=0.0, asperity_density=1e9, asperity_radius=1e-5)
-    )
+    law = GreenwoodTripp(roughness=0.0, asperity_density=1e9, asperity_radius=1e-5)
+    none = Interface(normal=law)
     assert none.rigid
     assert press(none, mu=0.3).depth == press(mu=0.3).depth
 
