@@ -70,17 +70,10 @@ def weighed(friction: float, slip_length: float, kind: str, seed: int) -> LawCom
     """Make, calibrate and measure one experiment, and weigh laws of its dry interface."""
     interface = Interface(slip_length=slip_length) if slip_length else None
     film = KNOWN_FILM if kind == "known" else PAPER_FILM
-    made = memscal.simulate_experiment(
-        film=film,
-        friction=friction,
-        interface=interface,
-        draw_inputs=True,
-        # Every kind of experiment has seeds of its own: shared ones would be unlucky together.
-        seed=round(1e5 * friction + 1e9 * slip_length) * 1000
-        + 250 * list(KINDS).index(kind)
-        + seed,
-        **KINDS[kind],
-    )
+    contact = {"film": film, "friction": friction, "interface": interface}
+    # Every kind of experiment has seeds of its own: shared ones would be unlucky together.
+    seed += round(1e5 * friction + 1e9 * slip_length) * 1000 + 250 * list(KINDS).index(kind)
+    made = memscal.simulate_experiment(draw_inputs=True, seed=seed, **contact, **KINDS[kind])
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
     profiles = memscal.measure_stress([made.dry], apparatus).profiles
     families = {"amontons": rigid(film), "slipping": slipping(film)}

@@ -192,9 +192,8 @@ def test_all_figures_have_the_names_that_the_command_line_proves():
         found = comparison(lubrications=lubrications)
         assert list(of_friction.comparison_figures(found)) == figure_stems(lubrications)
     found = comparison(interface=interface_comparison())
-    assert list(of_friction.comparison_figures(found)) == figure_stems(
-        ["dry", "lubricated"], interface=True
-    )
+    stems = figure_stems(["dry", "lubricated"], interface=True)
+    assert list(of_friction.comparison_figures(found)) == stems
 
 
 @pytest.mark.parametrize("stem", figure_stems(["dry", "lubricated"]))
@@ -228,11 +227,8 @@ def test_without_laws_of_the_interface_there_is_nothing_to_draw(found: FrictionC
 
 def test_one_load_and_one_loading_are_enough():
     found = comparison(lubrications=("",), loadings=("",), loads=(1.37,), macroscopic=None)
-    figures = [
-        of_friction.comparison_figure(found),
-        *(draw() for draw in of_friction.comparison_figures(found).values()),
-    ]
-    for figure in figures:
+    several = of_friction.comparison_figures(found).values()
+    for figure in (of_friction.comparison_figure(found), *(draw() for draw in several)):
         assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
