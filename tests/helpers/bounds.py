@@ -21,7 +21,7 @@ def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
 
 @lru_cache
 def cramer_rao(
-    noise: float, *, sigma: float = SIGMA, points: int = 65, repeats: int = 1
+    noise: float, sigma: float = SIGMA, centre: float = CENTRE, points: int = 65, repeats: int = 1
 ) -> tuple[float, float]:
     """Cramer-Rao bounds of A and sigma, relative; A, sigma, centre and baseline unknown.
 
@@ -29,7 +29,7 @@ def cramer_rao(
     """
     still = {"noise": 0.0, "points": points, "baseline": 0.0, "drift": 0.0}
 
-    def voltage(a: float = CONVERSION, s: float = sigma, x: float = CENTRE) -> FloatArray:
+    def voltage(a: float = CONVERSION, s: float = sigma, x: float = centre) -> FloatArray:
         kernel = memscal.GaussianMixture((1.0,), (s,))
         return simulated(conversion_constant=a, kernel=kernel, centre=(x, 0.0), **still).u_zz
 
@@ -37,7 +37,7 @@ def cramer_rao(
     columns = [
         (voltage(a=CONVERSION * (1 + step)) - voltage(a=CONVERSION * (1 - step))) / (2 * step),
         (voltage(s=sigma * (1 + step)) - voltage(s=sigma * (1 - step))) / (2 * step),
-        (voltage(x=CENTRE + shift) - voltage(x=CENTRE - shift)) / (2 * shift * 1e3),
+        (voltage(x=centre + shift) - voltage(x=centre - shift)) / (2 * shift * 1e3),
         np.ones(points),
     ]
     jacobian = np.stack(columns, axis=1)
