@@ -4,7 +4,7 @@ import os
 from functools import lru_cache
 
 import numpy as np
-from helpers.scans import CONVERSION, SIGMA, simulated
+from helpers.scans import CENTRE, CONVERSION, SIGMA, simulated
 from scipy.stats import chi2
 
 import memscal
@@ -21,12 +21,7 @@ def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
 
 @lru_cache
 def cramer_rao(
-    noise: float,
-    *,
-    sigma: float = SIGMA,
-    centre: float = 0.14e-3,
-    points: int = 65,
-    repeats: int = 1,
+    noise: float, sigma: float = SIGMA, centre: float = CENTRE, points: int = 65, repeats: int = 1
 ) -> tuple[float, float]:
     """Cramer-Rao bounds of A and sigma, relative; A, sigma, centre and baseline unknown.
 
