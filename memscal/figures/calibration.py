@@ -73,9 +73,7 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     band = _EXPANDED * transfer.modulus_errors
     blue = COLOURS["deconvolved"]
     low, high = np.maximum(transfer.modulus - band, 0.0), transfer.modulus + band
-    axes.fill_between(
-        k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2), with hidden detail"
-    )
+    axes.fill_between(k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (conservative)")
     axes.plot(k, transfer.modulus, "-", color=blue, label="modulus for G")
     gaussian = np.exp(-0.5 * (data.gaussian_sigma * transfer.k) ** 2)
     axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
@@ -92,9 +90,7 @@ def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
     spread = _EXPANDED * radial.g_errors
     low, high = (np.maximum(radial.g + side * spread, floor) / PER_MM2 for side in (-1, 1))
     blue, r = COLOURS["deconvolved"], radial.r / MM
-    axes.fill_between(
-        r, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2), with hidden detail"
-    )
+    axes.fill_between(r, low, high, color=blue, alpha=0.25, lw=0, label="±2u (conservative)")
 
 
 def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
