@@ -3,6 +3,7 @@
 Set MEMSCAL_FULL_STUDY for 400 seeds in place of 60.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from helpers.bounds import FULL
 from helpers.direct import direct_scan
 from helpers.scans import RING, TAILS, estimated, simulated
+from scipy.interpolate import make_interp_spline
 from scipy.stats import binom, kstest
 
 import memscal
@@ -73,6 +75,24 @@ def test_runs_are_rejected_no_more_often_than_their_level() -> None:
     found = np.concatenate([p_values(sensor, 0.003)["runs"] for sensor in SENSORS])
     for level in (0.01, 0.05, 0.2):
         assert np.sum(found < level) <= binom.ppf(1 - CHANCE, found.size, level)
+
+
+def test_uncertain_positions_are_noise_of_every_chi_square() -> None:
+    fine, error = simulated(noise=0.0, points=1025), 10e-6
+    voltage = make_interp_spline(fine.x, fine.u_zz, k=5)
+    found: dict[str, list[float]] = {"gaussian_misfit": [], "chi_square": [], "reconvolution": []}
+    for seed in range(SEEDS):
+        scan = simulated(noise=0.002, seed=seed)
+        off = error * np.random.default_rng([seed, 1]).normal(size=65)
+        u = scan.u_zz + voltage(scan.x + off) - voltage(scan.x)
+        scan = replace(scan, u_zz=u, x_errors=np.full(65, error))
+        for check in memscal.calibrate(scan).apparatus.checks:
+            if check.name in found:
+                # A reconvolution has no p-value.
+                found[check.name].append(check.p_value or check.value / check.limit)
+    assert kstest(found["chi_square"], "uniform").pvalue > CHANCE
+    assert kstest(found["gaussian_misfit"], "uniform").pvalue > CHANCE
+    assert np.sum(np.array(found["reconvolution"]) > 1) <= binom.ppf(1 - CHANCE, SEEDS, 1e-3)
 
 
 def test_clean_scans_hardly_ever_fail_a_check() -> None:

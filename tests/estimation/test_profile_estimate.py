@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import CONVERSION, RING, estimated, simulated
+from helpers.scans import CONVERSION, RING, TAILS, estimated, simulated
 from scipy.stats import chi2
 
 import memscal
 from memscal.errors import FitError
-from memscal.estimation.bayesian import weigh_departures
+from memscal.estimation.bayesian import HYPOTHESES, weigh_departures
 
 
 def test_without_noise_the_profile_is_the_scan() -> None:
@@ -92,6 +92,17 @@ def test_noise_that_is_stated_too_large_widens_the_band_by_what_noise_does_and_n
     found = [memscal.calibrate(stated, method="bayesian").apparatus for stated in scans]
     bands = [apparatus.radial_uncertainty(0.0) for apparatus in found]
     assert bands[0] < bands[1] < 3 * bands[0]
+
+
+def test_stated_noise_is_the_least_that_the_evidence_takes() -> None:
+    """Overstated, it says nothing against a Gaussian; understated, the scatter counts."""
+    for seed in range(4):
+        scan = simulated(noise=0.01, kernel=TAILS, seed=seed)
+        scans = [replace(scan, u_zz_errors=scan.u_zz_errors * factor) for factor in (0.5, 1, 10)]
+        under, stated, over = (estimated(s).weighed.gaussian_probability for s in scans)
+        # Within a third of what the scan itself says, and within 0.01 of the prior.
+        assert 0.3 * stated < under <= stated
+        assert stated < over == pytest.approx(HYPOTHESES[0].estimate, abs=0.01)
 
 
 def test_a_scan_without_scatter_is_calibrated_at_the_noise_that_it_states() -> None:
