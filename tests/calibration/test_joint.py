@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.bounds import assert_as_stated, cramer_rao
 from helpers.scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, as_points, simulated
 from scipy.stats import chi2
 
 import memscal
 from memscal.errors import InputError
+from memscal.model.apparatus import ParameterSet
 from memscal.model.scan import Scan, StressSensor
 
 SEEDS = 60
@@ -51,10 +53,18 @@ def test_a_joint_fit_is_surer_than_each_of_its_scans_and_between_them() -> None:
         assert abs(together.parameters[name] - weights @ values / weights.sum()) < combined
 
 
+def assert_a_is_as_stated(parameters: ParameterSet, bounds: list[dict[str, float]]) -> None:
+    """Assert that A is right to what it states, which is at the bound of separate scans."""
+    name = "conversion_constant"
+    combined = sum(bound[name] ** -2 for bound in bounds) ** -0.5
+    assert_as_stated(parameters, {name: CONVERSION}, {name: combined})
+
+
 def test_the_division_joins_scans_of_other_loads_rods_and_films() -> None:
     scans, name = several(0.005), "conversion_constant"
     together, *alone = (joint(s, "white-noise").parameters for s in (scans, *([s] for s in scans)))
-    assert abs(together[name] - CONVERSION) < 3 * together.uncertainty(name)
+    sizes = [{"film": s.film, "rod": s.indenter, "load": s.load, "points": s.x.size} for s in scans]
+    assert_a_is_as_stated(together, [cramer_rao(0.005, **size) for size in sizes])
     assert together.uncertainty(name) < min(parameters.uncertainty(name) for parameters in alone)
 
 
@@ -70,8 +80,9 @@ def test_a_scan_along_y_says_what_one_along_x_says() -> None:
 def test_lines_and_a_raster_are_fitted_together() -> None:
     raster = simulated(raster=True, points=21, noise=0.003, centre=(0.2e-3, -0.1e-3), kernel=TAILS)
     apparatus = joint([simulated(noise=0.003, kernel=TAILS), raster])
-    deviation = apparatus.conversion_constant - CONVERSION
-    assert abs(deviation) < 4 * apparatus.parameters.uncertainty("conversion_constant")
+    setting = {"raster": True, "points": 21, "centre": (0.2e-3, -0.1e-3)}
+    bounds = [cramer_rao(0.003, kernel=TAILS, **scan) for scan in ({}, setting)]
+    assert_a_is_as_stated(apparatus.parameters, bounds)
     assert apparatus.parameters["centre_y_2"] == pytest.approx(-0.1e-3, abs=0.02e-3)
 
 
