@@ -54,7 +54,7 @@ def cramer_rao(
     columns = [(voltage(name, h) - voltage(name, -h)) / 2 for name, h in steps.items()]
     # In units of the steps, and of the largest signal.
     jacobian = np.stack([*columns, np.full(signal.size, signal.max())], axis=1)
-    deviation = simulated(noise=noise, **setting).synthetic["noise"]
+    deviation = simulated(noise=noise, kernel=kernel, centre=centre, **setting).synthetic["noise"]
     variance = np.diag(np.linalg.inv(jacobian.T @ jacobian)) * deviation**2
     if inexact:
         changes = {"thickness": 1.01 * EXACT_FILM.thickness}, {"poisson_ratio": 0.495}
