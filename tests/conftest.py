@@ -1,7 +1,9 @@
 """Settings for all tests."""
 
 import gc
+import logging
 import os
+import secrets
 import sys
 from collections.abc import Iterator
 
@@ -18,7 +20,6 @@ settings.load_profile("memscal")
 
 REMEMBERING = ("memscal.mechanics.solver.refinement", "memscal.mechanics.finite_strain.solve")
 
-
 FULL_STUDY = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 
 
@@ -33,6 +34,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     full = [item for item in items if item.get_closest_marker("full_study") and not FULL_STUDY]
     config.hook.pytest_deselected(items=full)
     items[:] = [item for item in items if item not in full]
+
+
+@pytest.fixture
+def seed() -> int:
+    """Return another seed in every run; the log of a failed test names it."""
+    value = secrets.randbits(32)
+    logging.getLogger(__name__).info("seed %d", value)
+    return value
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -128,20 +128,14 @@ def test_html_holds_values_and_checks(calibration: memscal.Calibration) -> None:
 def test_ufloats_have_the_covariance_of_the_parameters(calibration, loaded, scan) -> None:
     uncertainties = pytest.importorskip("uncertainties")
     (fleet,) = memscal.calibrate_many([scan])
-    for result, parameters in (
-        (calibration, calibration.apparatus.parameters),
-        (loaded, loaded.parameters),
-        (fleet, calibration.apparatus.parameters),
-    ):
+    own = calibration.apparatus.parameters
+    for result, parameters in ((calibration, own), (loaded, loaded.parameters), (fleet, own)):
         numbers = result.ufloats()
         assert tuple(numbers) == parameters.names
         scale = np.sqrt(np.diag(parameters.covariance))
         covariance = np.array(uncertainties.covariance_matrix(list(numbers.values())))
-        np.testing.assert_allclose(
-            covariance / np.outer(scale, scale),
-            parameters.covariance / np.outer(scale, scale),
-            atol=1e-9,
-        )
+        expected = parameters.covariance / np.outer(scale, scale)
+        np.testing.assert_allclose(covariance / np.outer(scale, scale), expected, atol=1e-9)
     ratio = numbers["conversion_constant"] / numbers["conversion_constant_gaussian"]
     assert ratio.nominal_value == pytest.approx(1, abs=0.1)
 
@@ -199,7 +193,6 @@ def test_figures_are_those_of_the_command(calibration, loaded, drawn) -> None:
 
 def test_a_missing_library_is_named_with_the_extra_that_brings_it(calibration, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(
-        memscal.MemscalError, match=r"(?s)xarray is not installed.*memscal\[interop\]"
-    ):
+    said = r"(?s)xarray is not installed.*memscal\[interop\]"
+    with pytest.raises(memscal.MemscalError, match=said):
         calibration.to_xarray()

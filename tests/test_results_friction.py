@@ -168,11 +168,9 @@ def messages(
 ) -> str:
     film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
     scan = SimpleNamespace(synthetic=False, film=film, indenter=Sphere(radius=0.1))
-    measured: Any = SimpleNamespace(
-        scans=(scan,),
-        profiles=(SimpleNamespace(scan=scan, load_uncertainty=None),),
-        messages=(Message("measured", "from the measured stress"),),
-    )
+    profiles = (SimpleNamespace(scan=scan, load_uncertainty=None),)
+    told = (Message("measured", "from the measured stress"),)
+    measured: Any = SimpleNamespace(scans=(scan,), profiles=profiles, messages=told)
     joint = {"dry": {"incremental": incremental, "total": total}}
     sliding = None if macroscopic is None else (macroscopic, None)
     return "\n".join(map(str, comparison_messages(measured, {}, joint, (), sliding)))

@@ -40,8 +40,7 @@ class LazyGroup(click.Group):
         """Import a command."""
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f"memscal.cli.{COMMANDS[cmd_name][0]}")
-        command: click.Command = module.command
+        command: click.Command = import_module(f"memscal.cli.{COMMANDS[cmd_name][0]}").command
         return command
 
     def resolve_command(

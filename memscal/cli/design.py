@@ -7,22 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import (
-    PAPER_FILM,
-    Quantity,
-    film_from,
-    film_options,
-    indenter_from,
-    kernel_from,
-    kernel_options,
-    option,
-    output_options,
-    radius_options,
-    require_one_kernel,
-    si,
-)
+from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,13 +72,13 @@ class _Target(_TargetType):
 
 
 @click.command("design", epilog=EXAMPLES)
-@kernel_options
+@common.kernel_options
 @option("--load", Quantity("N"), 1.0)("Normal load, in N.")
 @option("--load-uncertainty", Quantity("percent", open_low=False), 1.0)(
     "Standard uncertainty (k = 1) of the load, in percent."
 )
-@radius_options(default=0.25, uncertainty=0.0025)
-@film_options(defaults=PAPER_FILM)
+@common.radius_options(default=0.25, uncertainty=0.0025)
+@common.film_options(defaults=PAPER_FILM)
 @option("--step", Quantity("mm"), 0.25)("Distance of neighbouring positions, in mm.")
 @option("--half-range", Quantity("mm"), 8.0)("Positions run from minus to plus this, in mm.")
 @option("--repeats", click.IntRange(min=1), 1)("How often the line is scanned.")
@@ -130,7 +118,7 @@ def command(
     the estimate and the uncertainties of film, rod and load. Defaults are the paper's. With --want
     and --vary, the smallest scan that reaches the targets is found.
     """
-    require_one_kernel(options)
+    common.require_one_kernel(options)
     if bool(targets) != (vary is not None):
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
     out.prove_writable(figures, force=force)
@@ -155,8 +143,8 @@ def _designed(options: dict[str, Any], targets: dict[str, float], vary: str | No
 
     settings: dict[str, Any] = {name: si(options[name], power) for name, power in _SCALED.items()}
     settings |= {name: options[name] for name in ("load", "repeats", "method")}
-    settings |= {"rod": indenter_from("rod", options), "film": film_from(options)}
-    return design(kernel=kernel_from(options), want=targets, vary=vary, **settings)
+    settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
+    return design(kernel=common.kernel_from(options), want=targets, vary=vary, **settings)
 
 
 def _figure(planned: Design, vary: str | None) -> Figure:

@@ -33,15 +33,14 @@ def _set_debug(ctx: click.Context, _: click.Parameter, debug: bool) -> None:
 
 def debug_option(command: _Command) -> _Command:
     """Add ``--debug``, before or after the name of a command."""
-    option = click.option(
+    return click.option(
         "--debug",
         is_flag=True,
         expose_value=False,
         is_eager=True,
         callback=_set_debug,
         help="Show Python's traceback with an error.",
-    )
-    return option(command)
+    )(command)
 
 
 def guarded(run: Callable[[Session], int]) -> int:

@@ -8,20 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import options as common
 from memscal.cli.failures import DONE
-from memscal.cli.options import (
-    FILE,
-    FILM,
-    Quantity,
-    film_from,
-    film_options,
-    indenter_from,
-    option,
-    options_of,
-    output_options,
-    radius_options,
-    si,
-)
+from memscal.cli.options import FILE, Quantity, option, options_of, output_options, si
 from memscal.cli.output import emit, emit_json, message, prove_writable, show_messages
 from memscal.model.checks import marked_texts
 from memscal.summaries.table import readable
@@ -88,10 +77,10 @@ def _unused_options(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str
 def _read_reference(path: Path, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting = _stated(options, (*_SHARED, "load"))
-    if any(options[name] is not None for name in FILM):
-        setting["film"] = film_from(options)
+    if any(options[name] is not None for name in common.FILM):
+        setting["film"] = common.film_from(options)
     if options["radius"] is not None:
-        setting["indenter"] = indenter_from(options["indenter"], options)
+        setting["indenter"] = common.indenter_from(options["indenter"], options)
     if not _is_mesh(path):
         from memscal.formats.tables.reference import read_reference_table
 
@@ -199,8 +188,8 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @option("--title", metavar="TEXT")("Scan: title.")
 @reference_options
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
-@radius_options("the rod or of the sphere's curvature")
-@film_options()
+@common.radius_options("the rod or of the sphere's curvature")
+@common.film_options()
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options
@@ -263,7 +252,7 @@ def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
 
 
 def _scan(path: Path, options: dict[str, Any]) -> ImportedScan:
-    film, indenter = film_from(options), indenter_from(options["indenter"], options)
+    film, indenter = common.film_from(options), common.indenter_from(options["indenter"], options)
     from memscal.formats.tables.scan import read_scan_table
     from memscal.model.scan import StressSensor
 

@@ -9,21 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE
-from memscal.cli.options import (
-    FILE,
-    PAPER_FILM,
-    Quantity,
-    film_from,
-    film_options,
-    indenter_from,
-    option,
-    options_of,
-    output_options,
-    radius_options,
-    si,
-)
+from memscal.cli.options import FILE, PAPER_FILM, Quantity, indenter_from, option, options_of, si
 
 if TYPE_CHECKING:
     from memscal.mechanics.contact import Contact
@@ -123,7 +112,7 @@ Examples:
 @option("--depth depths", Quantity("um"), multiple=True)(
     "Indentation depth, in um, in place of a load. May be repeated."
 )
-@radius_options("the rod or of the sphere's curvature", uncertainties=False)
+@common.radius_options("the rod or of the sphere's curvature", uncertainties=False)
 @option("--inclination", Quantity("deg", high=89.0))(
     "Cone: angle between its face and the film, in degrees."
 )
@@ -139,7 +128,7 @@ Examples:
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
-@film_options(defaults=PAPER_FILM, uncertainties=False)
+@common.film_options(defaults=PAPER_FILM, uncertainties=False)
 @option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
@@ -163,7 +152,7 @@ Examples:
     "Displacement and stress in the film, for ParaView (needs meshio); for finite elements "
     "and one load or depth."
 )
-@output_options
+@common.output_options
 def command(
     indenter: str,
     loads: tuple[float, ...],
@@ -216,7 +205,7 @@ def _check_usage(
 def _pressed(
     indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], options: dict[str, Any]
 ) -> list[Contact]:
-    film, body = film_from(options), indenter_of(indenter, options)
+    film, body = common.film_from(options), indenter_of(indenter, options)
     interface = interface_of(options)
     from memscal.mechanics.indent import indent
 

@@ -10,23 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from memscal.cli import options as common
 from memscal.cli.failures import DONE
-from memscal.cli.options import (
-    FILE,
-    PAPER_FILM,
-    Quantity,
-    film_from,
-    film_options,
-    indenter_from,
-    kernel_from,
-    kernel_options,
-    option,
-    options_of,
-    output_options,
-    radius_options,
-    require_one_kernel,
-    si,
-)
+from memscal.cli.options import FILE, PAPER_FILM, Quantity, option, options_of, output_options, si
 from memscal.cli.output import emit_json, emit_tables, message, note, prove_writable
 from memscal.cli.reference import interface_of, interface_options
 from memscal.summaries.table import Table
@@ -99,9 +85,9 @@ _OF_SPHERE = ("lubricated_loads", "friction", "loading", "record_loads", "draw_i
 def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return what describes a rod scan and an experiment alike."""
     return {
-        "film": film_from(options),
-        "rod": indenter_from("rod", options),
-        "kernel": kernel_from(options),
+        "film": common.film_from(options),
+        "rod": common.indenter_from("rod", options),
+        "kernel": common.kernel_from(options),
         "centre": (si(options["centre"], -3), si(options["centre_y"], -3)),
         **{name: si(options[name], power) for name, power in _SCALED.items()},
         **{name: options[name] for name in _SHARED},
@@ -115,7 +101,10 @@ def _experiment_from(options: Mapping[str, Any]) -> Experiment:
         "radius": options["sphere_radius"],
         "radius_uncertainty": options["sphere_radius_uncertainty"],
     }
-    settings |= {"sphere": indenter_from("sphere", radius), "interface": interface_of(options)}
+    settings |= {
+        "sphere": common.indenter_from("sphere", radius),
+        "interface": interface_of(options),
+    }
     from memscal.simulation.experiment import simulate_experiment
 
     return simulate_experiment(
@@ -199,13 +188,13 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
     "Scan to write (memscal-scan), or the folder of an experiment's three scans.  "
     "[default: synthetic_scan.h5, or synthetic_experiment]"
 )
-@kernel_options
+@common.kernel_options
 @option("--load loads", Quantity("N"), multiple=True)(
     "Normal load, in N. Repeated: one scan at each.  [default: 1; of a sphere's dry contacts "
     "0.34, 0.69, 1.37 and 2.75]"
 )
-@radius_options(default=0.25, uncertainty=0.0025)
-@film_options(defaults=PAPER_FILM)
+@common.radius_options(default=0.25, uncertainty=0.0025)
+@common.film_options(defaults=PAPER_FILM)
 @option("--half-range", Quantity("mm"), 8.0)(
     "Rod scan alone: positions run from minus to plus this, in mm."
 )
@@ -279,7 +268,7 @@ def _check_usage(experiment: str, options: Mapping[str, Any]) -> None:
         other = "sphere" if experiment == "rod" else "rod"
         belongs = "belongs" if len(names) == 1 else "belong"
         raise click.UsageError(f"{', '.join(names)} {belongs} to --experiment {other}.")
-    require_one_kernel(options)
+    common.require_one_kernel(options)
     if options["raster"] and max(len(options["loads"]), 1) * options["repeats"] > 1:
         raise click.UsageError("A raster has one repeat at one load.")
     for name in ("loads", "lubricated_loads"):
@@ -293,8 +282,7 @@ def _sphere(folder: Path, options: Mapping[str, Any], as_json: bool, force: bool
     from memscal.formats.scan import ensure_folder_writable, write_scans
 
     ensure_folder_writable(folder, FILES, overwrite=force)
-    experiment = _experiment_from(options)
-    scans = {folder / f"{name}.h5": scan for name, scan in experiment.scans.items()}
+    scans = {folder / f"{name}.h5": s for name, s in _experiment_from(options).scans.items()}
     write_scans({path.name: scan for path, scan in scans.items()}, folder, overwrite=force)
     if as_json:
         described = [_described(scan, path) for path, scan in scans.items()]

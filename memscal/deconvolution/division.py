@@ -215,8 +215,7 @@ _ALIASES = {"evidence": "bayesian"}
 
 def regulariser_names() -> tuple[str, ...]:
     """Names of every regulariser: memscal's own first, then plug-ins'."""
-    others = sorted({point.name for point in _plug_ins()} - set(_OWN))
-    return (*_OWN, *others)
+    return (*_OWN, *sorted({point.name for point in _plug_ins()} - set(_OWN)))
 
 
 def create_regulariser(name: str, /, **options: Any) -> Method:

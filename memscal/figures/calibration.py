@@ -73,10 +73,11 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     band = _EXPANDED * transfer.modulus_errors
     blue = COLOURS["deconvolved"]
     low, high = np.maximum(transfer.modulus - band, 0.0), transfer.modulus + band
-    axes.fill_between(k, low, high, color=blue, alpha=0.25, lw=0, label="±2u, with hidden detail")
+    axes.fill_between(
+        k, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2), with hidden detail"
+    )
     axes.plot(k, transfer.modulus, "-", color=blue, label="modulus for G")
-    sigma = data.gaussian_sigma
-    gaussian = np.exp(-0.5 * (sigma * transfer.k) ** 2)
+    gaussian = np.exp(-0.5 * (data.gaussian_sigma * transfer.k) ** 2)
     axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
     axes.plot(k, transfer.window, ":", color=COLOURS["window"], label="window")
     _shade_unresolved(axes, limit, end)
@@ -91,7 +92,9 @@ def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
     spread = _EXPANDED * radial.g_errors
     low, high = (np.maximum(radial.g + side * spread, floor) / PER_MM2 for side in (-1, 1))
     blue, r = COLOURS["deconvolved"], radial.r / MM
-    axes.fill_between(r, low, high, color=blue, alpha=0.25, lw=0, label="±2u, with hidden detail")
+    axes.fill_between(
+        r, low, high, color=blue, alpha=0.25, lw=0, label="±2u (k = 2), with hidden detail"
+    )
 
 
 def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
@@ -224,5 +227,4 @@ def _write_lines(figure: Figure, lines: list[tuple[str, str, str]]) -> None:
         text.set_in_layout(False)
         # Lines are broken by their number of characters; one of wide letters is set smaller.
         available = (1 - 3 * _MARGIN) * figure.bbox.width
-        width = text.get_window_extent().width
-        text.set_fontsize(size * min(1.0, available / max(width, 1.0)))
+        text.set_fontsize(size * min(1.0, available / max(text.get_window_extent().width, 1.0)))

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
+from memscal.figures import friction_scale as scale
 from memscal.figures.friction_profiles import (
     draw_profiles,
     draw_residuals,
@@ -23,16 +24,7 @@ from memscal.figures.friction_readings import (
     effective_friction_figure,
     likelihood_figure,
 )
-from memscal.figures.friction_scale import (
-    LUBRICATIONS,
-    chosen,
-    friction_axis,
-    friction_colours,
-    friction_name,
-    friction_position,
-    lubricated_words,
-    main_loading,
-)
+from memscal.figures.friction_scale import LUBRICATIONS, friction_name, friction_position
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.friction.family import FRICTION_SCALE
 from memscal.friction.results import (
@@ -88,7 +80,7 @@ def length_position(length: ArrayLike) -> FloatArray:
 def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     for direction, compared in by_direction.items():
         rise = np.asarray(compared.length.chi_square) - float(np.min(compared.length.chi_square))
-        label = f"{direction}, {lubricated_words(compared.lubrication)}"
+        label = f"{direction}, {scale.lubricated_words(compared.lubrication)}"
         colour = COLOURS[_COLOURS[direction]]
         axes.plot(length_position(compared.length.values), rise, color=colour, label=label)
     draw_levels(axes)
@@ -130,7 +122,7 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
         if reading.value is not None:
             place = friction_position([reading.value])
             axes.plot([at_load.load], place, "o", color=COLOURS["measured"], ms=4)
-    friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
+    scale.friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
     legend_above(axes, columns=1)
@@ -158,14 +150,14 @@ def maxima_figure(comparison: FrictionComparison) -> Figure:
 
 def draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str | None = None) -> None:
     """Draw the ratios of one definition of the loading, and the calculated curves."""
-    loading = main_loading(comparison, loading)
+    loading = scale.main_loading(comparison, loading)
     loads, curves = _curves(comparison, loading)
     ends = []
     ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
     usual = {float(mu) for mu in comparison.friction if mu in _SHOWN}
     for mu in sorted(usual.union(ends_of_all)):
         curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
-        (line,) = axes.plot(loads, curve, color=friction_colours(mu)[0], lw=0.9)
+        (line,) = axes.plot(loads, curve, color=scale.friction_colours(mu)[0], lw=0.9)
         line.set_gid(f"mu={mu:g}")
         ends.append((float(curve[-1]), mu))
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
@@ -197,7 +189,7 @@ def _draw_ratios(axes: Axes, loads: Sequence[LoadComparison], lubrication: str) 
         [load.ratio for load in measured],
         [load.ratio_uncertainty for load in measured],
         fmt=marker, color=black, mfc=black if filled else "white", ms=4, mew=0.8,
-        elinewidth=0.8, capsize=2, label=lubricated_words(lubrication), zorder=3,
+        elinewidth=0.8, capsize=2, label=scale.lubricated_words(lubrication), zorder=3,
     )  # fmt: skip
 
 
@@ -216,7 +208,7 @@ def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
         axes.annotate(
             text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
             (x, height), (7, 0), textcoords="offset points", va="center", fontsize=6.5,
-            color=friction_colours(max(mu for _, mu in group))[0],
+            color=scale.friction_colours(max(mu for _, mu in group))[0],
         )  # fmt: skip
 
 
@@ -236,8 +228,8 @@ def comparison_figure(
     Panel a, profiles between no friction and full stick; b, maxima over frictionless ones; c,
     residuals against the frictionless profiles; d, the effective friction coefficient.
     """
-    loading = main_loading(comparison, loading)
-    loads = chosen(comparison, loading, lubrication)
+    loading = scale.main_loading(comparison, loading)
+    loads = scale.chosen(comparison, loading, lubrication)
     with house_style():
         figure = new_figure(5.6)
         panels = figure.subplots(2, 2)

@@ -8,20 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from memscal.figures.friction_scale import (
-    EXPANDED,
-    LUBRICATIONS,
-    chosen,
-    draw_errorbar,
-    draw_points,
-    friction_colours,
-    friction_name,
-    load_looks,
-    lubricated_words,
-    main_loading,
-    on_axis,
-    share_limits,
-)
+from memscal.figures import friction_scale as scale
+from memscal.figures.friction_scale import LUBRICATIONS, friction_colours, friction_name, on_axis
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.quantities import KPA, MM
@@ -41,8 +29,8 @@ def profile_figure(
     Panels a and b, stress on a linear and a logarithmic scale; c and d, residuals over standard
     uncertainties against the frictionless profile and that of the largest coefficient.
     """
-    loading = main_loading(comparison, loading)
-    loads = chosen(comparison, loading, lubrication)
+    loading = scale.main_loading(comparison, loading)
+    loads = scale.chosen(comparison, loading, lubrication)
     with house_style():
         figure = new_figure(4.6)
         panels = figure.subplots(2, 2, height_ratios=(2.2, 1), sharex=True)
@@ -50,7 +38,7 @@ def profile_figure(
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
         for axes, index in zip(panels[1], (0, -1), strict=True):
             draw_residuals(axes, comparison, loads, index)
-        share_limits(panels[1])
+        scale.share_limits(panels[1])
         panel_letters(panels.flat)
     return figure
 
@@ -63,14 +51,14 @@ def draw_profiles(
     logarithmic: bool = False,
 ) -> None:
     """Draw measured points with their uncertainties, and the calculated limits through them."""
-    looks = load_looks(comparison)
+    looks = scale.load_looks(comparison)
     for at_load in loads:
         colour, name = looks[at_load.load]
         r = np.linspace(0.0, at_load.profile.r[-1], _FINE)
         limits = on_axis(at_load.profile.r, at_load.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
         axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
-        draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
+        scale.draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
         top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
         axes.set_yscale("log")
@@ -89,7 +77,7 @@ def draw_profiles(
 def _annotate_curves(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     """Name the scan and the curves inside the frame, where no data are."""
     ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
-    lines = [lubricated_words(at_load.lubrication)]
+    lines = [scale.lubricated_words(at_load.lubrication)]
     lines += [f"{at_load.loading} loading"] if at_load.loading else []
     lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
     axes.annotate(
@@ -101,9 +89,9 @@ def draw_residuals(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], index: int
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
-    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
+    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    looks = load_looks(comparison)
+    looks = scale.load_looks(comparison)
     for at_load in loads:
         colour, _ = looks[at_load.load]
         z = (at_load.profile.s_zz - at_load.calculated[index]) / at_load.profile.s_zz_errors
@@ -122,8 +110,8 @@ def friction_set_figure(
     A column for each of at most four loads: stress near the centre, the same less the frictionless
     profile (percent of its maximum), residuals against the coefficient of least chi-square.
     """
-    loading = main_loading(comparison, loading)
-    loads = chosen(comparison, loading, lubrication)
+    loading = scale.main_loading(comparison, loading)
+    loads = scale.chosen(comparison, loading, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
     with house_style():
@@ -134,7 +122,7 @@ def friction_set_figure(
             _draw_set(column[0], comparison, at_load)
             _draw_differences(column[1], comparison, at_load)
             _draw_best(column[2], comparison, at_load)
-        share_limits(panels[2])
+        scale.share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
         for axes in panels[1]:
             axes.set_ylim(min(low), max(high))
@@ -165,7 +153,7 @@ def _draw_set(axes: Axes, comparison: FrictionComparison, at_load: LoadCompariso
     for i in _shown_indices(comparison):
         curve = on_axis(at_load.profile.r, at_load.calculated[[i]], r)[0]
         axes.plot(r / MM, curve / KPA, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    draw_points(axes, at_load, COLOURS["measured"], "", False)
+    scale.draw_points(axes, at_load, COLOURS["measured"], "", False)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
     axes.set_ylim(bottom=0)
 
@@ -180,13 +168,13 @@ def _draw_differences(axes: Axes, comparison: FrictionComparison, at_load: LoadC
         axes.plot(r / MM, on_axis(at_load.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
     profile = at_load.profile
     beyond, u = (profile.s_zz - at_load.calculated[0]) / unit, profile.s_zz_errors / unit
-    draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=COLOURS["measured"])
+    scale.draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=COLOURS["measured"])
 
 
 def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     best = int(np.argmin(at_load.chi_square))
     z = (at_load.profile.s_zz - at_load.calculated[best]) / at_load.profile.s_zz_errors
-    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
+    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
     black = COLOURS["measured"]
@@ -210,7 +198,7 @@ def _legend_of_friction(
     point = Line2D(
         [], [], color="k", marker=marker, ms=3, mfc="k" if filled else "white", ls="none"
     )
-    point.set_label(f"measured, {lubricated_words(lubrication)}")
+    point.set_label(f"measured, {scale.lubricated_words(lubrication)}")
     title = f"{loading} loading" if loading else "profiles as given"
     figure.legend(
         handles=[point, *handles], loc="outside upper center", ncols=len(handles) + 1, title=title,

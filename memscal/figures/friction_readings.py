@@ -10,15 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from memscal.figures.friction_scale import (
-    LUBRICATIONS,
-    chosen,
-    friction_axis,
-    friction_position,
-    load_looks,
-    lubricated_words,
-    main_loading,
-)
+from memscal.figures import friction_scale as scale
+from memscal.figures.friction_scale import LUBRICATIONS, friction_position, lubricated_words
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letters
 from memscal.friction.results import BoundedEstimate, FrictionComparison
 
@@ -51,8 +44,8 @@ def draw_effective(
     loading: str | None = None,
 ) -> None:
     """Draw both readings of each load, the joint interval, and the macroscopic coefficient."""
-    loading = main_loading(comparison, loading)
-    loads = chosen(comparison, loading, lubrication)
+    loading = scale.main_loading(comparison, loading)
+    loads = scale.chosen(comparison, loading, lubrication)
     span = loads[-1].load - loads[0].load or loads[0].load
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
@@ -61,7 +54,7 @@ def draw_effective(
             _draw_reading(axes, reading, x, COLOURS[colour], words if i == 0 else "", marker)
     _draw_joint(axes, comparison.joint[loads[0].lubrication][loading])
     _draw_macroscopic(axes, comparison.macroscopic)
-    friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
+    scale.friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
     axes.set_xlim(0, loads[-1].load + 0.08 * span)
     axes.set_xlabel("load (N)")
 
@@ -161,15 +154,15 @@ def draw_likelihood(
     loading: str | None = None,
 ) -> None:
     """Draw chi-square above its least value of each load and of all loads together."""
-    loading = main_loading(comparison, loading)
-    loads = chosen(comparison, loading, lubrication)
-    looks = load_looks(comparison)
+    loading = scale.main_loading(comparison, loading)
+    loads = scale.chosen(comparison, loading, lubrication)
+    looks = scale.load_looks(comparison)
     for at_load in loads:
         _draw_curve(axes, at_load.by_profile, *looks[at_load.load], 1.0)
     joint = comparison.joint[loads[0].lubrication][loading]
     _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
     draw_levels(axes)
-    friction_axis(axes, "x", r"effective friction coefficient $\mu_e$")
+    scale.friction_axis(axes, "x", r"effective friction coefficient $\mu_e$")
     axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
 
 

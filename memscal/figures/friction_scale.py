@@ -36,8 +36,7 @@ def friction_position(friction: ArrayLike) -> FloatArray:
 def friction_axis(axes: Axes, which: Literal["x", "y"], label: str) -> None:
     """Give an axis the ticks of friction coefficients from 0 to infinity."""
     axis = axes.xaxis if which == "x" else axes.yaxis
-    positions = friction_position(_TICKS)
-    axis.set_ticks(list(positions), [friction_name(mu) for mu in _TICKS])
+    axis.set_ticks(list(friction_position(_TICKS)), [friction_name(mu) for mu in _TICKS])
     margin = 0.02
     (axes.set_xlim if which == "x" else axes.set_ylim)(-margin, 1 + margin)
     axis.set_label_text(label)

@@ -7,13 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
-from memscal.figures.style import (
-    COLOURS,
-    SCATTER_THRESHOLD,
-    channel_indices,
-    legend_above,
-    marker_size,
-)
+from memscal.figures import style
+from memscal.figures.style import COLOURS, channel_indices
 from memscal.model.apparatus import ApparatusData
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES
@@ -32,7 +27,7 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
     limit_to_scan(axes, scan.x)
     axes.set_ylabel(f"voltage $U_{{{channel_indices(data)}}}$ (mV)")
     _stress_axis(axes, data, baseline=_baseline(data))
-    legend_above(axes, points=scan.x.size)
+    style.legend_above(axes, points=scan.x.size)
 
 
 def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
@@ -47,13 +42,12 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
     clear = (signal > _EXPANDED * errors) & (signal > 0)
     limit = np.where(clear, np.nan, np.maximum(signal, 0.0) + _EXPANDED * errors)
     limit[~(limit > 0)] = np.nan
-    shown = np.where(clear, signal, np.nan)
-    _draw_measured(axes, scan.x, shown, errors, label="_measured")
+    _draw_measured(axes, scan.x, np.where(clear, signal, np.nan), errors, label="_measured")
     if np.any(np.isfinite(limit)):
         (limits,) = axes.plot(scan.x / MM, limit / MV, "v", mfc="none", mew=0.7)
-        limits.set(color=COLOURS["muted"], markersize=0.8 * marker_size(scan.x.size))
+        limits.set(color=COLOURS["muted"], markersize=0.8 * style.marker_size(scan.x.size))
         limits.set(label="less than 2u: upper limit, U + 2u")
-        limits.set_rasterized(scan.x.size > SCATTER_THRESHOLD)
+        limits.set_rasterized(scan.x.size > style.SCATTER_THRESHOLD)
     _draw_predictions(axes, data, net=True)
     _draw_reference(axes, data, net=True)
     axes.set_yscale("log")
@@ -76,8 +70,8 @@ def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
 def _draw_measured(
     axes: Axes, x: FloatArray, u: FloatArray, errors: FloatArray, label: str = "scan, ±u"
 ) -> None:
-    size, colour = marker_size(x.size), COLOURS["measured"]
-    if x.size > SCATTER_THRESHOLD:
+    size, colour = style.marker_size(x.size), COLOURS["measured"]
+    if x.size > style.SCATTER_THRESHOLD:
         (points,) = axes.plot(x / MM, u / MV, ".", color=colour, ms=1.5, mew=0, label="scan")
         points.set_rasterized(True)
         points.set_label("scan" if not label.startswith("_") else label)
@@ -92,7 +86,7 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
     """Draw both reconvolutions; ``net``: less baseline and drift, and only where positive."""
     scan = data.reconvolution
     background = _background(data, scan.x) if net else np.zeros(scan.x.shape)
-    for u, name, label, style in (
+    for u, name, label, dashes in (
         (scan.u_zz_predicted, "deconvolved", "reconvolved, G", "-"),
         (scan.u_zz_gaussian, "gaussian", "reconvolved, Gaussian", "--"),
     ):
@@ -102,10 +96,10 @@ def _draw_predictions(axes: Axes, data: ApparatusData, *, net: bool = False) -> 
             curve = np.where(curve > 0, curve, np.nan)
         single_valued = x.size < scan.x.size or np.unique(scan.x).size == scan.x.size
         line_like = single_valued and not _joint(data) and not _aligned(data)
-        (line,) = axes.plot(x / MM, curve / MV, style, color=COLOURS[name], label=label, zorder=3)
+        (line,) = axes.plot(x / MM, curve / MV, dashes, color=COLOURS[name], label=label, zorder=3)
         if not line_like:  # rasters, several scans: many voltages near one x, which no line joins
             line.set(linestyle="none", marker="o" if name == "deconvolved" else "x")
-            line.set(markersize=1.2 if x.size > SCATTER_THRESHOLD else 2.5, rasterized=True)
+            line.set(markersize=1.2 if x.size > style.SCATTER_THRESHOLD else 2.5, rasterized=True)
 
 
 def _as_curve(x: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -168,8 +162,7 @@ def _seen_stress(data: ApparatusData) -> FloatArray | None:
 
 def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
     """One; of a tangential channel -1 where the indenter stands beyond the sensor."""
-    beyond = (x > _centre(data)) & _tangential(data)
-    return np.where(beyond, -1.0, 1.0)
+    return np.where((x > _centre(data)) & _tangential(data), -1.0, 1.0)
 
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
@@ -251,8 +244,8 @@ def draw_residuals(axes: Axes, data: ApparatusData) -> None:
     limit = _residual_limit(with_g, with_gaussian)
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
     axes.axhline(0.0, color="0.4", lw=0.6)
-    many = scan.x.size > SCATTER_THRESHOLD
-    size = 1.2 if many else marker_size(scan.x.size)
+    many = scan.x.size > style.SCATTER_THRESHOLD
+    size = 1.2 if many else style.marker_size(scan.x.size)
     for z, name, marker, face in (
         (with_gaussian, "gaussian", "s", "none"),
         (with_g, "deconvolved", "o", COLOURS["deconvolved"]),
@@ -265,7 +258,7 @@ def draw_residuals(axes: Axes, data: ApparatusData) -> None:
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
     limit_to_scan(axes, scan.x)
-    legend_above(axes, points=scan.x.size)
+    style.legend_above(axes, points=scan.x.size)
 
 
 def _residual_scale(data: ApparatusData) -> tuple[FloatArray, str]:

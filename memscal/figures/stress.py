@@ -12,15 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from memscal.errors import InputError
-from memscal.figures.style import (
-    COLOURS,
-    SCATTER_THRESHOLD,
-    house_style,
-    legend_above,
-    marker_size,
-    new_figure,
-    panel_letters,
-)
+from memscal.figures import style
+from memscal.figures.style import COLOURS
 from memscal.measurement.restoration import Restoration, StressComparison
 from memscal.mechanics.contact import Contact
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
@@ -40,8 +33,8 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
     bars.  Bars are 95 %; lines are the restored stress, blurred by G; ticks at the top mark the
     radius of the frictionless contact.
     """
-    with house_style():
-        figure = new_figure(3.6)
+    with style.house_style():
+        figure = style.new_figure(3.6)
         panels = figure.subplots(1, 2)
         scales = ("linear scale", "logarithmic scale, three decades")
         for axes, scale in zip(panels, scales, strict=True):
@@ -51,7 +44,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
             axes.set_xlabel("distance from the centre (mm)")
             axes.set_ylabel(r"measured stress $S_{zz}$ (kPa)")
             axes.set_xlim(left=0.0)
-        panel_letters(panels)
+        style.panel_letters(panels)
         panels[0].axhline(0.0, color="0.8", lw=0.5, zorder=0)
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
         panels[1].set_yscale("log")
@@ -118,12 +111,12 @@ def restoration_figure(restored: Restoration, compared: StressComparison | None 
     Panel a, stress against the distance from the centre; b, residuals against position.
     """
     compared = restored.comparison if compared is None else compared
-    with house_style():
-        figure = new_figure(3.3)
+    with style.house_style():
+        figure = style.new_figure(3.3)
         left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))
         _draw_stress(left, restored, compared)
         _draw_residuals(right, restored)
-        panel_letters((left, right))
+        style.panel_letters((left, right))
     return figure
 
 
@@ -142,8 +135,8 @@ def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison |
             friction = compared.stress.friction
             label = f"calculated, {f'friction {friction:.3g}' if friction else 'no friction'}"
         axes.plot(r, compared.sigma_zz / KPA, color=COLOURS["reference"], ls="--", label=label)
-    many = restored.points.u.size > SCATTER_THRESHOLD
-    size = 1.2 if many else 0.8 * marker_size(restored.points.u.size)
+    many = restored.points.u.size > style.SCATTER_THRESHOLD
+    size = 1.2 if many else 0.8 * style.marker_size(restored.points.u.size)
     (points,) = axes.plot(restored.distance / MM, restored.measured_stress / KPA, "o")
     points.set(color=COLOURS["measured"], ms=size, mfc="none", mew=0.6)
     points.set(label="scan, $S_{zz} = U/A$", rasterized=many)
@@ -151,7 +144,7 @@ def _draw_stress(axes: Axes, restored: Restoration, compared: StressComparison |
     axes.set_xlim(0, max(r[-1], float(restored.distance.max()) / MM))
     axes.set_xlabel("distance from the centre (mm)")
     axes.set_ylabel("stress at the base (kPa)", labelpad=8)
-    legend_above(axes, columns=2, points=restored.points.u.size)
+    style.legend_above(axes, columns=2, points=restored.points.u.size)
 
 
 def _draw_residuals(axes: Axes, restored: Restoration) -> None:
@@ -162,14 +155,14 @@ def _draw_residuals(axes: Axes, restored: Restoration) -> None:
     side = np.where(restored.points.free[0, 0], restored.points.x, restored.points.y) / MM
     axes.axhspan(-_RESTORATION_EXPANDED, _RESTORATION_EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    size = marker_size(z.size)
+    size = style.marker_size(z.size)
     label = f"scan: rms {float(np.sqrt(np.mean(z**2))):.2f}"
     axes.plot(side[ordinary], z[ordinary], "o", color=COLOURS["measured"], ms=size, label=label)
     edge = 0.93 * limit * np.sign(z[~ordinary])
     axes.plot(side[~ordinary], edge, "^", color=COLOURS["failed"], ms=4, label="_beyond the axis")
     axes.set_ylim(-limit, limit)
     axes.set(xlabel="position (mm)", ylabel="residual / $u$")
-    legend_above(axes, columns=1)
+    style.legend_above(axes, columns=1)
 
 
 _MICROMETRE = 1e-6
@@ -192,15 +185,15 @@ def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
     if not contacts:
         raise InputError("There is no contact to draw.")
     several = len(contacts) > 1
-    with house_style():
-        figure = new_figure(2.9)
+    with style.house_style():
+        figure = style.new_figure(2.9)
         panels = figure.subplots(1, 3 if several else 2)
         colours = _shades(len(contacts))
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
         if several:
             _draw_loading(panels[2], contacts, colours)
-        panel_letters(panels)
+        style.panel_letters(panels)
     return figure
 
 
@@ -215,8 +208,7 @@ def _shades(count: int) -> list[str]:
 
 
 def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
-    widest = max(contact.contact_radius for contact in contacts)
-    r = np.linspace(0.0, 1.15 * widest, _RADII)
+    r = np.linspace(0.0, 1.15 * max(contact.contact_radius for contact in contacts), _RADII)
     highest = 0.0
     for i, (contact, colour) in enumerate(zip(contacts, colours, strict=True)):
         pressure = contact.interface_pressure(r)
@@ -239,7 +231,7 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
     axes.set_xlim(0, r[-1] / MM)
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
     axes.set(xlabel="radius (mm)", ylabel="at the interface (kPa)")
-    legend_above(axes, columns=2)
+    style.legend_above(axes, columns=2)
 
 
 def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:
@@ -253,7 +245,7 @@ def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) 
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
     axes.set_xlim(0, r[-1] / MM)
     axes.set(xlabel="radius (mm)", ylabel="at the base (kPa)")
-    legend_above(axes, columns=1)
+    style.legend_above(axes, columns=1)
 
 
 def _draw_loading(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:

@@ -136,5 +136,4 @@ def _relative_axis(axes: Axes, amplitude: FloatArray) -> None:
     def at_percent(percent: ArrayLike) -> FloatArray:
         return base * (1 + np.asarray(percent, dtype=float) / 100)
 
-    right = axes.secondary_yaxis("right", functions=(percent, at_percent))
-    right.set_ylabel("change (%)")
+    axes.secondary_yaxis("right", functions=(percent, at_percent)).set_ylabel("change (%)")

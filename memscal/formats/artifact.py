@@ -12,15 +12,8 @@ from memscal.formats.codec import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, Node, file_tree, write_tree
 from memscal.formats.values import altered, require_scalar, require_schema
-from memscal.model import records
-from memscal.model.apparatus import (
-    ApparatusData,
-    ApparatusField,
-    ApparatusRadial,
-    OtherEstimate,
-    Reconvolution,
-    TransferFunction,
-)
+from memscal.model import apparatus, records
+from memscal.model.apparatus import ApparatusData, ApparatusField, ApparatusRadial
 
 
 def artifact_from(file: SafeFile) -> ApparatusData:
@@ -40,8 +33,8 @@ def artifact_from(file: SafeFile) -> ApparatusData:
     return ApparatusData(
         field=ApparatusField(**read_record(records.FIELD, file, "/entry/apparatus_function")),
         radial_profile=_read_radial(file, "/entry/radial_profile", "/entry/radial_covariance"),
-        transfer=TransferFunction(**transfer),
-        reconvolution=Reconvolution(**reconvolution),
+        transfer=apparatus.TransferFunction(**transfer),
+        reconvolution=apparatus.Reconvolution(**reconvolution),
         parameters=groups.read_parameters(file, "/entry/parameters"),
         budget=groups.read_budget(file, "/entry/parameters/budget"),
         checks=groups.read_quality(file, "/entry/quality"),
@@ -94,13 +87,13 @@ def _entry(data: ApparatusData) -> Group:
     return Group("NXentry", children, {"default": "apparatus_function"})
 
 
-def _read_other(file: SafeFile) -> OtherEstimate | None:
+def _read_other(file: SafeFile) -> apparatus.OtherEstimate | None:
     """Read the estimate by the route that was not chosen; a division is one by white noise."""
     for route, method in (("bayesian", "bayesian"), ("division", "white-noise")):
         places = [f"/entry/{name}_{route}" for name in ("radial_profile", "radial_covariance")]
         if file.has(places[0]):
             parameters = groups.read_parameters(file, f"/entry/parameters_{route}")
-            return OtherEstimate(method, parameters, _read_radial(file, *places))
+            return apparatus.OtherEstimate(method, parameters, _read_radial(file, *places))
     return None
 
 

@@ -264,8 +264,7 @@ def quality_group(checks: tuple[QualityCheck, ...]) -> Group:
         if not name or name in children:
             raise InputError(f'Two quality checks would be stored as "{name}".')
         children[name] = write_record(records.CHECK, check)
-    listed = to_json("quality checks", list(children))
-    return Group("NXcollection", {"names": listed, **children})
+    return Group("NXcollection", {"names": to_json("quality checks", list(children)), **children})
 
 
 def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:

@@ -13,15 +13,8 @@ from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
 from memscal.formats.codec import listed, origins
 from memscal.formats.groups import estimated_record, read_quality
+from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import (
-    ARTIFACT_SCHEMA,
-    DIGEST_ATTRIBUTE,
-    REFERENCE_SCHEMA,
-    SCAN_SCHEMA,
-    SCHEMA_ATTRIBUTE,
-    STRESS_SCHEMA,
-)
 from memscal.formats.reference import profile_from
 from memscal.formats.scan import scan_from
 from memscal.formats.stress import profile_paths, stress_from
@@ -32,10 +25,10 @@ from memscal.model.checks import QualityCheck
 from memscal.model.quantities import Record, record
 
 _READERS: dict[str, Callable[[SafeFile], Any]] = {
-    SCAN_SCHEMA: scan_from,
-    REFERENCE_SCHEMA: profile_from,
-    ARTIFACT_SCHEMA: artifact_from,
-    STRESS_SCHEMA: stress_from,
+    writer.SCAN_SCHEMA: scan_from,
+    writer.REFERENCE_SCHEMA: profile_from,
+    writer.ARTIFACT_SCHEMA: artifact_from,
+    writer.STRESS_SCHEMA: stress_from,
 }
 _MEASURED_ON = {
     "/entry/indenter": records.INDENTER,
@@ -45,14 +38,14 @@ _MEASURED_ON = {
 }
 # The records of each kind of file by their paths, in the order in which they are listed.
 _LAYOUTS: dict[str, dict[str, Record]] = {
-    SCAN_SCHEMA: {
+    writer.SCAN_SCHEMA: {
         "/entry": records.EXPERIMENT,
         "/entry/data": records.SCAN_DATA,
         "/entry/reference": records.PROFILE,
         **_MEASURED_ON,
         "/entry/synthetic": records.SYNTHETIC,
     },
-    REFERENCE_SCHEMA: {
+    writer.REFERENCE_SCHEMA: {
         "/entry/reference": records.PROFILE,
         "/entry/parameters": records.CONTACT,
         "/entry/parameters/indenter": records.INDENTER,
@@ -62,7 +55,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
             "NXprocess", *records.PROFILE_NOTES.quantities, *records.SOLVER.quantities
         ),
     },
-    ARTIFACT_SCHEMA: {
+    writer.ARTIFACT_SCHEMA: {
         "/entry/apparatus_function": records.FIELD,
         "/entry/radial_profile": records.RADIAL_VERSION_1_0,
         "/entry/radial_covariance": records.RADIAL_COVARIANCE,
@@ -73,7 +66,7 @@ _LAYOUTS: dict[str, dict[str, Record]] = {
         **_MEASURED_ON,
         "/entry/process": records.PROCESS,
     },
-    STRESS_SCHEMA: {
+    writer.STRESS_SCHEMA: {
         **_MEASURED_ON,
         "/entry/sensor": records.CONVERSION,
         "/entry/process": records.PROCESS,
@@ -138,8 +131,8 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 
 def _digest(file: SafeFile, schema: str) -> Finding:
     """Results must have a digest: scans and references may come from other programs."""
-    result = schema in (ARTIFACT_SCHEMA, STRESS_SCHEMA)
-    if not result and file.attribute("/", DIGEST_ATTRIBUTE) is None:
+    result = schema in (writer.ARTIFACT_SCHEMA, writer.STRESS_SCHEMA)
+    if not result and file.attribute("/", writer.DIGEST_ATTRIBUTE) is None:
         return Finding("digest", True, "None: the file was written by another program.")
     if problem := altered(file):
         return Finding("digest", False, f"The file was changed after it was written: {problem}")
@@ -147,12 +140,12 @@ def _digest(file: SafeFile, schema: str) -> Finding:
 
 
 def _schema(file: SafeFile) -> str:
-    schema = file.attribute("/", SCHEMA_ATTRIBUTE)
+    schema = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
     if isinstance(schema, str) and schema in _READERS:
         return schema
     raise FormatError(
         f"{file.name} is not a file of memscal.",
-        why=f"Its root attribute {SCHEMA_ATTRIBUTE} is {schema!r}, not one of "
+        why=f"Its root attribute {writer.SCHEMA_ATTRIBUTE} is {schema!r}, not one of "
         f"{', '.join(_READERS)}.",
         cure="Convert a table with `memscal import`.",
     )

@@ -11,29 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from memscal.errors import FormatError, OutputError
-from memscal.formats import groups
+from memscal.formats import groups, values
 from memscal.formats.codec import read_record, write_record
 from memscal.formats.files import ensure_writable
+from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import (
-    SCAN_SCHEMA,
-    Group,
-    Node,
-    Number,
-    file_tree,
-    index_axis,
-    si,
-    to_json,
-    write_tree,
-)
-from memscal.formats.values import (
-    any_scalar,
-    json_value,
-    optional_scalar,
-    optional_text,
-    require_array,
-    require_schema,
-)
+from memscal.formats.hdf5.writer import Group, Node, si
+from memscal.formats.values import any_scalar, json_value, optional_text
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import by_name
@@ -94,7 +78,7 @@ def read_scan(path: str | os.PathLike[str]) -> Scan:
 
 def scan_from(file: SafeFile) -> Scan:
     """Read the scan of an open memscal-scan file."""
-    require_schema(file, SCAN_SCHEMA)
+    values.require_schema(file, writer.SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter")
     film = groups.read_film(file, f"{_SAMPLE}/film")
     indenter = groups.read_round_indenter(file, "/entry/indenter")
@@ -136,7 +120,7 @@ def _read_arrays(file: SafeFile, along: str) -> dict[str, Any]:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", *(("y_errors",) if along == "x" else ("x", "x_errors"))}
     arrays: dict[str, Any] = {
-        "position_scale_uncertainty": optional_scalar(
+        "position_scale_uncertainty": values.optional_scalar(
             file, f"{_DATA}/position_scale_errors", "dimensionless"
         )
     }
@@ -144,7 +128,7 @@ def _read_arrays(file: SafeFile, along: str) -> dict[str, Any]:
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
             ndim = len(quantity.axes) if name in _OF_ONE_SHAPE else None
-            arrays[name] = require_array(file, path, quantity.dimension, ndim=ndim)
+            arrays[name] = values.require_array(file, path, quantity.dimension, ndim=ndim)
     return arrays
 
 
@@ -165,7 +149,7 @@ def write_scan(scan: Scan, path: str | os.PathLike[str], *, overwrite: bool = Fa
     OutputError
         If the file exists or cannot be written.
     """
-    write_tree(file_tree(SCAN_SCHEMA, _entry(scan)), path, overwrite=overwrite)
+    writer.write_tree(writer.file_tree(writer.SCAN_SCHEMA, _entry(scan)), path, overwrite=overwrite)
 
 
 def _entry(scan: Scan) -> Group:
@@ -190,21 +174,21 @@ def _entry(scan: Scan) -> Group:
 def _data_group(scan: Scan) -> Group:
     along, points = scan.direction, scan.kind == "points"
     axes = _POINTS if points else (_ALONG_Y if along == "y" else _AXES)[scan.kind]
-    data: dict[str, Node] = {"point": index_axis("point", scan.x.size)} if points else {}
+    data: dict[str, Node] = {"point": writer.index_axis("point", scan.x.size)} if points else {}
     data |= _nodes({"y": scan.y}, axes if points else ("y",))
     if scan.repeat is not None:
-        data["repeat"] = Number(scan.repeat, "1", axes)
+        data["repeat"] = writer.Number(scan.repeat, "1", axes)
     elif scan.kind == "repeats":
-        data["repeat"] = index_axis("repeat", scan.u_zz.shape[0])
+        data["repeat"] = writer.index_axis("repeat", scan.u_zz.shape[0])
     if scan.branch is not None:
-        data["branch"] = Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
+        data["branch"] = writer.Number(scan.branch, "1", axes, {"meaning": _BRANCHES})
     positions = {along: scan.x, f"{along}_errors": scan.x_errors}
     data |= _nodes(positions, axes if points else (along,))
     if scan.position_scale_uncertainty is not None:
         data["position_scale_errors"] = si(scan.position_scale_uncertainty, "dimensionless")
     data |= _nodes({"u_zz": scan.u_zz}, axes)
     if scan.u_zz_correlation is not None:
-        data |= {axis: index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
+        data |= {axis: writer.index_axis(axis, scan.u_zz_correlation.shape[0]) for axis in _PAIRS}
         data |= _nodes({"u_zz_correlation": scan.u_zz_correlation}, _PAIRS)
     optional = {
         name: getattr(scan, name) for name in ("u_zz_errors", "normal_load", "normal_load_errors")
@@ -213,11 +197,11 @@ def _data_group(scan: Scan) -> Group:
     return Group("NXdata", data, {"signal": "u_zz", "axes": axes})
 
 
-def _nodes(values: Mapping[str, FloatArray | None], axes: tuple[str, ...]) -> dict[str, Node]:
+def _nodes(arrays: Mapping[str, FloatArray | None], axes: tuple[str, ...]) -> dict[str, Node]:
     """Return the arrays that there are, along the axes of this scan."""
     return {
         name: si(array, _DECLARED[name].dimension, axes)
-        for name, array in values.items()
+        for name, array in arrays.items()
         if array is not None
     }
 
@@ -253,7 +237,7 @@ def _synthetic_group(truth: Mapping[str, float | str]) -> Group:
             children[name] = value
         else:
             children[name] = si(value, groups.parameter_dimension(name))
-    children["names"] = to_json("names of the synthetic truth", list(truth))
+    children["names"] = writer.to_json("names of the synthetic truth", list(truth))
     return Group("NXcollection", children)
 
 

@@ -10,27 +10,12 @@ from typing import Any
 import numpy as np
 
 from memscal.errors import FormatError
-from memscal.formats import groups
+from memscal.formats import groups, values
 from memscal.formats.codec import read_record, read_source, write_record, write_source
+from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
-from memscal.formats.hdf5.writer import (
-    STRESS_SCHEMA,
-    Group,
-    Node,
-    count,
-    file_tree,
-    si,
-    to_json,
-    write_tree,
-)
-from memscal.formats.values import (
-    altered,
-    json_value,
-    optional_text,
-    require_array,
-    require_scalar,
-    require_schema,
-)
+from memscal.formats.hdf5.writer import Group, Node, si, to_json
+from memscal.formats.values import json_value, optional_text
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import (
@@ -53,7 +38,7 @@ def _read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
         for channel in _CHANNELS
         if file.has(f"{path}/points_{channel}")
     }
-    return {name: MeasuredPoints(**{"noise": None} | values) for name, values in stored.items()}
+    return {name: MeasuredPoints(**{"noise": None} | points) for name, points in stored.items()}
 
 
 def _scans_group(scans: Sequence[MeasuredScan]) -> Group:
@@ -107,7 +92,7 @@ def _read_scan(file: SafeFile, path: str, source: SourceFile | None) -> Measured
 
 
 def _old_scan(file: SafeFile, profile: str, source: SourceFile | None) -> MeasuredScan:
-    x, y = (require_array(file, f"{profile}/{name}", "length") for name in ("x", "y"))
+    x, y = (values.require_array(file, f"{profile}/{name}", "length") for name in ("x", "y"))
     return MeasuredScan(
         film=groups.read_film(file, "/entry/sample/film"),
         indenter=groups.read_round_indenter(file, "/entry/indenter"),
@@ -150,8 +135,8 @@ def read_stress(path: str | os.PathLike[str]) -> MeasuredStress:
 
 def stress_from(file: SafeFile) -> MeasuredStress:
     """Read the measured stress of an open memscal-stress file."""
-    require_schema(file, STRESS_SCHEMA)
-    if problem := altered(file):
+    values.require_schema(file, writer.STRESS_SCHEMA)
+    if problem := values.altered(file):
         raise FormatError(
             f"{file.name} was changed after it was written: {problem}",
             why="Measured stress is used only as it was measured.",
@@ -186,7 +171,9 @@ def write_stress(
     measured: MeasuredStress, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:
     """Write measured stress as a memscal-stress file, whole or not at all."""
-    write_tree(file_tree(STRESS_SCHEMA, _entry(measured)), path, overwrite=overwrite)
+    writer.write_tree(
+        writer.file_tree(writer.STRESS_SCHEMA, _entry(measured)), path, overwrite=overwrite
+    )
 
 
 def profile_paths(file: SafeFile) -> list[str]:
@@ -232,7 +219,7 @@ def _inputs_group(measured: MeasuredStress) -> Group:
 
 def _scan_number(file: SafeFile, path: str) -> int:
     """Which scan a profile comes from, counted from one."""
-    number = require_scalar(file, f"{path}/scan", "dimensionless")
+    number = values.require_scalar(file, f"{path}/scan", "dimensionless")
     if not 1 <= number <= _MOST_SCANS:
         raise FormatError(
             f"{file.where(path)}/scan is {number:g}.",
@@ -250,8 +237,8 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
     if profile.curve_r.size:
         optional["curve"] = write_record(records.STRESS_CURVE, profile)
     covariances = {
-        _PREFIX + source: si(values, "stress squared", _AXES)
-        for source, values in profile.covariances.items()
+        _PREFIX + source: si(covariance, "stress squared", _AXES)
+        for source, covariance in profile.covariances.items()
     }
     points = {
         f"points_{channel}": write_record(records.points_record(channel), of_channel)
@@ -262,7 +249,7 @@ def _profile_group(profile: MeasuredProfile, scans: tuple[MeasuredScan, ...]) ->
         **arrays.children,
         "sources": to_json("sources", list(profile.covariances)),
         **covariances,
-        "scan": count(scans.index(profile.scan) + 1),
+        "scan": writer.count(scans.index(profile.scan) + 1),
         **numbers,
         "budget": groups.budget_group(budget, _BUDGET),
         **points,

@@ -113,8 +113,7 @@ def _pint_factor(unit: str, dimension: str, where: str) -> float:
     registry = _registry()
     target = dimension if dimension == "dimensionless" else SI_UNITS[dimension]
     try:
-        quantity = registry.Quantity(1.0, registry.parse_units(unit))
-        return float(quantity.to(target).magnitude)
+        return float(registry.Quantity(1.0, registry.parse_units(unit)).to(target).magnitude)
     except pint.DimensionalityError as error:
         raise _wrong_dimension(where, unit, dimension) from error
     except Exception as error:  # pint raises what its parser happens to meet

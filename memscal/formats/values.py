@@ -8,16 +8,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from memscal.errors import FormatError, InputError, SchemaVersionError
+from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import (
-    CONTENTS_PATH,
-    DIGEST_ATTRIBUTE,
-    SCHEMA_ATTRIBUTE,
-    SCHEMA_VERSION,
-    VERSION_ATTRIBUTE,
-    DigestItem,
-    content_digest,
-)
+from memscal.formats.hdf5.writer import CONTENTS_PATH, SCHEMA_VERSION, VERSION_ATTRIBUTE
 from memscal.formats.units import SI_UNITS, dimension_of, to_si
 from memscal.model.arrays import FloatArray
 
@@ -26,12 +19,12 @@ _MAX_ITEMS = 10_000
 
 def require_schema(file: SafeFile, schema: str) -> str:
     """Return the schema version; refuse another schema or a newer major version."""
-    stored = file.attribute("/", SCHEMA_ATTRIBUTE)
+    stored = file.attribute("/", writer.SCHEMA_ATTRIBUTE)
     if stored != schema:
         held = "no memscal schema" if stored is None else f'the schema "{stored}"'
         raise FormatError(
             f'{file.name} has {held}, but "{schema}" is needed here.',
-            why=f"The root attribute {SCHEMA_ATTRIBUTE} names what a file holds.",
+            why=f"The root attribute {writer.SCHEMA_ATTRIBUTE} names what a file holds.",
             cure="Give the right file, or make one with `memscal import` or `memscal calibrate`.",
         )
     version = str(file.attribute("/", VERSION_ATTRIBUTE) or "")
@@ -139,22 +132,22 @@ def altered(file: SafeFile) -> str:
 
     From then on only what the file lists can be read from it.
     """
-    stated = file.attribute("/", DIGEST_ATTRIBUTE)
+    stated = file.attribute("/", writer.DIGEST_ATTRIBUTE)
     if stated is None:
-        return f"its root attribute {DIGEST_ATTRIBUTE} is missing."
+        return f"its root attribute {writer.DIGEST_ATTRIBUTE} is missing."
     contents = json_value(file, CONTENTS_PATH, dict, None)
     if contents is None:
         return f"the list of its contents ({CONTENTS_PATH}) is missing."
     missing = [path for path in contents if not (_PATH.fullmatch(path) and file.has(path))]
     if missing:
         return f"{missing[0]} is missing."
-    if content_digest(stored_items(file, contents)) != stated:
+    if writer.content_digest(stored_items(file, contents)) != stated:
         return "its content does not fit its digest."
     file.limit_to(contents)
     return ""
 
 
-def stored_items(file: SafeFile, contents: dict[str, Any]) -> Iterator[DigestItem]:
+def stored_items(file: SafeFile, contents: dict[str, Any]) -> Iterator[writer.DigestItem]:
     """Yield what the list of contents names, as it stands in the file."""
     for path, names in sorted(contents.items()):
         if not isinstance(names, list):

@@ -28,20 +28,16 @@ FRICTIONS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, math.inf)
 def amontons_family(
     film: ElasticFilm,
     indenter: Indenter,
-    loads: ArrayLike,
+    loads: ArrayLike,  # (L,), in N
     *,
     friction: Sequence[float] = FRICTIONS,
     loading: str = "incremental",
-    reach: float,
+    reach: float,  # largest distance from the axis at which stresses will be asked for, in m
     cache: CacheFolder = None,
     workers: int = 1,
-    order: int = 0,
+    order: int = 0,  # one for the shear at the base
 ) -> ProfileFamily:
-    """Return the base stresses of a sphere on a film for a range of friction coefficients.
-
-    ``loads`` (L,) are in N; ``reach`` (m) is the largest distance from the axis at which stresses
-    will be asked for; ``order`` is zero for the normal stress at the base, one for its shear.
-    """
+    """Return the base stresses of a sphere on a film for a range of friction coefficients."""
     setup = FamilySetup.of(
         film, indenter, loads, reach=reach, cache=cache, workers=workers, order=order
     )
@@ -79,10 +75,7 @@ def elasto_plastic_family(
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ProfileFamily:
-    """Return the base stresses for a range of slip lengths (m) at a given friction coefficient.
-
-    Loading is incremental.  A slip length of 0 is the rigid interface; ``inf`` bears no shear.
-    """
+    """Return incremental base stresses for slip lengths (m), from 0 (rigid) to inf (no shear)."""
     setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
     values = parameter_values("slip lengths", slip_lengths)
     if not 0 < friction < math.inf:
@@ -210,10 +203,7 @@ class LawFamilies:
         uncertainty: float | None,
         calculated: ProfileFamily | None,
     ) -> ProfileFamily:
-        """Return contacts of the elasto-plastic law at a macroscopic coefficient.
-
-        The change by its standard uncertainty is named ``"macroscopic_friction"``.
-        """
+        """Return contacts of the elasto-plastic law at a macroscopic coefficient."""
 
         def family(loads: FloatArray) -> ProfileFamily:
             how = {"loads": loads, **self._how}
@@ -249,10 +239,7 @@ def _at_loads(
     calculated: ProfileFamily | None,
     calculate: Callable[[FloatArray], ProfileFamily],
 ) -> ProfileFamily:
-    """Return a family at the nearest of its loads; calculate it where one is not near enough.
-
-    What is left of a difference is in the points' own loads, to first order.
-    """
+    """Return a family at the nearest of its loads; calculate it where one is not near enough."""
     loads = np.array([profile.load for profile in profiles])
 
     def apart(family: ProfileFamily) -> FloatArray:
@@ -264,4 +251,5 @@ def _at_loads(
             if not distinct or math.log(load / distinct[-1]) > _NEAR:
                 distinct.append(load)
         calculated = calculate(np.array(distinct))
+    # What is left of a difference is in the points' own loads, to first order.
     return calculated.only(apart(calculated).argmin(axis=1).tolist())

@@ -28,10 +28,7 @@ def comparison_checks(
     loads: Mapping[str, Sequence[LoadComparison]],
     joint: Mapping[str, Mapping[str, BoundedEstimate]],
 ) -> tuple[QualityCheck, ...]:
-    """Return the checks of every load, numbered from one, and those of all loads together.
-
-    A load passes if one definition of the loading explains it.
-    """
+    """Return the checks of every load (one loading has to explain it), and those of all loads."""
     checks: list[QualityCheck] = []
     for i, of_load in enumerate(zip(*loads.values(), strict=True), start=1):
         checks += [_profile(i, of_load), _bracketing(i, of_load)]

@@ -61,11 +61,10 @@ def profile_estimate(
     level: float = LEVEL,
     unit: str = "",
 ) -> BoundedEstimate:
-    r"""Return best value and interval of chi-square (m,) along an increasing bounded coordinate t.
+    """Return best value and interval of chi-square (m,) along an increasing bounded coordinate.
 
-    The interval is :math:`\{t : \chi^2(t) - \min\chi^2 \le \chi^2_{1,p}\}`; at an end of the
-    coordinate that it holds, it is open.  There is a value where the interval has an upper end
-    (with ``two_sided`` both ends); elsewhere ``reason`` says why not.
+    The interval is open at an end of the coordinate that it holds.  There is a value where it has
+    an upper end (with ``two_sided`` both ends); elsewhere ``reason`` says why not.
     """
     from scipy.interpolate import CubicSpline
 
@@ -143,24 +142,19 @@ _SYSTEMATIC = {"conversion_constant", "apparatus", "film", "position_scale", "lo
 
 @dataclass(frozen=True, eq=False)
 class Confrontation:
-    """Measured loads against a family: chi-square of each along the family's parameter.
-
-    ``members`` is the family at fine values; ``loads`` the family's load of each of ``points``;
-    ``whole`` the likelihood of all loads along the fine values.
-    """
+    """Measured loads against a family: chi-square of each along the family's parameter."""
 
     family: ProfileFamily
     sensor: Sensor
-    members: ProfileFamily
+    members: ProfileFamily  # the family at fine values
     points: tuple[LoadPoints, ...]
-    loads: tuple[int, ...]
-    whole: Likelihood
+    loads: tuple[int, ...]  # the family's load of each of the points
+    whole: Likelihood  # of all loads, along the fine values
 
     def effective(self, chosen: Sequence[int]) -> BoundedEstimate:
         """Return the coefficient that explains some of the loads together, by their profiles."""
-        points = [self.points[i] for i in chosen]
         loads = [self.loads[i] for i in chosen]
-        return self._effective(self.whole.only(chosen), points, loads)
+        return self._effective(self.whole.only(chosen), [self.points[i] for i in chosen], loads)
 
     def effective_of_maximum(self, profile: MeasuredProfile, index: int) -> BoundedEstimate:
         """Return the coefficient that explains the measured maximum of one load."""
@@ -314,16 +308,14 @@ def dry_against_lubricated(
     profiles: tuple[MeasuredProfile, MeasuredProfile],
     points: tuple[LoadPoints, LoadPoints],
     sensor: Sensor,
-    frictionless: ProfileFamily,
-    loads: tuple[int, int],
-    conversion_share: float,
+    frictionless: ProfileFamily,  # says how voltages change with load and place
+    loads: tuple[int, int],  # its loads of the two
+    conversion_share: float,  # relative standard uncertainty of A
 ) -> DryAgainstLubricated | None:
     """Compare the dry and the lubricated profile of one load, without A.
 
-    Errors of A, G and film nearly cancel in the difference: what is left is noise, the scatter of
-    the loads, and each scan's own baseline, drift and centre.  ``frictionless`` says how voltages
-    change with load and place, ``loads`` are its loads of the two, ``conversion_share`` is the
-    relative standard uncertainty of A.  ``None``: the scans have too few places in common.
+    Errors of A, G and film nearly cancel in the difference: noise, the scatter of the loads, and
+    each scan's own baseline, drift and centre are left.  ``None``: too few places in common.
     """
     sides = [of_load.averaged() for of_load in points]
     kept = _common(sides[0].offset, sides[1].offset)
@@ -369,9 +361,8 @@ def _covariance(points: LoadPoints, predicted: Predicted) -> FloatArray:
     """Covariance of the voltages, without what both scans share, in V^2."""
     noise = np.outer(points.noise, points.noise)
     noise = np.diag(np.diag(noise)) if points.correlation is None else noise * points.correlation
-    scatter = (predicted.by_load[0] * points.load_errors) ** 2
     moved = (predicted.slope[0] * points.x_errors) ** 2
-    return np.asarray(noise + np.diag(scatter + moved))
+    return np.asarray(noise + np.diag((predicted.by_load[0] * points.load_errors) ** 2 + moved))
 
 
 def _chi_square(values: FloatArray, covariance: FloatArray, flat: FloatArray) -> float:

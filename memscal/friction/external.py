@@ -38,11 +38,7 @@ def external_family(
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ProfileFamily:
-    """Return the base stresses of tables that were calculated elsewhere, by friction coefficient.
-
-    A table serves loads within 1 % of its own.  Sensitivities are those of contacts solved here,
-    where film and sphere are given or stated by a table.
-    """
+    """Return base stresses of tables by friction; each serves loads within 1 % of its own."""
     nominal = require_loads(loads)
     tables = [_checked(profile, reach) for profile in profiles]
     if not tables:

@@ -52,33 +52,25 @@ def bounded(value: float, scale: float) -> float:
 class ProfileFamily:
     r"""Base-stress transforms of contacts at M values of one parameter, L loads, K wavenumbers.
 
-    ``name`` is ``"amontons"``, ``"elasto-plastic"``, ``"normal-compliance"`` or ``"external"``;
-    ``loading`` ``"incremental"``, ``"total"``, or ``""`` where it is unknown or changes nothing.
-    ``loads`` (L,) are in N; ``values`` (M,), increasing from 0 or above up to ``inf``, and
-    ``scale`` (:math:`\theta_0`) are friction coefficients or lengths in m.  In N and of shape
-    (M, L, K): ``spectra``, the transforms :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` (with
-    ``order`` one :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the shear); ``by_load``, their
-    derivatives by the logarithm of the load; ``changes``, by one standard uncertainty of each
-    source that states one.  ``depths``, ``contact_radii`` (m) and ``convergence`` (largest
-    relative change under refinement) are of shape (M, L), NaN where unknown.  ``notes`` say what
-    was assumed.  ``slopes`` are those of a selection by :meth:`at`, whose values have any order.
+    Spectra are :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr`, with ``order`` one
+    :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the shear.
     """
 
-    name: str
-    loading: str
+    name: str  # "amontons", "elasto-plastic", "normal-compliance" or "external"
+    loading: str  # "incremental", "total", or "" where it is unknown or changes nothing
     wavenumbers: Wavenumbers
-    loads: FloatArray
-    values: FloatArray
-    scale: float
-    spectra: FloatArray
-    by_load: FloatArray
-    changes: Mapping[str, FloatArray]
-    depths: FloatArray
-    contact_radii: FloatArray
-    convergence: FloatArray
-    notes: tuple[str, ...] = field(default=())
+    loads: FloatArray  # (L,), in N
+    values: FloatArray  # (M,): coefficients or lengths in m, increasing from 0 or above up to inf
+    scale: float  # theta_0, of the values
+    spectra: FloatArray  # (M, L, K), in N
+    by_load: FloatArray  # their derivatives by the logarithm of the load
+    changes: Mapping[str, FloatArray]  # by one standard uncertainty of each source that states one
+    depths: FloatArray  # (M, L), in m; NaN where unknown, as the next two
+    contact_radii: FloatArray  # (M, L), in m
+    convergence: FloatArray  # (M, L): largest relative change under refinement
+    notes: tuple[str, ...] = field(default=())  # what was assumed
     order: int = 0
-    slopes: FloatArray | None = None
+    slopes: FloatArray | None = None  # of a selection by at(), whose values have any order
 
     def __post_init__(self) -> None:
         arrays = ("loads", "values", "spectra", "by_load")
@@ -252,10 +244,7 @@ def _scaled_changes(
 
 
 def _poisson_ratios(film: ElasticFilm) -> tuple[float, float] | None:
-    """Return two Poisson's ratios whose difference shows its influence; ``None`` if it is exact.
-
-    The difference is one-sided for an incompressible film.
-    """
+    """Return two Poisson's ratios (one-sided if incompressible) for its influence, if uncertain."""
     if not (u := film.poisson_ratio_uncertainty):
         return None
     step = max(u, _SMALLEST_STEP)
@@ -278,10 +267,7 @@ _STRETCH = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class LoadingPath:
-    """A loading of one film with one interface, looked at at ``loads`` (N, in any order).
-
-    ``order`` is zero for the normal stress at the base, one for the shear.
-    """
+    """A loading of one film with one interface, looked at at ``loads`` (N, in any order)."""
 
     film: ElasticFilm
     indenter: Sphere
@@ -290,7 +276,7 @@ class LoadingPath:
     loading: str = "incremental"
     interface: Interface = field(default_factory=Interface)
     derivatives: bool = True
-    order: int = 0
+    order: int = 0  # one for the shear at the base
 
 
 def solve_paths(
@@ -456,13 +442,10 @@ class FamilySetup:
         loading: str,
         values: FloatArray,
         a_length: bool = False,
-        stronger: Sequence[LoadingPath] | None = None,
+        stronger: Sequence[LoadingPath] | None = None,  # interface stronger by STRONGER
         notes: tuple[str, ...] = (),
     ) -> ProfileFamily:
-        """Return the family of some paths, as it was kept or calculated now.
-
-        ``stronger`` are paths with an interface stronger by ``STRONGER``, where that matters.
-        """
+        """Return the family of some paths, as it was kept or calculated now."""
         k = self.wavenumbers.k
         # Lengths scale as the film's displacements: twice the sphere's rise over its thickness.
         scale = self.film.thickness**2 / self.indenter.radius if a_length else FRICTION_SCALE
@@ -570,5 +553,4 @@ def _by_log_value(spectra: FloatArray, values: FloatArray, scale: float) -> Floa
     from scipy.interpolate import PchipInterpolator
 
     t = np.array([bounded(float(value), scale) for value in values])
-    slopes = PchipInterpolator(t, spectra, axis=0)(t, 1)
-    return np.asarray((t * (1 - t))[:, None, None] * slopes)
+    return np.asarray((t * (1 - t))[:, None, None] * PchipInterpolator(t, spectra, axis=0)(t, 1))

@@ -53,15 +53,12 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class LawCurve:
-    """The likelihood of a law along its parameter, at M values.
-
-    Between ``edges`` (M + 1,) each value stands for all others; ``tables`` are of shape (M, 1).
-    """
+    """The likelihood of a law along its parameter, at M values."""
 
     values: FloatArray
     coordinates: FloatArray
-    edges: FloatArray
-    tables: Tables
+    edges: FloatArray  # (M + 1,): between them each value stands for all others
+    tables: Tables  # of shape (M, 1)
     log_likelihood: FloatArray
     chi_square: FloatArray
 
@@ -82,12 +79,10 @@ class LawCurve:
 
 
 def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] = ()) -> LawCurve:
-    """Return the likelihood along a family's parameter, of all loads or of one by its index.
-
-    Nodes are even in the bounded coordinate, closer where it matters; ``also`` are nodes too.
-    """
+    """Return the likelihood along a family's parameter, of all loads or of one by its index."""
     family = measured.family
     first, last = family.coordinates[0], family.coordinates[-1]
+    # Nodes are even in the bounded coordinate, closer where it matters.
     extra = [family.coordinate(value) for value in also]
     coarse = np.unique(np.concatenate([np.linspace(first, last, _COARSE), extra]))
 
@@ -99,8 +94,7 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     rough_log = log_likelihood(rough)[0][:, 0]
     near = np.flatnonzero(2 * (rough_log.max() - rough_log) < _EXCLUDED)
     low, high = coarse[max(near[0] - 1, 0)], coarse[min(near[-1] + 1, coarse.size - 1)]
-    count = _FINE if load is None else _FINER
-    fine = np.setdiff1d(np.linspace(low, high, count), coarse)
+    fine = np.setdiff1d(np.linspace(low, high, _FINE if load is None else _FINER), coarse)
     close = tables_at(fine)
     both = np.concatenate([coarse, fine])
     order = np.argsort(both)
@@ -194,8 +188,7 @@ def implied_friction(
     curves, maxima = _maxima(rigid, values), _maxima(slipping, lengths)
     implied = [[_read(values, curves[:, load], top) for top in maxima[:, load]] for load in order]
     family = slipping.family
-    radii = family.at(length.best).contact_radii[0]
-    pressures = (family.loads / (np.pi * radii**2))[order]
+    pressures = (family.loads / (np.pi * family.at(length.best).contact_radii[0] ** 2))[order]
     with np.errstate(divide="ignore"):
         stiffnesses = friction * pressures[:, None] / lengths
     return ImpliedFriction(family.loads[order], np.array(implied), pressures, stiffnesses)

@@ -44,27 +44,19 @@ from memscal.model.measured_stress import MeasuredProfile
 
 @dataclass(frozen=True, eq=False)
 class LoadPoints:
-    """Voltages ``u`` (n,), in V, of one load of one scan, and what is known about each.
+    """Voltages (n,) of one load of one scan, and what is known about each."""
 
-    ``offset``: position from the centre along the scan, in m; ``log_load``: logarithm of the
-    point's load over the nominal one; ``noise``: standard deviation in V, larger for outliers;
-    ``load_errors`` (relative) and ``x_errors`` (m): independent standard uncertainties; ``flat``
-    (n, d): baseline and drift, of unknown size; ``free_centre``: whether the centre is free;
-    ``load_share``, ``position_share``: relative standard uncertainty of all loads, and of the
-    stage's scale; ``correlation`` (n, n): of the electronic noise.
-    """
-
-    u: FloatArray
-    offset: FloatArray
-    log_load: FloatArray
-    noise: FloatArray
-    load_errors: FloatArray
-    x_errors: FloatArray
-    flat: FloatArray
+    u: FloatArray  # in V
+    offset: FloatArray  # position from the centre along the scan, in m
+    log_load: FloatArray  # logarithm of the point's load over the nominal one
+    noise: FloatArray  # standard deviation in V, larger for outliers
+    load_errors: FloatArray  # independent standard uncertainties, relative
+    x_errors: FloatArray  # likewise, in m
+    flat: FloatArray  # (n, d): baseline and drift, of unknown size
     free_centre: bool = True
-    load_share: float = 0.0
-    position_share: float = 0.0
-    correlation: FloatArray | None = None
+    load_share: float = 0.0  # relative standard uncertainty of all loads
+    position_share: float = 0.0  # likewise of the stage's scale
+    correlation: FloatArray | None = None  # (n, n): of the electronic noise
 
     @property
     def radius(self) -> FloatArray:
@@ -105,10 +97,7 @@ class LoadPoints:
 
 
 def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
-    """Return the points of a measured profile, with the noise that is stated, or was estimated.
-
-    A stated noise is not raised by a misfit: chi-square would not show it then.
-    """
+    """Return the points of a measured profile, with the noise that is stated, or was estimated."""
     points = profile.points.get(channel)
     if points is None:
         raise _missing(profile, channel)
@@ -123,6 +112,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         u=points.u,
         offset=position - float(profile.centre[profile.axis]),
         log_load=np.log(points.load / profile.load),
+        # A stated noise is not raised by a misfit: chi-square would not show it then.
         noise=np.asarray(points.noise / np.sqrt(points.weight)),
         load_errors=points.load_errors / profile.load,
         x_errors=points.x_errors,
@@ -181,18 +171,13 @@ _RADII = 64
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A sensor at the nodes of a family.
-
-    ``transfer`` (K,): transform of A G, in V/Pa; ``changes`` (K, q): its independent changes by
-    one standard uncertainty; ``conversion_constant``: A, in V/Pa; ``order``: zero, or one of a
-    tangential channel.
-    """
+    """A sensor at the nodes of a family."""
 
     wavenumbers: Wavenumbers
-    transfer: FloatArray
-    changes: FloatArray
-    conversion_constant: float
-    order: int = 0
+    transfer: FloatArray  # (K,): transform of A G, in V/Pa
+    changes: FloatArray  # (K, q): its independent changes by one standard uncertainty
+    conversion_constant: float  # A, in V/Pa
+    order: int = 0  # one of a tangential channel
 
     @property
     def of_shape(self) -> Sensor:
@@ -204,19 +189,13 @@ class Sensor:
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Voltages of the n points of one load at V values of a family's parameter, shape (V, n).
+    """Voltages (V) of the n points of one load at V values of a family's parameter, (V, n)."""
 
-    ``signal`` is A G convolved with the base stress at the point's load, in V; ``by_load``,
-    ``by_coordinate`` and ``slope`` its derivatives by the logarithm of the load, the bounded
-    coordinate and the distance from the centre (V/m); ``columns`` (V, n, q) its changes by one
-    standard uncertainty of each systematic source, in V.
-    """
-
-    signal: FloatArray
-    by_load: FloatArray
-    by_coordinate: FloatArray
-    slope: FloatArray
-    columns: Mapping[str, FloatArray]
+    signal: FloatArray  # A G convolved with the base stress at the point's load
+    by_load: FloatArray  # its derivative by the logarithm of the load
+    by_coordinate: FloatArray  # by the bounded coordinate
+    slope: FloatArray  # by the distance from the centre, in V/m
+    columns: Mapping[str, FloatArray]  # (V, n, q): changes by each systematic source's uncertainty
 
 
 def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float) -> Sensor:
@@ -262,14 +241,11 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
 
 @dataclass(frozen=True, eq=False)
 class _Bessel:
-    """Inverse transforms at distances (n,) in m, and their slopes; repeats share theirs.
-
-    Both are times the ``sign`` (n,): of a vector's component, the side of the centre.
-    """
+    """Inverse transforms at distances (n,) in m, and their slopes; repeats share theirs."""
 
     radius: FloatArray
     wavenumbers: Wavenumbers
-    sign: FloatArray | float = 1.0
+    sign: FloatArray | float = 1.0  # factor (n,) of both: of a vector, the side of the centre
 
     def values(self, spectra: FloatArray) -> FloatArray:
         """Values of transforms (V, K) at the distances, shape (V, n)."""
@@ -311,19 +287,13 @@ class _VectorBessel(_Bessel):
 
 @dataclass(frozen=True, eq=False)
 class Standardised:
-    """One load at V values of the parameter, its noise independent and of unit variance.
+    """One load at V parameter values: noise of unit variance, flat nuisances projected out."""
 
-    ``residual`` (V, n): measured less calculated voltage, flat nuisances projected out; ``slope``
-    (V, n) and ``columns`` (V, n, q): derivative by the bounded coordinate and systematic changes,
-    likewise; ``noises``: roots (V, n, n) of the covariances of the kinds of noise, (V, n) where
-    they are diagonal; ``volume`` (V,): log-determinants of N and of the flat information.
-    """
-
-    residual: FloatArray
-    slope: FloatArray
-    columns: Mapping[str, FloatArray]
-    noises: Mapping[str, FloatArray]
-    volume: FloatArray
+    residual: FloatArray  # (V, n): measured less calculated voltage
+    slope: FloatArray  # (V, n): derivative by the bounded coordinate
+    columns: Mapping[str, FloatArray]  # (V, n, q): systematic changes
+    noises: Mapping[str, FloatArray]  # roots (V, n, n) of each kind's covariance; (V, n): diagonal
+    volume: FloatArray  # (V,): log-determinants of N and of the flat information
     degrees: int
 
 
@@ -452,8 +422,7 @@ class Likelihood:
 
     def _columns_of(self, load: Standardised, source: str) -> FloatArray:
         """Return the columns of a source, zero where the load does not know it."""
-        nothing = np.zeros((*load.residual.shape, self._widths[source]))
-        return load.columns.get(source, nothing)
+        return load.columns.get(source, np.zeros((*load.residual.shape, self._widths[source])))
 
     def _all_columns(self, load: Standardised) -> FloatArray:
         columns = [self._columns_of(load, source) for source in self._widths]

@@ -40,16 +40,12 @@ _NEGLIGIBLE = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    r"""Statistics of J groups at M values of a parameter, their own nuisances integrated.
+    """Statistics of J groups at M values of a parameter, their own nuisances integrated."""
 
-    ``squares`` (M, J): :math:`\rho^T Q \rho`; ``pulls`` (M, J, q): :math:`D^T Q \rho`; ``grips``
-    (M, J, q, q): :math:`D^T Q D`; ``volumes`` (M, J): :math:`\ln\det N + \ln\det F^T N^{-1} F`.
-    """
-
-    squares: FloatArray
-    pulls: FloatArray
-    grips: FloatArray
-    volumes: FloatArray
+    squares: FloatArray  # (M, J): rho^T Q rho
+    pulls: FloatArray  # (M, J, q): D^T Q rho
+    grips: FloatArray  # (M, J, q, q): D^T Q D
+    volumes: FloatArray  # (M, J): ln det N + ln det F^T N^-1 F
 
     def together(self) -> Tables:
         """Return the groups as one, of shape (M, 1): one parameter for all of them."""
@@ -106,9 +102,8 @@ def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> Evidenc
 def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) -> Evidence:
     """Return the evidence of a law with one parameter of each load, on its nodes and their weights.
 
-    The loads are taken one after the other, and the parameter of each drawn given those before;
-    the evidence is the mean over the draws (of a Sobol sequence) of the product of what each load
-    was expected to be.
+    The parameter of each load is drawn (by a Sobol sequence) given those before; the evidence is
+    the mean over the draws of the product of what each load was expected to be.
     """
     from scipy.stats.qmc import Sobol
 

@@ -167,21 +167,15 @@ def compare_interface(
     profiles: Sequence[MeasuredProfile],
     apparatus: ApparatusFunction,
     *,
-    macroscopic: float,
+    macroscopic: float,  # coefficient at which the indenter slides
     macroscopic_uncertainty: float | None = None,
-    amontons: ProfileFamily | None = None,
-    slipping: ProfileFamily | None = None,
-    yielding: ProfileFamily | None = None,
+    amontons: ProfileFamily | None = None,  # incremental, from 0 to inf
+    slipping: ProfileFamily | None = None,  # elasto-plastic at the macroscopic coefficient
+    yielding: ProfileFamily | None = None,  # normally compliant
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> InterfaceComparison:
-    """Weigh laws of the interface by all loads together.
-
-    The macroscopic coefficient is that at which the indenter slides.  Families without a load
-    within 1 % of each measured one are calculated: ``amontons`` (incremental, from 0 to ``inf``),
-    ``slipping`` (elasto-plastic at the macroscopic coefficient, its uncertainty among the changes),
-    ``yielding`` (normally compliant).
-    """
+    """Weigh laws of the interface; families without a load within 1 % of each are calculated."""
     if not profiles:
         raise InputError(
             "Laws of the interface are compared with measured profiles, but none is given."
@@ -194,18 +188,16 @@ def compare_interface(
     calculated = LawFamilies(profiles, cache, workers)
     tangential = normal = None
     if dry:
-        rigid = calculated.rigid(dry, amontons)
         elastic = calculated.slipping(dry, macroscopic, macroscopic_uncertainty, slipping)
         tangential = weigh_slip_length(
-            _measured(dry, apparatus, rigid),
+            _measured(dry, apparatus, calculated.rigid(dry, amontons)),
             _measured(dry, apparatus, elastic),
             macroscopic=macroscopic,
             lubrication=dry[0].lubrication,
         )
     if wet:
-        normal = weigh_normal_compliance(
-            _measured(wet, apparatus, calculated.yielding(wet, yielding))
-        )
+        family = calculated.yielding(wet, yielding)
+        normal = weigh_normal_compliance(_measured(wet, apparatus, family))
     messages = tuple(_messages(tangential, normal, macroscopic_uncertainty, dry))
     return InterfaceComparison((macroscopic, macroscopic_uncertainty), tangential, normal, messages)
 
@@ -218,8 +210,7 @@ def _measured(
     for profile, load in zip(profiles, family.loads, strict=True):
         of_load = load_points(profile)
         # Loads count from that of the calculated contact.
-        shifted = of_load.log_load + math.log(profile.load / load)
-        points.append(replace(of_load, log_load=shifted))
+        points.append(replace(of_load, log_load=of_load.log_load + math.log(profile.load / load)))
     return Measured(points, sensor_of(apparatus, family, reach), family)
 
 

@@ -346,8 +346,7 @@ def _messages(
         for message in load.messages:
             numbers.setdefault(message, []).append(str(i + 1))
     for message, of_profiles in numbers.items():
-        everywhere = len(of_profiles) == len(loads)
-        place = "" if everywhere else f"Profile {', '.join(of_profiles)}: "
+        place = "" if len(of_profiles) == len(loads) else f"Profile {', '.join(of_profiles)}: "
         yield replace(message, text=f"{place}{message.text}")
 
 

@@ -303,8 +303,7 @@ def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
     scatter = 1.4826 * float(np.median(np.abs(residual)))
     tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * estimate.largest_signal)
     variance = tried[:, None] ** 2 + of_load**2
-    deviance = np.sum(np.log(variance) + square / variance, axis=1)
-    return float(tried[np.argmin(deviance)])
+    return float(tried[np.argmin(np.sum(np.log(variance) + square / variance, axis=1))])
 
 
 def _distance(scan: Scan, centre: FloatArray) -> FloatArray:

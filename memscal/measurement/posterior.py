@@ -367,7 +367,6 @@ def _resolved(posterior: Posterior, per_pressure: FloatArray) -> float:
     estimate, nodes = posterior.estimate, posterior.nodes
     k = estimate.model.k
     errors = np.sqrt(np.maximum(np.diag(posterior.covariance)[:nodes], 0.0))
-    yardstick = per_pressure * gaussian_transfer(k, estimate.gaussian.sigma)
-    lost = errors * _RESOLVED > yardstick
+    lost = errors * _RESOLVED > per_pressure * gaussian_transfer(k, estimate.gaussian.sigma)
     first = int(np.argmax(lost)) if lost.any() else k.size - 1
     return float(min(k[first], np.pi / estimate.points.step))

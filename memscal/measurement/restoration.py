@@ -328,10 +328,9 @@ class Restoration(Result):
         Of the centre only the coordinates that the scan determines: shape (4, 4) or (5, 5).
         """
         nodes, first_drift = self.posterior.nodes, self._first_drift
-        last = slice(nodes, first_drift + 1)
         rows = np.zeros((2 + first_drift + 1 - nodes, self.posterior.state.size))
         rows[0, :nodes], rows[1, :nodes] = self._at_zero, self._synthesis(0.0)
-        rows[2:, last] = np.eye(first_drift + 1 - nodes)
+        rows[2:, nodes : first_drift + 1] = np.eye(first_drift + 1 - nodes)
         return np.asarray(rows @ self.posterior.covariance @ rows.T)
 
     @property

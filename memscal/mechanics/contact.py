@@ -192,8 +192,7 @@ class Contact(Result):
 
     @cached_property
     def _default_profile(self) -> StressProfile:
-        edge = self.contact_radius / self.film.thickness
-        near = np.arange(0.0, edge + _NEAR_REACH, _NEAR_STEP)
+        near = np.arange(0.0, self.contact_radius / self.film.thickness + _NEAR_REACH, _NEAR_STEP)
         far = near[-1] + np.arange(_FAR_STEP, _FAR_REACH - _NEAR_REACH, _FAR_STEP)
         radii = np.concatenate([near, far]) * self.film.thickness
         sigma_zz = np.abs(self.base_stress(radii))

@@ -109,8 +109,7 @@ def _prepare(x: ArrayLike, nu: float) -> tuple[FloatArray, FloatArray, FloatArra
     """Return x, exp(-2x), 2 exp(-2x) D and kappa."""
     x = np.minimum(np.asarray(x, dtype=np.float64), _LARGEST_X)
     kappa, decay = 3 - 4 * nu, np.exp(-2 * x)
-    denominator = kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1)
-    return x, decay, denominator, kappa
+    return x, decay, kappa * (1 + decay**2) + decay * (4 * x**2 + kappa**2 + 1), kappa
 
 
 def _x_cosh_minus_sinh(x: FloatArray, decay: FloatArray) -> FloatArray:
@@ -164,10 +163,7 @@ _BASE_STRESS_CHUNK = 128
 def base_spectrum(
     film: ElasticFilm, traction: InterfaceTraction, k: FloatArray, *, order: int = 0
 ) -> FloatArray:
-    r"""Return :math:`T\hat p - N\hat q` or, of ``order`` one, :math:`-(S\hat p + R\hat q)`, in N.
-
-    At ``k`` (rad/m): transforms of the base's normal stress and of its traction on the film.
-    """
+    r"""Return :math:`T\hat p - N\hat q`; of ``order`` one :math:`-(S\hat p + R\hat q)`; in N."""
     x, nu = k * film.thickness, film.poisson_ratio
     p, q = traction.pressure_transform(k), traction.shear_transform(k)
     if order:
@@ -178,10 +174,7 @@ def base_spectrum(
 def base_stress(
     film: ElasticFilm, traction: InterfaceTraction, r: FloatArray, *, order: int = 0
 ) -> FloatArray:
-    r"""Return :math:`\int\hat\sigma(k)\,J_n(kr)\,k\,dk` of the base at ``r`` (m), in Pa.
-
-    Compression and outward traction are positive; accurate to 1e-13 of the maximum.
-    """
+    """Return stress, or of ``order`` one traction, at the base (Pa), to 1e-13 of the peak."""
     h, flat = film.thickness, np.ravel(r)
     inside = np.flatnonzero(flat <= traction.radius + _DECAYED * h)
     sorting = inside[np.argsort(flat[inside], kind="stable")]

@@ -155,11 +155,7 @@ def indent(
 
 
 def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
-    """Return contacts with each stated property of film and indenter varied, at the same load.
-
-    Each: the contacts with more and with less of it, and the standard uncertainty over the
-    difference of the two.  A contact that was not reached by loading alone is refused.
-    """
+    """Return contacts with more and less of each uncertain input, and u over its difference."""
     film, indenter = contact.film, contact.indenter
 
     def again(film: ElasticFilm, indenter: Indenter) -> Contact:

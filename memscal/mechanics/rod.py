@@ -60,8 +60,7 @@ def rod_integrals(
 
     # t^2 = rho^2 + s^2 beyond: the root sqrt(t^2 - rho^2) = s cancels against dt = s ds / t.
     top = np.sqrt(np.maximum(1 - rho**2, 0.0))
-    s = top[:, None] * share
-    t = np.sqrt(inner[:, None] ** 2 + s**2)
+    t = np.sqrt(inner[:, None] ** 2 + (top[:, None] * share) ** 2)
     d_s = top[:, None] * weights
     reciprocal = np.divide(1.0, t, out=np.zeros_like(t), where=t > 0)
     w_by_q = np.sum(d_s * legendre.legval(t, odd) * reciprocal, axis=1)

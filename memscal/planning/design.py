@@ -99,11 +99,7 @@ def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, fl
 def least_design(
     plan: Plan, targets: Mapping[str, float], vary: str, evaluate: Callable[[Plan], Design]
 ) -> Design:
-    """Find the coarsest step, the shortest range or the fewest repeats that reach the targets.
-
-    ``targets`` by full name: largest relative uncertainty, or smallest resolved wavenumber in
-    rad/m.  Where they are out of reach, the error states the best design and its limiting source.
-    """
+    """Find the coarsest step, the shortest range or the fewest repeats that reach the targets."""
     search = _search(plan, vary)
     tried: dict[int, Design | None] = {}
 

@@ -72,8 +72,7 @@ def expected_calibration(plan: Plan, method: Method) -> Expected:
     )
     effects = input_effects(solution.scans, solution.stresses, estimate)
     wavenumbers = fields.along_axis(deconvolution.quotient.window)[0]
-    drawn = drawn_scatter(solution)
-    results = propagate(solution, deconvolution, wavenumbers, effects, {}, drawn)
+    results = propagate(solution, deconvolution, wavenumbers, effects, {}, drawn_scatter(solution))
     return Expected(solution, results)
 
 

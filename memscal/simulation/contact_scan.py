@@ -34,13 +34,10 @@ _LEAST_SPREAD = 0.02
 
 @dataclass(frozen=True, eq=False)
 class LoadPath:
-    """Contacts at several nominal loads, with neighbours where their loads scatter.
+    """Contacts at several nominal loads, with neighbours where their loads scatter."""
 
-    ``states``: at each nominal load one contact, or three, ``spread`` apart in ln P.
-    """
-
-    states: Sequence[Sequence[Contact]]
-    spread: float
+    states: Sequence[Sequence[Contact]]  # at each nominal load one contact, or three
+    spread: float  # their distance in ln P
 
     def at_nominal(self, kernel: RadialKernel, radius: FloatArray) -> FloatArray:
         """Return the blurred stress at every nominal load, shape (loads, *radius.shape), in Pa."""
@@ -52,18 +49,14 @@ class LoadPath:
         kernel: RadialKernel,
         radius: FloatArray,
         ratio: FloatArray,
-        order: int = 0,
+        order: int = 0,  # one for the shear's radial component
     ) -> FloatArray:
-        r"""Return the blurred stress in Pa at ``radius`` (m) and ``ratio``, load over nominal load.
-
-        :math:`S + S't + S''t^2/2` with :math:`t = \ln(P_i/P)`, its derivatives by finite
-        differences.  ``order`` one gives the shear's radial component.
-        """
+        """Return the blurred stress (Pa) at ``radius`` (m); ``ratio``: load over nominal."""
         values = blurred_stress(self.states[index], kernel, radius, order=order)
         if len(values) == 1:
             return np.asarray(values[0])
         below, middle, above = values
-        t = np.log(ratio)
+        t = np.log(ratio)  # the stress is a parabola in it
         slope = (above - below) / (2 * self.spread)
         bend = (above - 2 * middle + below) / self.spread**2
         return np.asarray(middle + slope * t + 0.5 * bend * t**2)

@@ -36,11 +36,7 @@ class Reality:
 
 
 def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
-    """Draw the true values from the stated ones, normal and independent, by their uncertainties.
-
-    A Poisson's ratio above 0.5 is reflected at 0.5.  ``load_uncertainty``: relative standard
-    uncertainty of the common factor of the rod's loads, and of that of the sphere's.
-    """
+    """Draw the true values from the stated ones, normal and independent, by their uncertainties."""
     rng = np.random.default_rng(seed)
 
     def around(value: float, uncertainty: float | None) -> float:
@@ -49,6 +45,7 @@ def drawn(stated: Reality, load_uncertainty: float, seed: int) -> Reality:
 
     film, rod, sphere = stated.film, stated.rod, stated.sphere
     modulus = around(film.young_modulus, film.young_modulus_uncertainty)
+    # A Poisson's ratio above 0.5 is reflected at 0.5.
     ratio = 0.5 - abs(0.5 - around(film.poisson_ratio, film.poisson_ratio_uncertainty))
     thickness = around(film.thickness, film.thickness_uncertainty)
     return Reality(

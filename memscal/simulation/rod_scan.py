@@ -128,8 +128,7 @@ def simulate(
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
     x = np.linspace(-half_range, half_range, points)
-    y = x if raster else np.zeros(1)
-    radius = np.hypot.outer(y - centre[1], x - centre[0])
+    radius = np.hypot.outer((x if raster else np.zeros(1)) - centre[1], x - centre[0])
     contact = indent(film, rod, load=float(loads.max()))
     per_newton = conversion_constant * blurred_stress([contact], truth, radius)[0] / contact.load
     row_loads = np.repeat(loads, repeats)

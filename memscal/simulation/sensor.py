@@ -41,11 +41,8 @@ def apparatus_function(kernel: RadialKernel | None) -> RadialKernel:
 def blurred_stress(
     contacts: Sequence[Contact], kernel: RadialKernel, radius: FloatArray, *, order: int = 0
 ) -> FloatArray:
-    r"""Return :math:`G \otimes \sigma_{zz}` in Pa of contacts on one film, by Hankel transforms.
-
-    Shape (contacts, *radius.shape) at distances ``radius`` (m) from the axis; of order one, the
-    radial component of the blurred base shear.
-    """
+    r"""Return :math:`G \otimes \sigma_{zz}` in Pa at ``radius`` (m), a row for each contact."""
+    # Of order one: the radial component of the blurred base shear.
     nodes = Wavenumbers.covering(_REACH / contacts[0].film.thickness, float(radius.max()))
     transforms = [(c.base_shear_spectrum if order else c.base_spectrum)(nodes.k) for c in contacts]
     spectra = np.stack(transforms, axis=1) * kernel.transform(nodes.k)[:, None]
@@ -94,10 +91,7 @@ class ShearChannel:
     def recorded(
         self, stress: FloatArray, x: FloatArray, disturbed: Disturbances
     ) -> tuple[dict[str, FloatArray], dict[str, float | str]]:
-        """Return the channel's voltages, and its truth by names that end in ``_xz``.
-
-        ``stress`` (..., n): the blurred shear along x, in Pa; ``x`` (n,): positions, in m.
-        """
+        """Return voltages of the blurred shear along x (..., n), in Pa, and their truth (_xz)."""
         clean = self.conversion_constant * stress
         largest = float(np.abs(clean).max())
         draws = np.random.default_rng([disturbed.seed, 1]).standard_normal(clean.shape)

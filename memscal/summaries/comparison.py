@@ -19,20 +19,12 @@ from memscal.friction.results import (
     ShearComparison,
     percent,
 )
+from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FAILED_CHECK, Message, QualityCheck, failed_check_messages
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import MM, measured
-from memscal.model.records import (
-    CALCULATED,
-    COMPARED_LOAD,
-    COMPARED_MAXIMA,
-    DRY_AGAINST_LUBRICATED,
-    ESTIMATE_FIT,
-    FRICTION,
-    STRESS_NUMBERS,
-)
 from memscal.summaries import interface_laws
 from memscal.summaries.declared import cell, columns, correlated_numbers, members
 from memscal.summaries.interface_laws import friction_name
@@ -59,7 +51,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
         loads = [
             {
                 "lubrication": profile.lubrication,
-                **members(STRESS_NUMBERS.quantities[:1], profile),
+                **members(records.STRESS_NUMBERS.quantities[:1], profile),
                 "by_loading": {
                     loading or "given": _estimate(estimates[i])
                     for loading, estimates in comparison.loads.items()
@@ -75,7 +67,8 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
         "loads": [_load(i, comparison, load) for i, load in enumerate(first)],
         "joint": joint,
         "dry_against_lubricated": [
-            members(DRY_AGAINST_LUBRICATED, pair) for pair in comparison.dry_against_lubricated
+            members(records.DRY_AGAINST_LUBRICATED, pair)
+            for pair in comparison.dry_against_lubricated
         ],
         "interface": None if laws is None else interface_laws.mapping(laws),
         "macroscopic": None if sliding is None else _sliding(*sliding),
@@ -93,11 +86,11 @@ def frame(comparison: FrictionComparison | ShearComparison) -> pd.DataFrame:
     for loading in comparison.loadings:
         loads: Sequence[LoadComparison | BoundedEstimate] = comparison.loads[loading]
         for profile, load in zip(comparison.measured.profiles, loads, strict=True):
-            row: dict[str, Any] = {"loading": loading, **columns(COMPARED_LOAD, profile)}
+            row: dict[str, Any] = {"loading": loading, **columns(records.COMPARED_LOAD, profile)}
             if isinstance(load, BoundedEstimate):
                 row |= _columns("friction", load)
             else:
-                row |= columns(COMPARED_MAXIMA, load) | {"bracketed": load.bracketed}
+                row |= columns(records.COMPARED_MAXIMA, load) | {"bracketed": load.bracketed}
                 row |= _columns("friction by maximum", load.by_maximum)
                 row |= _columns("friction by profile", load.by_profile)
             rows.append(row)
@@ -169,7 +162,7 @@ def file_json(source: SourceFile | None) -> dict[str, Any]:
 
 def _sliding(value: float, uncertainty: float | None) -> dict[str, Any]:
     values = {"friction": value, "friction_uncertainty": uncertainty}
-    [member] = members(measured(FRICTION), None, **values).values()
+    [member] = members(measured(records.FRICTION), None, **values).values()
     return dict(member)
 
 
@@ -177,8 +170,8 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
     """Return what was measured at one load, and what each loading makes of it."""
     return {
         "scan": getattr(load.profile.scan.source, "file_name", None),
-        **members(COMPARED_LOAD, load.profile),
-        **members(COMPARED_MAXIMA, load),
+        **members(records.COMPARED_LOAD, load.profile),
+        **members(records.COMPARED_MAXIMA, load),
         "by_loading": {
             loading or "given": _by_loading(comparison, loads[index])
             for loading, loads in comparison.loads.items()
@@ -187,7 +180,7 @@ def _load(index: int, comparison: FrictionComparison, load: LoadComparison) -> d
 
 
 def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[str, Any]:
-    names = [quantity.name for quantity in CALCULATED]
+    names = [quantity.name for quantity in records.CALCULATED]
     mu, sticking = comparison.friction, np.isinf(comparison.friction).tolist()
     calculated = zip(mu, sticking, load.p_max, load.chi_square, load.p_values, strict=True)
     return {
@@ -198,7 +191,8 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
         "bracketed": finite(load.bracketed),
         "degrees": load.degrees,
         "profiles": [
-            members(CALCULATED, None, **dict(zip(names, row, strict=True))) for row in calculated
+            members(records.CALCULATED, None, **dict(zip(names, row, strict=True)))
+            for row in calculated
         ],
     }
 
@@ -206,8 +200,8 @@ def _by_loading(comparison: FrictionComparison, load: LoadComparison) -> dict[st
 def _estimate(estimate: BoundedEstimate) -> dict[str, Any]:
     """Return a coefficient with its interval, how it fits, and its likelihood."""
     return {
-        **interface_laws.bounded_json(FRICTION, estimate),
-        **members(ESTIMATE_FIT, estimate),
+        **interface_laws.bounded_json(records.FRICTION, estimate),
+        **members(records.ESTIMATE_FIT, estimate),
         "profile_likelihood": {
             "friction_coefficient": _shortened(estimate.values),
             "chi2": _shortened(estimate.chi_square),
@@ -297,11 +291,10 @@ def tables(comparison: FrictionComparison | ShearComparison) -> list[Table]:
     friction = [_friction_table(comparison, loading) for loading in comparison.loadings]
     if isinstance(comparison, ShearComparison):
         return [*friction, _budget_table(comparison)]
-    fits = [table for way in comparison.loadings for table in _chi_square_tables(comparison, way)]
     return [
         _maxima_table(comparison),
         *friction,
-        *fits,
+        *(table for way in comparison.loadings for table in _chi_square_tables(comparison, way)),
         _budget_table(comparison),
         _macroscopic_table(comparison),
         _lubrication_table(comparison),
@@ -317,7 +310,7 @@ def _maxima_table(comparison: FrictionComparison) -> Table:
         f"Measured stress S = U/A and frictionless p0, {sphere.shape} of radius "
         f"{sphere.radius / MM:.4g} mm (± standard uncertainty)"
     )
-    force, maxima = COMPARED_LOAD[2], COMPARED_MAXIMA[::2]
+    force, maxima = records.COMPARED_LOAD[2], records.COMPARED_MAXIMA[::2]
     head = [*_LABELS, *(quantity.heading for quantity in (force, *maxima))]
     rows = [
         [
@@ -469,7 +462,7 @@ def _checks_table(checks: Sequence[QualityCheck]) -> Table:
 
 def _lubrication_table(comparison: FrictionComparison) -> Table:
     """Return how far dry and lubricated stress differ at each load."""
-    load, maximum, _, relative, *_ = DRY_AGAINST_LUBRICATED
+    load, maximum, _, relative, *_ = records.DRY_AGAINST_LUBRICATED
     rows = [
         [
             f"{pair.load:.4g}",
@@ -480,6 +473,5 @@ def _lubrication_table(comparison: FrictionComparison) -> Table:
         ]
         for pair in comparison.dry_against_lubricated
     ]
-    words = (load.heading, maximum.heading, relative.words)
-    head = [*words, "χ²/ν of no difference", "p"]
+    head = [load.heading, maximum.heading, relative.words, "χ²/ν of no difference", "p"]
     return Table("Dry less lubricated stress (± standard uncertainty)", head, rows)

@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Any
 from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity
 from memscal.model.records import EXPECTED, PLAN, RADIAL, TRANSFER
 from memscal.planning.expected import Design
-from memscal.summaries.declared import (
-    correlated_parameters,
-    data_frame,
-    labelled_dataset,
-    members,
-    parameter_json,
-    plain,
-)
+from memscal.summaries import declared
 from memscal.summaries.table import Table
 
 if TYPE_CHECKING:
@@ -61,10 +54,9 @@ def tables(planned: Design) -> list[Table]:
     ]
     title = f"A planned scan (nothing was measured), for method {planned.method}"
     head = ("", "value", "uncertainty", "relative")
-    expected = "Expected, with standard uncertainties (k = 1)"
     return [
         Table(title, ("", ""), rows),
-        Table(expected, head, _expected_rows(planned)),
+        Table("Expected, with standard uncertainties (k = 1)", head, _expected_rows(planned)),
         _contributions_table(planned),
     ]
 
@@ -111,33 +103,33 @@ def mapping(planned: Design) -> dict[str, Any]:
     return {
         "planned": True,
         "method": planned.method,
-        "plan": members(PLAN, planned.plan),
+        "plan": declared.members(PLAN, planned.plan),
         "wanted_si": dict(planned.want),
         "expected": {name: _expected_json(planned, name) for name in _SHOWN},
-        **members(EXPECTED, planned, **axis),
+        **declared.members(EXPECTED, planned, **axis),
     }
 
 
 def _expected_json(planned: Design, name: str) -> dict[str, Any]:
     return {
-        **parameter_json(planned.parameters, name),
+        **declared.parameter_json(planned.parameters, name),
         "relative_uncertainty": planned.relative_uncertainty(name),
-        "budget": plain(planned.budget[name], ESTIMATED[name].scale),
+        "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
     }
 
 
 def dataset(planned: Design) -> xarray.Dataset:
     """Return G along r and its transfer function along k, with standard uncertainties."""
     values = {quantity.name: getattr(planned, quantity.name) for quantity in _QUANTITIES}
-    return labelled_dataset(_QUANTITIES, values)
+    return declared.labelled_dataset(_QUANTITIES, values)
 
 
 def frame(planned: Design) -> pd.DataFrame:
     """Return one row for each radius at which G is expected."""
     names = ("r", "g", "g_errors")
-    return data_frame(_QUANTITIES[:3], {name: getattr(planned, name) for name in names})
+    return declared.data_frame(_QUANTITIES[:3], {name: getattr(planned, name) for name in names})
 
 
 def correlated(planned: Design) -> dict[str, Any]:
     """Return the expected parameters with their joint covariance."""
-    return correlated_parameters(planned.parameters)
+    return declared.correlated_parameters(planned.parameters)

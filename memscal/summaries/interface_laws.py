@@ -5,14 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from memscal.friction.results import (
-    BoundedEstimate,
-    ImpliedFriction,
-    InterfaceComparison,
-    InterfaceLaw,
-    LawComparison,
-    percent,
-)
+from memscal.friction import results
+from memscal.friction.results import percent
 from memscal.model.quantities import KPA, Quantity
 from memscal.model.records import BAYES_FACTOR, COMPARED_LAWS, IMPLIED, LAW, PRIOR, SLIP_LENGTH
 from memscal.summaries.declared import members, plain
@@ -27,7 +21,7 @@ def friction_name(friction: float) -> str:
 _STIFFNESS = IMPLIED[-1]
 
 
-def tables(comparison: InterfaceComparison) -> list[Table]:
+def tables(comparison: results.InterfaceComparison) -> list[Table]:
     """Return evidence and lengths, and what a slip length means at each load."""
     shown = []
     for direction, compared in comparison.by_direction.items():
@@ -40,7 +34,7 @@ def tables(comparison: InterfaceComparison) -> list[Table]:
     return shown
 
 
-def _law_table(direction: str, compared: LawComparison) -> Table:
+def _law_table(direction: str, compared: results.LawComparison) -> Table:
     best = max(law.log_evidence for law in compared.laws)
     title = (
         f"Laws of the {compared.lubrication or 'contact'} interface, {direction}: "
@@ -59,14 +53,14 @@ def _law_table(direction: str, compared: LawComparison) -> Table:
     return Table(title, ["law", "best", "ln of evidence", "χ²/ν", "p"], rows)
 
 
-def _best(compared: LawComparison, law: InterfaceLaw) -> str:
+def _best(compared: results.LawComparison, law: results.InterfaceLaw) -> str:
     """Return the free parameters where the likelihood is largest; the last law's is a length."""
     if law is compared.laws[-1]:
         return ", ".join(f"{value / SLIP_LENGTH.scale:.3g} um" for value in law.best)
     return ", ".join(friction_name(float(f"{value:.3g}")) for value in law.best)
 
 
-def _length_table(direction: str, compared: LawComparison) -> Table:
+def _length_table(direction: str, compared: results.LawComparison) -> Table:
     """Return the length by which the interface yields, and how the evidence stands."""
     words = "slip length" if direction == "tangential" else "length"
     length = str(compared.length)
@@ -81,7 +75,7 @@ def _length_table(direction: str, compared: LawComparison) -> Table:
     return Table(title, ["law", "Bayes factor", "evidence"], rows)
 
 
-def _implied_table(implied: ImpliedFriction) -> Table:
+def _implied_table(implied: results.ImpliedFriction) -> Table:
     rows = []
     for load, friction, pressure, stiffness in zip(
         implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True
@@ -106,13 +100,13 @@ def _short(value: float) -> str:
     return friction_name(float(f"{value:.2g}"))
 
 
-def mapping(comparison: InterfaceComparison) -> dict[str, Any]:
+def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
     """Return laws, evidence and lengths as JSON holds them."""
     directions = {name: _laws_json(compared) for name, compared in comparison.by_direction.items()}
     return directions | {"warnings": texts_of(comparison.messages)}
 
 
-def _laws_json(compared: LawComparison) -> dict[str, Any]:
+def _laws_json(compared: results.LawComparison) -> dict[str, Any]:
     implied = compared.implied
     return {
         **members(COMPARED_LAWS, compared),
@@ -124,13 +118,13 @@ def _laws_json(compared: LawComparison) -> dict[str, Any]:
     }
 
 
-def _implied_json(implied: ImpliedFriction) -> list[dict[str, Any]]:
+def _implied_json(implied: results.ImpliedFriction) -> list[dict[str, Any]]:
     names = [quantity.name for quantity in IMPLIED]
     rows = zip(implied.loads, implied.friction, implied.pressures, implied.stiffnesses, strict=True)
     return [members(IMPLIED, implied, **dict(zip(names, row, strict=True))) for row in rows]
 
 
-def bounded_json(quantity: Quantity, estimate: BoundedEstimate) -> dict[str, Any]:
+def bounded_json(quantity: Quantity, estimate: results.BoundedEstimate) -> dict[str, Any]:
     """Return an estimate with its interval; without a value there is a reason."""
     interval, scale = estimate.interval, quantity.scale
     return {

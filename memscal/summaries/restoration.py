@@ -12,13 +12,8 @@ from memscal.model.arrays import FloatArray
 from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, PER_MM, Quantity, by_name
 from memscal.model.records import PROFILE, RESTORED, RESTORED_AGAINST
-from memscal.summaries.declared import (
-    cell,
-    correlated_numbers,
-    data_frame,
-    labelled_dataset,
-    members,
-)
+from memscal.summaries import declared
+from memscal.summaries.declared import members
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
 
 if TYPE_CHECKING:
@@ -90,7 +85,7 @@ def tables(restored: Restoration) -> list[Table]:
     shown = [quantity for quantity in _determined(restored) if quantity.name in _NUMBERS]
     rows = [
         ("load", f"{restored.scan.load:.4g} N"),
-        *((quantity.words, cell(quantity, restored, **values)) for quantity in shown),
+        *((quantity.words, declared.cell(quantity, restored, **values)) for quantity in shown),
         ("resolved up to the wavenumber", f"{restored.resolved_wavenumber / PER_MM:.3g} rad/mm"),
         ("restored stress blurred again", f"χ²/ν = {restored.chi_square / restored.degrees:.3g}"),
     ]
@@ -148,17 +143,19 @@ def _arrays(restored: Restoration) -> dict[str, FloatArray]:
 
 def dataset(restored: Restoration) -> xarray.Dataset:
     """Return the stress with its covariance along r, and the calculated one where there is one."""
-    return labelled_dataset(_QUANTITIES, _arrays(restored))
+    return declared.labelled_dataset(_QUANTITIES, _arrays(restored))
 
 
 def frame(restored: Restoration) -> pd.DataFrame:
     """Return one row for each radius."""
     columns = {name: values for name, values in _arrays(restored).items() if values.ndim == 1}
-    return data_frame(_QUANTITIES, columns)
+    return declared.data_frame(_QUANTITIES, columns)
 
 
 def correlated(restored: Restoration) -> dict[str, Any]:
     """Return force, stress on the axis, centre and baseline with their joint covariance."""
     held = _values(restored) | {"force": restored.force, "baseline": restored.baseline}
     shown = [quantity.name for quantity in _determined(restored) if quantity.name in _NUMBERS]
-    return correlated_numbers(shown, [held[name] for name in shown], restored.scalar_covariance)
+    return declared.correlated_numbers(
+        shown, [held[name] for name in shown], restored.scalar_covariance
+    )

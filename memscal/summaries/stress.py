@@ -7,30 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from memscal.measurement.measure_stress import SHARED_SOURCES, pooled_force
+from memscal.model import records
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import MM, Quantity, by_name
-from memscal.model.records import (
-    APPLIED,
-    FORCE_BUDGET,
-    MAXIMUM_BUDGET,
-    STRESS_NUMBERS,
-    STRESS_PROFILE,
-)
-from memscal.summaries.declared import (
-    cell,
-    correlated_numbers,
-    data_frame,
-    labelled_dataset,
-    members,
-)
+from memscal.summaries import declared
 from memscal.summaries.table import Table, checks_json, checks_table, texts_of
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-_NUMBERS = by_name(STRESS_NUMBERS.quantities)
-_QUANTITIES = by_name(STRESS_PROFILE.quantities) | _NUMBERS
+_NUMBERS = by_name(records.STRESS_NUMBERS.quantities)
+_QUANTITIES = by_name(records.STRESS_PROFILE.quantities) | _NUMBERS
 _POINTS = ("r", "x", "y", "s_zz", "s_zz_errors")
 _SCALARS = tuple(name for name in _NUMBERS if not name.startswith("centre"))
 _IN_JSON = [q for name, q in _NUMBERS.items() if not name.startswith("centre_y")]
@@ -40,7 +28,7 @@ _POINTS_IN_JSON = [_QUANTITIES[name] for name in ("r", "x", "s_zz", "s_zz_errors
 def mapping(stress: MeasuredStress) -> dict[str, Any]:
     """Return the object of ``apply --json`` without its files; the contract fixes its form."""
     return {
-        **members(APPLIED, stress, **_force_over_load(stress)),
+        **declared.members(records.APPLIED, stress, **_force_over_load(stress)),
         "profiles": [_profile_json(profile) for profile in stress.profiles],
         "overridden": list(stress.overridden),
         "checks": checks_json(stress.checks),
@@ -56,16 +44,17 @@ def _force_over_load(stress: MeasuredStress) -> dict[str, Any]:
 def _profile_json(profile: MeasuredProfile) -> dict[str, Any]:
     return {
         "scan": getattr(profile.scan.source, "file_name", None),
-        **members([*_IN_JSON, FORCE_BUDGET, MAXIMUM_BUDGET], profile, **_centre(profile)),
-        "stress": members(_POINTS_IN_JSON, profile),
+        **declared.members(
+            [*_IN_JSON, records.FORCE_BUDGET, records.MAXIMUM_BUDGET], profile, **_centre(profile)
+        ),
+        "stress": declared.members(_POINTS_IN_JSON, profile),
     }
 
 
 def _centre(profile: MeasuredProfile) -> dict[str, Any]:
     """Return the centre along the scan, in m."""
-    axis = profile.axis
-    u = profile.centre_uncertainty[axis]
-    return {"centre": profile.centre[axis], "centre_uncertainty": u}
+    u = profile.centre_uncertainty[profile.axis]
+    return {"centre": profile.centre[profile.axis], "centre_uncertainty": u}
 
 
 def tables(stress: MeasuredStress) -> list[Table]:
@@ -79,7 +68,7 @@ def tables(stress: MeasuredStress) -> list[Table]:
         if failed:
             marked.add(i)
         names = ", ".join(name.replace("_", " ") for name in failed)
-        cells = [cell(quantity, profile, **_centre(profile)) for quantity in shown]
+        cells = [declared.cell(quantity, profile, **_centre(profile)) for quantity in shown]
         state = profile.lubrication or "not stated"
         checks = f"FAILED: {names}" if failed else "passed"
         rows.append((number, f"{profile.load:.4g} N", state, *cells, checks))
@@ -97,7 +86,7 @@ def tables(stress: MeasuredStress) -> list[Table]:
 
 def _common_rows(stress: MeasuredStress) -> list[tuple[str, str]]:
     ratio = _force_over_load(stress)
-    numbers = [(q.words, cell(q, stress, **ratio)) for q in APPLIED[::2]]
+    numbers = [(q.words, declared.cell(q, stress, **ratio)) for q in records.APPLIED[::2]]
     points = sum(profile.r.size for profile in stress.profiles)
     farthest = max(float(profile.r[-1]) for profile in stress.profiles)
     return [*numbers, ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")]
@@ -116,7 +105,7 @@ def dataset(stress: MeasuredStress) -> xarray.Dataset:
         values[name] = [p.centre[i] for p in profiles]
         values[f"{name}_uncertainty"] = [p.centre_uncertainty[i] for p in profiles]
     axes = dict.fromkeys(values, ("profile",)) | dict.fromkeys(_POINTS, ("profile", "point"))
-    return labelled_dataset(_QUANTITIES.values(), values, axes)
+    return declared.labelled_dataset(_QUANTITIES.values(), values, axes)
 
 
 def frame(stress: MeasuredStress) -> pd.DataFrame:
@@ -131,7 +120,7 @@ def frame(stress: MeasuredStress) -> pd.DataFrame:
         values[name] = np.repeat([getattr(profile, name) for profile in stress.profiles], sizes)
     names = ("load", "lubrication", *_POINTS)
     number = Quantity("profile", "number", "number of the profile")
-    return data_frame((number, *(_QUANTITIES[name] for name in names)), values)
+    return declared.data_frame((number, *(_QUANTITIES[name] for name in names)), values)
 
 
 def correlated(stress: MeasuredStress) -> dict[str, Any]:
@@ -156,4 +145,4 @@ def correlated(stress: MeasuredStress) -> dict[str, Any]:
     for source in SHARED_SOURCES:
         shared = np.array([profile.force_budget.get(source, 0.0) for profile in stress.profiles])
         covariance[forces, forces] += np.outer(shared, shared) - np.diag(shared**2)
-    return correlated_numbers(names, values, covariance)
+    return declared.correlated_numbers(names, values, covariance)

@@ -62,14 +62,10 @@ def families() -> dict[str, ProfileFamily]:
 @lru_cache
 def outcome(friction: float, seed: int, gain: float = 1.0, thickness: float = 1.0) -> Outcome:
     """Make, calibrate, measure and compare one experiment, all inputs drawn."""
-    made = memscal.simulate_experiment(
-        friction=friction,
-        draw_inputs=True,
-        gain=gain,
-        thickness_factor=thickness,
-        # Every coefficient has seeds of its own: shared ones would be unlucky together.
-        seed=1000 * round(100 * min(friction, 9.0)) + seed,
-    )
+    mistakes = {"gain": gain, "thickness_factor": thickness}
+    # Every coefficient has seeds of its own: shared ones would be unlucky together.
+    own = 1000 * round(100 * min(friction, 9.0)) + seed
+    made = memscal.simulate_experiment(friction=friction, draw_inputs=True, seed=own, **mistakes)
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
     measured = memscal.measure_stress([made.dry, made.lubricated], apparatus)
     return Outcome(friction, compare_measured(measured, apparatus, families()))

@@ -18,12 +18,7 @@ from scipy.stats import binom
 
 import memscal
 from memscal import ElasticFilm, Interface, LawComparison
-from memscal.friction.calculated import (
-    FRICTIONS,
-    SLIP_LENGTHS,
-    amontons_family,
-    elasto_plastic_family,
-)
+from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
 from memscal.friction.model_comparison import compare_interface
 from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
@@ -55,15 +50,17 @@ KNOWN_FILM = replace(
 @lru_cache
 def rigid(film: ElasticFilm) -> ProfileFamily:
     """Contacts of the paper's sphere at the paper's loads: the same for every experiment."""
-    friction = FRICTIONS if FULL else (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, math.inf)
-    return amontons_family(film, PAPER_SPHERE, PAPER_LOADS, friction=friction, reach=_REACH)
+    friction = calculated.FRICTIONS if FULL else (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, math.inf)
+    return calculated.amontons_family(
+        film, PAPER_SPHERE, PAPER_LOADS, friction=friction, reach=_REACH
+    )
 
 
 @lru_cache
 def slipping(film: ElasticFilm) -> ProfileFamily:
     # Short lengths take the longest, and the truth of the reduced form is none.
-    lengths = SLIP_LENGTHS if FULL else (0.0, 4e-6, 1e-5, 3e-5, 1e-4, math.inf)
-    return elasto_plastic_family(
+    lengths = calculated.SLIP_LENGTHS if FULL else (0.0, 4e-6, 1e-5, 3e-5, 1e-4, math.inf)
+    return calculated.elasto_plastic_family(
         film, PAPER_SPHERE, PAPER_LOADS, friction=MACROSCOPIC, slip_lengths=lengths, reach=_REACH
     )
 
@@ -73,17 +70,10 @@ def weighed(friction: float, slip_length: float, kind: str, seed: int) -> LawCom
     """Make, calibrate and measure one experiment, and weigh laws of its dry interface."""
     interface = Interface(slip_length=slip_length) if slip_length else None
     film = KNOWN_FILM if kind == "known" else PAPER_FILM
-    made = memscal.simulate_experiment(
-        film=film,
-        friction=friction,
-        interface=interface,
-        draw_inputs=True,
-        # Every kind of experiment has seeds of its own: shared ones would be unlucky together.
-        seed=round(1e5 * friction + 1e9 * slip_length) * 1000
-        + 250 * list(KINDS).index(kind)
-        + seed,
-        **KINDS[kind],
-    )
+    contact = {"film": film, "friction": friction, "interface": interface}
+    # Every kind of experiment has seeds of its own: shared ones would be unlucky together.
+    seed += round(1e5 * friction + 1e9 * slip_length) * 1000 + 250 * list(KINDS).index(kind)
+    made = memscal.simulate_experiment(draw_inputs=True, seed=seed, **contact, **KINDS[kind])
     apparatus = memscal.calibrate(made.rod, method="evidence").apparatus
     profiles = memscal.measure_stress([made.dry], apparatus).profiles
     families = {"amontons": rigid(film), "slipping": slipping(film)}

@@ -9,18 +9,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers import scans as made
 from helpers.bounds import FULL
-from helpers.scans import (
-    EXACT_FILM,
-    GAUSSIAN,
-    RING,
-    TAILS,
-    known_apparatus,
-    plane_error,
-    pressed,
-    simulated,
-    sphere_scan,
-)
+from helpers.scans import GAUSSIAN, RING, TAILS, plane_error, pressed
 from scipy.stats import binom
 
 import memscal
@@ -36,7 +27,7 @@ CASES = {
     "light": (pressed(0.34), GAUSSIAN), "middle": (pressed(1.0), GAUSSIAN),
     "heavy": (pressed(2.75), GAUSSIAN), "sticking, light": (pressed(0.34, np.inf), GAUSSIAN),
     "sticking, heavy": (pressed(2.75, np.inf), GAUSSIAN),
-    "compressible": (pressed(film=replace(EXACT_FILM, poisson_ratio=0.3)), GAUSSIAN),
+    "compressible": (pressed(film=replace(made.EXACT_FILM, poisson_ratio=0.3)), GAUSSIAN),
     "ring": (pressed(), RING), "tails": (pressed(), TAILS),
     "thin rod": (pressed(indenter=memscal.Rod(radius=0.25e-3)), GAUSSIAN),
     "wide rod": (pressed(indenter=memscal.Rod(radius=2.5e-3)), GAUSSIAN),
@@ -47,11 +38,11 @@ CASES = {
 def study(case: str, noise: float) -> np.ndarray:
     """Of each seed: share of radii within 95 % bounds, error, stated error, z of the force."""
     contact, kernel = CASES[case]
-    sensor = known_apparatus(kernel)
+    sensor = made.known_apparatus(kernel)
     # Every case and noise has draws of its own: shared ones would be unlucky together.
     first = 1000 * (list(CASES).index(case) * len(NOISES) + NOISES.index(noise))
     seeds = range(first, first + SEEDS)
-    scans = (sphere_scan(contact, kernel=kernel, noise=noise, seed=s) for s in seeds)
+    scans = (made.sphere_scan(contact, kernel=kernel, noise=noise, seed=s) for s in seeds)
     return np.array([outcome(memscal.restore(scan, sensor), contact) for scan in scans])
 
 
@@ -105,10 +96,10 @@ def test_the_force_is_the_load_as_often_as_it_says() -> None:
 def test_the_uncertainty_of_a_calibrated_sensor_is_counted(kernel: memscal.GaussianMixture) -> None:
     outcomes = []
     for seed in range(2 * SEEDS):
-        rod = simulated(kernel=kernel, noise=0.01, seed=500 + seed, load_uncertainty=None)
+        rod = made.simulated(kernel=kernel, noise=0.01, seed=500 + seed, load_uncertainty=None)
         sensor = memscal.calibrate(rod, method="evidence").apparatus
         contact = pressed((0.34, 1.0, 2.75)[seed % 3], (0.0, np.inf)[seed % 2])
-        scan = sphere_scan(contact, kernel=kernel, noise=0.003, seed=seed)
+        scan = made.sphere_scan(contact, kernel=kernel, noise=0.003, seed=seed)
         outcomes.append(outcome(memscal.restore(scan, sensor), contact))
     within, error, stated, _ = np.transpose(outcomes)
     assert within.mean() > 0.92 - SIGMAS * within.std() / np.sqrt(within.size)

@@ -22,12 +22,14 @@ def centred_axis(count: int, step: float, offset: float = 0.0) -> FloatArray:
     return (np.arange(count) - count // 2) * step + offset
 
 
-def random_lattice(rng: np.random.Generator) -> Lattice:
-    m, n = 2 * rng.integers(2, 9, size=2) + 1
-    return Lattice(
-        centred_axis(n, rng.uniform(0.1, 2.0), rng.normal()),
-        centred_axis(m, rng.uniform(0.1, 2.0), rng.normal()),
-    )
+def random_field(seed: int) -> tuple[Lattice, FloatArray]:
+    """A lattice of a random size, step and place, and a field on it."""
+    rng = np.random.default_rng(seed)
+    axes = [
+        centred_axis(2 * n + 1, rng.uniform(0.1, 2.0), rng.normal())
+        for n in rng.integers(2, 9, size=2)
+    ]
+    return Lattice(*axes), rng.normal(size=(axes[1].size, axes[0].size))
 
 
 @given(count=st.integers(3, 24), spacing=st.floats(1e-5, 10.0), seed=SEEDS)
@@ -89,9 +91,7 @@ def test_convolution_on_a_quarter_plane_is_linear_convolution_in_the_plane(seed:
 
 @given(seed=SEEDS)
 def test_a_lattice_gives_the_direct_sum_about_its_first_point(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    grid = random_lattice(rng)
-    field = rng.normal(size=(grid.y.size, grid.x.size))
+    grid, field = random_field(seed)
     dy, dx = grid.spacing
     ky = 2 * np.pi * np.fft.fftfreq(grid.y.size, dy)
     kx = 2 * np.pi * np.fft.fftfreq(grid.x.size, dx)[: grid.x.size // 2 + 1]
@@ -103,9 +103,7 @@ def test_a_lattice_gives_the_direct_sum_about_its_first_point(seed: int) -> None
 
 @given(seed=SEEDS)
 def test_what_a_lattice_inverts_it_transforms_back_about_the_central_point(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    grid = random_lattice(rng)
-    field = rng.normal(size=(grid.y.size, grid.x.size))
+    grid, field = random_field(seed)
     spectrum = grid.forward(field)
     centred = grid.inverse(spectrum)
     np.testing.assert_allclose(grid.transfer(centred), spectrum, atol=1e-10)
@@ -140,9 +138,7 @@ def test_convolution_on_a_lattice_is_linear_convolution_of_what_does_not_wrap(se
 
 @given(seed=SEEDS, factor=st.sampled_from([1, 3, 5]))
 def test_a_refined_kernel_keeps_its_values_and_its_integral(seed: int, factor: int) -> None:
-    rng = np.random.default_rng(seed)
-    grid = random_lattice(rng)
-    kernel = rng.normal(size=(grid.y.size, grid.x.size))
+    grid, kernel = random_field(seed)
     fine, values = grid.refined(kernel, factor)
     assert values.shape == (fine.y.size, fine.x.size)
     assert fine.x[fine.x.size // 2] == fine.y[fine.y.size // 2] == 0.0

@@ -68,8 +68,7 @@ def test_a_scan_of_no_use_is_refused(refused: Refused, folder: Path, scan, words
 def test_a_reference_shorter_than_the_scan_is_refused(refused: Refused, scan: Path, folder: Path):
     rod = memscal.indent(SCAN.film, memscal.Rod(radius=0.25e-3), load=1.0)
     memscal.write_reference(rod.profile(np.linspace(0.0, 2e-3, 100)), folder / "short.h5")
-    words = ("ends at r = 2 mm", "Extend the reference")
-    refused(scan, "--reference", "short.h5", words=words)
+    refused(scan, "--reference", "short.h5", words=("ends at r = 2 mm", "Extend the reference"))
 
 
 def test_a_scan_is_no_reference_and_a_missing_scan_is_named(refused: Refused, scan: Path):

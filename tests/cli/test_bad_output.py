@@ -38,13 +38,11 @@ def no_computing(monkeypatch: Patch) -> None:
 
 
 @pytest.mark.usefixtures("no_computing")
-def test_a_full_disk_is_known_first(
-    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
-):
+def test_a_full_disk_is_known_first(run: Run, scan: Path, old: Path, monkeypatch: Patch):
     monkeypatch.setattr("os.fsync", raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))))
     run("calibrate", scan, "-o", old, "--force").exits(4, "No space left", "Free some space")
     assert old.read_bytes() == OLD
-    assert names(folder) == ["out.h5", "scan.h5"]
+    assert names(old.parent) == ["out.h5", "scan.h5"]
 
 
 @pytest.mark.usefixtures("no_computing")
@@ -93,15 +91,13 @@ def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name):
     assert refused.err.startswith("Error: The output ")
 
 
-def test_an_interruption_keeps_the_old(
-    run: Run, scan: Path, old: Path, folder: Path, monkeypatch: Patch
-):
+def test_an_interruption_keeps_the_old(run: Run, scan: Path, old: Path, monkeypatch: Patch):
     monkeypatch.setattr("memscal.formats.artifact.write_tree", raising(KeyboardInterrupt()))
     stopped = run("calibrate", scan, "-o", old, "--force").exits(130)
     assert "Interrupted" in stopped.err
     assert "Traceback" not in stopped.err
     assert old.read_bytes() == OLD
-    assert names(folder) == ["out.h5", "scan.h5"]
+    assert names(old.parent) == ["out.h5", "scan.h5"]
 
 
 def test_a_figure_that_fails_leaves_nothing(run: Run, scan: Path, folder: Path, monkeypatch: Patch):
@@ -133,9 +129,7 @@ def meanwhile(monkeypatch: Patch) -> Callable[[Callable[[], object]], None]:
     from memscal.calibration.calibrate import calibrate
 
     def happens(action: Callable[[], object]) -> None:
-        monkeypatch.setattr(
-            CALIBRATE, lambda *a, **options: (action(), calibrate(*a, **options))[1]
-        )
+        monkeypatch.setattr(CALIBRATE, lambda *a, **more: (action(), calibrate(*a, **more))[1])
 
     return happens
 

@@ -43,16 +43,14 @@ def test_a_failed_check_is_exit_code_1_and_marked(run: Run, drifting_scan: Path,
     assert {c["name"]: c["passed"] for c in done.json["checks"]}["baseline_drift"] is False
     apparatus = memscal.load_apparatus("out.h5")
     assert not apparatus.passed
-    meaning = next(c.meaning for c in apparatus.checks if c.name == "baseline_drift")
-    assert meaning in done.err
+    assert next(c.meaning for c in apparatus.checks if c.name == "baseline_drift") in done.err
     assert "out.h5 was written and is marked" in done.err
 
 
 def test_an_artifact_is_not_replaced_unless_forced(run: Run, scan: Path, folder: Path):
     old = folder / "scan.apparatus.h5"
     old.write_bytes(b"old")
-    refused = run("calibrate", scan).exits(4, "--force")
-    assert refused.out == ""
+    assert run("calibrate", scan).exits(4, "--force").out == ""
     assert old.read_bytes() == b"old"
     assert run("calibrate", scan, "--force").code == 0
     assert memscal.load_apparatus(old).passed
@@ -90,8 +88,7 @@ def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, scan: Path
     assert given["conversion_constant"]["value"] == pytest.approx(
         own["conversion_constant"]["value"], rel=1e-5
     )
-    source = memscal.load_apparatus("given.h5").process.input_reference
-    assert source.file_name == "rod.h5"
+    assert memscal.load_apparatus("given.h5").process.input_reference.file_name == "rod.h5"
 
 
 def test_a_reference_that_is_a_table_is_sent_to_import(run: Run, scan: Path):
@@ -102,8 +99,7 @@ def test_a_reference_that_is_a_table_is_sent_to_import(run: Run, scan: Path):
 
 def test_a_method_and_its_options_reach_the_artifact(run: Run, scan: Path):
     options = ["--method", "tikhonov", "--option", "amplitude=0.5", "-o", "out.h5"]
-    done = run("calibrate", scan, *options, "--json")
-    assert done.json["method"] == "tikhonov"
+    assert run("calibrate", scan, *options, "--json").json["method"] == "tikhonov"
     configuration = memscal.load_apparatus("out.h5").process.configuration
     assert configuration["method"] == "tikhonov"
     assert configuration["options"]["amplitude"] == 0.5
@@ -112,8 +108,7 @@ def test_a_method_and_its_options_reach_the_artifact(run: Run, scan: Path):
 def test_the_seed_decides_a_draw_and_is_recorded(run: Run, scan: Path):
     def width(seed: int, name: str) -> float:
         arguments = ["--method", "white-noise-draw", "--seed", seed, "-o", name, "--json"]
-        value = run("calibrate", scan, *arguments).json["gaussian_sigma_deconvolved"]["value"]
-        return float(value)
+        return float(run("calibrate", scan, *arguments).json["gaussian_sigma_deconvolved"]["value"])
 
     assert width(5, "a.h5") == width(5, "b.h5") != width(6, "c.h5")
     assert memscal.load_apparatus("c.h5").process.configuration["seed"] == 6
@@ -135,8 +130,7 @@ def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path):
     (["--colour"], "--colour"),
 ])  # fmt: skip
 def test_wrong_use_is_exit_code_2_with_a_hint(run: Run, scan: Path, folder: Path, arguments, hint):
-    refused = run("calibrate", scan, *arguments).exits(2, hint, "--help")
-    assert refused.out == ""
+    assert run("calibrate", scan, *arguments).exits(2, hint, "--help").out == ""
     assert names(folder) == ["scan.h5"]
 
 

@@ -69,19 +69,16 @@ def test_version_is_that_of_the_package(run: Run):
     (["completion", "tcsh"], "fish"), (["--verbose"], "--version"),
 ])  # fmt: skip
 def test_wrong_usage_is_exit_code_2_with_a_hint(run: Run, arguments, hint):
-    refused = run(*arguments).exits(2, hint)
-    assert refused.out == ""
+    assert run(*arguments).exits(2, hint).out == ""
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_shell_gets_its_completion_script(run: Run, shell):
-    done = run("completion", shell).exits(0)
-    assert f"_MEMSCAL_COMPLETE={shell}_complete" in done.out
+    assert f"_MEMSCAL_COMPLETE={shell}_complete" in run("completion", shell).exits(0).out
 
 
 @pytest.mark.parametrize(("words", "expected"), [
-    (["memscal", "ca"], {"calibrate"}),
-    (["memscal", "calibrate", "--met"], {"--method"}),
+    (["memscal", "ca"], {"calibrate"}), (["memscal", "calibrate", "--met"], {"--method"}),
     (["memscal", "calibrate", "--method", "white"], {"white-noise", "white-noise-draw"}),
     (["memscal", "reference", ""], {"rod", "sphere", "cone", "profile"}),
 ])  # fmt: skip

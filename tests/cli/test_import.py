@@ -88,8 +88,7 @@ def test_each_combination_of_load_and_pass_is_a_line(run: Run, folder: Path):
 
 
 @pytest.mark.parametrize(("first", "repeat", "branch"), [
-    ("approach", ["--repeat", 3], [[1, 1, 1, 1], [2, 2, 2, 2]]),
-    ("", [], [0, 2, 1, 2, 1, 2, 1, 2]),
+    ("approach", ["--repeat", 3], [[1, 1, 1, 1], [2, 2, 2, 2]]), ("", [], [0, 2, 1, 2, 1, 2, 1, 2]),
 ])  # fmt: skip
 def test_branches_are_words_or_numbers(run: Run, folder: Path, first, repeat, branch):
     words = [first, "Retreat", "1", "2", "APPROACH", "2.0", "approach", "retreat"]
@@ -172,8 +171,7 @@ def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path):
 
 
 @pytest.mark.parametrize(("arguments", "hints"), [
-    ([], ["--x", "--x-unit", "--u", "--u-unit"]),
-    (COLUMNS, ["--load-column"]),
+    ([], ["--x", "--x-unit", "--u", "--u-unit"]), (COLUMNS, ["--load-column"]),
     ([*COLUMNS, "--load", 1], ["--young-modulus", "--poisson-ratio", "--thickness"]),
     ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
     (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
@@ -185,8 +183,7 @@ def test_all_that_is_missing_is_named(run: Run, table: Path, folder: Path, argum
 
 
 @pytest.mark.parametrize(("change", "word"), [
-    (["--x", "place"], "Its columns are: position, voltage"),
-    (["--x-unit", "mV"], "mV"),
+    (["--x", "place"], "Its columns are: position, voltage"), (["--x-unit", "mV"], "mV"),
     (["--u-unit", "bananas"], "bananas"),
 ])  # fmt: skip
 def test_a_wrong_column_or_unit_is_named(run: Run, table: Path, folder: Path, change, word):

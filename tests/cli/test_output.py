@@ -30,8 +30,7 @@ TABLE = Table(
 
 
 @pytest.mark.parametrize(("encoding", "text"), [
-    ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"),
-    ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
+    ("utf-8", "σ = (3.01 ± 0.02)×10⁻⁵ mV/Pa"), ("ascii", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
     ("latin-1", "sigma = (3.01 +/- 0.02)e-5 mV/Pa"),
 ])  # fmt: skip
 def test_a_number_stays_the_same_in_every_encoding(encoding, text):

@@ -31,9 +31,7 @@ def test_a_failed_check_is_the_exit_code_of_the_process(drifting_scan: Path, fol
 
 def test_a_file_size_limit_leaves_the_old_artifact(scan: Path, folder: Path):
     (folder / "out.h5").write_bytes(b"old")
-
-    arguments = ["calibrate", "scan.h5", "-o", "out.h5", "--force"]
-    done = run(*arguments, cwd=folder, limit=4096)
+    done = run("calibrate", "scan.h5", "-o", "out.h5", "--force", cwd=folder, limit=4096)
     assert done.returncode == 4, done.stderr
     assert (folder / "out.h5").read_bytes() == b"old"
     assert sorted(os.listdir(folder)) == ["out.h5", "scan.h5"]

@@ -29,8 +29,7 @@ def sphere(folder: Path) -> Path:
 
 
 def test_the_file_is_a_reference_with_errors(run: Run, artifact: Path, sphere: Path, folder: Path):
-    done = run("restore", artifact, sphere, "-o", "stress.h5")
-    assert "Written: stress.h5" in done.err
+    assert "Written: stress.h5" in run("restore", artifact, sphere, "-o", "stress.h5").err
     profile = memscal.read_reference(folder / "stress.h5")
     assert np.all(profile.sigma_zz_errors > 0)
     assert profile.force == pytest.approx(1.0, rel=0.1)
@@ -44,8 +43,7 @@ def test_another_expected_stress_is_code_1(run: Run, artifact: Path, sphere: Pat
     assert wrong.code == CHECKED
     assert "expected stress" in wrong.out
     assert "out.h5" in names(folder)
-    right = run("restore", artifact, sphere, "--expected", "sliding.h5").exits(0)
-    assert "sliding.h5" in right.out
+    assert "sliding.h5" in run("restore", artifact, sphere, "--expected", "sliding.h5").exits(0).out
 
 
 def test_another_film_is_exit_code_1(run: Run, artifact: Path, folder: Path):

@@ -62,9 +62,8 @@ def test_text_mapping_notebook_figure_and_arrays(name, words, request: pytest.Fi
 def test_the_commands_print_the_results(
     run: Run, folder: Path, apparatus: memscal.ApparatusFunction, contact: memscal.Contact
 ):
-    scan = contact_scan(1, load=LOADS)
     apparatus.save(folder / "a.h5")
-    memscal.write_scan(scan, folder / "scan.h5")
+    memscal.write_scan(contact_scan(1, load=LOADS), folder / "scan.h5")
     shown = run("apply", "a.h5", "scan.h5")
     assert shown.out.rstrip() == str(memscal.read_stress(folder / "scan.stress.h5"))
     told = run("apply", "a.h5", "scan.h5", "--json", "--force").json

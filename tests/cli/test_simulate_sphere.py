@@ -15,6 +15,7 @@ from memscal.cli.simulate import FILES
 from memscal.formats.inspection import check
 
 SPHERE = ("simulate", "--experiment", "sphere")
+ROD = ("--experiment", "rod")
 FEW = ("--load", 0.69, "--lubricated-load", 0.69, "--contacts", 9, "--spacing", 2)
 
 
@@ -133,19 +134,11 @@ def test_a_file_that_cannot_be_written_leaves_none_of_them(folder: Path):
     (["--load-scatter", 11], 2, "(in percent)"), (["--friction", -1], 2, "of at least 0"),
     (["--contacts", 1], 2, "2<=x<=4096"), (["--load", 1e7], 3, "film"),
     (["-o", "no/such/folder"], 4, "Create the folder first"), (["-o", "file"], 4, "not a folder"),
+    ([*ROD, "--friction", 0.2], 2, "--friction belongs to --experiment sphere"),
+    ([*ROD, "--gain", 1, "--slip-length", 2], 2, "--slip-length, --gain belong"),
 ])  # fmt: skip
 def test_what_makes_no_experiment_is_refused(run: Run, folder: Path, arguments, code, hint):
     (folder / "file").write_text("mine")
     refused = run(*SPHERE, *arguments)
     assert (refused.code, hint in refused.err) == (code, True), refused.err
     assert names(folder) == ["file"]
-
-
-@pytest.mark.parametrize(("arguments", "hint"), [
-    (["--friction", 0.2], "--friction belongs to --experiment sphere"),
-    (["--gain", 1, "--slip-length", 2], "--slip-length, --gain belong"),
-])  # fmt: skip
-def test_a_rod_scan_refuses_what_only_a_sphere_has(run: Run, folder: Path, arguments, hint):
-    refused = run("simulate", *arguments)
-    assert (refused.code, hint in refused.err) == (2, True), refused.err
-    assert names(folder) == []

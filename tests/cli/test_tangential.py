@@ -30,9 +30,7 @@ def test_the_channel_goes_to_an_artifact_of_its_own_by_method_bayesian(run: Run,
 
 
 def test_a_report_and_a_figure_are_drawn(run: Run, sheared: Path):
-    run(
-        "calibrate", sheared, "--channel", "xz", "--report", "r.html", "--figure", "f.png"
-    ).exits(0)  # fmt: skip
+    run("calibrate", sheared, "--channel", "xz", "--report", "r.html", "--figure", "f.png").exits(0)
     assert {"r.html", "f.png"} < set(names(sheared.parent))
 
 

@@ -1,6 +1,5 @@
 """Division problems whose answer is known in closed form."""
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -79,11 +78,3 @@ def on_each_grid(request: pytest.FixtureRequest) -> Callable[..., Gaussians]:
 def on_each_lattice(request: pytest.FixtureRequest) -> Callable[..., Gaussians]:
     """Return the maker of problems on one of the lattices."""
     return lambda weakest=1e-3: _make(request.param, weakest)
-
-
-@pytest.fixture
-def seed() -> int:
-    """Return another seed in every run; the log of a failed test names it."""
-    value = int(np.random.SeedSequence().generate_state(1)[0])
-    logging.getLogger(__name__).info("seed %d", value)
-    return value

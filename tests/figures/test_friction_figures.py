@@ -9,13 +9,7 @@ from matplotlib.axes import Axes
 
 from memscal.cli.compare import figure_stems
 from memscal.errors import InputError
-from memscal.figures.friction import (
-    comparison_figure,
-    comparison_figures,
-    interface_figure,
-    length_position,
-    maxima_figure,
-)
+from memscal.figures import friction as of_friction
 from memscal.figures.friction_profiles import friction_set_figure, profile_figure
 from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
 from memscal.figures.friction_scale import friction_position, load_looks, on_axis
@@ -122,7 +116,7 @@ def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest():
 
 
 def test_ratios_stand_at_their_loads_among_the_calculated_curves(found: FrictionComparison):
-    figure = maxima_figure(found)
+    figure = of_friction.maxima_figure(found)
     assert len(figure.axes) == len(found.loadings)
     for axes, loads in zip(figure.axes, found.loads.values(), strict=True):
         dry, lubricated = bars(axes)
@@ -196,28 +190,29 @@ def test_a_profile_between_the_measured_radii_is_even_and_smooth(first):
 def test_all_figures_have_the_names_that_the_command_line_proves():
     for lubrications in (("dry", "lubricated"), ("lubricated",), ("",)):
         found = comparison(lubrications=lubrications)
-        assert list(comparison_figures(found)) == figure_stems(lubrications)
+        assert list(of_friction.comparison_figures(found)) == figure_stems(lubrications)
     found = comparison(interface=interface_comparison())
-    assert list(comparison_figures(found)) == figure_stems(["dry", "lubricated"], interface=True)
+    stems = figure_stems(["dry", "lubricated"], interface=True)
+    assert list(of_friction.comparison_figures(found)) == stems
 
 
 @pytest.mark.parametrize("stem", figure_stems(["dry", "lubricated"]))
 def test_every_figure_renders(found: FrictionComparison, stem):
-    figure = comparison_figures(found)[stem]()
+    figure = of_friction.comparison_figures(found)[stem]()
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
 def test_the_likelihood_of_a_slip_length_touches_zero_at_it():
-    figure = interface_figure(comparison(interface=interface_comparison(1.8e-6)))
+    figure = of_friction.interface_figure(comparison(interface=interface_comparison(1.8e-6)))
     curves = {line.get_label(): line for line in figure.axes[0].lines}
     t, rise = (np.asarray(values) for values in curves["tangential, dry"].get_data())
-    assert t[np.argmin(rise)] == pytest.approx(float(length_position(1.8e-6)), abs=0.01)
+    assert t[np.argmin(rise)] == pytest.approx(float(of_friction.length_position(1.8e-6)), abs=0.01)
     assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
 def test_evidence_is_drawn_below_that_of_the_best_law():
     laws = interface_comparison()
-    axes = interface_figure(comparison(interface=laws)).axes[1]
+    axes = of_friction.interface_figure(comparison(interface=laws)).axes[1]
     drawn = [float(line.get_xdata()[0]) for line in axes.lines if line.get_marker() == "o"]
     tangential = [law.log_evidence for law in laws.tangential.laws]
     normal = [law.log_evidence for law in laws.normal.laws]
@@ -227,13 +222,13 @@ def test_evidence_is_drawn_below_that_of_the_best_law():
 
 def test_without_laws_of_the_interface_there_is_nothing_to_draw(found: FrictionComparison):
     with pytest.raises(InputError, match="interface=True"):
-        interface_figure(found)
+        of_friction.interface_figure(found)
 
 
 def test_one_load_and_one_loading_are_enough():
     found = comparison(lubrications=("",), loadings=("",), loads=(1.37,), macroscopic=None)
-    figures = [comparison_figure(found), *(draw() for draw in comparison_figures(found).values())]
-    for figure in figures:
+    several = of_friction.comparison_figures(found).values()
+    for figure in (of_friction.comparison_figure(found), *(draw() for draw in several)):
         assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 

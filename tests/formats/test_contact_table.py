@@ -117,8 +117,7 @@ def test_the_tables_used_longest_ago_make_room(tmp_path: Path, monkeypatch: pyte
         os.utime(entry(tmp_path, key), (1e9 + age, 1e9 + age))
     assert find_contact_table(tmp_path, keys[0]) is not None  # used again
     keep_contact_table(tmp_path, keys[3], table())
-    kept = {key for key in keys if entry(tmp_path, key).exists()}
-    assert kept == {keys[0], keys[2], keys[3]}
+    assert {key for key in keys if entry(tmp_path, key).exists()} == {keys[0], keys[2], keys[3]}
 
 
 def test_a_folder_keeps_to_its_limit_of_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -134,8 +133,7 @@ def test_clearing_removes_tables_and_nothing_else(tmp_path: Path):
     (tmp_path / "scan.h5").write_text("mine too")
     (tmp_path / f"{table_key({'a': 'folder'})}.h5").mkdir()
     assert clear_contact_tables(tmp_path) == 1
-    files = {path.name for path in tmp_path.iterdir() if path.is_file()}
-    assert files == {"notes.txt", "scan.h5"}
+    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == {"notes.txt", "scan.h5"}
     assert clear_contact_tables(tmp_path / "none") == 0
 
 

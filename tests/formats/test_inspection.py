@@ -38,8 +38,7 @@ def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: P
     ("name", "title"), [("S1", "Apparatus function of S1"), ("", "Apparatus function")]
 )
 def test_an_artifact_is_titled_by_its_sensor_alone(tmp_path: Path, name, title):
-    data = make_artifact(sensor=StressSensor(name=name))
-    write_artifact(data, tmp_path / "a.h5")
+    write_artifact(make_artifact(sensor=StressSensor(name=name)), tmp_path / "a.h5")
     assert describe(tmp_path / "a.h5")["title"] == title
 
 

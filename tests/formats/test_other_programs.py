@@ -98,10 +98,8 @@ def test_xarray_opens_every_group_without_a_warning(path: Path):
     ("artifact", "parameters", "covariance", ("parameter", "parameter_prime"), "1"),
     ("raster", "data", "u_zz", ("y", "x"), "mV"),
     ("raster", "data", "normal_load", ("y", "x"), "N"),
-    ("repeats", "data", "u_zz", ("repeat", "x"), "mV"),
-    ("line", "data", "u_zz", ("x",), "mV"),
-    ("points", "data", "y", ("point",), "mm"),
-    ("reference", "reference", "sigma_zz", ("r",), "Pa"),
+    ("repeats", "data", "u_zz", ("repeat", "x"), "mV"), ("line", "data", "u_zz", ("x",), "mV"),
+    ("points", "data", "y", ("point",), "mm"), ("reference", "reference", "sigma_zz", ("r",), "Pa"),
 ], indirect=["kind"])  # fmt: skip
 def test_xarray_gives_dimensions_in_order_with_units(path: Path, group, name, dims, units):
     with xarray.open_dataset(path, engine="h5netcdf", group=f"/entry/{group}") as dataset:

@@ -57,8 +57,7 @@ def test_a_scan_comes_back_with_its_source_named(tmp_path: Path, kind):
     found = read_scan(path)
     assert_same(found, make_scan(kind), but=("source",))
     assert found.kind == kind
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    assert found.source == SourceFile("scan.h5", digest)
+    assert found.source == SourceFile("scan.h5", hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 @pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
@@ -126,12 +125,10 @@ def test_an_artifact_comes_back(tmp_path: Path):
 
 
 def test_a_covariance_between_different_units_comes_back(tmp_path: Path):
-    spread = np.array([1e-10, 1e-6, 2e-6, 1e-6, 1e-7])
+    u = np.array([1e-10, 1e-6, 2e-6, 1e-6, 1e-7])
     correlation = np.full((5, 5), 0.3) + 0.7 * np.eye(5)
     data = make_artifact()
-    parameters = dataclasses.replace(
-        data.parameters, covariance=correlation * spread[:, None] * spread
-    )
+    parameters = dataclasses.replace(data.parameters, covariance=correlation * u[:, None] * u)
     write_artifact(make_artifact(parameters=parameters), tmp_path / "a.h5")
     found = load_apparatus(tmp_path / "a.h5").parameters
     np.testing.assert_allclose(found.covariance, parameters.covariance, rtol=1e-14)

@@ -167,8 +167,7 @@ def test_a_sound_file_is_described_and_in_order(path: Path):
     assert all(finding.passed for finding in check(path))
     found = describe(path)
     assert found["schema"] == "memscal-stress"
-    loads = [q["value"] for q in found["quantities"] if q["name"] == "load"]
-    assert loads == [0.5, 1.5]
+    assert [q["value"] for q in found["quantities"] if q["name"] == "load"] == [0.5, 1.5]
     assert {a["path"] for a in found["arrays"]} >= {"/entry/profile_1/s_zz", "/entry/profile_2/r"}
 
 

@@ -102,9 +102,7 @@ def test_sensitivities_are_the_differences_of_contacts_with_other_properties(cas
     family = build(UNCERTAIN_FILM, UNCERTAIN_SPHERE, [load], grid)
     member = family.at(value)
     for source in ("young_modulus", "thickness", "indenter_radius"):
-        upper, lower = (
-            build(*with_a_changed(source, share), [load], [value]) for share in (step, -step)
-        )
+        upper, lower = (build(*with_a_changed(source, d), [load], [value]) for d in (step, -step))
         # Stated are 1 %; a film of another thickness has other wavenumbers.
         truth = stress(upper, upper.spectra[0]) - stress(lower, lower.spectra[0])
         truth *= 0.01 / (2 * step)

@@ -184,8 +184,7 @@ def test_scans_of_different_films_or_spheres_are_refused(made, apparatus) -> Non
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    ({"friction": [0.2]}, "nothing to choose from"),
-    ({"loading": ()}, "No loading"),
+    ({"friction": [0.2]}, "nothing to choose from"), ({"loading": ()}, "No loading"),
     ({"loading": "sideways"}, "sideways"),
     ({"interface": True}, "macroscopic friction coefficient is not given"),
     ({"macroscopic_uncertainty": 0.1}, "macroscopic friction coefficient is not given"),

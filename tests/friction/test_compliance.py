@@ -77,8 +77,7 @@ def test_more_freedom_is_charged_by_occams_factor() -> None:
 
 
 @pytest.mark.parametrize(("compared", "bound"), [
-    (lambda: weighed("rigid", math.inf), 5e-6),
-    (lambda: normal(yielding(), 0.0), math.inf),
+    (lambda: weighed("rigid", math.inf), 5e-6), (lambda: normal(yielding(), 0.0), math.inf),
 ])  # fmt: skip
 def test_a_rigid_interface_gives_an_upper_bound_of_the_length(compared, bound) -> None:
     found = compared()

@@ -71,9 +71,7 @@ def test_an_error_of_the_conversion_constant_scales_the_difference_alone() -> No
     one = compared(0.2, 1)
     noise = np.sqrt(2) * bare_points().noise[0] / CONVERSION
     assert one.difference_errors == pytest.approx(np.hypot(noise, 0.01 * one.difference))
-    assert one.maximum_uncertainty == pytest.approx(
-        np.hypot(0.01 * one.maximum, np.sqrt(2) * 100.0)
-    )
+    assert one.maximum_uncertainty == pytest.approx(np.hypot(0.01 * one.maximum, 100 * 2**0.5))
 
 
 def test_scans_without_common_places_are_not_compared() -> None:

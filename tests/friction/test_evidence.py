@@ -34,9 +34,7 @@ def test_the_likelihood_is_that_of_a_normal_distribution_with_all_that_is_uncert
     rng = np.random.default_rng(seed)
     residual, systematic = rng.normal(size=12), rng.normal(size=(12, 3))
     noise = rng.uniform(0.3, 2.0, 12)
-
     found, chi_square = log_likelihood(tables(residual, systematic, noise))
-
     covariance = np.diag(noise**2) + systematic @ systematic.T
     expected = multivariate_normal(cov=covariance).logpdf(residual)
     assert found.item() - 6 * LOG_2PI == pytest.approx(expected, rel=1e-10)
@@ -94,9 +92,7 @@ class Linear:
         """Return what a load tells at values of its parameter."""
         residuals = self.data[load] - np.outer(nodes, self.shapes[load])
         each = [tables(r, self.columns[load], np.full(r.size, self.noise)) for r in residuals]
-        return Tables(
-            *(np.concatenate(parts) for parts in zip(*(t.arrays for t in each), strict=True))
-        )
+        return Tables(*map(np.concatenate, zip(*(t.arrays for t in each), strict=True)))
 
 
 @pytest.mark.parametrize("loads", [1, 2, 4])

@@ -53,10 +53,8 @@ def test_another_name_of_the_film_is_the_same_request(tmp_path: Path, solved: li
 
 @pytest.mark.parametrize("changed", [
     {"film": replace(FILM, thickness=1.999e-3)},
-    {"film": replace(FILM, young_modulus_uncertainty=1e5)},
-    {"loading": "total"},
-    {"friction": [0.0, 0.31]},
-    {"reach": 50e-3},
+    {"film": replace(FILM, young_modulus_uncertainty=1e5)}, {"loading": "total"},
+    {"friction": [0.0, 0.31]}, {"reach": 50e-3},
 ])  # fmt: skip
 def test_another_request_is_calculated(tmp_path, solved, changed) -> None:
     calculated(tmp_path)

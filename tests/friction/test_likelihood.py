@@ -76,12 +76,9 @@ def test_the_squares_of_the_budget_add_up_to_the_variance(laboratory: Laboratory
     found = laboratory.drawn(0.15, seed=3)
     i = int(np.argmin(np.abs(found.members.values - 0.15)))
     budget = found.whole.budget(i)
-    assert set(budget) == {
-        "noise", "load_scatter", "position", "apparatus", "thickness", "load",
-    }  # fmt: skip
-    assert sum(part**2 for part in budget.values()) == pytest.approx(
-        1 / found.whole.information[i], rel=1e-9
-    )
+    assert set(budget) == {"noise", "load_scatter", "position", "apparatus", "thickness", "load"}
+    variance = 1 / found.whole.information[i]
+    assert sum(part**2 for part in budget.values()) == pytest.approx(variance, rel=1e-9)
 
 
 def test_the_uncertainty_is_the_curvature_of_chi_square() -> None:
@@ -113,9 +110,7 @@ def test_baseline_drift_and_a_shift_of_the_centre_change_nothing() -> None:
 
 
 def test_loads_that_were_recorded_off_the_nominal_one_are_followed() -> None:
-    laboratory = Laboratory.of(
-        points=replace(bare_points(), log_load=0.1 * (-1.0) ** np.arange(33))
-    )
+    laboratory = Laboratory.of(points=replace(bare_points(), log_load=0.1 * (-1) ** np.arange(33)))
     found = laboratory.drawn(0.2, seed=6)
     ignored = [replace(points, log_load=np.zeros(33)) for points in found.points]
     wrong = likelihood(ignored, found.sensor, found.members, [0, 1])

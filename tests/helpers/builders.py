@@ -82,6 +82,9 @@ def make_artifact(**changes: Any) -> ApparatusData:
         "gaussian_sigma_deconvolved": 1.01 * SIGMA, "centre": 1e-5, "baseline": 2e-6,
     }  # fmt: skip
     covariance = np.diag([1e-20, 1e-12, 4e-12, 1e-12, 1e-14])
+    stamp = {"program": "memscal", "version": "0.1.0", "date": "2024-01-02T03:04:05+00:00"}
+    of_a = {"noise": 1e-10, "load": 3e-10}
+    budget = {"conversion_constant": of_a, "gaussian_sigma": {"noise": 1e-6}}
     scan = make_scan()
     voltage = np.nan_to_num(scan.u_zz)
     data = ApparatusData(
@@ -102,17 +105,12 @@ def make_artifact(**changes: Any) -> ApparatusData:
         load=1.0,
         reference=make_profile(),
         process=Process(
-            program="memscal",
-            version="0.1.0",
-            date="2024-01-02T03:04:05+00:00",
+            **stamp,
             configuration={"method": "white-noise", "seed": None, "noise": 0.1},
             environment={"python": "3.11"},
             messages=(Message("outlier", "Two points were down-weighted.", "warning"),),
             input_scan=SourceFile("scan.h5", "0" * 64),
         ),
-        budget={
-            "conversion_constant": {"noise": 1e-10, "load": 3e-10},
-            "gaussian_sigma": {"noise": 1e-6},
-        },
+        budget=budget,
     )
     return replace(data, **changes)

@@ -62,11 +62,9 @@ def measured_profile(load: float, lubrication: str, friction: float, rng: Any) -
 
 
 def _scan(lubrication: str) -> Any:
-    return SimpleNamespace(
-        source=memscal.SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32),
-        lubrication=lubrication,
-        indenter=SimpleNamespace(shape="sphere", radius=0.1288),
-    )
+    source = memscal.SourceFile(f"{lubrication or 'sphere'}.h5", "ef" * 32)
+    indenter = SimpleNamespace(shape="sphere", radius=0.1288)
+    return SimpleNamespace(source=source, lubrication=lubrication, indenter=indenter)
 
 
 def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.LoadComparison:
@@ -108,11 +106,10 @@ def comparison(
     macroscopic: tuple[float, float | None] | None = (1.6, 0.2),
     friction_grid: np.ndarray = FRICTION,
     loads: Sequence[float] = LOADS,
-    seed: int = 1,
     **fields: Any,
 ) -> memscal.FrictionComparison:
     """Return a comparison of every load, dry and lubricated."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     profiles = [
         measured_profile(load, lubrication, friction if lubrication != "lubricated" else 0.0, rng)
         for lubrication in lubrications
@@ -145,34 +142,18 @@ def comparison(
 def interface_comparison(slip_length: float = 1.8e-6) -> memscal.InterfaceComparison:
     """Return laws of a dry and of a lubricated interface, a slip length preferred."""
     pressures = np.array([27e3, 33e3, 50e3, 80e3])
-    return memscal.InterfaceComparison(
-        macroscopic=(1.6, 0.2),
-        tangential=_laws(
-            "dry",
-            ("effective Amontons", "effective Amontons, one for each load", "elasto-plastic"),
-            (0.0, 2.1, 7.4),
-            slip_length,
-            memscal.ImpliedFriction(
-                loads=np.array(LOADS),
-                friction=np.outer([0.11, 0.14, 0.17, 0.2], [1.3, 1.0, 0.8]),
-                pressures=pressures,
-                stiffnesses=np.outer(pressures, 1.6 / slip_length / np.array([0.8, 1.0, 1.3])),
-            ),
-        ),
-        normal=_laws(
-            "lubricated", ("rigid, frictionless", "normal compliance"), (0.0, -1.2), 0.3e-6, None
-        ),
-        messages=(memscal.Message("prior", "The slip length is that of the prior."),),
-    )
+    friction = np.outer([0.11, 0.14, 0.17, 0.2], [1.3, 1.0, 0.8])
+    stiffnesses = np.outer(pressures, 1.6 / slip_length / np.array([0.8, 1.0, 1.3]))
+    implied = memscal.ImpliedFriction(np.array(LOADS), friction, pressures, stiffnesses)
+    names = ("effective Amontons", "effective Amontons, one for each load", "elasto-plastic")
+    tangential = _laws("dry", names, (0.0, 2.1, 7.4), slip_length, implied)
+    names = ("rigid, frictionless", "normal compliance")
+    normal = _laws("lubricated", names, (0.0, -1.2), 0.3e-6, None)
+    messages = (memscal.Message("prior", "The slip length is that of the prior."),)
+    return memscal.InterfaceComparison((1.6, 0.2), tangential, normal, messages)
 
 
-def _laws(
-    lubrication: str,
-    names: Sequence[str],
-    evidence: Sequence[float],
-    length: float,
-    implied: memscal.ImpliedFriction | None,
-) -> memscal.LawComparison:
+def _laws(lubrication: str, names: Any, evidence: Any, length: float, implied: Any) -> Any:
     lengths = np.concatenate([[0.0], np.geomspace(0.05e-6, 50e-6, 120), [math.inf]])
     bounded = np.where(np.isinf(lengths), 20.0, np.log1p(lengths / 1e-6) / 0.1)
     chi_square = (bounded - math.log1p(length / 1e-6) / 0.1) ** 2 + 120.0
@@ -199,27 +180,15 @@ def _joint(of_each: Sequence[memscal.LoadComparison], lubrication: str) -> memsc
 
 def _differences(profiles: Sequence[Any]) -> tuple[memscal.DryAgainstLubricated, ...]:
     found = []
-    for dry in (p for p in profiles if p.lubrication == "dry"):
-        for wet in (p for p in profiles if p.lubrication == "lubricated"):
-            if wet.load != dry.load:
-                continue
-            difference = dry.s_zz - wet.s_zz
-            errors = np.hypot(dry.s_zz_errors, wet.s_zz_errors)
-            top = dry.maximum - wet.maximum
-            spread = math.hypot(dry.maximum_uncertainty, wet.maximum_uncertainty)
-            found.append(
-                memscal.DryAgainstLubricated(
-                    load=dry.load,
-                    r=dry.r,
-                    difference=difference,
-                    difference_errors=errors,
-                    chi_square=float(np.sum((difference / errors) ** 2)),
-                    degrees=dry.r.size,
-                    p_value=0.02,
-                    maximum=top,
-                    maximum_uncertainty=spread,
-                    relative=top / wet.maximum,
-                    relative_uncertainty=spread / wet.maximum,
-                )
-            )
+    dry_profiles = [p for p in profiles if p.lubrication == "dry"]
+    lubricated = {p.load: p for p in profiles if p.lubrication == "lubricated"}
+    for dry, wet in ((p, lubricated[p.load]) for p in dry_profiles if p.load in lubricated):
+        difference, errors = dry.s_zz - wet.s_zz, np.hypot(dry.s_zz_errors, wet.s_zz_errors)
+        top = dry.maximum - wet.maximum
+        spread = math.hypot(dry.maximum_uncertainty, wet.maximum_uncertainty)
+        misfit = (float(np.sum((difference / errors) ** 2)), dry.r.size, 0.02)
+        maxima = (top, spread, top / wet.maximum, spread / wet.maximum)
+        found.append(
+            memscal.DryAgainstLubricated(dry.load, dry.r, difference, errors, *misfit, *maxima)
+        )
     return tuple(found)

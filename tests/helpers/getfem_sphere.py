@@ -97,11 +97,8 @@ class Film:
 
     def mark_boundaries(self, thickness):
         r, z = self.mesh.pts()
-        for region, inside in (
-            (BASE, z < 1e-9),
-            (AXIS, r < 1e-9),
-            (TOP, (z > thickness - 1e-9) & (r < self.contact + 1e-9)),
-        ):
+        top = (z > thickness - 1e-9) & (r < self.contact + 1e-9)
+        for region, inside in ((BASE, z < 1e-9), (AXIS, r < 1e-9), (TOP, top)):
             self.mesh.set_region(region, self.mesh.faces_from_pid(np.flatnonzero(inside)))
 
     def space(self, degree, region=None, without_axis=False):

@@ -8,11 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from memscal import ElasticFilm, Sphere
-from memscal.friction.calculated import (
-    amontons_family,
-    elasto_plastic_family,
-    normal_compliance_family,
-)
+from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
 from memscal.friction.interface_laws import Measured
 from memscal.friction.likelihood import LoadPoints, Sensor
@@ -44,7 +40,7 @@ PRECISE = Precision(0.001, 0.002)
 @lru_cache
 def amontons() -> ProfileFamily:
     """Return contacts of a rigid interface along the friction coefficient."""
-    return amontons_family(
+    return calculated.amontons_family(
         FILM, SPHERE, LOADS, reach=_REACH,
         friction=(0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, math.inf),
     )  # fmt: skip
@@ -54,7 +50,7 @@ def amontons() -> ProfileFamily:
 def slipping() -> ProfileFamily:
     """Return contacts along the slip length; short ones, which take long, are few."""
     lengths = (0.0, 2e-6, 4e-6, 8e-6, 1.6e-5, 4e-5, 8e-5, 2e-4, math.inf)
-    return elasto_plastic_family(
+    return calculated.elasto_plastic_family(
         FILM, SPHERE, LOADS, friction=MACROSCOPIC, slip_lengths=lengths, reach=_REACH
     )
 
@@ -63,7 +59,7 @@ def slipping() -> ProfileFamily:
 def yielding() -> ProfileFamily:
     """Return contacts without friction along the length of a normal law."""
     lengths = (0.0, 1e-6, 2e-6, 4e-6)
-    return normal_compliance_family(
+    return calculated.normal_compliance_family(
         FILM, SPHERE, (0.69, 2.75), lengths=lengths, law="greenwood-tripp", reach=_REACH
     )
 

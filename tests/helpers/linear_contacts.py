@@ -42,19 +42,13 @@ def gaussian_sensor() -> Sensor:
     return Sensor(NODES, CONVERSION * g, changes, CONVERSION)
 
 
-def bare_points(
-    *,
-    correlation: float = 0.0,
-    repeats: int = 1,
-    load_scatter: float = 0.02,
-    positions: float = 10e-6,
-) -> LoadPoints:
+def bare_points(*, correlation: float = 0.0, repeats: int = 1) -> LoadPoints:
     """Points of a load whose voltages are still to be drawn."""
     x = np.tile(_POSITIONS, repeats)
     apart = np.abs(np.subtract.outer(np.arange(x.size), np.arange(x.size)))
     return LoadPoints(
         u=np.zeros(x.size), offset=x, log_load=np.zeros(x.size), noise=np.full(x.size, 3e-5),
-        load_errors=np.full(x.size, load_scatter), x_errors=np.full(x.size, positions),
+        load_errors=np.full(x.size, 0.02), x_errors=np.full(x.size, 10e-6),
         flat=np.stack([np.ones(x.size), x / x.max()], axis=1), load_share=0.01,
         correlation=correlation**apart if correlation else None,
     )  # fmt: skip

@@ -61,9 +61,6 @@ def block(x: Any, y: Any, *, centre: tuple[float, float] = (0.0, 0.0)) -> meshio
     rr, zz, hoop, rz = tensor(np.hypot(dx, dy), points[:, 2]).T
     angle = np.arctan2(dy, dx)
     c, s = np.cos(angle), np.sin(angle)
-    six = [
-        rr * c**2 + hoop * s**2, rr * s**2 + hoop * c**2, zz, (rr - hoop) * c * s, rz * s, rz * c,
-    ]  # fmt: skip
-    return meshio.Mesh(
-        points, [("hexahedron", cells)], point_data={"S6": np.stack(six, axis=1), "S33": zz}
-    )
+    plane = [rr * c**2 + hoop * s**2, rr * s**2 + hoop * c**2, zz, (rr - hoop) * c * s]
+    at_points = {"S6": np.stack([*plane, rz * s, rz * c], axis=1), "S33": zz}
+    return meshio.Mesh(points, [("hexahedron", cells)], point_data=at_points)

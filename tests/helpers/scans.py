@@ -9,7 +9,7 @@ from helpers.builders import make_artifact
 from scipy.special import i0e
 
 import memscal
-from memscal import MeasuredStress, Process, RadialKernel, Scan, StressSensor
+from memscal import Contact, MeasuredStress, Process, RadialKernel, Scan, StressSensor
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
@@ -45,9 +45,7 @@ def estimated(scan: Scan) -> ProfileEstimate:
     return estimate_profile(points, reference_spectrum(contact, points, scan.film.thickness))
 
 
-def reference_spectrum(
-    reference: memscal.StressProfile | memscal.Contact, points: ScanPoints, thickness: float
-) -> RadialSpectrum:
+def reference_spectrum(reference: Any, points: ScanPoints, thickness: float) -> RadialSpectrum:
     """Transform of one scan's reference per newton."""
     return reference_spectra([reference], [points], [thickness])[0]
 
@@ -87,37 +85,23 @@ SENSOR = StressSensor(name="a simulated sensor", channel="zz")
 
 
 def pressed(
-    load: float = 1.0,
-    friction: float = 0.0,
-    *,
-    film: memscal.ElasticFilm = EXACT_FILM,
-    indenter: memscal.Rod | memscal.Sphere = SPHERE,
-) -> memscal.Contact:
+    load: float = 1.0, friction: float = 0.0, *, film: Any = EXACT_FILM, indenter: Any = SPHERE
+) -> Contact:
     """Press the paper's sphere on the film; the contact is remembered."""
-    contact = memscal.indent(film, indenter, load=load, friction=friction)
-    assert isinstance(contact, memscal.Contact)
-    return contact
+    return memscal.indent(film, indenter, load=load, friction=friction)
 
 
 def sphere_scan(
-    contact: memscal.Contact,
-    *,
-    kernel: RadialKernel = GAUSSIAN,
-    noise: float = 0.005,
-    seed: int = 0,
-    centre: float = 0.14e-3,
-    half_range: float = 8e-3,
-    points: int = 33,
+    contact: Contact, *, kernel: RadialKernel = GAUSSIAN, noise: float = 0.005, seed: int = 0
 ) -> Scan:
     """Scan a contact: its base stress convolved by Hankel transforms, noise, offset and drift."""
-    x = np.linspace(-half_range, half_range, points)
-    nodes = Wavenumbers.covering(40 / contact.film.thickness, 3 * half_range)
+    x = np.linspace(-8e-3, 8e-3, 33)
+    nodes = Wavenumbers.covering(40 / contact.film.thickness, 24e-3)
     spectrum = contact.base_spectrum(nodes.k) * kernel.transform(nodes.k)
-    signal = CONVERSION * nodes.synthesise(spectrum, np.abs(x - centre))
+    signal = CONVERSION * nodes.synthesise(spectrum, np.abs(x - CENTRE))
     top = float(signal.max())
     rng = np.random.default_rng(seed)
-    u = signal + top * (0.01 + 0.0025 * x / half_range + rng.normal(0.0, noise, x.size))
-    assert isinstance(contact.indenter, memscal.Sphere | memscal.Rod)
+    u = signal + top * (0.01 + 0.0025 * x / 8e-3 + rng.normal(0.0, noise, x.size))
     return Scan(
         x=x, u_zz=u, u_zz_errors=np.full(x.size, noise * top) if noise > 0 else None,
         load=contact.load, indenter=contact.indenter, film=contact.film, sensor=SENSOR,
@@ -129,7 +113,6 @@ def known_apparatus(
     *,
     conversion_uncertainty: float = 0.0,
     width_uncertainty: float = 0.0,
-    conversion: float = CONVERSION,
 ) -> memscal.ApparatusFunction:
     """Return a sensor whose G is known, or wrong in one way only: wider or narrower.
 
@@ -138,21 +121,15 @@ def known_apparatus(
     r, k = np.linspace(0.0, 6e-3, 301), np.linspace(0.0, 12e3, 241)
     g = kernel.radial(r)
     spread = width_uncertainty * (2 * g + r * np.gradient(g, r))
+    names, values = ("conversion_constant", "gaussian_sigma"), np.array([CONVERSION, SIGMA])
+    covariance = np.diag([(conversion_uncertainty * CONVERSION) ** 2, 0.0])
+    contact = {"film": EXACT_FILM, "indenter": EXACT_ROD, "reference": pressed().profile()}
+    empty = {"checks": (), "budget": {}, "process": Process(program="test", version="0", date="")}
     data = make_artifact(
         radial_profile=ApparatusRadial(r, g, np.abs(spread), g, np.outer(spread, spread)),
         transfer=TransferFunction(k, np.abs(kernel.transform(k)), 0 * k, 0 * k + 1, 5e3),
-        parameters=ParameterSet(
-            ("conversion_constant", "gaussian_sigma"),
-            np.array([conversion, SIGMA]),
-            np.diag([(conversion_uncertainty * conversion) ** 2, 0.0]),
-        ),
-        checks=(),
-        film=EXACT_FILM,
-        indenter=EXACT_ROD,
-        sensor=SENSOR,
-        reference=pressed().profile(),
-        process=Process(program="test", version="0", date=""),
-        budget={},
+        parameters=ParameterSet(names, values, covariance),
+        **(contact | empty | {"sensor": SENSOR}),
     )
     return memscal.ApparatusFunction(**{f.name: getattr(data, f.name) for f in fields(data)})
 
@@ -183,7 +160,6 @@ def shear_scan(
     kernel: RadialKernel | None = None,
     noise: float = 0.005,
     crosstalk: float = 0.0,
-    repeats: int = 1,
     channel: str = "xz",
     **options: Any,
 ) -> Scan:
@@ -191,7 +167,7 @@ def shear_scan(
 
     ``noise``, and ``crosstalk`` of the normal channel, are shares of the largest voltage.
     """
-    scan = memscal.simulate(seed=seed, repeats=repeats, centre=(CENTRE, 0.0), **options)
+    scan = memscal.simulate(seed=seed, centre=(CENTRE, 0.0), **options)
     kernel = kernel or memscal.GaussianMixture(sigmas=(SHEAR_SIGMA,))
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
     wavenumbers = Wavenumbers.covering(40 / scan.film.thickness, 12e-3)

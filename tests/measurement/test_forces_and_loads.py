@@ -124,9 +124,8 @@ def test_a_line_at_several_loads_is_refused_by_its_number() -> None:
     scan = contact_scan()
     loads = scan.normal_load.copy()
     loads[2, :5] = 0.5
-    mixed = replace(scan, normal_load=loads, source=SourceFile("mixed.h5", ""))
     with pytest.raises(InputError, match=r"mixed\.h5, line 3: its loads go from 0\.5 to 1\.37 N"):
-        single_loads(mixed)
+        single_loads(replace(scan, normal_load=loads, source=SourceFile("mixed.h5", "")))
 
 
 def test_a_line_without_any_load_is_refused_by_its_number() -> None:

@@ -14,6 +14,7 @@ from memscal.simulation.rod_scan import PAPER_FILM
 EXACT = known_apparatus()
 FEW = 6
 NOISE = 0.005
+SCAN = sphere_scan(pressed(), seed=1)
 
 
 def wider(share: float) -> memscal.GaussianMixture:
@@ -88,9 +89,8 @@ def test_an_uncertain_conversion_constant_makes_every_stress_as_uncertain() -> N
     found = memscal.restore(scan, known_apparatus(conversion_uncertainty=0.02))
     assert found.force_budget["apparatus"] == pytest.approx(0.02 * found.force, rel=0.05)
     r = np.linspace(0, 2e-3, 5)
-    np.testing.assert_allclose(
-        apparatus_part(found, "apparatus", r), 0.02 * found.stress(r), rtol=0.05
-    )
+    expected = 0.02 * found.stress(r)
+    np.testing.assert_allclose(apparatus_part(found, "apparatus", r), expected, rtol=0.05)
 
 
 def test_an_uncertain_width_of_g_counts_as_much_as_it_changes() -> None:
@@ -142,26 +142,18 @@ def test_a_raster_is_restored_like_a_line() -> None:
 
 
 def test_the_direction_of_a_scan_changes_nothing() -> None:
-    scan = sphere_scan(pressed(), seed=1)
-    along_x, along_y = (memscal.restore(replace(scan, direction=d), EXACT) for d in "xy")
+    along_x, along_y = (memscal.restore(replace(SCAN, direction=d), EXACT) for d in "xy")
     np.testing.assert_allclose(along_y.sigma_zz, along_x.sigma_zz)
     assert along_y.centre[1] == along_x.centre[0]
 
 
-def test_a_wrong_unit_of_the_voltage_fails_the_force() -> None:
-    scan = sphere_scan(pressed(), seed=1)
-    in_mv = replace(scan, u_zz=1e3 * scan.u_zz, u_zz_errors=1e3 * scan.u_zz_errors)
-    failed = {c.name for c in memscal.restore(in_mv, EXACT).checks if not c.passed}
-    assert "restored_force" in failed
-
-
-def test_another_film_than_the_calibration_s_fails_a_check() -> None:
-    scan = sphere_scan(pressed(), seed=1)
-    film = replace(scan.film, thickness=2.2e-3)
-    failed = {
-        c.name for c in memscal.restore(replace(scan, film=film), EXACT).checks if not c.passed
-    }
-    assert "film_agreement" in failed
+@pytest.mark.parametrize(("changed", "failed"), [
+    ({"u_zz": 1e3 * SCAN.u_zz, "u_zz_errors": 1e3 * SCAN.u_zz_errors}, "restored_force"),
+    ({"film": replace(SCAN.film, thickness=2.2e-3)}, "film_agreement"),
+], ids=["mV", "film"])  # fmt: skip
+def test_a_wrong_unit_of_the_voltage_or_another_film_fails_its_check(changed, failed) -> None:
+    found = memscal.restore(replace(SCAN, **changed), EXACT)
+    assert failed in {check.name for check in found.checks if not check.passed}
 
 
 def test_a_spoilt_point_is_named_and_moves_little() -> None:
@@ -181,11 +173,9 @@ def test_the_table_is_a_reference_with_uncertainties() -> None:
 
 
 def test_the_paper_s_film_adds_its_uncertainty() -> None:
-    scan = replace(sphere_scan(pressed(), seed=1), film=PAPER_FILM)
-    assert memscal.restore(scan, EXACT).force_budget["film"] > 0
+    assert memscal.restore(replace(SCAN, film=PAPER_FILM), EXACT).force_budget["film"] > 0
 
 
-SCAN = sphere_scan(pressed(), seed=1)
 OTHER, NOISE = memscal.StressSensor(name="other"), np.random.default_rng(0).normal(0, 1e-5, 33)
 BARE = replace(EXACT.radial_profile, g_covariance=np.full((301, 301), np.nan))
 BESIDE = replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None)

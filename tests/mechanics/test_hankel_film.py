@@ -47,8 +47,7 @@ def test_the_energy_of_any_traction_is_positive(nu: float) -> None:
 @pytest.mark.parametrize("nu", [0.2, 0.5])
 @pytest.mark.parametrize("sticking", [False, True])
 def test_the_surface_meets_a_rod_all_the_way_to_its_edge(nu: float, sticking: bool) -> None:
-    friction = math.inf if sticking else 0.0
-    contact = indent(film(nu), Rod(radius=1e-3), load=1.0, friction=friction)
+    contact = indent(film(nu), Rod(radius=1e-3), load=1.0, friction=math.inf if sticking else 0.0)
     r = np.linspace(0.0, 0.95e-3, 20)
     np.testing.assert_allclose(contact.surface_depression(r), contact.depth, rtol=2e-4)
     beside = contact.surface_depression([1.0001e-3, 1.1e-3, 10e-3])

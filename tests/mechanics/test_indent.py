@@ -135,8 +135,7 @@ def test_loads_and_depths_that_are_not_positive_are_refused(name: str, value: fl
 
 @pytest.mark.parametrize(("asked", "error", "words"), [
     ({"load": 1.0, "depth": 1e-4}, InputError, "either a load or a depth, not both"),
-    ({}, InputError, "either a load or a depth"),
-    ({"depth": 2e-3}, DomainError, "sink"),
+    ({}, InputError, "either a load or a depth"), ({"depth": 2e-3}, DomainError, "sink"),
     ({"load": 10.0}, DomainError, "sink"),
 ])  # fmt: skip
 def test_a_load_or_a_depth_within_the_film_is_needed(asked, error, words) -> None:

@@ -29,9 +29,8 @@ def test_frictionless_rod_solves_the_fredholm_equation(ratio: float, nu: float) 
     phi = np.linalg.solve(np.eye(t.size) + kernel * t_weights, np.ones(t.size))
     solution = solve_rod(ratio, nu, sticking=False)
     assert solution.stiffness_factor == pytest.approx(t_weights @ phi, rel=1e-10)
-    transform = cosines.T @ (t_weights * phi) / (t_weights @ phi)
     found = 2 * np.pi * solution.traction(1.0, 1.0).pressure_transform(k)
-    np.testing.assert_allclose(found, transform, atol=1e-10)
+    np.testing.assert_allclose(found, cosines.T @ (t_weights * phi) / (t_weights @ phi), atol=1e-10)
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.2, 0.5])

@@ -1,6 +1,5 @@
 """Synthetic contact scans and whole experiments: mechanics, force, statistics, stated truth."""
 
-import logging
 from dataclasses import replace
 from typing import Any
 
@@ -25,14 +24,6 @@ RARE = 1e-9
 STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 EXACT: dict[str, Any] = {**STILL, "load_scatter": 0.0, "position_error": 0.0}
 CENTRED = {"centre": (0.0, 0.0)}
-
-
-@pytest.fixture
-def seed() -> int:
-    """Return another seed in every run; the log of a failed test names it."""
-    value = int(np.random.SeedSequence().generate_state(1)[0])
-    logging.getLogger(__name__).info("seed %d", value)
-    return value
 
 
 def truth(scan: Scan) -> dict[str, Any]:
@@ -198,11 +189,9 @@ def test_an_experiment_is_a_calibration_and_contacts_dry_and_lubricated() -> Non
     assert (found.dry.u_zz.shape, found.lubricated.u_zz.shape) == ((4, 33), (2, 33))
     assert (truth(found.dry)["friction"], truth(found.lubricated)["friction"]) == (0.2, 0.0)
     for scan in found.scans.values():
-        assert scan.sensor == found.rod.sensor
-        assert scan.film is PAPER_FILM
+        assert (scan.sensor, scan.film) == (found.rod.sensor, PAPER_FILM)
         assert "synthetic" in scan.title.lower()
-        assert truth(scan)["gaussian_sigma"] == 561e-6
-        assert truth(scan)["seed"] == 0
+        assert (truth(scan)["gaussian_sigma"], truth(scan)["seed"]) == (561e-6, 0)
 
 
 def test_another_load_of_one_scan_changes_no_number_of_another() -> None:
@@ -250,16 +239,15 @@ def test_what_is_drawn_scatters_as_it_is_stated() -> None:
 def test_the_files_state_the_nominal_values_and_the_voltages_are_of_the_true_ones() -> None:
     found = memscal.simulate_experiment(**FEW, **EXACT, draw_inputs=True, seed=3)
     told, rod = truth(found.dry), truth(found.rod)
-    for name in ("young_modulus", "poisson_ratio", "thickness"):
+    names = ("young_modulus", "poisson_ratio", "thickness")
+    for name in names:
         assert told[name] == rod[name] != getattr(PAPER_FILM, name)
         assert getattr(found.dry.film, name) == getattr(PAPER_FILM, name)
     assert (found.dry.indenter, found.rod.indenter) == (PAPER_SPHERE, PAPER_ROD)
     assert (found.dry.load, found.rod.load) == (0.69, 1.0)
     assert found.rod.load_uncertainty == pytest.approx(0.01)
     assert told["load_1"] == pytest.approx(0.69 * told["load_scale"])
-    film = replace(
-        PAPER_FILM, **{n: told[n] for n in ("young_modulus", "poisson_ratio", "thickness")}
-    )
+    film = replace(PAPER_FILM, **{name: told[name] for name in names})
     sphere = memscal.Sphere(radius=told["indenter_radius"])
     again = simulate_contacts(
         film=film, sphere=sphere, load=[told["load_1"]], friction=0.2, points=9, spacing=2e-3,
@@ -291,10 +279,8 @@ def test_a_thicker_film_than_is_stated_is_under_all_indenters() -> None:
 
 
 def test_a_lubricated_contact_keeps_the_normal_compliance_of_its_surface() -> None:
-    law = memscal.Interface(
-        normal=memscal.ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6),
-        slip_length=2e-6,
-    )
+    normal = memscal.ExponentialCompliance(decay_length=1e-6, reference_pressure=1e6)
+    law = memscal.Interface(normal=normal, slip_length=2e-6)
     found = memscal.simulate_experiment(**FEW, load_scatter=0.0, friction=0.3, interface=law)
     dry, lubricated = truth(found.dry), truth(found.lubricated)
     assert (dry["slip_length"], dry["decay_length"]) == (2e-6, 1e-6)

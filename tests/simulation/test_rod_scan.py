@@ -1,6 +1,5 @@
 """Synthetic scans: conservation of force, and statistics; tests/accuracy convolves directly."""
 
-import logging
 from typing import Any
 
 import numpy as np
@@ -22,14 +21,6 @@ DISC = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
 KERNELS = {"gaussian": GaussianMixture(), "ring": RING, "disc": DISC}
 
 
-@pytest.fixture
-def seed() -> int:
-    """Return another seed in every run; the log of a failed test names it."""
-    value = int(np.random.SeedSequence().generate_state(1)[0])
-    logging.getLogger(__name__).info("seed %d", value)
-    return value
-
-
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: RadialKernel) -> None:
     # The integral of a smooth field is the sum of a raster's pixels; this one, of an
@@ -44,8 +35,7 @@ def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: Radia
 def test_a_line_is_the_middle_row_of_a_raster() -> None:
     options: dict[str, Any] = {"points": 33, "centre": (0.3e-3, 0.2e-3), **STILL}
     raster, line = simulate(raster=True, **options), simulate(**options)
-    assert raster.kind == "raster"
-    assert line.kind == "line"
+    assert (raster.kind, line.kind) == ("raster", "line")
     np.testing.assert_array_equal(raster.x, raster.y)
     np.testing.assert_allclose(raster.u_zz[16], line.u_zz, rtol=1e-9)
 
@@ -73,7 +63,6 @@ def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed:
     options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5]}
     noisy, clean = (simulate(noise=s, seed=seed, **options) for s in (noise, 0.0))
     residual = noisy.u_zz - clean.u_zz
-    assert noisy.u_zz_errors is not None
     stated = noisy.u_zz_errors
     assert np.ptp(stated) == 0
     assert noisy.synthetic["noise"] == stated.flat[0]
@@ -104,8 +93,7 @@ def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed: int) -> No
 
 def test_several_loads_give_a_repeat_each_in_proportion() -> None:
     scan = simulate(load=[0.34, 0.69, 1.37], repeats=2, points=17, load_uncertainty=0.02, **STILL)
-    assert scan.kind == "repeats"
-    assert scan.u_zz.shape == (6, 17)
+    assert (scan.kind, scan.u_zz.shape) == ("repeats", (6, 17))
     loads = np.array([0.34, 0.34, 0.69, 0.69, 1.37, 1.37])
     np.testing.assert_array_equal(scan.normal_load, np.tile(loads[:, None], 17))
     np.testing.assert_allclose(scan.u_zz / loads[:, None], np.tile(scan.u_zz[0] / 0.34, (6, 1)))
@@ -124,25 +112,20 @@ def test_repeats_at_one_load_share_their_signal_but_not_their_noise() -> None:
 def test_the_truth_travels_with_the_scan() -> None:
     scan = simulate(conversion_constant=2e-8, centre=(0.1e-3, 0.2e-3), seed=11, points=9)
     truth = scan.synthetic
-    assert truth["conversion_constant"] == 2e-8
-    assert truth["gaussian_sigma"] == 561e-6
-    assert (truth["centre"], truth["centre_y"]) == (0.1e-3, 0.2e-3)
-    assert truth["seed"] == 11
-    assert scan.film == PAPER_FILM
-    assert scan.indenter == PAPER_ROD
+    assert (truth["conversion_constant"], truth["gaussian_sigma"]) == (2e-8, 561e-6)
+    assert (truth["centre"], truth["centre_y"], truth["seed"]) == (0.1e-3, 0.2e-3, 11)
+    assert (scan.film, scan.indenter) == (PAPER_FILM, PAPER_ROD)
     assert "Synthetic" in scan.notes
     mixed = simulate(kernel=RING, points=9).synthetic
     assert "gaussian_sigma" not in mixed
-    assert mixed["kernel_weights"] == "1.8, -0.8"
-    assert mixed["kernel_sigmas_um"] == "700, 450"
+    assert (mixed["kernel_weights"], mixed["kernel_sigmas_um"]) == ("1.8, -0.8", "700, 450")
 
 
 def test_another_film_and_rod_are_simulated_as_they_are() -> None:
     film = ElasticFilm(young_modulus=1e6, poisson_ratio=0.4, thickness=1e-3)
     rod = Rod(radius=0.4e-3)
     scan = simulate(film=film, rod=rod, centre=(0.0, 0.0), points=9, **STILL)
-    assert scan.film is film
-    assert scan.indenter is rod
+    assert (scan.film, scan.indenter) == (film, rod)
     # A narrower stress gives a higher peak: the film is half as thick.
     assert scan.u_zz.max() > simulate(centre=(0.0, 0.0), points=9, **STILL).u_zz.max()
 
@@ -193,8 +176,7 @@ class Own:
 def test_any_object_with_the_three_methods_is_a_kernel() -> None:
     own, disc = simulate(kernel=Own(), seed=3), simulate(kernel=DISC, seed=3)
     np.testing.assert_allclose(own.u_zz, disc.u_zz, rtol=1e-12)
-    assert own.synthetic["kernel"] == "my own"
-    assert own.synthetic["centre_of_mass"] == 0.0
+    assert own.synthetic.items() >= {"kernel": "my own", "centre_of_mass": 0.0}.items()
 
 
 @pytest.mark.parametrize(("kernel", "problem"), [

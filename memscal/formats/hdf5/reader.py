@@ -19,15 +19,8 @@ import numpy as np
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
 from memscal.formats.files import read_bytes
-from memscal.formats.hdf5.limits import (
-    MAX_TEXT_BYTES,
-    attribute_text_lengths,
-    check_layout,
-    check_type,
-    claimed_bytes,
-    refuse,
-    text_length,
-)
+from memscal.formats.hdf5 import limits
+from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
 from memscal.model.notation import printable
 from memscal.model.provenance import SourceFile
 
@@ -192,8 +185,8 @@ class SafeFile:
 
     def _read_array(self, path: str) -> np.ndarray[Any, Any]:
         dataset = self._dataset(path)
-        check_layout(self.where(path), dataset, text=False)
-        self._spend(path, claimed_bytes(dataset))
+        limits.check_layout(self.where(path), dataset, text=False)
+        self._spend(path, limits.claimed_bytes(dataset))
         whole = dataset.get_type().get_class() == h5py.h5t.INTEGER
         values = np.empty(dataset.shape, dtype=np.int64 if whole else np.float64)
         dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
@@ -202,10 +195,10 @@ class SafeFile:
 
     def _read_text(self, path: str) -> str:
         dataset = self._dataset(path)
-        check_layout(self.where(path), dataset, text=True)
-        self._spend(path, claimed_bytes(dataset))
+        limits.check_layout(self.where(path), dataset, text=True)
+        self._spend(path, limits.claimed_bytes(dataset))
         if dataset.get_type().is_variable_str():
-            self._check_length(path, text_length(self._data, dataset.get_offset() or -1))
+            self._check_length(path, limits.text_length(self._data, dataset.get_offset() or -1))
         return printable(h5py.Dataset(dataset)[()], MAX_TEXT_BYTES)
 
     def _read_attribute(self, path: str, name: str) -> str | int | float | tuple[str, ...] | None:
@@ -224,11 +217,11 @@ class SafeFile:
         if len(attribute.shape) > 1 or number > _MAX_ATTRIBUTE_ITEMS or size > _MAX_ATTRIBUTE_BYTES:
             raise refuse(where, f"has {number} values", "An attribute is one value or a few names.")
         text = attribute.get_type().get_class() == h5py.h5t.STRING
-        check_type(where, attribute.get_type(), text=text)
+        limits.check_type(where, attribute.get_type(), text=text)
         self._spend(path, size)
         if text and attribute.get_type().is_variable_str():
             address = h5py.h5o.get_info(item).addr
-            for length in attribute_text_lengths(self._data, address, key, number):
+            for length in limits.attribute_text_lengths(self._data, address, key, number):
                 self._check_length(f"{path}@{name}", length)
         # h5py's attribute access needs nothing of an object but its identifier.
         value = h5py.AttributeManager(SimpleNamespace(id=item))[name]

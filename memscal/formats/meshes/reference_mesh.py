@@ -8,13 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.formats.meshes.film_base import (
-    Base,
-    Frame,
-    average_over_circles,
-    find_base,
-    find_frame,
-)
+from memscal.formats.meshes import film_base
 from memscal.formats.meshes.mesh_files import Mesh, read_mesh
 from memscal.formats.meshes.stress_components import Component, find_normal, find_shear
 from memscal.formats.tables.reference import (
@@ -61,12 +55,12 @@ def read_reference_mesh(
         require_sign("shear sign", shear_sign)
     mesh = read_mesh(path)
     name = mesh.source.file_name
-    frame = find_frame(mesh, to_si(mesh.points, r_unit, "length", name), vertical)
+    frame = film_base.find_frame(mesh, to_si(mesh.points, r_unit, "length", name), vertical)
     normal = find_normal(mesh, frame, sigma)
     section = len(frame.radial) == 1
     _require_meaning(name, section, shear, centre)
     tangential = _shear_component(mesh, frame, normal, shear) if section else None
-    footing = find_base(mesh, frame, base)
+    footing = film_base.find_base(mesh, frame, base)
     places, values = _at_base(mesh, frame, footing, normal)
     columns = {"sigma_zz": sign * to_si(values, sigma_unit, "stress", f"{name}: {sigma}")}
     treatment = "compression negative" if sign < 0 else "as it is"
@@ -97,7 +91,7 @@ def read_reference_mesh(
 
 
 def _along_radius(
-    samples: Samples, frame: Frame, places: FloatArray, centre: tuple[float, float]
+    samples: Samples, frame: film_base.Frame, places: FloatArray, centre: tuple[float, float]
 ) -> Samples:
     """Give samples their radii: those of a section as they are, those of a plane by circles."""
     if len(frame.radial) == 1:
@@ -110,7 +104,7 @@ def _along_radius(
             )
         return replace(samples, columns={"r": r, **samples.columns})
     require_numbers(samples)  # a mean would leave out what is missing
-    columns, note = average_over_circles(places - np.array(centre), samples.columns)
+    columns, note = film_base.average_over_circles(places - np.array(centre), samples.columns)
     return replace(samples, columns=columns, notes=[*samples.notes, *import_notes([note])])
 
 
@@ -133,7 +127,7 @@ def _require_meaning(
 
 
 def _shear_component(
-    mesh: Mesh, frame: Frame, normal: Component, shear: str | None
+    mesh: Mesh, frame: film_base.Frame, normal: Component, shear: str | None
 ) -> Component | None:
     """Return the shear that is asked for, or the one that comes with a stress tensor."""
     if shear is not None:
@@ -149,7 +143,7 @@ def _shear_component(
 
 
 def _at_base(
-    mesh: Mesh, frame: Frame, base: Base, component: Component
+    mesh: Mesh, frame: film_base.Frame, base: film_base.Base, component: Component
 ) -> tuple[FloatArray, FloatArray]:
     """Return places in the base and the values there: at nodes, or at the middles of sides."""
     radial = list(frame.radial)

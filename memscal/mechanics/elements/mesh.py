@@ -81,8 +81,7 @@ def _surface_nodes(rings: FloatArray, radius: float, sizes: _Sizes) -> FloatArra
     step = rings[-1] - inside[-2]
     while beyond[-1] < radius:
         step = min(step * (1 + _GROWTH / sizes.refinement), float(sizes.widest(beyond[-1])))
-        left = radius - beyond[-1]
-        beyond.append(radius if left < 1.5 * step else beyond[-1] + step)
+        beyond.append(radius if radius - beyond[-1] < 1.5 * step else beyond[-1] + step)
     return np.concatenate([inside, beyond[1:]])
 
 
@@ -150,8 +149,7 @@ class _Front:
         longest = np.minimum(slope * lower, 1.001 * self.sizes.widest(self.r))
         # The side that bridges a dropped node must pass well below it.
         share = (self.r[1:-1] - self.r[:-2]) / np.maximum(width[1:-1], self.r[-1] * 1e-300)
-        bridge = (1 - share) * lower[:-2] + share * lower[2:]
-        room = np.pad(bridge - self.depth[1:-1], 1)
+        room = np.pad((1 - share) * lower[:-2] + share * lower[2:] - self.depth[1:-1], 1)
         droppable = moving & (width > 0) & (width <= longest) & (room >= _ROOM * width)
         kept = np.ones(self.r.size, dtype=bool)
         for i in np.flatnonzero(droppable):

@@ -62,10 +62,9 @@ class NeoHookean:
 
     def energy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the stored energy per undeformed volume, shape (...), where p has settled."""
-        G = self.shear_modulus
         strain = (np.sum(F**2, axis=-1) - 3) / 2 - (determinant(F) - 1)
         swelling = self.held / 2 * (determinant(F) - 1) ** 2
-        return np.asarray(G * strain + swelling + self.softness / 2 * p**2)
+        return np.asarray(self.shear_modulus * strain + swelling + self.softness / 2 * p**2)
 
     def _pressing(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return G + p - held (J - 1): minus the factor of the cofactor in the stress."""
@@ -109,7 +108,6 @@ _NEAR = 4.0
 # Growth of the sides with the distance from where the surface is folded around the rod's edge.
 _SLOPE = 0.7
 
-
 # Thickness and radius in mm, and how many times finer than by default the mesh is.
 FilmSize = tuple[float, float, float]
 
@@ -121,8 +119,7 @@ def mesh_below_a_rod(
     thickness, _, refinement = size
     near = _WIDEST_BELOW_A_ROD * thickness / refinement
     side = min(_SHARE_OF_ROD * rod / refinement, near)
-    even = np.linspace(0.0, rod, max(2, round(rod / side)) + 1)
-    mesh = _tensor(even, side, near, size)
+    mesh = _tensor(np.linspace(0.0, rod, max(2, round(rod / side)) + 1), side, near, size)
     while True:
         r, z = mesh.p[:, mesh.t]
         longest = np.hypot(r - np.roll(r, 1, axis=0), z - np.roll(z, 1, axis=0)).max(axis=0)
@@ -140,8 +137,7 @@ def mesh_below_a_sphere(size: FilmSize, *, contact: float) -> Any:
     thickness, _, refinement = size
     near = _WIDEST_BELOW_A_SPHERE * thickness / refinement
     side = min(_SHARE_OF_CONTACT * contact / refinement, near)
-    even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
-    return _tensor(even, side, near, size)
+    return _tensor(np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1), side, near, size)
 
 
 def _tensor(even: FloatArray, side: float, near: float, size: FilmSize) -> Any:
@@ -153,12 +149,10 @@ def _tensor(even: FloatArray, side: float, near: float, size: FilmSize) -> Any:
     r, step = [contact], side
     while r[-1] < radius:
         step = min(step * grow, near if r[-1] < contact + _NEAR * thickness else far)
-        left = radius - r[-1]
-        r.append(radius if left < 1.5 * step else r[-1] + step)
+        r.append(radius if radius - r[-1] < 1.5 * step else r[-1] + step)
     depth, step = [0.0], side
     while depth[-1] < thickness:
-        left = thickness - depth[-1]
-        depth.append(thickness if left < 1.5 * step else depth[-1] + step)
+        depth.append(thickness if thickness - depth[-1] < 1.5 * step else depth[-1] + step)
         step = min(step * grow, near)
     heights = thickness - np.array(depth[::-1])
     heights[0] = 0.0
@@ -257,9 +251,8 @@ class FilmElements:
         stress = (self.material.stress(F, p) * volumes[..., None]).reshape(cells, -1)
         swelling = (determinant(F) - 1 + self.material.softness * p) * volumes
         pushed = (stress[:, None, :] @ gradients.reshape(cells, -1, 12))[:, 0]
-        swollen = -(swelling[:, None, :] @ pressures)[:, 0]
         dofs = np.concatenate([moving, pressing], axis=1).ravel()
-        values = np.concatenate([pushed, swollen], axis=1).ravel()
+        values = np.concatenate([pushed, -(swelling[:, None, :] @ pressures)[:, 0]], axis=1).ravel()
         return np.bincount(dofs, values, self.size).astype(np.float64)
 
     def tangent(self, x: FloatArray) -> sparse.csr_array:

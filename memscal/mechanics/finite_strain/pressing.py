@@ -222,9 +222,8 @@ class Pressing:
         steps = np.zeros(size)
         steps[free] = solution[: np.count_nonzero(free)]
         place = state.place if self.sticking else state.place + steps[touching]
-        moved = max(float(np.max(np.abs(steps[: 2 * n]))), abs(sunk))
         ahead = replace(state, x=state.x + steps, depth=state.depth + sunk, place=place)
-        return self.placed(ahead), moved
+        return self.placed(ahead), max(float(np.max(np.abs(steps[: 2 * n]))), abs(sunk))
 
 
 # The first step of a rod, as a share of its radius in depth; those of a sphere to the first goal,

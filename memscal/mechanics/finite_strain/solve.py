@@ -208,10 +208,8 @@ class _Request:
             backend="fem",
             convergence=math.inf,
             steps=step.count,
-            discretisation=(
-                f"{elements.mesh.t.shape[1]} Taylor-Hood triangles (quadratic displacement, linear "
-                f"pressure), {elements.size} unknowns"
-            ),
+            discretisation=f"{elements.mesh.t.shape[1]} Taylor-Hood triangles (quadratic "
+            f"displacement, linear pressure), {elements.size} unknowns",
             traction=interface_traction(pressing, pressed),
             inside=FiniteStrainField(pressing, pressed),
             elastic_energy=elements.energy(pressed.x) / _MM,

@@ -35,8 +35,7 @@ def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> Contact
 
 def _is_contact(problem: ContactProblem, state: ContactState) -> bool:
     """Whether a state fulfils Signorini's conditions, but for what an edge does not resolve."""
-    outside = problem.separations(state)[~state.touching]
-    overlaps = np.any(outside < -_OVERLAP * abs(state.depth))
+    overlaps = np.any(problem.separations(state)[~state.touching] < -_OVERLAP * abs(state.depth))
     return bool(state.pressure.min() >= -_PULL * state.pressure.max() and not overlaps)
 
 
@@ -263,8 +262,7 @@ def _dissipation(problem: ContactProblem, before: ContactState, after: ContactSt
     slips = before.touching & (after.pressure > 0) & (after.slip != 0)
     slipped = np.where(slips, after.anchor - before.anchor, 0.0)
     # A ring that turns around slips under the shear that it has at the end.
-    steady = before.slip == after.slip
-    shear = np.where(steady, (before.shear + after.shear) / 2, after.shear)
+    shear = np.where(before.slip == after.slip, (before.shear + after.shear) / 2, after.shear)
     return -_surface_integral(problem.compliance.r, (shear, slipped))
 
 

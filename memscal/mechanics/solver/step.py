@@ -58,9 +58,8 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trac
 
     # In units of the film's own compliance, the matrix mixes pressures with pressures.
     unit = c.normal[0, 0]
-    depth = np.full((problem.size, 1), -unit)
     by_rows = c.normal[:, rows] + c.normal_by_shear[:, rows] * ratio
-    normal = np.hstack([by_rows, c.normal_by_shear[:, stuck], depth])
+    normal = np.hstack([by_rows, c.normal_by_shear[:, stuck], np.full((problem.size, 1), -unit)])
     by_rows = c.radial_by_pressure[np.ix_(stuck, rows)] + c.radial[np.ix_(stuck, rows)] * ratio
     radial = np.hstack([by_rows, c.radial[np.ix_(stuck, stuck)], np.zeros((stuck.size, 1))])
     last, value = _goal_row(problem, goal, normal, rows, unit)
@@ -154,8 +153,7 @@ def take_step(
     held = goal.ring if isinstance(goal, Touch) else None
     for iteration in range(1, _MOST_ITERATIONS + 1):
         tractions = _solve_system(problem, status, goal)
-        careful = iteration > _CAREFUL_AFTER
-        revised, settled = _revise(problem, status, tractions, held, careful)
+        revised, settled = _revise(problem, status, tractions, held, iteration > _CAREFUL_AFTER)
         if same_contact:
             changed = not np.array_equal(revised.slip, status.slip)
             revised, settled = replace(revised, pressing=status.pressing), not changed
