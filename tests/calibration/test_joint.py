@@ -14,7 +14,7 @@ from memscal.model.apparatus import ParameterSet
 from memscal.model.scan import Scan, StressSensor
 
 SEEDS = 60
-CHANCE = 1e-5
+LOW, HIGH = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], SEEDS) / SEEDS)
 
 
 def joint(scans: list[Scan], method: str = "bayesian", **options):
@@ -141,9 +141,8 @@ def test_a_centre_for_each_repeat_needs_repeats_that_stand_alone(bad, words: str
 
 
 def test_films_of_other_names_count_for_themselves_and_a_shared_film_once() -> None:
-    uncertain = [
-        replace(s, film=replace(s.film, thickness_uncertainty=2e-5)) for s in several(0.003)
-    ]
+    scans = several(0.003)
+    uncertain = [replace(s, film=replace(s.film, thickness_uncertainty=2e-5)) for s in scans]
     budget = joint(uncertain).budget["gaussian_sigma"]
     assert {"thickness", "thickness_2"} <= set(budget)
     assert "thickness_3" not in budget
@@ -169,8 +168,7 @@ def test_noise_that_is_correlated_is_weighed_as_such() -> None:
             name = "gaussian_sigma"
             found.append(((p[name] - SIGMA) / p.uncertainty(name), p[name] - SIGMA))
     stated, naive = np.array(stated), np.array(naive)
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], SEEDS) / SEEDS)
-    assert low / 1.1 < np.sqrt(np.mean(stated[:, 0] ** 2)) < high * 1.1
+    assert LOW / 1.1 < np.sqrt(np.mean(stated[:, 0] ** 2)) < HIGH * 1.1
     assert np.std(stated[:, 1]) < np.std(naive[:, 1])
 
 
@@ -196,8 +194,7 @@ def test_uncertain_positions_count_as_noise_where_the_voltage_is_steep() -> None
         scan = replace(scan, u_zz=shaken, x_errors=np.full_like(scan.x, jitter))
         p = joint([scan]).parameters
         deviates.append((p["gaussian_sigma"] - SIGMA) / p.uncertainty("gaussian_sigma"))
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], SEEDS) / SEEDS)
-    assert low / 1.15 < np.sqrt(np.mean(np.square(deviates))) < high * 1.15
+    assert LOW / 1.15 < np.sqrt(np.mean(np.square(deviates))) < HIGH * 1.15
     still = joint([clean]).parameters.uncertainty("gaussian_sigma")
     assert p.uncertainty("gaussian_sigma") > 1.5 * still
 

@@ -110,17 +110,14 @@ def test_a_reference_for_another_load_is_scaled_and_a_wrong_force_is_caught() ->
 
 def test_several_loads_give_one_conversion_constant_per_newton() -> None:
     setting = {"load": (0.4, 1.0, 1.6), "points": 33, "noise": 0.002}
-    scan = simulated(**setting)
-    calibration = memscal.calibrate(scan)
-    parameters = calibration.apparatus.parameters
-    assert_as_stated(parameters, scan.synthetic, cramer_rao(**setting))
+    calibration = memscal.calibrate(scan := simulated(**setting))
+    assert_as_stated(calibration.apparatus.parameters, scan.synthetic, cramer_rao(**setting))
     assert check(calibration, "load_linearity").passed
 
 
 def test_a_raster_is_used_as_it_is_and_agrees_with_a_line() -> None:
     setting = {"raster": True, "points": 33, "centre": (0.3e-3, -0.4e-3), "noise": 0.005}
-    scan = simulated(**setting)
-    raster = memscal.calibrate(scan)
+    raster = memscal.calibrate(scan := simulated(**setting))
     assert_as_stated(raster.apparatus.parameters, scan.synthetic, cramer_rao(**setting))
     assert plane_error(R, raster.apparatus.radial(R), memscal.GaussianMixture().radial(R)) < 0.15
     assert {c.name for c in raster.apparatus.checks} >= {"axisymmetry", "reconvolution"}
@@ -160,11 +157,9 @@ def test_a_raster_s_points_may_repeat_and_lie_off_their_places(method: str) -> N
     rng = np.random.default_rng(4)
     x, y = (np.tile(positions.ravel(), 3) for positions in clean.positions)
     u = np.tile(clean.u_zz.ravel(), 3) + 0.005 * clean.u_zz.max() * rng.normal(size=x.size)
-    off = rng.normal(scale=1e-6, size=(2, x.size))
-    scan = replace(
-        clean, x=x + off[0], y=y + off[1], u_zz=u, u_zz_errors=None,
-        repeat=np.repeat([0, 1, 2], clean.u_zz.size),
-    )  # fmt: skip
+    x, y = np.stack([x, y]) + rng.normal(scale=1e-6, size=(2, x.size))
+    repeat = np.repeat([0, 1, 2], clean.u_zz.size)
+    scan = replace(clean, x=x, y=y, u_zz=u, u_zz_errors=None, repeat=repeat)
     apparatus = memscal.calibrate(scan, method=method).apparatus
     bounds = cramer_rao(0.005 / np.sqrt(3), **setting)
     assert_as_stated(apparatus.parameters, clean.synthetic, bounds)
@@ -205,9 +200,8 @@ def test_the_sweep_is_flat_about_the_rule_s_choice() -> None:
     assert sweep.amplitude[[0, 4, 8]] == pytest.approx([0.1, 1.0, 10.0])
     middle = slice(2, 7)  # one decade
     assert np.ptp(sweep.conversion_constant[middle]) < 0.005 * CONVERSION
-    assert sweep.conversion_constant[4] == pytest.approx(
-        calibration.apparatus.conversion_constant, rel=1e-9
-    )
+    usual = calibration.apparatus.conversion_constant
+    assert sweep.conversion_constant[4] == pytest.approx(usual, rel=1e-9)
     # More noise than the rule's smooths more: the width grows, and the scan is no longer met.
     assert (np.diff(sweep.gaussian_sigma_deconvolved[4:]) > 0).all()
     assert sweep.relative_rms[8] > sweep.relative_rms[0]

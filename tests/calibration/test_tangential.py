@@ -164,10 +164,8 @@ def test_a_line_along_y_calibrates_the_other_channel() -> None:
 def test_two_scans_together_know_more_than_either() -> None:
     scans = [shear_scan(seed=seed, noise=0.02) for seed in (8, 9)]
     together = memscal.calibrate(scans, channel="xz", method="bayesian")
-    alone, both = (
-        found.apparatus.budget["gaussian_sigma"]["noise"]
-        for found in (calibrated(scans[0]), together)
-    )
+    found = (calibrated(scans[0]), together)
+    alone, both = (c.apparatus.budget["gaussian_sigma"]["noise"] for c in found)
     assert both == pytest.approx(alone / np.sqrt(2), rel=0.25)
 
 
@@ -196,19 +194,11 @@ def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part() -> None:
 
 def test_the_wrong_sign_is_refused_and_the_cure_is_said() -> None:
     scan = shear_scan(seed=12)
-    turned = replace(scan, channels={"u_xz": -scan.channels["u_xz"]})
-    with pytest.raises(InputError, match="wrong sign") as refusal:
-        calibrated(turned)
-    assert "sign of u_xz" in refusal.value.cure
     # Positions of the sensor instead of the indenter are the same mistake.
-    with pytest.raises(InputError, match="wrong sign"):
-        calibrated(replace(scan, x=-scan.x))
-
-
-def test_a_normal_channel_in_its_place_is_refused_as_even() -> None:
-    scan = shear_scan(seed=13)
-    with pytest.raises(InputError, match="same on both sides"):
-        calibrated(replace(scan, channels={"u_xz": scan.u_zz}))
+    for changes in ({"channels": {"u_xz": -scan.channels["u_xz"]}}, {"x": -scan.x}):
+        with pytest.raises(InputError, match="wrong sign") as refusal:
+            calibrated(replace(scan, **changes))
+        assert "sign of u_xz" in refusal.value.cure
 
 
 @pytest.mark.parametrize("method", ["white-noise", "wiener", "tikhonov", "richardson-lucy"])
@@ -229,34 +219,32 @@ def test_a_scan_without_the_channel_is_refused() -> None:
         calibrated(scan, "xx")
 
 
-def test_a_line_across_the_component_and_a_raster_are_refused() -> None:
-    scan = shear_scan(seed=15)
-    with pytest.raises(InputError, match="runs along y"):
-        calibrated(replace(scan, direction="y"))
-    raster = memscal.simulate(raster=True, points=11)
-    with pytest.raises(InputError, match="raster"):
-        calibrated(replace(raster, channels={"u_xz": raster.u_zz}))
+def test_a_normal_channel_a_line_across_the_component_and_a_raster_are_refused() -> None:
+    scan, raster = shear_scan(seed=15), memscal.simulate(raster=True, points=11)
+    for refused, words in (
+        (replace(scan, channels={"u_xz": scan.u_zz}), "same on both sides"),
+        (replace(scan, direction="y"), "runs along y"),
+        (replace(raster, channels={"u_xz": raster.u_zz}), "raster"),
+    ):
+        with pytest.raises(InputError, match=words):
+            calibrated(refused)
 
 
 def test_a_scan_of_a_tangential_channel_is_not_taken_for_a_normal_one() -> None:
     scan = memscal.simulate()
-    shear = replace(scan, sensor=replace(scan.sensor, channel="xz"))
     with pytest.raises(InputError, match="recorded by channel xz"):
-        memscal.calibrate(shear)
+        memscal.calibrate(replace(scan, sensor=replace(scan.sensor, channel="xz")))
 
 
 def test_a_reference_from_elsewhere_needs_its_shear() -> None:
     scan = shear_scan(seed=16)
     profile = memscal.indent(scan.film, scan.indenter, load=1.0).profile()
-    own, given = (
-        memscal.calibrate(scan, reference=reference, channel="xz", method="bayesian").apparatus
-        for reference in (None, profile)
-    )
-    assert given.conversion_constant == pytest.approx(own.conversion_constant, rel=1e-3)
+    options = {"channel": "xz", "method": "bayesian"}
+    own, given = (memscal.calibrate(scan, reference=p, **options) for p in (None, profile))
+    constant = own.apparatus.conversion_constant
+    assert given.apparatus.conversion_constant == pytest.approx(constant, rel=1e-3)
     with pytest.raises(InputError, match="no shear"):
-        memscal.calibrate(
-            scan, reference=replace(profile, sigma_rz=None), channel="xz", method="bayesian"
-        )
+        memscal.calibrate(scan, reference=replace(profile, sigma_rz=None), **options)
 
 
 def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative() -> None:
