@@ -20,6 +20,8 @@ pytestmark = pytest.mark.accuracy
 DESIGNS, SEEDS = (10, 40) if FULL else (3, 16)
 #: How near a prediction is to come.
 TOLERANCE = 0.15
+#: Least scatter of A, sigma and FWHM over the part of their uncertainty that is their own.
+LEAST = np.array([0.35, 0.85, 0.1])
 #: Chance that a bound fails by accident, and as many standard errors.
 CHANCE, DEVIATIONS = 1e-4, 3.9
 NAMES = ("conversion_constant", "gaussian_sigma", "fwhm")
@@ -115,7 +117,9 @@ def test_over_all_designs_the_prediction_is_right_on_average() -> None:
 @pytest.mark.parametrize("number", range(DESIGNS))
 def test_nothing_scatters_more_than_noise_and_prior_together_allow(number: int) -> None:
     # Beside its linear answer to noise, an estimate changes its mind about the kind of departure:
-    # A and FWHM scatter more than the part called noise, and less than the whole.
+    # A and FWHM scatter more than the part called noise, and less than the whole, which allows for
+    # departures that a Gaussian has not: over ten designs by 0.57, 1.01 and 0.19 of it.
     found = study(number)
-    scatter = np.std(found.found, axis=0, ddof=1)
-    assert np.all(scatter < found.own * np.sqrt(chi2.ppf(1 - CHANCE, SEEDS - 1) / (SEEDS - 1)))
+    ratio = np.std(found.found, axis=0, ddof=1) / found.own
+    low, high = np.sqrt(chi2.ppf([CHANCE, 1 - CHANCE], SEEDS - 1) / (SEEDS - 1))
+    assert np.all((LEAST * low < ratio) & (ratio < high)), ratio

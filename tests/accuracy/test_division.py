@@ -107,13 +107,11 @@ def test_g_and_a_are_found_and_are_as_uncertain_as_stated(case: Case) -> None:
 @pytest.mark.parametrize("case", GAUSSIANS, ids=lambda case: case.name)
 def test_the_fit_reaches_its_bound_and_states_what_it_scatters_by(case: Case) -> None:
     columns, seeds = study(case)[1], seeds_of(case)
-    error, stated, bound = (
-        columns["fit"],
-        columns["u_fit"],
-        cramer_rao(case.noise, sigma=case.sigma),
-    )
+    error, stated, bounds = columns["fit"], columns["u_fit"], cramer_rao(case.noise, case.kernel)
+    truths = {"conversion_constant": CONVERSION, "gaussian_sigma": case.sigma}
+    bound = np.array([bounds[name] / truth for name, truth in truths.items()])
     limit = root_mean_square_limit(1.1, seeds, CHANCE)
-    assert (root_mean_square(error) < limit * np.array(bound)).all()
+    assert (root_mean_square(error) < limit * bound).all()
     # The bound is what an efficient estimate truly scatters by, free of sampling error.
     assert root_mean_square(stated) == pytest.approx(bound, rel=0.15)
     low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], seeds) / seeds)

@@ -12,7 +12,7 @@ import pytest
 from helpers import scans as made
 from helpers.bounds import FULL
 from helpers.scans import GAUSSIAN, RING, TAILS, plane_error, pressed
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 
 import memscal
 
@@ -72,10 +72,16 @@ def test_no_contact_is_left_out_of_the_band(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_error_is_no_larger_than_stated(case: str) -> None:
+def test_the_error_is_about_as_large_as_stated(case: str) -> None:
     found = np.concatenate([study(case, noise) for noise in NOISES])
     error, stated = np.mean(found[:, 1:3] ** 2, axis=0)
-    assert np.sqrt(error / stated) < 1.5
+    assert 0.3 < np.sqrt(error / stated) < 1.5
+
+
+def test_over_all_contacts_the_error_is_two_thirds_of_what_is_stated_or_more() -> None:
+    ratios = everything()[:, 1] / everything()[:, 2]
+    spread = np.std(ratios**2) / np.sqrt(ratios.size)
+    assert np.mean(ratios**2) > (2 / 3) ** 2 - SIGMAS * spread
 
 
 def test_the_error_falls_with_the_noise() -> None:
@@ -87,9 +93,9 @@ def test_the_error_falls_with_the_noise() -> None:
 
 def test_the_force_is_the_load_as_often_as_it_says() -> None:
     z = everything()[:, 3]
-    hits = int(np.sum(np.abs(z) <= 1.96))
-    low, high = binom.ppf(CHANCE, z.size, 0.92), binom.isf(CHANCE, z.size, 0.99)
-    assert low <= hits <= high
+    assert np.sum(np.abs(z) <= 1.96) >= binom.ppf(CHANCE, z.size, 0.92)
+    # Shapes that no contact has are allowed for: errors are three quarters of what is stated.
+    assert np.mean(z**2) > 0.65**2 * chi2.ppf(CHANCE, z.size) / z.size
 
 
 @pytest.mark.parametrize("kernel", [GAUSSIAN, RING], ids=["gaussian", "ring"])
@@ -103,4 +109,4 @@ def test_the_uncertainty_of_a_calibrated_sensor_is_counted(kernel: memscal.Gauss
         outcomes.append(outcome(memscal.restore(scan, sensor), contact))
     within, error, stated, _ = np.transpose(outcomes)
     assert within.mean() > 0.92 - SIGMAS * within.std() / np.sqrt(within.size)
-    assert np.mean(error**2) < 1.5**2 * np.mean(stated**2)
+    assert 0.3 < np.sqrt(np.mean(error**2) / np.mean(stated**2)) < 1.5

@@ -52,6 +52,6 @@ def test_what_no_window_divides_scatters_by_half_to_twice_what_is_stated(method:
         assert not (off and apparatus.passed)
     ratio = np.std(values, axis=0, ddof=1) / np.median(stated, axis=0)
     low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], count - 1) / (count - 1))
-    # What is stated of G counts what every scan hides, too.
-    assert (ratio[:2] > low / 2).all()
+    # What is stated of G counts what every scan hides, too: at some radii ten times the scatter.
+    assert min(*ratio[:2], np.sqrt(np.mean(ratio[2:] ** 2))) > low / 2
     assert (ratio < 2 * high).all()

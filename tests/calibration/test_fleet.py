@@ -30,13 +30,9 @@ def test_every_scan_says_what_it_says_by_itself(workers: int) -> None:
     for one, scan in zip(found, given, strict=True):
         alone = memscal.calibrate(scan, method="bayesian").apparatus
         assert constant(one) == pytest.approx(alone.conversion_constant, rel=1e-9)
-        np.testing.assert_allclose(
-            one.parameters.covariance, alone.parameters.covariance, rtol=1e-6, atol=1e-30
-        )
-        profile = alone.radial_profile
-        np.testing.assert_allclose(
-            one.radial_profile.g, profile.g, rtol=1e-9, atol=1e-9 * profile.g.max()
-        )
+        covariance, g = alone.parameters.covariance, alone.radial_profile.g
+        np.testing.assert_allclose(one.parameters.covariance, covariance, rtol=1e-6, atol=1e-30)
+        np.testing.assert_allclose(one.radial_profile.g, g, rtol=1e-9, atol=1e-9 * g.max())
         assert one.resolved_wavenumber == pytest.approx(alone.resolved_wavenumber, rel=1e-9)
         assert [check.name for check in one.checks] == [check.name for check in alone.checks]
         assert one.passed == alone.passed
@@ -83,17 +79,13 @@ def test_no_scans_are_no_results() -> None:
     assert memscal.calibrate_many([], workers=2) == []
 
 
-@pytest.mark.parametrize("workers", [0, -1, 1.5, 1000])
-def test_a_number_of_processes_that_makes_no_sense_is_refused(workers: int) -> None:
-    with pytest.raises(memscal.MemscalError, match="workers is"):
-        memscal.calibrate_many(scans(1), workers=workers)
-
-
-def test_a_wrong_method_or_option_is_refused_at_once() -> None:
-    with pytest.raises(memscal.MemscalError, match="nonsense"):
-        memscal.calibrate_many(scans(2), method="nonsense")
-    with pytest.raises(memscal.MemscalError, match="bogus"):
-        memscal.calibrate_many(scans(2), method="bayesian", bogus=1)
+@pytest.mark.parametrize(("options", "words"), [
+    *[({"workers": workers}, "workers is") for workers in (0, -1, 1.5, 1000)],
+    ({"method": "nonsense"}, "nonsense"), ({"method": "bayesian", "bogus": 1}, "bogus"),
+])  # fmt: skip
+def test_a_wrong_number_of_processes_method_or_option_is_refused_at_once(options, words) -> None:
+    with pytest.raises(memscal.MemscalError, match=words):
+        memscal.calibrate_many(scans(2), **options)
 
 
 def test_one_scan_is_no_list() -> None:
@@ -114,7 +106,6 @@ def test_a_scan_survives_pickling() -> None:
 def test_processes_are_told_one_thread_and_the_environment_is_put_back() -> None:
     before = dict(os.environ)
     with worker_pool(1) as pool:
-        assert pool.submit(os.getenv, "OMP_NUM_THREADS").result() == before.get(
-            "OMP_NUM_THREADS", "1"
-        )
+        told = pool.submit(os.getenv, "OMP_NUM_THREADS").result()
+    assert told == before.get("OMP_NUM_THREADS", "1")
     assert dict(os.environ) == before

@@ -4,15 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.bounds import assert_as_stated, cramer_rao
 from helpers.scans import CONVERSION, EXACT_FILM, EXACT_ROD, SIGMA, TAILS, as_points, simulated
 from scipy.stats import chi2
 
 import memscal
 from memscal.errors import InputError
+from memscal.model.apparatus import ParameterSet
 from memscal.model.scan import Scan, StressSensor
 
 SEEDS = 60
-CHANCE = 1e-5
+LOW, HIGH = np.sqrt(chi2.isf([1 - 1e-5, 1e-5], SEEDS) / SEEDS)
 
 
 def joint(scans: list[Scan], method: str = "bayesian", **options):
@@ -51,10 +53,18 @@ def test_a_joint_fit_is_surer_than_each_of_its_scans_and_between_them() -> None:
         assert abs(together.parameters[name] - weights @ values / weights.sum()) < combined
 
 
+def assert_a_is_as_stated(parameters: ParameterSet, bounds: list[dict[str, float]]) -> None:
+    """Assert that A is right to what it states, which is at the bound of separate scans."""
+    name = "conversion_constant"
+    combined = sum(bound[name] ** -2 for bound in bounds) ** -0.5
+    assert_as_stated(parameters, {name: CONVERSION}, {name: combined})
+
+
 def test_the_division_joins_scans_of_other_loads_rods_and_films() -> None:
     scans, name = several(0.005), "conversion_constant"
     together, *alone = (joint(s, "white-noise").parameters for s in (scans, *([s] for s in scans)))
-    assert abs(together[name] - CONVERSION) < 3 * together.uncertainty(name)
+    sizes = [{"film": s.film, "rod": s.indenter, "load": s.load, "points": s.x.size} for s in scans]
+    assert_a_is_as_stated(together, [cramer_rao(0.005, **size) for size in sizes])
     assert together.uncertainty(name) < min(parameters.uncertainty(name) for parameters in alone)
 
 
@@ -70,8 +80,9 @@ def test_a_scan_along_y_says_what_one_along_x_says() -> None:
 def test_lines_and_a_raster_are_fitted_together() -> None:
     raster = simulated(raster=True, points=21, noise=0.003, centre=(0.2e-3, -0.1e-3), kernel=TAILS)
     apparatus = joint([simulated(noise=0.003, kernel=TAILS), raster])
-    deviation = apparatus.conversion_constant - CONVERSION
-    assert abs(deviation) < 4 * apparatus.parameters.uncertainty("conversion_constant")
+    setting = {"raster": True, "points": 21, "centre": (0.2e-3, -0.1e-3)}
+    bounds = [cramer_rao(0.003, kernel=TAILS, **scan) for scan in ({}, setting)]
+    assert_a_is_as_stated(apparatus.parameters, bounds)
     assert apparatus.parameters["centre_y_2"] == pytest.approx(-0.1e-3, abs=0.02e-3)
 
 
@@ -130,9 +141,8 @@ def test_a_centre_for_each_repeat_needs_repeats_that_stand_alone(bad, words: str
 
 
 def test_films_of_other_names_count_for_themselves_and_a_shared_film_once() -> None:
-    uncertain = [
-        replace(s, film=replace(s.film, thickness_uncertainty=2e-5)) for s in several(0.003)
-    ]
+    scans = several(0.003)
+    uncertain = [replace(s, film=replace(s.film, thickness_uncertainty=2e-5)) for s in scans]
     budget = joint(uncertain).budget["gaussian_sigma"]
     assert {"thickness", "thickness_2"} <= set(budget)
     assert "thickness_3" not in budget
@@ -158,8 +168,7 @@ def test_noise_that_is_correlated_is_weighed_as_such() -> None:
             name = "gaussian_sigma"
             found.append(((p[name] - SIGMA) / p.uncertainty(name), p[name] - SIGMA))
     stated, naive = np.array(stated), np.array(naive)
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], SEEDS) / SEEDS)
-    assert low / 1.1 < np.sqrt(np.mean(stated[:, 0] ** 2)) < high * 1.1
+    assert LOW / 1.1 < np.sqrt(np.mean(stated[:, 0] ** 2)) < HIGH * 1.1
     assert np.std(stated[:, 1]) < np.std(naive[:, 1])
 
 
@@ -185,8 +194,7 @@ def test_uncertain_positions_count_as_noise_where_the_voltage_is_steep() -> None
         scan = replace(scan, u_zz=shaken, x_errors=np.full_like(scan.x, jitter))
         p = joint([scan]).parameters
         deviates.append((p["gaussian_sigma"] - SIGMA) / p.uncertainty("gaussian_sigma"))
-    low, high = np.sqrt(chi2.isf([1 - CHANCE, CHANCE], SEEDS) / SEEDS)
-    assert low / 1.15 < np.sqrt(np.mean(np.square(deviates))) < high * 1.15
+    assert LOW / 1.15 < np.sqrt(np.mean(np.square(deviates))) < HIGH * 1.15
     still = joint([clean]).parameters.uncertainty("gaussian_sigma")
     assert p.uncertainty("gaussian_sigma") > 1.5 * still
 

@@ -58,11 +58,9 @@ def test_a_check_passes_just_when_its_p_value_is_above_a_thousandth() -> None:
                 assert check.passed == (check.p_value > 1e-3), check
 
 
-@pytest.mark.parametrize(
-    ("kernel", "words"), [(TAILS, "tails"), (RING, "a core of its own|an edge")]
-)
-def test_a_departure_from_a_gaussian_is_named(kernel, words: str) -> None:
-    found = checks(simulated(kernel=kernel, noise=0.001))
+@pytest.mark.parametrize("words", ["tails", "a core of its own|an edge"])
+def test_a_departure_from_a_gaussian_is_named(words: str) -> None:
+    found = checks(simulated(kernel=TAILS if words == "tails" else RING, noise=0.001))
     departure = found["gaussian_evidence"]
     assert not departure.passed
     assert re.search(f"most probable departure is ({words})", departure.meaning)

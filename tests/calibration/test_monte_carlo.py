@@ -24,9 +24,9 @@ def drawn_scans(calibration: Calibration, seed: int = 0) -> DrawnScans:
     return DrawnScans(calibration.solution, calibration.effects, calibration.correlations, seed)
 
 
-def spread_limit(draws: int, chance_in_sigma: float = 4.0) -> float:
+def spread_limit(draws: int) -> float:
     """Relative error of a standard deviation of normal draws, exceeded once in 16,000."""
-    return chance_in_sigma / np.sqrt(2 * draws)
+    return 4.0 / np.sqrt(2 * draws)
 
 
 @pytest.fixture(scope="module")
@@ -95,9 +95,8 @@ TRUTHS = {
 
 @pytest.mark.parametrize("source", TRUTHS)
 def test_voltages_of_a_draw_are_those_of_the_true_inputs(source: str) -> None:
-    film = replace(
-        EXACT_FILM, poisson_ratio=0.45, thickness_uncertainty=1e-5, poisson_ratio_uncertainty=0.005
-    )
+    uncertainties = {"thickness_uncertainty": 1e-5, "poisson_ratio_uncertainty": 0.005}
+    film = replace(EXACT_FILM, poisson_ratio=0.45, **uncertainties)
     quiet = {"noise": 1e-6, "baseline": 0.0, "drift": 0.0}
     stated = {"film": film, "rod": replace(EXACT_ROD, radius_uncertainty=5e-6)} | quiet
     scan = replace(simulated(**stated, load_uncertainty=0.01), position_scale_uncertainty=1e-3)
@@ -145,9 +144,8 @@ def test_poissons_ratio_never_exceeds_one_half_and_the_reason_says_so() -> None:
 
 def test_draws_do_not_depend_on_the_number_of_processes(paper, hundred) -> None:
     told: list[tuple[int, int]] = []
-    two = memscal.monte_carlo(
-        paper, draws=34, seed=8, workers=2, progress=lambda *numbers: told.append(numbers)
-    )
+    options = {"seed": 8, "workers": 2, "progress": lambda *numbers: told.append(numbers)}
+    two = memscal.monte_carlo(paper, draws=34, **options)
     np.testing.assert_allclose(two.samples, hundred.samples[:34], rtol=1e-9)
     other = memscal.monte_carlo(paper, draws=2, seed=9).samples
     assert not np.any(other == hundred.samples[:2])
@@ -163,9 +161,7 @@ def test_intervals_hold_their_share_of_the_draws(hundred: memscal.MonteCarlo) ->
             held = np.mean((hundred.samples[:, i] >= low) & (hundred.samples[:, i] <= high))
             assert held == pytest.approx(0.95, abs=0.011)
     # Of normal draws 1 / sqrt(2 M), known itself to 12 %.
-    errors = [
-        comparison.sampling_error / comparison.uncertainty for comparison in hundred.comparisons
-    ]
+    errors = [c.sampling_error / c.uncertainty for c in hundred.comparisons]
     assert np.median(errors) == pytest.approx(1 / np.sqrt(200), rel=0.36)
     low, high = hundred.g_symmetric
     assert ((hundred.g_mean >= low) & (hundred.g_mean <= high))[hundred.r < 3e-3].all()
@@ -186,9 +182,8 @@ def test_what_regularisation_hides_is_said_not_to_scatter(hundred: memscal.Monte
 def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle() -> None:
     scan = simulated(film=PAPER_FILM, rod=PAPER_ROD, load_uncertainty=0.01, noise=0.003)
     other = memscal.indent(replace(PAPER_FILM, poisson_ratio=0.45), PAPER_ROD, load=1.0)
-    together = memscal.calibrate(
-        scan, method="evidence", alternative=other, correlations={("thickness", "load"): 0.9}
-    )
+    options = {"alternative": other, "correlations": {("thickness", "load"): 0.9}}
+    together = memscal.calibrate(scan, method="evidence", **options)
     normal = np.random.default_rng(0).standard_normal((len(together.effects), 4000))
     drawn = drawn_scans(together).standardised(normal)
     # Of 4000 draws a correlation of 0.9 is known to 0.003.

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.bounds import root_mean_square_limit
 from helpers.machine import assert_same_to_rounding
 from helpers.scans import CENTRE, SHEAR_CONVERSION, SHEAR_SIGMA, plane_error, shear_scan
 from scipy.stats import binom, norm
@@ -66,8 +67,10 @@ def test_95_percent_intervals_hold_the_truth_as_often_as_they_say(noise: float) 
         held = int(np.sum(np.abs(errors) < 1.96))
         # A few percent less than stated is allowed for; a free G is cautious, and never too sure.
         assert held >= binom.ppf(CHANCE, SEEDS, 0.92), name
-        if name in ("conversion_constant_gaussian", "gaussian_sigma"):
-            assert held <= binom.isf(CHANCE, SEEDS, 0.97), name
+        # So many seeds hardly tell 97 % from always: a band is too wide by its RMS error.
+        ratio = 0.55 if name == "conversion_constant" else 0.9
+        least = root_mean_square_limit(ratio, SEEDS, 1 - CHANCE)
+        assert np.sqrt(np.mean(errors**2)) > least, name
 
 
 def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
@@ -81,7 +84,9 @@ def test_a_g_that_is_no_gaussian_is_found_as_a_free_one() -> None:
         u = apparatus.parameters.uncertainty("conversion_constant")
         a.append((apparatus.conversion_constant - SHEAR_CONVERSION) / u)
     assert np.median(free) < 0.5 * np.median(gaussian)
-    assert abs(np.mean(a)) < 1.5
+    # What the prior admits beyond a Gaussian makes u(A) ten times as large as its errors.
+    least, most = (root_mean_square_limit(1.0, 12, p) for p in (1 - CHANCE, CHANCE))
+    assert 0.1 * least < np.sqrt(np.mean(np.square(a))) < most
 
 
 def test_the_reconvolution_is_a_times_g_times_the_shear_with_its_side() -> None:
@@ -148,19 +153,19 @@ def test_a_film_that_is_off_by_its_uncertainty_moves_the_width_by_its_share() ->
 
 
 def test_a_line_along_y_calibrates_the_other_channel() -> None:
-    apparatus = calibrated(shear_scan(seed=7, channel="yz"), "yz").apparatus
-    u = apparatus.parameters.uncertainty("conversion_constant")
-    assert abs(apparatus.conversion_constant - SHEAR_CONVERSION) < 5 * u
-    assert abs(apparatus.parameters["centre_y"] - CENTRE) < 20e-6
+    along_x, along_y = (
+        calibrated(shear_scan(seed=7, channel=c), c).apparatus.parameters for c in ("xz", "yz")
+    )
+    np.testing.assert_allclose(along_y.values, along_x.values, rtol=1e-9)
+    np.testing.assert_allclose(along_y.covariance, along_x.covariance, rtol=1e-9)
+    assert {"centre_y", "drift_y"} <= set(along_y.names)
 
 
 def test_two_scans_together_know_more_than_either() -> None:
     scans = [shear_scan(seed=seed, noise=0.02) for seed in (8, 9)]
     together = memscal.calibrate(scans, channel="xz", method="bayesian")
-    alone, both = (
-        found.apparatus.budget["gaussian_sigma"]["noise"]
-        for found in (calibrated(scans[0]), together)
-    )
+    found = (calibrated(scans[0]), together)
+    alone, both = (c.apparatus.budget["gaussian_sigma"]["noise"] for c in found)
     assert both == pytest.approx(alone / np.sqrt(2), rel=0.25)
 
 
@@ -189,19 +194,11 @@ def test_crosstalk_of_the_normal_stress_is_seen_as_an_even_part() -> None:
 
 def test_the_wrong_sign_is_refused_and_the_cure_is_said() -> None:
     scan = shear_scan(seed=12)
-    turned = replace(scan, channels={"u_xz": -scan.channels["u_xz"]})
-    with pytest.raises(InputError, match="wrong sign") as refusal:
-        calibrated(turned)
-    assert "sign of u_xz" in refusal.value.cure
     # Positions of the sensor instead of the indenter are the same mistake.
-    with pytest.raises(InputError, match="wrong sign"):
-        calibrated(replace(scan, x=-scan.x))
-
-
-def test_a_normal_channel_in_its_place_is_refused_as_even() -> None:
-    scan = shear_scan(seed=13)
-    with pytest.raises(InputError, match="same on both sides"):
-        calibrated(replace(scan, channels={"u_xz": scan.u_zz}))
+    for changes in ({"channels": {"u_xz": -scan.channels["u_xz"]}}, {"x": -scan.x}):
+        with pytest.raises(InputError, match="wrong sign") as refusal:
+            calibrated(replace(scan, **changes))
+        assert "sign of u_xz" in refusal.value.cure
 
 
 @pytest.mark.parametrize("method", ["white-noise", "wiener", "tikhonov", "richardson-lucy"])
@@ -222,34 +219,32 @@ def test_a_scan_without_the_channel_is_refused() -> None:
         calibrated(scan, "xx")
 
 
-def test_a_line_across_the_component_and_a_raster_are_refused() -> None:
-    scan = shear_scan(seed=15)
-    with pytest.raises(InputError, match="runs along y"):
-        calibrated(replace(scan, direction="y"))
-    raster = memscal.simulate(raster=True, points=11)
-    with pytest.raises(InputError, match="raster"):
-        calibrated(replace(raster, channels={"u_xz": raster.u_zz}))
+def test_a_normal_channel_a_line_across_the_component_and_a_raster_are_refused() -> None:
+    scan, raster = shear_scan(seed=15), memscal.simulate(raster=True, points=11)
+    for refused, words in (
+        (replace(scan, channels={"u_xz": scan.u_zz}), "same on both sides"),
+        (replace(scan, direction="y"), "runs along y"),
+        (replace(raster, channels={"u_xz": raster.u_zz}), "raster"),
+    ):
+        with pytest.raises(InputError, match=words):
+            calibrated(refused)
 
 
 def test_a_scan_of_a_tangential_channel_is_not_taken_for_a_normal_one() -> None:
     scan = memscal.simulate()
-    shear = replace(scan, sensor=replace(scan.sensor, channel="xz"))
     with pytest.raises(InputError, match="recorded by channel xz"):
-        memscal.calibrate(shear)
+        memscal.calibrate(replace(scan, sensor=replace(scan.sensor, channel="xz")))
 
 
 def test_a_reference_from_elsewhere_needs_its_shear() -> None:
     scan = shear_scan(seed=16)
     profile = memscal.indent(scan.film, scan.indenter, load=1.0).profile()
-    own, given = (
-        memscal.calibrate(scan, reference=reference, channel="xz", method="bayesian").apparatus
-        for reference in (None, profile)
-    )
-    assert given.conversion_constant == pytest.approx(own.conversion_constant, rel=1e-3)
+    options = {"channel": "xz", "method": "bayesian"}
+    own, given = (memscal.calibrate(scan, reference=p, **options) for p in (None, profile))
+    constant = own.apparatus.conversion_constant
+    assert given.apparatus.conversion_constant == pytest.approx(constant, rel=1e-3)
     with pytest.raises(InputError, match="no shear"):
-        memscal.calibrate(
-            scan, reference=replace(profile, sigma_rz=None), channel="xz", method="bayesian"
-        )
+        memscal.calibrate(scan, reference=replace(profile, sigma_rz=None), **options)
 
 
 def test_friction_under_the_rod_is_counted_where_it_is_given_as_the_alternative() -> None:

@@ -13,6 +13,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from helpers.bounds import assert_as_stated, cramer_rao
 from numpy.testing import assert_allclose
 
 import memscal
@@ -28,6 +29,7 @@ EXPERIMENT = [
 OWN = [f"tables/{name}.csv" for name in ("rod", "sphere_dry", "sphere_lubricated")]
 TABLES = ["rod_scan_messy.csv", "rod_reference_fem.csv", *OWN]
 ARTIFACT = "rod_scan_65.apparatus.h5"
+SETTINGS = {SCANS[2]: {"load": (0.5, 1.0, 1.5)}, SCANS[3]: {"raster": True}}
 
 
 def commands(block: str) -> list[list[str]]:
@@ -116,14 +118,16 @@ def test_every_file_says_that_it_is_synthetic() -> None:
 def test_a_calibration_finds_the_stored_truth_within_its_uncertainty(name, calibrations) -> None:
     calibration = calibrations[name]
     assert calibration.passed
-    truth = memscal.read_scan(DATA / name).synthetic
+    scan = memscal.read_scan(DATA / name)
+    truth = scan.synthetic
     assert truth["gaussian_sigma"] == 561e-6
     found = calibration.apparatus.parameters
-    sought = {name: truth[name] for name in found.names if name in truth}
-    assert {"conversion_constant", "gaussian_sigma", "centre", "baseline", "drift"} <= set(sought)
-    sought["gaussian_sigma_deconvolved"] = truth["gaussian_sigma"]
-    for parameter, value in sought.items():
-        assert abs(found[parameter] - float(value)) < 4 * found.uncertainty(parameter), parameter
+    setting = {"points": scan.x.size} | SETTINGS.get(name, {})
+    bounds = dict(cramer_rao(0.005, inexact=True, **setting))
+    # A straight line's slope, in closed form: from even points, over the whole range.
+    bounds["drift"] = truth["noise"] * np.sqrt(12 / scan.u_zz.size)
+    assert_as_stated(found, truth, bounds)
+    assert found["gaussian_sigma_deconvolved"] == pytest.approx(truth["gaussian_sigma"], rel=0.1)
 
 
 def own_uncertainty(apparatus: memscal.ApparatusFunction) -> float:
@@ -224,9 +228,8 @@ def test_the_messy_table_is_messy_and_still_gives_its_truth(imported: Path) -> N
     apparatus = memscal.load_apparatus(imported / "messy.apparatus.h5")
     assert [m.kind for m in apparatus.process.messages].count("outlier") == 1
     truth = {"conversion_constant": 1e-7, "gaussian_sigma": 561e-6, "centre": -0.23e-3}
-    for name, value in truth.items():
-        uncertainty = apparatus.parameters.uncertainty(name)
-        assert abs(apparatus.parameters[name] - value) < 4 * uncertainty, name
+    bounds = cramer_rao(0.005, inexact=True, points=33, repeats=3, centre=(truth["centre"], 0.0))
+    assert_as_stated(apparatus.parameters, truth, {name: bounds[name] for name in truth})
 
 
 def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows(

@@ -1,13 +1,16 @@
 """The size of the studies, what no estimator can be better than, and what chance allows."""
 
 import os
+from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from helpers.scans import CENTRE, CONVERSION, SIGMA, simulated
+from helpers.scans import CENTRE, CONVERSION, EXACT_FILM, GAUSSIAN, simulated
 from scipy.stats import chi2
 
 import memscal
+from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
 
 FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
@@ -21,26 +24,54 @@ def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
 
 @lru_cache
 def cramer_rao(
-    noise: float, sigma: float = SIGMA, centre: float = CENTRE, points: int = 65, repeats: int = 1
-) -> tuple[float, float]:
-    """Cramer-Rao bounds of A and sigma, relative; A, sigma, centre and baseline unknown.
+    noise: float,
+    kernel: memscal.GaussianMixture = GAUSSIAN,
+    *,
+    centre: tuple[float, float] = (CENTRE, 0.0),
+    inexact: bool = False,
+    **setting: Any,
+) -> dict[str, float]:
+    """Cramer-Rao bounds of A, sigma, centre and baseline, all unknown, in SI units.
 
     By finite differences of simulated, noise-free scans: not by the estimator's own Jacobian.
+    ``inexact``: with what the uncertainties of the paper's film and of a load known to 1 % add.
     """
-    still = {"noise": 0.0, "points": points, "baseline": 0.0, "drift": 0.0}
+    width = kernel.sigmas[0]
+    names = ("conversion_constant", "gaussian_sigma", "centre", "centre_y")
+    steps = dict(zip(names, (1e-4 * CONVERSION, 1e-4 * width, 0.01e-3, 0.01e-3), strict=True))
 
-    def voltage(a: float = CONVERSION, s: float = sigma, x: float = centre) -> FloatArray:
-        kernel = memscal.GaussianMixture((1.0,), (s,))
-        return simulated(conversion_constant=a, kernel=kernel, centre=(x, 0.0), **still).u_zz
+    def voltage(name: str = "", change: float = 0.0, **other: Any) -> FloatArray:
+        a, s, x, y = np.array([CONVERSION, width, *centre]) + change * (np.array(names) == name)
+        sigmas = tuple(sigma * s / width for sigma in kernel.sigmas)
+        return simulated(
+            conversion_constant=a, kernel=memscal.GaussianMixture(kernel.weights, sigmas),
+            centre=(x, y), noise=0.0, baseline=0.0, drift=0.0, **(setting | other),
+        ).u_zz.ravel()  # fmt: skip
 
-    step, shift = 1e-4, 0.01e-3
-    columns = [
-        (voltage(a=CONVERSION * (1 + step)) - voltage(a=CONVERSION * (1 - step))) / (2 * step),
-        (voltage(s=sigma * (1 + step)) - voltage(s=sigma * (1 - step))) / (2 * step),
-        (voltage(x=centre + shift) - voltage(x=centre - shift)) / (2 * shift * 1e3),
-        np.ones(points),
-    ]
-    jacobian = np.stack(columns, axis=1)
-    deviation = noise * voltage().max() / np.sqrt(repeats)
-    bound = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian))) * deviation
-    return float(bound[0]), float(bound[1])
+    if not setting.get("raster"):
+        del steps["centre_y"]
+    signal = voltage()
+    columns = [(voltage(name, h) - voltage(name, -h)) / 2 for name, h in steps.items()]
+    # In units of the steps, and of the largest signal.
+    jacobian = np.stack([*columns, np.full(signal.size, signal.max())], axis=1)
+    deviation = simulated(noise=noise, kernel=kernel, centre=centre, **setting).synthetic["noise"]
+    variance = np.diag(np.linalg.inv(jacobian.T @ jacobian)) * deviation**2
+    if inexact:
+        changes = {"thickness": 1.01 * EXACT_FILM.thickness}, {"poisson_ratio": 0.495}
+        others = [1.01 * signal, *(voltage(film=replace(EXACT_FILM, **c)) for c in changes)]
+        shifts = [np.linalg.pinv(jacobian) @ (other - signal) for other in others]
+        variance += np.sum(np.square(shifts), axis=0)
+    bounds = np.sqrt(variance) * [*steps.values(), signal.max()]
+    return dict(zip([*steps, "baseline"], bounds.tolist(), strict=True))
+
+
+WIDEST = {"conversion_constant": 4.0, "baseline": 1.6}
+"""Largest uncertainties over their bounds: a free G, and a drift, cost A and the baseline more."""
+
+
+def assert_as_stated(parameters: ParameterSet, truths: Any, bounds: dict[str, float]) -> None:
+    """Assert that the truth is within four uncertainties, and these are at their bounds."""
+    for name, bound in bounds.items():
+        u = parameters.uncertainty(name)
+        assert abs(parameters[name] - truths[name]) < 4 * u, name
+        assert 0.85 * bound < u < WIDEST.get(name, 1.2) * bound, name

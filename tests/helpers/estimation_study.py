@@ -161,7 +161,9 @@ class Case:
         """Relative Cramer-Rao bound of A, where G is Gaussian."""
         if self.sigma is None:
             return None
-        return cramer_rao(self.noise, sigma=self.sigma, **self.setting)[0]
+        setting = self.setting | {"centre": (self.setting["centre"], 0.0)}
+        bounds = cramer_rao(self.noise, kernel=self.kernel, **setting)
+        return bounds["conversion_constant"] / CONVERSION
 
     def drawn(self, seed: int) -> tuple[Kernel, float]:
         """Kernel and noise of a seed."""
