@@ -20,7 +20,7 @@ from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import InputError
-from memscal.estimation.bayesian import Bayesian
+from memscal.estimation.bayesian import HYPOTHESES, Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
     reference_profile,
@@ -237,10 +237,11 @@ def _tails(estimate: ProfileEstimate) -> list[Message]:
     probability, change = estimate.weighed.of_kind("wide tail")
     if probability < _LEAST_TOLD:
         return []
+    prior = sum(h.estimate for h in HYPOTHESES if h.kind == "wide tail")
     a = estimate.conversion_constant
     text = (
         "Tails of G two to three times as wide as its core have a probability of "
-        f"{probability:.2g} (prior 0.12). With them A by method bayesian is {abs(change) / a:.2%} "
+        f"{probability:.2g} (prior {prior:.2g}). With them A by method bayesian is {abs(change) / a:.2%} "
         f"{'larger' if change > 0 else 'smaller'} than without; it is the mean of both."
     )
     return [Message("wide_tails", text)]

@@ -25,7 +25,7 @@ what is left of the shape's columns, data :math:`p_j` along its singular vectors
 
 and less ln of the determinant of the flat columns X, :math:`\log|X^TX|^{1/2}`.  Where noise is
 stated, :math:`\hat\sigma` is at least that.  Of a scan that is only planned, expected squares take
-the place of the data's.  The estimate is the posterior mean with a prior probability of 0.4 for the
+the place of the data's.  The estimate is the posterior mean with a prior probability of 0.45 for the
 Gaussian itself; its uncertainty is the mean squared error with priors that allow no Gaussian.
 """
 
@@ -417,17 +417,17 @@ class Hypothesis:
 #: Family (none: the Gaussian), departure from it and its strengths; prior probabilities, shared
 #: evenly within a row, for the estimate and for its uncertainty.
 _PRIOR: tuple[tuple[str, str, tuple[float, ...], float, float], ...] = (
-    ("", "", (0.0,), 0.40, 0.0),
-    ("", "edge", (0.4,), 0.25, 0.0),
+    ("", "", (0.0,), 0.45, 0.0),
+    ("", "edge", (0.4,), 0.20, 0.0),
     ("", "rough edge 0.4", (0.4,), 0.01, 0.015),
     ("", "rough edge 0.5", (0.8, 1.6), 0.0, 0.005),
     ("", "core", (0.4,), 0.03, 0.0),
     ("", "core", (0.3,), 0.0, 0.015),
-    ("", "tail", (0.2,), 0.11, 0.015),
-    ("disc", "", (0.0,), 0.065, 0.30),
+    ("", "tail", (0.2,), 0.105, 0.015),
+    ("disc", "", (0.0,), 0.10, 0.30),
     ("disc", "edge", (0.2,), 0.0, 0.17),
     ("disc", "core", (0.2,), 0.0, 0.04),
-    ("wide tail", "", (0.0,), 0.12, 0.17),
+    ("wide tail", "", (0.0,), 0.09, 0.17),
     ("wide tail", "core", (0.1,), 0.0, 0.09),
     ("ring", "", (0.0,), 0.015, 0.18),
 )
@@ -462,7 +462,7 @@ class WeighedFit:
 
     @property
     def gaussian_probability(self) -> float:
-        """Posterior probability that there is no departure, from a prior of 0.4."""
+        """Posterior probability that there is no departure, from a prior of 0.45."""
         return float(self.probability[0])
 
     def of_kind(self, name: str) -> tuple[float, float]:
