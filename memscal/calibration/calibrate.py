@@ -241,8 +241,9 @@ def _tails(estimate: ProfileEstimate) -> list[Message]:
     a = estimate.conversion_constant
     text = (
         "Tails of G two to three times as wide as its core have a probability of "
-        f"{probability:.2g} (prior {prior:.2g}). With them A by method bayesian is {abs(change) / a:.2%} "
-        f"{'larger' if change > 0 else 'smaller'} than without; it is the mean of both."
+        f"{probability:.2g} (prior {prior:.2g}). With them A by method bayesian is "
+        f"{abs(change) / a:.2%} {'larger' if change > 0 else 'smaller'} than without; it is the "
+        "mean of both."
     )
     return [Message("wide_tails", text)]
 

@@ -25,8 +25,8 @@ what is left of the shape's columns, data :math:`p_j` along its singular vectors
 
 and less ln of the determinant of the flat columns X, :math:`\log|X^TX|^{1/2}`.  Where noise is
 stated, :math:`\hat\sigma` is at least that.  Of a scan that is only planned, expected squares take
-the place of the data's.  The estimate is the posterior mean with a prior probability of 0.45 for the
-Gaussian itself; its uncertainty is the mean squared error with priors that allow no Gaussian.
+the place of the data's.  The estimate is the posterior mean with a prior probability of 0.45 for
+the Gaussian itself; its uncertainty is the mean squared error with priors that allow no Gaussian.
 """
 
 from __future__ import annotations
