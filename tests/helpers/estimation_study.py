@@ -30,7 +30,7 @@ RADII = R[::4]
 
 K95 = 1.96
 BANDS = ("A", "σ", "FWHM")
-MEAN_COVERAGE = {"G": (0.93, 0.99), "A": (0.93, 0.99), "σ": (0.93, 0.98), "FWHM": (0.93, 0.99)}
+MEAN_COVERAGE = {"G": (0.93, 0.99), "A": (0.93, 0.99), "σ": (0.93, 0.98), "FWHM": (0.93, 0.997)}
 """How often bands of 95 % hold the truth, averaged over all cases."""
 EFFICIENCY = 1.15
 """RMS error of A over its Cramer-Rao bound, of all Gaussian cases together."""
@@ -76,30 +76,37 @@ GOALS = {
 """What is asked of a kind of kernel; the tables say where it does not hold."""
 
 SMOOTHED: dict[str, Any] = {
-    "error": (0.14, 0.20, 0.20), "beyond": 0.05, "bias_g": 7.3, "coverage": 0.0,
-    "mean_coverage": 0.72, "ratio": (0.15, 7.3), "bias_a": 0.5, "z_a": (0.5, 1.2),
-    "z_fwhm": (0.15, 1.36),
+    "error": (0.14, 0.14, 0.20), "beyond": 0.15, "bias_g": 2.3, "coverage": 0.25,
+    "ratio": (0.1, 2.3), "bias_a": 0.6, "z_fwhm": (0.15, 1.36),
 }  # fmt: skip
 EXCEPTIONS: dict[str, dict[str, Any]] = {
-    # The band counts departures that the scan does not exclude, and a Gaussian has none; in a few
-    # draws the noise resembles one.
-    "Gaussian": {"beyond": 0.05, "ratio": (0.04, 1.36), "z_a": (0.4, 1.2), "z_fwhm": (0.05, 1.36)},
-    # Detail beside an edge is beyond what the film passes: the prior smooths it.
-    "disc": {"error": (0.09, 0.11, 0.20), "beyond": 0.05, "bias_g": 1.7, "coverage": 0.50,
-             "ratio": (0.1, 1.8), "z_a": (0.5, 1.2), "z_fwhm": (0.3, 1.36)},
+    # The band counts what the scan does not exclude, and a Gaussian has none of it; in a few draws
+    # the noise resembles another shape.
+    "Gaussian": {"beyond": 0.10, "ratio": (0.04, 1.36), "z_a": (0.4, 1.2), "z_fwhm": (0.06, 1.36)},
+    # The noise may resemble a ring, whose hole the film hides, or a Gaussian.
+    "disc": {"error": (0.08, 0.11, 0.20), "beyond": 0.12, "ratio": (0.05, 1.36),
+             "z_a": (0.45, 1.2), "z_fwhm": (0.3, 1.36)},
     # A wide tail cannot be told from the baseline.
-    "mixture": {"beyond": 0.03, "bias_g": 1.2, "coverage": 0.60, "mean_coverage": 0.87,
-                "ratio": (0.15, 1.36), "bias_a": 1.0, "z_a": (0.6, 1.5), "z_fwhm": (0.2, 1.36)},
+    "mixture": {"beyond": 0.03, "bias_g": 1.2, "coverage": 0.65, "ratio": (0.15, 1.36),
+                "bias_a": 0.9, "z_a": (0.5, 1.2), "z_fwhm": (0.2, 1.36)},
+    "tail": {"bias_g": 1.5, "coverage": 0.60, "ratio": (0.12, 1.5), "bias_a": 1.1,
+             "z_a": (0.6, 1.4), "z_fwhm": (0.1, 1.36)},
     # The hole of a narrow ring is hidden by the film.
-    "ring": {"bias_g": 2.0, "coverage": 0.50, "ratio": (0.25, 2.0), "z_a": (0.6, 1.2),
-             "z_fwhm": (0.35, 1.36)},
-    # No departure of the prior has an edge as sharp, a tail as wide, or these forms.
-    "sharp disc": SMOOTHED | {"error": (0.40, 0.30, 0.36), "z_fwhm": (0.76, 2.5)},
-    "cone": SMOOTHED, "paraboloid": SMOOTHED,
-    "discs at random": {"error": (0.15, 0.22, 0.25), "bias_g": 1.2, "coverage": 0.50,
-                        "mean_coverage": 0.87, "ratio": (0.3, 2.9), "z_a": (0.7, 1.2)},
-    "tail": {"bias_g": 1.6, "coverage": 0.40, "mean_coverage": 0.88, "ratio": (0.2, 1.8),
-             "bias_a": 1.9, "z_a": (0.8, 2.2), "z_fwhm": (0.15, 1.36)},
+    "ring": {"error": (0.165, 0.24, 0.26), "bias_g": 1.6, "coverage": 0.75, "ratio": (0.35, 1.6),
+             "bias_a": 0.6, "z_fwhm": (0.45, 1.5)},
+    # So is an edge that is sharper than the film passes, above all of a small disc and in noise.
+    "sharp disc": {"error": (0.18, 0.20, 0.25), "beyond": 0.10, "bias_g": 1.4,
+                   "ratio": (0.15, 1.4), "bias_a": 0.6, "z_a": (0.5, 1.2), "z_fwhm": (0.35, 1.36)},
+    "sharp disc 0.6/0.05, 0.3 %, 0.25 mm x 2": {
+        "error": (0.40, 0.40, 0.40), "beyond": 0.2, "bias_g": 1.9, "coverage": 0.60,
+        "ratio": (0.04, 1.9), "bias_a": 0.7,
+    },
+    "sharp disc 1.2/0.05, 1 %, 0.5 mm x 2, off": {
+        "error": (0.27, 0.27, 0.28), "bias_g": 2.3, "coverage": 0.25, "ratio": (0.2, 2.3),
+    },
+    "discs at random": {"ratio": (0.3, 1.36), "bias_a": 0.5, "z_a": (0.7, 1.2)},
+    # No shape of the prior has a kink.
+    "cone": SMOOTHED, "paraboloid": SMOOTHED | {"error": (0.15, 0.19, 0.20)},
 }  # fmt: skip
 """Wider limits where a goal is known not to hold, of a kind or of a case by its name."""
 
