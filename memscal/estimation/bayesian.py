@@ -131,6 +131,7 @@ class Family:
         return SmoothedDisc(2 * width * math.sqrt(share), width * math.sqrt(1 - share))
 
 
+#: Shares of discs and their spreads, about half the way to the next share.
 _DISCS = ((0.35, 0.2), (0.6, 0.2), (0.8, 0.12), (0.92, 0.08), (0.98, 0.04))
 FAMILIES = (
     *(Family("disc", share, spread) for share, spread in _DISCS),
@@ -138,6 +139,7 @@ FAMILIES = (
     Family("wide tail", 0.35, 0.12, 2.0),
     Family("ring", -0.3, 0.15, 0.5),
 )
+#: Step in ln(width) of the derivative by it.
 _RELATIVE_STEP = 1e-3
 
 
@@ -228,6 +230,8 @@ def departure_basis(
     return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families)
 
 
+#: Steps in ln(width) end below the first, are cut at the second; beyond the third factor from the
+#: Gaussian's width a family does not fit the scan.
 _FAMILY_ROUNDS = 8
 _SETTLED, _LONGEST, _FARTHEST = 1e-3, 0.3, 2.5
 
