@@ -192,7 +192,7 @@ class DrawnScans:
 
 
 def _rod_spectrum(scan: Scan, reference: RadialSpectrum) -> FloatArray:
-    contact = indent(scan.film, scan.indenter, load=scan.load)
+    contact = indent(scan.film, scan.indenter, load=scan.load, strain="linear")
     k = reference.wavenumbers.k
     return contact.base_shear_spectrum(k) if reference.order else contact.base_spectrum(k)
 

@@ -96,7 +96,7 @@ def _beside_calculated(restored: Restoration) -> Restoration:
 
     scan = restored.scan
     try:
-        contact = indent(scan.film, scan.indenter, load=scan.load)
+        contact = indent(scan.film, scan.indenter, load=scan.load, strain="linear")
         return replace(restored, comparison=restored.compare(contact))
     except MemscalError as failure:
         out.note(f"No contact is shown beside the result: {failure.problem}")

@@ -341,6 +341,7 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
                 # Without friction the way makes no difference, and the solution is remembered.
                 loading=path.loading if path.friction > 0 else "incremental",
                 interface=path.interface,
+                strain="linear",
                 rings=rings,
             )
         except ConvergenceError as error:

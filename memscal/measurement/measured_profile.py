@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,8 +148,9 @@ def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactS
     loads = load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
     slides = single.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
     try:
+        settings: dict[str, Any] = {"load": loads, "strain": "linear", "rings": _RINGS}
         contacts = [
-            indent(scan.film, scan.indenter, load=loads, friction=friction, rings=_RINGS)
+            indent(scan.film, scan.indenter, friction=friction, **settings)
             for friction in ((0.0,) if slides else (0.0, math.inf))
         ]
     except DomainError as failure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -16,7 +16,7 @@ from memscal.mechanics.interface import Interface
 from memscal.mechanics.surface import FilmField, MeshedField
 from memscal.model.arrays import FloatArray
 from memscal.model.field_mesh import FieldMesh
-from memscal.model.film import ElasticFilm
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.model.result import Result
 from memscal.model.stress import StressProfile
@@ -105,6 +105,14 @@ class Contact(Result):
             f"<Contact: {self.indenter.shape}, {self.load:.4g} N, depth {self.depth * 1e6:.4g} um, "
             f"radius {self.contact_radius * 1e3:.4g} mm, friction {self.friction:.4g}>"
         )
+
+    @property
+    def film_of_law(self) -> ElasticFilm:
+        """The film, with the law by which it was solved."""
+        if self.strain == "linear":
+            return replace(self.film, law=LINEAR, mooney_rivlin_ratio=None)
+        law = self.film.law if self.film.law not in ("", LINEAR) else NEO_HOOKEAN
+        return replace(self.film, law=law)
 
     def base_stress(self, r: ArrayLike) -> FloatArray:
         r"""Return the normal stress :math:`\sigma_{zz}` at the base in Pa, compression positive.
@@ -210,7 +218,7 @@ class Contact(Result):
             stick_radius=self.stick_radius,
             friction_coefficient=self.friction,
             loading=self.loading,
-            film=self.film,
+            film=self.film_of_law,
             indenter=self.indenter,
             solver=f"memscal, {self.backend} backend, {self.strain} strain",
             discretisation=self.discretisation,

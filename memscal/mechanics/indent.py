@@ -18,7 +18,7 @@ from memscal.mechanics.rod import solve_rod
 from memscal.mechanics.solver.problem import Depth, Load, Target
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.model.arrays import FloatArray, require_positive
-from memscal.model.film import ElasticFilm
+from memscal.model.film import LINEAR, ElasticFilm
 from memscal.model.indenter import Indenter, Rod
 from memscal.parallel import single_threaded
 
@@ -35,7 +35,7 @@ def indent(
     film: ElasticFilm, indenter: Indenter, *,
     load: float | None = None, depth: float | None = None,
     friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
-    interface: Interface | None = None, strain: str = "linear",
+    interface: Interface | None = None, strain: str | None = None,
     film_radius: float | None = None, rings: int | None = None,
 ) -> Contact: ...  # fmt: skip
 @overload
@@ -43,7 +43,7 @@ def indent(
     film: ElasticFilm, indenter: Indenter, *,
     load: _Several | None = None, depth: _Several | None = None,
     friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
-    interface: Interface | None = None, strain: str = "linear",
+    interface: Interface | None = None, strain: str | None = None,
     film_radius: float | None = None, rings: int | None = None,
 ) -> list[Contact]: ...  # fmt: skip
 @single_threaded()
@@ -57,7 +57,7 @@ def indent(
     loading: str = "incremental",
     backend: str = "hankel",
     interface: Interface | None = None,
-    strain: str = "linear",
+    strain: str | None = None,
     film_radius: float | None = None,
     rings: int | None = None,
 ) -> Contact | list[Contact]:
@@ -83,9 +83,10 @@ def indent(
         on a film with a free edge; slower, and independent.
     interface : Interface, optional
         Compliance of the interface; rigid by default.
-    strain : str
-        ``"linear"`` or ``"finite"``: a neo-Hookean film at finite strain, by finite elements,
-        under a rod or a sphere that slides freely or sticks (a sphere with loading ``"total"``).
+    strain : str, optional
+        ``"linear"``: small strain, whatever the film's law; ``"finite"``: by finite elements, under
+        a rod or a sphere that slides freely or sticks (a sphere with loading ``"total"``), a film
+        that states no law as neo-Hookean.  By default as the film's law has it.
     film_radius : float, optional
         Radius of the film's free edge in m, for finite elements; by default twelve thicknesses
         away from the contact.
@@ -131,6 +132,7 @@ def indent(
     16.9 um, 1.98 mm
     30.7 um, 2.83 mm
     """
+    strain = strain or ("linear" if film.law in ("", LINEAR) else "finite")
     _check_request(friction, loading, backend, strain, rings)
     if film_radius is not None:
         require_positive("film_radius", film_radius, "m")

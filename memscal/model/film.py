@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from memscal.errors import InputError
 from memscal.model.arrays import require_non_negative, require_positive, require_range
+
+
+#: Laws of the film's stress: linear elasticity, and two of rubber at finite strain.
+LINEAR, NEO_HOOKEAN, MOONEY_RIVLIN = LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ElasticFilm:
-    r"""A linear elastic film bonded to a rigid base.
+    r"""An elastic film bonded to a rigid base.
 
     Parameters
     ----------
@@ -24,6 +29,11 @@ class ElasticFilm:
     young_modulus_uncertainty, poisson_ratio_uncertainty, thickness_uncertainty : float, optional
         Standard uncertainties (k = 1), in the unit of the quantity.  ``None`` means "not stated":
         a calibration counts nothing for that source and notes it.
+    law : str
+        ``"linear"``, ``"neo-hookean"`` or ``"mooney-rivlin"``, each with the modulus and Poisson's
+        ratio at small strain; empty where it is not stated: a calibration then counts its form.
+    mooney_rivlin_ratio : float, optional
+        :math:`C_2/C_1` of a Mooney-Rivlin film, from 0 (neo-Hookean) upward.
     name : str
         Which film it is, where there are several; scans that name the same film must agree on it.
 
@@ -42,6 +52,8 @@ class ElasticFilm:
     poisson_ratio_uncertainty: float | None = None
     thickness_uncertainty: float | None = None
     roughness_rms_uncertainty: float | None = None
+    law: str = ""
+    mooney_rivlin_ratio: float | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -54,6 +66,20 @@ class ElasticFilm:
                 require_non_negative(f"standard uncertainty of film {name}", uncertainty)
         if self.roughness_rms is not None:
             require_non_negative("film roughness_rms", self.roughness_rms)
+        if self.law not in ("", *LAWS):
+            raise InputError(
+                f"The film's law is {self.law!r}.",
+                cure=f"Give one of {', '.join(LAWS)}, or leave it out where it is not known.",
+            )
+        if (self.law == MOONEY_RIVLIN) != (self.mooney_rivlin_ratio is not None):
+            raise InputError(
+                f"The film's law is {self.law or 'not stated'!r}, and its ratio C2/C1 is "
+                f"{self.mooney_rivlin_ratio}.",
+                why="A Mooney-Rivlin film has such a ratio, and no other film has.",
+                cure="Give both or neither: law and mooney_rivlin_ratio.",
+            )
+        if self.mooney_rivlin_ratio is not None:
+            require_non_negative("film mooney_rivlin_ratio", self.mooney_rivlin_ratio)
 
     @property
     def shear_modulus(self) -> float:

@@ -17,6 +17,8 @@ FILM = record(
     *measured(Quantity("poisson_ratio", _ONE, "Poisson's ratio", "ν", required=True)),
     *measured(Quantity("thickness", _L, "thickness", "h", required=True)),
     *measured(Quantity("roughness_rms", _L, "rms roughness", shown="um")),
+    Quantity("law", "text", "law"),
+    Quantity("mooney_rivlin_ratio", _ONE, "C2/C1"),
     Quantity("name", "text", "name of the film", origin="film"),
 )
 

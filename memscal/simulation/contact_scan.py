@@ -153,7 +153,9 @@ def simulate_contacts(
     shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
     law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
     path = pressed_path(
-        lambda at: indent(film, sphere, load=at, **law), load_scale * loads, load_scatter
+        lambda at: indent(film, sphere, load=at, strain="linear", **law),
+        load_scale * loads,
+        load_scatter,
     )
     x = np.linspace(-1.0, 1.0, points) * (0.5 * (points - 1) * spacing)
     row = np.repeat(np.arange(loads.size), repeats)

@@ -129,7 +129,7 @@ def simulate(
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
     x = np.linspace(-half_range, half_range, points)
     radius = np.hypot.outer((x if raster else np.zeros(1)) - centre[1], x - centre[0])
-    contact = indent(film, rod, load=float(loads.max()))
+    contact = indent(film, rod, load=float(loads.max()), strain="linear")
     per_newton = conversion_constant * blurred_stress([contact], truth, radius)[0] / contact.load
     row_loads = np.repeat(loads, repeats)
     signal = per_newton * row_loads[:, None] if not raster else per_newton * loads[0]
