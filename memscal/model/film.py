@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from memscal.errors import InputError
 from memscal.model.arrays import require_non_negative, require_positive, require_range
 
-
 #: Laws of the film's stress: linear elasticity, and two of rubber at finite strain.
 LINEAR, NEO_HOOKEAN, MOONEY_RIVLIN = LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 
