@@ -36,7 +36,13 @@ from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import carried_force, film_sensitivities, rod_sensitivities
+from memscal.estimation.reference import (
+    RECTANGLE,
+    carried_force,
+    film_sensitivities,
+    law_sensitivities,
+    rod_sensitivities,
+)
 from memscal.estimation.smoothing import SmoothedProfile
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
@@ -46,8 +52,6 @@ from memscal.model.stress import StressProfile
 
 #: Points per step of the profile between which the half maximum is interpolated.
 _FINE = 20
-#: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
-_RECTANGLE = 1 / np.sqrt(3)
 #: Windows below this have closed; what sums of squares lose to rounding.
 _CLOSED = _ROUNDING = 1e-9
 #: Parameters whose uncertainty is broken down by source.
@@ -157,9 +161,12 @@ def input_effects(
             errors = hankel_transform(stress.r, stress.sigma_zz_errors, model.k) / stress.load
             blank = [np.zeros_like(errors) for _ in scans]
             changes.setdefault("reference_stress", blank)[i] = errors
+    for i, scan in enumerate(scans):
+        for source, change in law_sensitivities(scan, model.references[i]).items():
+            changes.setdefault(source, [np.zeros_like(change) for _ in scans])[i] = change
     if alternatives is not None:
         pairs = zip(alternatives, model.references, strict=True)
-        changes["model_form"] = [_RECTANGLE * (a.values - ours.values) for a, ours in pairs]
+        changes["model_form"] = [RECTANGLE * (a.values - ours.values) for a, ours in pairs]
     effects = {source: _of_reference(estimate, change) for source, change in changes.items()}
     return effects | _of_positions(scans, estimate) | _of_loads(scans, stresses, estimate)
 

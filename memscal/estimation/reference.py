@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -12,15 +13,17 @@ from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_trans
 from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints, require_plausible
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
+from memscal.mechanics.press_rod import is_tabulated, largest_tabulated_load, press_rod
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
+#: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
+RECTANGLE = 1 / math.sqrt(3)
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
 
@@ -63,12 +66,6 @@ def require_calibration_rod(scan: Scan) -> None:
     require_plausible(scan)
 
 
-@lru_cache(maxsize=64)
-def reference_contact(film: ElasticFilm, indenter: RoundIndenter, load: float) -> Contact:
-    """Solve the rod of a scan, frictionless: friction changes its base stress by about 1e-3."""
-    return indent(film, indenter, load=load, strain="linear")
-
-
 def reference_profile(
     scan: Scan, reference: StressProfile | Contact | None
 ) -> StressProfile | Contact:
@@ -77,7 +74,7 @@ def reference_profile(
         return reference
     if scan.reference is not None:
         return scan.reference
-    return reference_contact(scan.film, scan.indenter, scan.load)
+    return press_rod(scan.film, scan.indenter, scan.load, scan.rod_friction)
 
 
 def reference_spectra(
@@ -166,11 +163,15 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
 def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of each film property."""
     # Centred differences of the rod's solution (one-sided at nu = 1/2), or its relative change
-    # for a reference from elsewhere.  Young's modulus does not change the stress at a given load.
+    # for a reference from elsewhere.
     film = scan.film
     changes: dict[str, FloatArray] = {}
-    if film.young_modulus_uncertainty is not None:
+    if (u := film.young_modulus_uncertainty) is not None:
+        # At a given load it does not change the stress in a linear film.
         changes["young_modulus"] = np.zeros_like(reference.values)
+        if u and film.law not in ("", LINEAR):
+            films = [replace(film, young_modulus=film.young_modulus + step) for step in (u, -u)]
+            changes["young_modulus"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
     if u := film.thickness_uncertainty:
         films = [replace(film, thickness=film.thickness + step) for step in (u, -u)]
         changes["thickness"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
@@ -192,6 +193,30 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     return {"rod_radius": _difference(scan, reference, [scan.film] * 2, rods) / 2}
 
 
+def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+    """Change of the reference's transform by what is not known of the film's law.
+
+    Rectangles, of which the standard uncertainty is the half width over the root of three: where
+    no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
+    at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
+    sliding.
+    """
+    film, rod, load = scan.film, scan.indenter, scan.load
+    if film.law == LINEAR or (film.law and scan.rod_friction is not None):
+        return {}
+    rubber = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    k, order = reference.wavenumbers.k.tobytes(), reference.order
+    if not film.law:
+        pair = press_rod(rubber, rod, load, math.inf), press_rod(film, rod, load)
+    else:
+        # A film that slides is drawn out from under the rod, and is not solved to any depth.
+        end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False))
+        pair = press_rod(rubber, rod, end, math.inf), press_rod(rubber, rod, end, 0.0)
+    change = np.subtract(*(_base_spectrum(c, k, order) / c.load for c in pair))
+    name = "rod_friction" if film.law else "model_form"
+    return {name: RECTANGLE * change * load / pair[0].load}
+
+
 def _difference(
     scan: Scan,
     reference: RadialSpectrum,
@@ -199,10 +224,18 @@ def _difference(
     rods: Sequence[RoundIndenter],
 ) -> FloatArray:
     """Difference of two rods' solutions, scaled from the rod's own to the reference."""
-    k = reference.wavenumbers.k
+    k, law, own = reference.wavenumbers.k, scan.film.law, (scan.film, scan.indenter)
+    if law not in ("", LINEAR):
+        # Beyond the table, and for other laws, by the relative change that is found at once.
+        rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+        law = (
+            NEO_HOOKEAN if is_tabulated(rubber, scan.indenter, scan.load, scan.rod_friction) else ""
+        )
 
     def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
-        return _base_spectrum(reference_contact(film, rod, scan.load), k.tobytes(), reference.order)
+        film = replace(film, law=law, mooney_rivlin_ratio=None)
+        contact = press_rod(film, rod, scan.load, scan.rod_friction)
+        return _base_spectrum(contact, k.tobytes(), reference.order)
 
     upper, lower = (transform(film, rod) for film, rod in zip(films, rods, strict=True))
-    return np.asarray((upper - lower) * (reference.values / transform(scan.film, scan.indenter)))
+    return np.asarray((upper - lower) * (reference.values / transform(*own)))

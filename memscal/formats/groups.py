@@ -148,9 +148,12 @@ def sample_group(film: ElasticFilm, lubrication: str = "", lubricant: str = "") 
 
 
 def indenter_group(
-    indenter: Indenter, load: float | None = None, load_uncertainty: float | None = None
+    indenter: Indenter,
+    load: float | None = None,
+    load_uncertainty: float | None = None,
+    rod_friction: float | None = None,
 ) -> Group:
-    """Return an indenter as an NXcollection, with its nominal load."""
+    """Return an indenter as an NXcollection, with its nominal load, and a rod's friction."""
     children: dict[str, Node] = {"shape": indenter.shape}
     if isinstance(indenter, Profile):
         children["face"] = write_record(records.INDENTER_FACE, indenter)
@@ -158,7 +161,7 @@ def indenter_group(
         round_or_cone = records.CONE if isinstance(indenter, Cone) else records.ROUND_INDENTER
         children |= write_record(round_or_cone, indenter).children
     if load is not None:
-        stated = {"load": load, "load_uncertainty": load_uncertainty}
+        stated = {"load": load, "load_uncertainty": load_uncertainty, "rod_friction": rod_friction}
         children |= write_record(records.LOAD, stated).children
     return Group("NXcollection", children)
 

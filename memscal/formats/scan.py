@@ -159,7 +159,9 @@ def _entry(scan: Scan) -> Group:
     children |= {
         **texts,
         "data": _data_group(scan),
-        "indenter": groups.indenter_group(scan.indenter, scan.load, scan.load_uncertainty),
+        "indenter": groups.indenter_group(
+            scan.indenter, scan.load, scan.load_uncertainty, scan.rod_friction
+        ),
         "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
         "instrument": groups.instrument_group(scan.sensor),
         **notes,

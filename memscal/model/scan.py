@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
@@ -328,6 +329,8 @@ class Scan:
         Nominal load of the indenter and its standard uncertainty, common to all points, in N.
     indenter, film, sensor
         What was pressed, on what, measured by what.
+    rod_friction : float, optional
+        0 where a rod slides freely under the film, ``inf`` where it sticks.
     y : ndarray, shape (m,) of a raster, (n,) of points, optional
         Second axis of a raster, or second position of each point, in m.
     repeat : ndarray of int, shape (n,), optional
@@ -395,6 +398,7 @@ class Scan:
     position_scale_uncertainty: float | None = None
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     load_uncertainty: float | None = None
+    rod_friction: float | None = None
     lubrication: str = ""
     lubricant: str = ""
     title: str = ""
@@ -532,6 +536,12 @@ class Scan:
             )
         if self.load_uncertainty is not None:
             require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        if self.rod_friction not in (None, 0.0, math.inf):
+            raise InputError(
+                f"The rod's friction is {self.rod_friction:g}.",
+                why="Only a rod that slides freely or sticks is solved at finite strain.",
+                cure="Give 0 or inf, or leave it out: the difference is then counted.",
+            )
         errors, loads = self.u_zz_errors, self.normal_load
         if errors is not None and np.any((errors < 0) | np.isinf(errors)):
             raise InputError(

@@ -25,7 +25,7 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.estimation.reference import (
-    reference_contact,
+    reference_profile,
     reference_spectra,
     require_calibration_rod,
 )
@@ -48,7 +48,7 @@ def expected_calibration(plan: Plan, method: Method) -> Expected:
     """Calibrate the planned scan, with expected squares in place of data."""
     scan = plan.scan()
     require_calibration_rod(scan)
-    stress = reference_contact(plan.film, plan.rod, plan.load)
+    stress = reference_profile(scan, None)
     points = measured_points(scan)
     references = reference_spectra([stress], [points], [plan.film.thickness])
     estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)

@@ -10,7 +10,7 @@ import numpy as np
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
 from memscal.errors import InputError
-from memscal.estimation.reference import reference_contact
+from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
@@ -90,7 +90,7 @@ class Plan:
     def signal(self) -> float:
         """Voltage to expect with the rod right above the sensor, in V."""
         wavenumbers = Wavenumbers.covering(_LARGEST_KH / self.film.thickness, self.film.thickness)
-        contact = reference_contact(self.film, self.rod, self.load)
+        contact = press_rod(self.film, self.rod, self.load)
         spectrum = contact.base_spectrum(wavenumbers.k) * self.kernel.transform(wavenumbers.k)
         peak = RadialSpectrum(wavenumbers, spectrum).at(np.zeros(1))[0]
         return float(self.conversion_constant * peak)
