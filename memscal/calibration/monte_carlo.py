@@ -17,7 +17,6 @@ from scipy.special import ndtr, ndtri
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.calibration.calibrate import Calibration, uncertainties
-from memscal.calibration.drawn_scatter import read_off
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import (
     BUDGETED,
@@ -26,6 +25,7 @@ from memscal.calibration.uncertainty import (
     correlation_matrix,
     drawn_about,
     expected_values,
+    read_off,
 )
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry

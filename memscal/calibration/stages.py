@@ -24,7 +24,6 @@ from memscal.deconvolution.fourier_ratio import (
 )
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.assumptions import CentresApart, repeat_centres_test
-from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import (
     channel_order,
@@ -34,7 +33,7 @@ from memscal.estimation.points import (
 )
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
-from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
+from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM

@@ -13,7 +13,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, force_option, json_option, option
+from memscal.cli.options import FILE, Quantity, force_option, json_option, option
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
 
+#: As in model/film.py, which is not imported before a command runs.
+LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 #: Processes that share the draws, where there are as many cores.
 _MOST_WORKERS = 8
 
@@ -169,8 +171,19 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "else the rod is solved on the film."
 )
 @option("--alternative", FILE, metavar="FILE")(
-    "The same stress by another model of the film (memscal-reference), such as finite strain: "
-    "its difference is counted as an uncertainty of the model's form."
+    "The same stress by another model of the film (memscal-reference): its difference is counted "
+    "as an uncertainty of the model's form, in place of the neo-Hookean film's."
+)
+@option("--film-law", click.Choice(LAWS))(
+    "Law of the film by which the rod is solved, taken as known. By default the one that scan or "
+    "reference state; else linear, and its difference from neo-hookean is counted (model_form)."
+)
+@option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
+    "C2/C1 of --film-law mooney-rivlin."
+)
+@option("--rod-friction", click.Choice(("0", "inf")))(
+    "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite "
+    "strain. By default as the scan states it; else it sticks, and the difference is counted."
 )
 @option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
     "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."
@@ -220,6 +233,9 @@ def command(
     output: Path | None,
     reference: Path | None,
     alternative: Path | None,
+    film_law: str | None,
+    mooney_rivlin_ratio: float | None,
+    rod_friction: str | None,
     correlations: tuple[str, ...],
     channel: str,
     method: str | None,
@@ -267,6 +283,9 @@ def command(
             data,
             reference=profile,
             alternative=other,
+            film_law=film_law,
+            mooney_rivlin_ratio=mooney_rivlin_ratio,
+            rod_friction=None if rod_friction is None else float(rod_friction),
             channel=channel,
             method=regulariser,
             centre=centre,

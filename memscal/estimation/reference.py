@@ -160,6 +160,28 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
         )
 
 
+def reference_sensitivities(
+    scans: Sequence[Scan], references: Sequence[RadialSpectrum]
+) -> dict[str, list[FloatArray]]:
+    """Change of each scan's transform by one standard uncertainty of each input, by its name."""
+    # Scans share the error of a common film or rod, and that of the film's law.
+    changes: dict[str, list[FloatArray]] = {}
+    films, rods = ([getattr(scan, of) for scan in scans] for of in ("film", "indenter"))
+    for sensitivities, owners in (
+        (film_sensitivities, films),
+        (rod_sensitivities, rods),
+        (law_sensitivities, [None] * len(scans)),
+    ):
+        distinct = list(dict.fromkeys(owners))
+        for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
+            number = distinct.index(owner)
+            suffix = f"_{number + 1}" if number else ""
+            for source, change in sensitivities(scan, references[i]).items():
+                blank = [np.zeros_like(change) for _ in scans]
+                changes.setdefault(source + suffix, blank)[i] = change
+    return changes
+
+
 def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of each film property."""
     # Centred differences of the rod's solution (one-sided at nu = 1/2), or its relative change
@@ -193,6 +215,12 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     return {"rod_radius": _difference(scan, reference, [scan.film] * 2, rods) / 2}
 
 
+def press_neo_hookean(scan: Scan) -> Contact:
+    """Press the rod of a scan on its film as if that were neo-Hookean; it sticks unless stated."""
+    rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    return press_rod(rubber, scan.indenter, scan.load, scan.rod_friction)
+
+
 def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by what is not known of the film's law.
 
@@ -204,11 +232,11 @@ def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     film, rod, load = scan.film, scan.indenter, scan.load
     if film.law == LINEAR or (film.law and scan.rod_friction is not None):
         return {}
-    rubber = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
     k, order = reference.wavenumbers.k.tobytes(), reference.order
     if not film.law:
-        pair = press_rod(rubber, rod, load, math.inf), press_rod(film, rod, load)
+        pair = press_neo_hookean(scan), press_rod(film, rod, load)
     else:
+        rubber = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
         # A film that slides is drawn out from under the rod, and is not solved to any depth.
         end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False))
         pair = press_rod(rubber, rod, end, math.inf), press_rod(rubber, rod, end, 0.0)

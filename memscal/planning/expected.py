@@ -18,7 +18,6 @@ from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
-from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, supported, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
@@ -29,7 +28,7 @@ from memscal.estimation.reference import (
     reference_spectra,
     require_calibration_rod,
 )
-from memscal.estimation.smoothing import smooth_profile
+from memscal.estimation.smoothing import find_band, smooth_profile
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, freeze_arrays
 from memscal.model.result import Result

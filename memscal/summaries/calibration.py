@@ -62,7 +62,23 @@ def advice(apparatus: ApparatusData) -> str:
         else f"use G(r), for the Gaussian fails the check {' and '.join(failed)}."
     ).replace("_", " ")
     by = f" (method {method})" if method else ""
-    return f"Use A = {measured_text(parameters, 'conversion_constant')}{by}; {which}"
+    a = measured_text(parameters, "conversion_constant")
+    return f"{_of_the_law(apparatus)}Use A = {a}{by}; {which}"
+
+
+def _of_the_law(apparatus: ApparatusData) -> str:
+    """Return that the law of the film, which is not stated, dominates the uncertainty, if so."""
+    shares = {}
+    for symbol, name in (("A", "conversion_constant"), ("sigma", "gaussian_sigma")):
+        form = apparatus.budget.get(name, {}).get("model_form", 0.0)
+        shares[symbol] = (form / apparatus.parameters.uncertainty(name)) ** 2
+    dominated = [f"{share:.0%} of that of {of}" for of, share in shares.items() if share > 0.5]
+    if not dominated:
+        return ""
+    return (
+        "The film's law, which is not stated, dominates the uncertainty: it makes up "
+        f"{' and '.join(dominated)} (of the variance).\n"
+    )
 
 
 def _method(apparatus: ApparatusData) -> str:

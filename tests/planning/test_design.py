@@ -12,13 +12,12 @@ import memscal
 from memscal import Plan
 from memscal.deconvolution.division import create_regulariser
 from memscal.errors import FitError, InputError
-from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectra
-from memscal.estimation.smoothing import smooth_profile
+from memscal.estimation.smoothing import find_band, smooth_profile
 from memscal.planning.design import varied_designs
 from memscal.planning.expected import Design, expected_calibration
 
