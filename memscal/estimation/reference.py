@@ -24,6 +24,8 @@ from memscal.model.stress import StressProfile
 _LARGEST_KH = 20.0
 #: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
 RECTANGLE = 1 / math.sqrt(3)
+#: Rods of somewhat larger load are in the table, too, where it serves for varied inputs.
+_MARGIN = 1.1
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
 
@@ -252,18 +254,25 @@ def _difference(
     rods: Sequence[RoundIndenter],
 ) -> FloatArray:
     """Difference of two rods' solutions, scaled from the rod's own to the reference."""
-    k, law, own = reference.wavenumbers.k, scan.film.law, (scan.film, scan.indenter)
-    if law not in ("", LINEAR):
-        # Beyond the table, and for other laws, by the relative change that is found at once.
-        rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
-        law = (
-            NEO_HOOKEAN if is_tabulated(rubber, scan.indenter, scan.load, scan.rod_friction) else ""
-        )
+    law = law_at_once(scan)
+    upper, lower = (
+        rod_spectrum(replace(scan, film=film, indenter=rod), reference, law)
+        for film, rod in zip(films, rods, strict=True)
+    )
+    return np.asarray((upper - lower) * (reference.values / rod_spectrum(scan, reference, law)))
 
-    def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
-        film = replace(film, law=law, mooney_rivlin_ratio=None)
-        contact = press_rod(film, rod, scan.load, scan.rod_friction)
-        return _base_spectrum(contact, k.tobytes(), reference.order)
 
-    upper, lower = (transform(film, rod) for film, rod in zip(films, rods, strict=True))
-    return np.asarray((upper - lower) * (reference.values / transform(*own)))
+def law_at_once(scan: Scan) -> str:
+    """Law by which rods like the scan's are solved in milliseconds: its own, or the nearest one."""
+    if scan.film.law in ("", LINEAR):
+        return LINEAR
+    rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    within = is_tabulated(rubber, scan.indenter, _MARGIN * scan.load, scan.rod_friction)
+    return NEO_HOOKEAN if within else LINEAR
+
+
+def rod_spectrum(scan: Scan, reference: RadialSpectrum, law: str) -> FloatArray:
+    """Transform of the base stress of a scan's rod, by a law, at the nodes of a reference (N)."""
+    film = replace(scan.film, law=law, mooney_rivlin_ratio=None)
+    contact = press_rod(film, scan.indenter, scan.load, scan.rod_friction)
+    return _base_spectrum(contact, reference.wavenumbers.k.tobytes(), reference.order)
