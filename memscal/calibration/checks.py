@@ -465,10 +465,13 @@ def _indentation(solution: Solution) -> QualityCheck:
     elif not film.law:
         meaning += (
             "It passes at any depth, for the form of the film's law, which is not stated, is "
-            "counted (model_form); a lighter load makes this source small."
+            "counted (model_form); a failure means that a film was stated to be linear."
         )
     else:
-        meaning += f"It passes at any depth, for the reference is that of a {film.law} film."
+        meaning += (
+            f"It passes at any depth, for the reference is that of a {film.law} film; a failure "
+            "means that a film was stated to be linear."
+        )
     passed = film.law != LINEAR or max(depths) <= INDENTATION_LIMIT
     return QualityCheck("indentation", max(depths), INDENTATION_LIMIT, passed, meaning)
 

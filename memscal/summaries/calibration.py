@@ -112,6 +112,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
     }
+    values["film_law"] = apparatus.film.law or None
     choice = apparatus.process.configuration.get("centre")
     if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]

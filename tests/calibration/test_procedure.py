@@ -36,7 +36,8 @@ def test_with_hardly_any_noise_the_truth_returns(kernel: memscal.GaussianMixture
 
 def test_a_scan_without_noise_is_known_to_the_error_of_the_model() -> None:
     calibration = memscal.calibrate(simulated(noise=0.0))
-    assert calibration.passed
+    failed = [check.name for check in calibration.apparatus.checks if not check.passed]
+    assert failed == ["indentation"]  # of a film that is stated to be linear
     for name in ("gaussian_sigma", "gaussian_sigma_deconvolved"):
         assert calibration.apparatus.parameters[name] == pytest.approx(SIGMA, rel=1e-3)
 

@@ -55,7 +55,8 @@ class TabulatedField:
 
 
 def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -> Contact | None:
-    rows = pickle.load(open(f"/tmp/stub_{'stick' if sticking else 'slide'}.pkl", "rb"))
+    with open(f"/tmp/stub_{'stick' if sticking else 'slide'}.pkl", "rb") as f:
+        rows = pickle.load(f)
     p = load / (film.shear_modulus * film.thickness**2) * (2.2e6 / 3 * 4e-6)
     loads = np.array([row[0] for row in rows])
     if not p <= loads[-1]:
