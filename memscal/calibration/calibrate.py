@@ -27,6 +27,7 @@ from memscal.estimation.reference import (
     reference_spectra,
     require_calibration_rod,
     require_one_sensor,
+    require_same_set_up,
 )
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import Contact
@@ -44,8 +45,8 @@ from memscal.model.checks import (
     Message,
     QualityCheck,
     failed_check_messages,
+    override_messages,
 )
-from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result
 from memscal.model.scan import Scan
@@ -166,8 +167,6 @@ _WINDOWS = ("white-noise", "tikhonov", "bayesian")
 _LINEAR = (*_WINDOWS, "wiener")
 #: Tails of less probability are not told.
 _LEAST_TOLD = 0.001
-#: Relative difference below which two lengths or ratios are the same.
-_SAME = 1e-6
 
 
 def calibration_messages(
@@ -262,14 +261,13 @@ def _method(solution: Solution) -> list[Message]:
 
 
 def _reference(solution: Solution) -> list[Message]:
-    stress, scan = solution.stress, solution.scan
+    stress = solution.stress
     if isinstance(stress, Contact):
         return [Message("model_form", _model_form(stress))]
-    messages = _other_set_up(scan, stress)
-    if stress.convergence is None:
-        text = "The reference states no convergence: its own error is not counted."
-        messages.append(Message("convergence_unstated", text))
-    return messages
+    if stress.convergence is not None:
+        return []
+    text = "The reference states no convergence: its own error is not counted."
+    return [Message("convergence_unstated", text)]
 
 
 def _model_form(contact: Contact) -> str:
@@ -287,26 +285,6 @@ def _model_form(contact: Contact) -> str:
         "error of linear elasticity there is not part of the uncertainties. A reference at finite "
         "strain (memscal reference rod --strain finite --friction inf) shows what it changes."
     )
-
-
-def _other_set_up(scan: Scan, stress: StressProfile) -> list[Message]:
-    """Return where a reference was made for another film or indenter than the scan's."""
-    pairs = []
-    if stress.film is not None:
-        for name, unit in (("thickness", 1e3), ("poisson_ratio", 1.0)):
-            ours, theirs = getattr(scan.film, name), getattr(stress.film, name)
-            pairs.append((f"film {name.replace('_', ' ')}", ours * unit, theirs * unit))
-    if isinstance(stress.indenter, RoundIndenter):
-        pairs.append(("rod radius", scan.indenter.radius * 1e3, stress.indenter.radius * 1e3))
-    return [
-        Message(
-            "other_set_up",
-            f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "
-            f"{ours:.4g}{'' if 'ratio' in name else ' mm'}.",
-        )
-        for name, ours, theirs in pairs
-        if abs(theirs - ours) > _SAME * abs(ours)
-    ]
 
 
 def _unstated(scan: Scan) -> list[Message]:
@@ -397,6 +375,7 @@ def calibrate(
     centre: str | None = None,
     correlations: Mapping[tuple[str, str], float] | None = None,
     seed: int = 0,
+    override: bool = False,
     **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
@@ -432,6 +411,8 @@ def calibrate(
         Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
     seed : int, default 0
         Seed of methods that draw random numbers.
+    override : bool, default False
+        Accept a reference or alternative of another film, rod or load than the scan's; recorded.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -443,7 +424,7 @@ def calibrate(
     Raises
     ------
     InputError
-        If the scan or the reference cannot be used.
+        If the scan or the reference cannot be used, or not together.
     FitError
         If the scan does not determine the parameters.
 
@@ -458,18 +439,20 @@ def calibrate(
     for rod_scan in scans:
         require_calibration_rod(rod_scan)
     references = _references(reference, scans)
+    alternatives = None if alternative is None else _references(alternative, scans)
+    overridden = require_same_set_up(scans, references, alternatives or (), override=override)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
         raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
     solution = solve(scans, stresses, chosen, channel, centre=centre)
-    effects = _effects(solution, None if alternative is None else _references(alternative, scans))
+    effects = _effects(solution, alternatives)
     results = uncertainties(solution, solution.deconvolution, effects, pairs)
     beside = solution.other
     other = None if beside is None else uncertainties(solution, beside, effects, pairs)
     checks = quality_checks(solution, results)
-    messages = calibration_messages(solution, checks)
+    messages = (*override_messages(overridden), *calibration_messages(solution, checks))
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
@@ -480,6 +463,8 @@ def calibrate(
         configuration["centre"] = {"choice": choice, "chosen_by": "option" if centre else "test"}
         if solution.apart is not None:
             configuration["centre"]["p_value"] = solution.apart.p_value
+    if overridden:
+        configuration["override"] = overridden
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
     apparatus = assemble(solution, results, other, checks, messages, configuration)

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from memscal.mechanics.press_rod import is_tabulated, largest_tabulated_load, pr
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.provenance import SourceFile
+from memscal.model.quantities import Record
+from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
@@ -26,6 +31,10 @@ _LARGEST_KH = 20.0
 RECTANGLE = 1 / math.sqrt(3)
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
+#: Stated values agree within this many standard uncertainties of their difference ...
+_COVERAGE = 2.0
+#: ... and within this share of them where none is stated.
+_SAME = 1e-6
 
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
@@ -64,6 +73,141 @@ def require_calibration_rod(scan: Scan) -> None:
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
     require_plausible(scan)
+
+
+def file_in_words(source: SourceFile | None, kind: str) -> str:
+    """Name what a file holds, for messages: "the scan rod.h5"."""
+    return f"the {kind} {source.file_name}" if source else f"the {kind}"
+
+
+def stated_differences(
+    record: Record,
+    names: Sequence[str],
+    stated: Sequence[object],
+    places: Sequence[str],
+    of: str = "",
+) -> list[str]:
+    """Return in words which quantities two sides both state, and with values that do not agree.
+
+    Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of them
+    where no uncertainty is stated; texts if they are equal.
+    """
+    differences = []
+    for quantity in (q for q in record.quantities if q.name in names):
+        values: list[Any] = [getattr(side, quantity.name, None) for side in stated]
+        spreads = [getattr(side, f"{quantity.name}_uncertainty", None) for side in stated]
+        if None in values or "" in values or _agree(values, spreads):
+            continue
+        words = quantity.words if " of the " in quantity.words else f"{of} {quantity.words}"
+        sides = []
+        for value, spread, place in zip(values, spreads, places, strict=True):
+            shown = f'"{value}"'
+            if not isinstance(value, str):
+                u = "not stated" if spread is None else f"{spread / quantity.scale:.2g}"
+                unit = quantity.unit and f" {quantity.unit}"
+                shown = f"{value / quantity.scale:.7g}{unit} (u {u})"
+            sides.append(f"{shown} in {place}")
+        differences.append(f"{words.strip()} {', '.join(sides)}")
+    return differences
+
+
+def _agree(values: Sequence[Any], spreads: Sequence[float | None]) -> bool:
+    first, second = values
+    if first == second or isinstance(first, str):
+        return bool(first == second)
+    allowed = _COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
+    return bool(abs(first - second) <= max(allowed, _SAME * abs(first)))
+
+
+def accepted_differences(
+    differences: Sequence[str], *, override: bool, problem: str, why: str, cure: str
+) -> list[str]:
+    """Refuse what does not agree; with ``override`` return it, each difference once."""
+    if differences and not override:
+        raise InputError(
+            f"{problem}: {'; '.join(dict.fromkeys(differences))}.",
+            why=why,
+            cure=f"{cure} To go on all the same, override it (override=True; --override on the "
+            "command line): that is recorded.",
+        )
+    return list(dict.fromkeys(differences))
+
+
+def require_same_set_up(
+    scans: Sequence[Scan],
+    references: Sequence[StressProfile | Contact | None],
+    alternatives: Sequence[StressProfile | Contact | None] = (),
+    *,
+    override: bool,
+) -> list[str]:
+    """Refuse a reference of another film, rod or load than its scan; or return the differences.
+
+    :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
+    alternative may have another law and friction, which it is given for.
+    """
+    differences: list[str] = []
+    for scan, given in zip(scans, references, strict=True):
+        if (stress := scan.reference if given is None else given) is not None:
+            differences += _other_set_up(scan, stress, "reference")
+    for scan, given in zip(scans, alternatives, strict=False):
+        if given is not None:
+            differences += _other_set_up(scan, given, "alternative")
+    cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
+    cure += "value that is wrong."
+    if any(text.startswith("load") for text in differences):
+        cure += " If the film of the reference is linear, state it (memscal import --film-law "
+        cure += "linear; ElasticFilm(law='linear') in Python)."
+    return accepted_differences(
+        differences,
+        override=override,
+        problem="Scan and calculated stress are not of one set-up",
+        why="A calibration divides by the stress that this rod makes below this film, in "
+        "proportion to the load where the film's law is linear.",
+        cure=cure,
+    )
+
+
+def _other_set_up(scan: Scan, stress: StressProfile | Contact, kind: str) -> list[str]:
+    """Return in words what of film, rod and load a stress was not calculated for."""
+    source = None if isinstance(stress, Contact) else stress.source
+    places = file_in_words(scan.source, "scan"), file_in_words(source, kind)
+    film = stress.film_of_law if isinstance(stress, Contact) else stress.film
+    law = "" if film is None else film.law
+    names = ["thickness", "poisson_ratio"]
+    finite = {scan.film.law, law} - {"", LINEAR}
+    if finite:
+        # Equilibrium of a linear film holds its modulus as a factor on both sides: at a given load
+        # the modulus changes depths, and no stress.
+        names.append("young_modulus")
+    if kind == "reference":
+        names += ["law", "mooney_rivlin_ratio"]
+    differences = []
+    if film is not None:
+        differences += stated_differences(FILM, names, (scan.film, film), places, "film")
+    if stress.indenter is not None:
+        pair = scan.indenter, stress.indenter
+        differences += stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+    if kind == "reference" and finite:
+        friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
+        rods = scan, SimpleNamespace(rod_friction=friction)
+        differences += stated_differences(LOAD, ("rod_friction",), rods, places)
+    if law == LINEAR:
+        return differences
+    stated = f"law is {law}" if law else "law is not stated"
+    return differences + [
+        f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
+        for text in stated_differences(LOAD, ("load",), (_farthest(scan, stress), stress), places)
+    ]
+
+
+def _farthest(scan: Scan, stress: StressProfile | Contact) -> SimpleNamespace:
+    """Return the load of the scan that agrees least with a stress's, and its uncertainty, in N."""
+    loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
+    stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
+    spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
+    i = np.nanargmax(np.abs(loads - stress.load) - _COVERAGE * spread)
+    uncertainty = float(spread.flat[i]) if stated else None
+    return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 
 
 def reference_profile(

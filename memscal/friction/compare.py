@@ -12,6 +12,7 @@ import numpy as np
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
+from memscal.estimation.reference import accepted_differences
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction.calculated import FRICTIONS, amontons_family
@@ -37,7 +38,7 @@ from memscal.friction.results import (
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
 from memscal.model.arrays import require_non_negative
-from memscal.model.checks import Message
+from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.scan import Scan
@@ -79,18 +80,18 @@ def same_apparatus(
     name = f" ({measured.artifact.file_name})" if measured.artifact else ""
     other = f" ({apparatus.source.file_name})" if apparatus.source else ""
     text = f"the stress was measured with another apparatus function{name} than the given{other}"
-    if not override:
-        raise InputError(
-            f"{text[0].upper()}{text[1:]}: their content digests differ.",
-            why="The stress on the axis, centres and noise are those of the calibration by which "
-            "they were measured.",
-            cure="Give its artifact, or measure again with memscal apply. To go on all the same, "
-            "override it (override=True; --override on the command line): that is recorded.",
-        )
-    messages = (*measured.messages, Message("overridden", f"Overridden: {text}.", "warning"))
+    differences = accepted_differences(
+        [text],
+        override=override,
+        problem="Measured stress and artifact do not belong together",
+        why="The stress on the axis, centres and noise are those of the calibration by which "
+        "they were measured.",
+        cure="Give its artifact, or measure again with memscal apply.",
+    )
+    messages = (*measured.messages, *override_messages(differences))
     return replace(
         measured,
-        overridden=(*measured.overridden, text),
+        overridden=(*measured.overridden, *differences),
         process=replace(measured.process, messages=messages),
     )
 
