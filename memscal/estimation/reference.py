@@ -7,20 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import InputError
-from memscal.estimation.points import ScanPoints, require_plausible
+from memscal.estimation.points import (
+    COVERAGE,
+    ScanPoints,
+    accepted_differences,
+    file_in_words,
+    require_plausible,
+    stated_differences,
+)
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import is_tabulated, largest_tabulated_load, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
-from memscal.model.provenance import SourceFile
-from memscal.model.quantities import Record
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -31,10 +35,6 @@ _LARGEST_KH = 20.0
 RECTANGLE = 1 / math.sqrt(3)
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
-#: Stated values agree within this many standard uncertainties of their difference ...
-_COVERAGE = 2.0
-#: ... and within this share of them where none is stated.
-_SAME = 1e-6
 
 
 def require_one_sensor(scans: Sequence[Scan]) -> tuple[Scan, ...]:
@@ -73,64 +73,6 @@ def require_calibration_rod(scan: Scan) -> None:
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
     require_plausible(scan)
-
-
-def file_in_words(source: SourceFile | None, kind: str) -> str:
-    """Name what a file holds, for messages: "the scan rod.h5"."""
-    return f"the {kind} {source.file_name}" if source else f"the {kind}"
-
-
-def stated_differences(
-    record: Record,
-    names: Sequence[str],
-    stated: Sequence[object],
-    places: Sequence[str],
-    of: str = "",
-) -> list[str]:
-    """Return in words which quantities two sides both state, and with values that do not agree.
-
-    Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of them
-    where no uncertainty is stated; texts if they are equal.
-    """
-    differences = []
-    for quantity in (q for q in record.quantities if q.name in names):
-        values: list[Any] = [getattr(side, quantity.name, None) for side in stated]
-        spreads = [getattr(side, f"{quantity.name}_uncertainty", None) for side in stated]
-        if None in values or "" in values or _agree(values, spreads):
-            continue
-        words = quantity.words if " of the " in quantity.words else f"{of} {quantity.words}"
-        sides = []
-        for value, spread, place in zip(values, spreads, places, strict=True):
-            shown = f'"{value}"'
-            if not isinstance(value, str):
-                u = "not stated" if spread is None else f"{spread / quantity.scale:.2g}"
-                unit = quantity.unit and f" {quantity.unit}"
-                shown = f"{value / quantity.scale:.7g}{unit} (u {u})"
-            sides.append(f"{shown} in {place}")
-        differences.append(f"{words.strip()} {', '.join(sides)}")
-    return differences
-
-
-def _agree(values: Sequence[Any], spreads: Sequence[float | None]) -> bool:
-    first, second = values
-    if first == second or isinstance(first, str):
-        return bool(first == second)
-    allowed = _COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
-    return bool(abs(first - second) <= max(allowed, _SAME * abs(first)))
-
-
-def accepted_differences(
-    differences: Sequence[str], *, override: bool, problem: str, why: str, cure: str
-) -> list[str]:
-    """Refuse what does not agree; with ``override`` return it, each difference once."""
-    if differences and not override:
-        raise InputError(
-            f"{problem}: {'; '.join(dict.fromkeys(differences))}.",
-            why=why,
-            cure=f"{cure} To go on all the same, override it (override=True; --override on the "
-            "command line): that is recorded.",
-        )
-    return list(dict.fromkeys(differences))
 
 
 def require_same_set_up(
@@ -205,7 +147,7 @@ def _farthest(scan: Scan, stress: StressProfile | Contact) -> SimpleNamespace:
     loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
     spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
-    i = np.nanargmax(np.abs(loads - stress.load) - _COVERAGE * spread)
+    i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
     uncertainty = float(spread.flat[i]) if stated else None
     return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
-from memscal.estimation.points import TANGENTIAL
-from memscal.estimation.reference import accepted_differences
+from memscal.estimation.points import TANGENTIAL, accepted_differences
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction.calculated import FRICTIONS, amontons_family

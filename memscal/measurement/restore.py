@@ -12,9 +12,14 @@ from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
 from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
-from memscal.estimation.points import ScanPoints, measured_points
+from memscal.estimation.points import (
+    ScanPoints,
+    accepted_differences,
+    file_in_words,
+    measured_points,
+    stated_differences,
+)
 from memscal.estimation.profile import CentreError, ProfileEstimate, estimate_profile
-from memscal.estimation.reference import accepted_differences, file_in_words, stated_differences
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
 from memscal.measurement.posterior import (
