@@ -489,11 +489,10 @@ def stated_differences(
 
 
 def _agree(values: Sequence[Any], spreads: Sequence[float | None]) -> bool:
-    first, second = values
-    if first == second or isinstance(first, str):
-        return bool(first == second)
+    if isinstance(values[0], str):
+        return bool(values[0] == values[1])
     allowed = COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
-    return bool(abs(first - second) <= max(allowed, _SAME * abs(first)))
+    return math.isclose(*values, rel_tol=_SAME, abs_tol=allowed)
 
 
 def accepted_differences(
