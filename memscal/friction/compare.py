@@ -36,6 +36,7 @@ from memscal.friction.results import (
     ShearComparison,
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
+from memscal.measurement.restore import accept_other_sensor
 from memscal.model.arrays import require_non_negative
 from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
@@ -393,6 +394,7 @@ def compare_shear(
     *,
     friction: Sequence[float] = FRICTIONS,
     loading: str | Sequence[str] = ("incremental", "total"),
+    override: bool = False,
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ShearComparison:
@@ -413,6 +415,8 @@ def compare_shear(
         Friction coefficients between which to interpolate; the last may be ``inf``.
     loading : str or sequence of str
         ``"incremental"``, ``"total"``, or both.
+    override : bool
+        Accept an artifact of another sensor or film: a message records it.
     cache : path, optional
         A folder in which calculated contacts are kept; without it nothing is written.
     workers : int
@@ -425,8 +429,8 @@ def compare_shear(
     Raises
     ------
     InputError
-        If the artifact is of no tangential channel, or of another sensor, if a scan is not a
-        sphere's, or if it holds no voltage of the channel with its noise.
+        If the artifact is of no tangential channel, or of another sensor or film, if a scan is not
+        a sphere's, or if it holds no voltage of the channel with its noise.
 
     Examples
     --------
@@ -447,7 +451,8 @@ def compare_shear(
     """
     sensor, measured = opened_apparatus(apparatus), opened_stress(measured)
     require_contacts(measured.scans)
-    _require_tangential(sensor, measured.scans[0])
+    _require_tangential(sensor)
+    overridden = accept_other_sensor(measured.scans[0], sensor, ("name",), override=override)
     channel = sensor.sensor.channel
     families = _families(measured, friction, loading, cache, workers, order=1)
     confronted = _confronted(measured, sensor, families, channel)
@@ -461,22 +466,19 @@ def compare_shear(
             for name, of_family in confronted.items()
         },
         joint=_joint(measured, confronted),
-        messages=(Message("experimental", note), *synthetic_messages(measured)),
+        messages=(
+            *override_messages(overridden),
+            Message("experimental", note),
+            *synthetic_messages(measured),
+        ),
     )
 
 
-def _require_tangential(apparatus: ApparatusFunction, scan: MeasuredScan) -> None:
+def _require_tangential(apparatus: ApparatusFunction) -> None:
     channel = apparatus.sensor.channel
     if channel not in TANGENTIAL:
         raise InputError(
             f"The artifact is of channel {channel}, not of a tangential one.",
             cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="evidence"); '
             "compare the normal channel with memscal.compare().",
-        )
-    ours, theirs = scan.sensor.name, apparatus.sensor.name
-    if ours and theirs and ours != theirs:
-        raise InputError(
-            f'The scan is of sensor "{ours}", the artifact of "{theirs}".',
-            why="An apparatus function belongs to one sensor.",
-            cure="Give the artifact of the scan's sensor.",
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 
@@ -42,8 +43,10 @@ from memscal.model.checks import (
     chi_square_limit,
     failed_check_messages,
     override_messages,
+    state_of_checks,
 )
 from memscal.model.indenter import Rod
+from memscal.model.measured_stress import MeasuredScan
 from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
@@ -89,18 +92,25 @@ def require_covariance(apparatus: ApparatusFunction) -> None:
 
 def accept_mismatches(scan: Scan, apparatus: ApparatusFunction, *, override: bool) -> list[str]:
     """Refuse a scan of another sensor, channel or film; with ``override`` return what differs."""
-    places = file_in_words(scan.source, "scan"), file_in_words(apparatus.source, "artifact")
     if apparatus.order:
         raise InputError(
             f"The artifact is of the tangential channel {apparatus.sensor.channel}, but "
-            f"{places[0]} is to be read as normal stress.",
+            f"{file_in_words(scan.source, 'scan')} is to be read as normal stress.",
             why="A shear is no normal stress: this cannot be overridden.",
             cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
         )
+    return accept_other_sensor(scan, apparatus, ("name", "channel"), override=override)
+
+
+def accept_other_sensor(
+    scan: Scan | MeasuredScan, apparatus: ApparatusFunction, names: Sequence[str], *, override: bool
+) -> list[str]:
+    """Refuse a scan whose sensor (its ``names``) or film is not the artifact's, or return that."""
+    places = file_in_words(scan.source, "scan"), file_in_words(apparatus.source, "artifact")
     sensors, films = (scan.sensor, apparatus.sensor), (scan.film, apparatus.film)
     return accepted_differences(
         [
-            *stated_differences(SENSOR, ("name", "channel"), sensors, places),
+            *stated_differences(SENSOR, names, sensors, places),
             *stated_differences(FILM, _OF_THE_FILM, films, places, "film"),
         ],
         override=override,
@@ -259,7 +269,7 @@ def restoration_messages(
 
 def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
     """Return one message if a check of the calibration had failed, else none."""
-    text = "A quality check of the calibration itself had failed: see its artifact."
+    text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
     return [] if apparatus.passed else [Message(FAILED_CALIBRATION, text)]
 
 
