@@ -29,6 +29,7 @@ from memscal.estimation.reference import (
     reference_spectra,
     require_calibration_rod,
     require_one_sensor,
+    require_same_set_up,
 )
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import Contact
@@ -42,6 +43,7 @@ from memscal.model.apparatus import (
 from memscal.model.checks import (
     Message,
     QualityCheck,
+    override_messages,
 )
 from memscal.model.film import LINEAR
 from memscal.model.provenance import Process, timestamp
@@ -239,6 +241,7 @@ def calibrate(
     centre: str | None = None,
     correlations: Mapping[tuple[str, str], float] | None = None,
     seed: int = 0,
+    override: bool = False,
     **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
@@ -282,6 +285,8 @@ def calibrate(
         Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
     seed : int, default 0
         Seed of methods that draw random numbers.
+    override : bool, default False
+        Accept a reference or alternative of another film, rod or load than the scan's; recorded.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -293,7 +298,7 @@ def calibrate(
     Raises
     ------
     InputError
-        If the scan or the reference cannot be used.
+        If the scan or the reference cannot be used, or not together.
     FitError
         If the scan does not determine the parameters.
 
@@ -310,18 +315,21 @@ def calibrate(
     references = _references(reference, scans)
     known = (film_law, mooney_rivlin_ratio, rod_friction)
     scans = tuple(_of_law(s, r, *known) for s, r in zip(scans, references, strict=True))
+    alternatives = None if alternative is None else _references(alternative, scans)
+    overridden = require_same_set_up(scans, references, alternatives or (), override=override)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
         raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
     solution = solve(scans, stresses, chosen, channel, centre=centre)
-    effects = _effects(solution, None if alternative is None else _references(alternative, scans))
+    effects = _effects(solution, alternatives)
     results = uncertainties(solution, solution.deconvolution, effects, pairs)
     beside = solution.other
     other = None if beside is None else uncertainties(solution, beside, effects, pairs)
     checks = quality_checks(solution, results)
     messages = calibration_messages(solution, results, checks)
+    messages = (*override_messages(overridden), *messages)
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
@@ -336,6 +344,8 @@ def calibrate(
         configuration["centre"] = {"choice": choice, "chosen_by": "option" if centre else "test"}
         if solution.apart is not None:
             configuration["centre"]["p_value"] = solution.apart.p_value
+    if overridden:
+        configuration["override"] = overridden
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
     apparatus = assemble(solution, results, other, checks, messages, configuration)

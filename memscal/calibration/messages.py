@@ -25,16 +25,12 @@ from memscal.model.checks import (
     failed_check_messages,
 )
 from memscal.model.film import LINEAR
-from memscal.model.indenter import RoundIndenter
 from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
 _WINDOWS = ("white-noise", "tikhonov", "bayesian")
 #: Tails of less probability are not told.
 _LEAST_TOLD = 0.001
-#: Relative difference below which two lengths or ratios are the same.
-_SAME = 1e-6
 
 
 def calibration_messages(
@@ -129,14 +125,11 @@ def _method(solution: Solution) -> list[Message]:
 
 
 def _reference(solution: Solution) -> list[Message]:
-    stress, scan = solution.stress, solution.scan
-    if isinstance(stress, Contact):
+    stress = solution.stress
+    if isinstance(stress, Contact) or stress.convergence is not None:
         return []
-    messages = _other_set_up(scan, stress)
-    if stress.convergence is None:
-        text = "The reference states no convergence: its own error is not counted."
-        messages.append(Message("convergence_unstated", text))
-    return messages
+    text = "The reference states no convergence: its own error is not counted."
+    return [Message("convergence_unstated", text)]
 
 
 def _law(solution: Solution, results: Results) -> list[Message]:
@@ -185,26 +178,6 @@ def _change_of(parameters: ParameterSet, change: FloatArray) -> str:
     """Return relative changes of A and of the fitted width in words."""
     rows = _a_and_sigma(parameters)
     return " and ".join(f"{symbol} by {change[i] / value:+.1%}" for symbol, i, value in rows)
-
-
-def _other_set_up(scan: Scan, stress: StressProfile) -> list[Message]:
-    """Return where a reference was made for another film or indenter than the scan's."""
-    pairs = []
-    if stress.film is not None:
-        for name, unit in (("thickness", 1e3), ("poisson_ratio", 1.0)):
-            ours, theirs = getattr(scan.film, name), getattr(stress.film, name)
-            pairs.append((f"film {name.replace('_', ' ')}", ours * unit, theirs * unit))
-    if isinstance(stress.indenter, RoundIndenter):
-        pairs.append(("rod radius", scan.indenter.radius * 1e3, stress.indenter.radius * 1e3))
-    return [
-        Message(
-            "other_set_up",
-            f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "
-            f"{ours:.4g}{'' if 'ratio' in name else ' mm'}.",
-        )
-        for name, ours, theirs in pairs
-        if abs(theirs - ours) > _SAME * abs(ours)
-    ]
 
 
 #: Film properties by their names in messages, with their symbols; the share by which one that

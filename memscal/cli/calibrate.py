@@ -208,6 +208,9 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "the rule chooses). May be repeated."
 )
 @option("--seed", click.IntRange(min=0), metavar="N")("Seed of random numbers.  [default: 0]")
+@option("--override", is_flag=True)(
+    "Go on although a reference is of another film, rod or load than its scan: recorded."
+)
 @json_option
 @option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
@@ -242,6 +245,7 @@ def command(
     centre: str | None,
     options: tuple[str, ...],
     seed: int | None,
+    override: bool,
     as_json: bool,
     report: Path | None,
     figures: tuple[Path, ...],
@@ -273,7 +277,7 @@ def command(
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs.paths, force=force, inputs=inputs)
     if dry_run:
-        _rehearse(data, profile, channel, regulariser, outputs, as_json, centre)
+        _rehearse(data, profile, other, override, channel, regulariser, outputs, as_json, centre)
         return DONE
 
     from memscal.calibration.calibrate import calibrate
@@ -291,6 +295,7 @@ def command(
             centre=centre,
             correlations=dict(pairs),
             seed=seed or 0,
+            override=override,
         )
     sweep, drawn = None, None
     if sweeping or sweep_figure:
@@ -339,6 +344,8 @@ def _read_reference(path: Path) -> StressProfile:
 def _rehearse(
     scans: list[Scan],
     profile: StressProfile | None,
+    alternative: StressProfile | None,
+    override: bool,
     channel: str,
     regulariser: Method,
     outputs: Outputs,
@@ -352,11 +359,15 @@ def _rehearse(
         reference_profile,
         reference_spectra,
         require_one_sensor,
+        require_same_set_up,
     )
+    from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
     require_one_sensor(scans)
     require_channel_method(channel, regulariser)
+    given = [profile] * len(scans), [alternative] * len(scans)
+    out.show_messages(override_messages(require_same_set_up(scans, *given, override=override)))
     if centre == "per-repeat":
         scans = scans_of_repeats(scans, channel)[0]
     readings = [measured_points(scan, channel) for scan in scans]

@@ -77,7 +77,7 @@ def _unused_options(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str
 def _read_reference(path: Path, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting = _stated(options, (*_SHARED, "load"))
-    if any(options[name] is not None for name in common.FILM):
+    if any(options[name] is not None for name in (*common.FILM, "film_law")):
         setting["film"] = common.film_from(options)
     if options["radius"] is not None:
         setting["indenter"] = common.indenter_from(options["indenter"], options)
@@ -190,6 +190,9 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
+@option("--film-law", click.Choice(["linear", "neo-hookean"]))(
+    "Law of the film: of a scan if it is known; of a reference, that by which it was calculated."
+)
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options

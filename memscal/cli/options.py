@@ -189,6 +189,7 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
         young_modulus_uncertainty=si(options.get("young_modulus_uncertainty"), 6),
         poisson_ratio_uncertainty=options.get("poisson_ratio_uncertainty"),
         thickness_uncertainty=si(options.get("thickness_uncertainty"), -3),
+        law=options.get("film_law") or "",
     )
 
 

@@ -6,17 +6,26 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import InputError
-from memscal.estimation.points import ScanPoints, require_plausible
+from memscal.estimation.points import (
+    COVERAGE,
+    ScanPoints,
+    accepted_differences,
+    file_in_words,
+    require_plausible,
+    stated_differences,
+)
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import is_tabulated, largest_tabulated_load, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
@@ -66,6 +75,83 @@ def require_calibration_rod(scan: Scan) -> None:
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
     require_plausible(scan)
+
+
+def require_same_set_up(
+    scans: Sequence[Scan],
+    references: Sequence[StressProfile | Contact | None],
+    alternatives: Sequence[StressProfile | Contact | None] = (),
+    *,
+    override: bool,
+) -> list[str]:
+    """Refuse a reference of another film, rod or load than its scan; or return the differences.
+
+    :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
+    alternative may have another law and friction, which it is given for.
+    """
+    differences: list[str] = []
+    for scan, given in zip(scans, references, strict=True):
+        if (stress := scan.reference if given is None else given) is not None:
+            differences += _other_set_up(scan, stress, "reference")
+    for scan, given in zip(scans, alternatives, strict=False):
+        if given is not None:
+            differences += _other_set_up(scan, given, "alternative")
+    cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
+    cure += "value that is wrong."
+    if any(text.startswith("load") for text in differences):
+        cure += " If the film of the reference is linear, state it (memscal import --film-law "
+        cure += "linear; ElasticFilm(law='linear') in Python)."
+    return accepted_differences(
+        differences,
+        override=override,
+        problem="Scan and calculated stress are not of one set-up",
+        why="A calibration divides by the stress that this rod makes below this film, in "
+        "proportion to the load where the film's law is linear.",
+        cure=cure,
+    )
+
+
+def _other_set_up(scan: Scan, stress: StressProfile | Contact, kind: str) -> list[str]:
+    """Return in words what of film, rod and load a stress was not calculated for."""
+    source = None if isinstance(stress, Contact) else stress.source
+    places = file_in_words(scan.source, "scan"), file_in_words(source, kind)
+    film = stress.film_of_law if isinstance(stress, Contact) else stress.film
+    law = "" if film is None else film.law
+    names = ["thickness", "poisson_ratio"]
+    finite = {scan.film.law, law} - {"", LINEAR}
+    if finite:
+        # Equilibrium of a linear film holds its modulus as a factor on both sides: at a given load
+        # the modulus changes depths, and no stress.
+        names.append("young_modulus")
+    if kind == "reference":
+        names += ["law", "mooney_rivlin_ratio"]
+    differences = []
+    if film is not None:
+        differences += stated_differences(FILM, names, (scan.film, film), places, "film")
+    if stress.indenter is not None:
+        pair = scan.indenter, stress.indenter
+        differences += stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+    if kind == "reference" and finite:
+        friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
+        rods = scan, SimpleNamespace(rod_friction=friction)
+        differences += stated_differences(LOAD, ("rod_friction",), rods, places)
+    if law == LINEAR:
+        return differences
+    stated = f"law is {law}" if law else "law is not stated"
+    return differences + [
+        f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
+        for text in stated_differences(LOAD, ("load",), (_farthest(scan, stress), stress), places)
+    ]
+
+
+def _farthest(scan: Scan, stress: StressProfile | Contact) -> SimpleNamespace:
+    """Return the load of the scan that agrees least with a stress's, and its uncertainty, in N."""
+    loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
+    stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
+    spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
+    i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
+    uncertainty = float(spread.flat[i]) if stated else None
+    return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 
 
 def reference_profile(

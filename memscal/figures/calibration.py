@@ -201,7 +201,7 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
         for line in _wrapped(message.text)
     ]
     if len(failed) > _MAX_FAILED_LINES:
-        ending = "… and more failed checks: see the report, or `memscal inspect`."
+        ending = "… and more failed checks, which the artifact names."
         failed = [*failed[: _MAX_FAILED_LINES - 1], (ending, COLOURS["failed"], "normal")]
     return [(line, ink, weight) for row, ink, weight in rows for line in _wrapped(row)] + failed
 

@@ -259,16 +259,6 @@ def test_ripples_and_spikes_are_no_sound_shape(method: str) -> None:
         assert not shapely(simulated(kernel=kernel, seed=seed), method, seed)
 
 
-def test_a_reference_for_another_film_or_rod_is_noticed() -> None:
-    scan = simulated()
-    thicker = replace(scan.film, thickness=2.1e-3)
-    other = memscal.indent(thicker, memscal.Rod(radius=0.3e-3), load=1.0).profile()
-    text = "\n".join(map(str, memscal.calibrate(scan, reference=other).apparatus.process.messages))
-    assert "another film thickness than the scan's: 2.1 instead of 2 mm" in text
-    assert "another rod radius" in text
-    assert "poisson ratio" not in text
-
-
 def test_a_raster_may_miss_whole_rows_and_columns() -> None:
     scan = simulated(raster=True, points=25, noise=0.002)
     u = scan.u_zz.copy()

@@ -150,9 +150,10 @@ def test_what_does_not_belong_together_is_refused(cache: Path) -> None:
     options = {"friction": (0.0, math.inf), "loading": "total", "cache": cache}
     with pytest.raises(InputError, match="not of a tangential"):
         compare_shear(measured, normal, **options)
-    other = replace(shear, sensor=replace(shear.sensor, name="another"))
-    with pytest.raises(InputError, match="another"):
-        compare_shear(measured, other, **options)
+    named = {"sensor": replace(shear.sensor, name="another")}
+    for changed in (named, {"film": replace(shear.film, thickness=3e-3)}):
+        with pytest.raises(InputError, match=r'"another"|3 mm'):
+            compare_shear(measured, replace(shear, **changed), **options)
     rod = memscal.measure_stress(made.rod, normal)
     with pytest.raises(InputError, match="rod"):
         compare_shear(rod, shear, **options)

@@ -158,13 +158,16 @@ def test_the_direction_of_a_scan_changes_nothing() -> None:
     assert along_y.centre[1] == along_x.centre[0]
 
 
-@pytest.mark.parametrize(("changed", "failed"), [
-    ({"u_zz": 1e3 * SCAN.u_zz, "u_zz_errors": 1e3 * SCAN.u_zz_errors}, "restored_force"),
-    ({"film": replace(SCAN.film, thickness=2.2e-3)}, "film_agreement"),
-], ids=["mV", "film"])  # fmt: skip
-def test_a_wrong_unit_of_the_voltage_or_another_film_fails_its_check(changed, failed) -> None:
-    found = memscal.restore(replace(SCAN, **changed), EXACT)
-    assert failed in {check.name for check in found.checks if not check.passed}
+def test_a_wrong_unit_of_the_voltage_fails_the_check_of_the_force() -> None:
+    scan = replace(SCAN, u_zz=1e3 * SCAN.u_zz, u_zz_errors=1e3 * SCAN.u_zz_errors)
+    found = memscal.restore(scan, EXACT)
+    assert "restored_force" in {check.name for check in found.checks if not check.passed}
+
+
+def test_an_override_of_another_film_stands_in_the_restored_stress() -> None:
+    other = replace(SCAN, film=replace(SCAN.film, thickness=2.2e-3))
+    restored = memscal.restore(other, EXACT, override=True)
+    assert "Overridden: film thickness 2.2 mm" in restored.profile().notes
 
 
 def test_a_spoilt_point_is_named_and_moves_little() -> None:
@@ -192,7 +195,12 @@ BARE = replace(EXACT.radial_profile, g_covariance=np.full((301, 301), np.nan))
 BESIDE = replace(SCAN, x=SCAN.x[18:], u_zz=SCAN.u_zz[18:], u_zz_errors=None)
 BAD = {
     "several loads": (replace(SCAN, normal_load=np.linspace(0.5, 1.5, 33)), EXACT, "grows"),
-    "another sensor": (replace(SCAN, sensor=OTHER), EXACT, "belongs to one sensor"),
+    "another sensor": (replace(SCAN, sensor=OTHER), EXACT, 'name of the sensor "other" in'),
+    "another film": (
+        replace(SCAN, film=replace(SCAN.film, thickness=2.2e-3)),
+        EXACT,
+        "film thickness 2.2 mm",
+    ),
     "no covariance": (SCAN, replace(EXACT, radial_profile=BARE), "does not state the covariance"),
     "zero noise": (replace(SCAN, u_zz_errors=np.zeros(33)), EXACT, "uncertainty of zero"),
     "wrong sign": (replace(SCAN, u_zz=-SCAN.u_zz), EXACT, "Change the sign"),
