@@ -165,7 +165,7 @@ EXAMPLES = """\b
 Examples:
   memscal simulate -o scan.h5
   memscal simulate -o scan.h5 --points 33 --noise 0.5 --seed 7
-  memscal simulate -o loads.h5 --load 0.5 --load 1 --load 2 --repeats 3
+  memscal simulate -o loads.h5 --load 0.1 --load 0.3 --load 1 --repeats 3
   memscal simulate -o raster.h5 --raster --points 33 --half-range 6
   memscal simulate -o ring.h5 --sigma 700 --weight 1.5 --sigma 400 --weight -0.5
   memscal simulate -o disc.h5 --disc-radius 800 --sigma 300

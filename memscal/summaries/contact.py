@@ -74,7 +74,7 @@ def _in_rubber(contact: Contact) -> str:
     changes = (rubber.max_base_stress / contact.max_base_stress, rubber.depth / contact.depth)
     shares = [f"{change - 1:+.0%}" for change in changes]
     return (
-        f" In a neo-Hookean film that sticks to the rod the largest base stress is {stress:.4g} "
+        f" In a neo-Hookean film that sticks to the rod the largest base stress is {stress:.3g} "
         f"kPa ({shares[0]}) and the depth {depth:.3g} mm ({shares[1]})."
     )
 
