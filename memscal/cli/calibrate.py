@@ -13,7 +13,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, Quantity, force_option, json_option, option
+from memscal.cli.options import FILE, FILM_LAWS, Quantity, force_option, json_option, option
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from memscal.model.scan import Scan
     from memscal.model.stress import StressProfile
 
-#: As in model/film.py, which is not imported before a command runs.
-LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 #: Processes that share the draws, where there are as many cores.
 _MOST_WORKERS = 8
 
@@ -174,7 +172,7 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "The same stress by another model of the film (memscal-reference): its difference is counted "
     "as an uncertainty of the model's form, in place of the neo-Hookean film's."
 )
-@option("--film-law", click.Choice(LAWS))(
+@option("--film-law", click.Choice(FILM_LAWS))(
     "Law of the film by which the rod is solved, taken as known. By default the one that scan or "
     "reference state; else linear, and its difference from neo-hookean is counted (model_form)."
 )

@@ -77,7 +77,7 @@ def _unused_options(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str
 def _read_reference(path: Path, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting = _stated(options, (*_SHARED, "load"))
-    if any(options[name] is not None for name in (*common.FILM, "film_law")):
+    if any(options[name] is not None for name in (*common.FILM, *common.LAW)):
         setting["film"] = common.film_from(options)
     if options["radius"] is not None:
         setting["indenter"] = common.indenter_from(options["indenter"], options)
@@ -125,7 +125,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 _SCAN_NAMES = [
     *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "branch", "u_xz"),
     *("u_yz", "load_column", "load_unit", "load_uncertainty", "title"),
-    *("lubrication", "lubricant"),
+    *("lubrication", "lubricant", "rod_friction"),
 ]
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
@@ -190,9 +190,7 @@ _NEEDED = ("x", "x_unit", "u", "u_unit")
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
-@option("--film-law", click.Choice(["linear", "neo-hookean"]))(
-    "Law of the film: of a scan if it is known; of a reference, that by which it was calculated."
-)
+@common.rod_friction_option
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options
@@ -239,6 +237,8 @@ def _check_usage(path: Path, kind: str, options: dict[str, Any]) -> None:
     misplaced = [name for name in _ONLY[other] if options[name] is not None]
     if misplaced:
         raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
+    if options["rod_friction"] is not None and options["indenter"] != "rod":
+        raise click.UsageError("--rod-friction belongs to --indenter rod.")
     if kind == "reference":
         file_kind, unused = _unused_options(path, options)
         if unused:

@@ -104,29 +104,32 @@ json_option = option("--json as_json", is_flag=True)("Print one JSON object in p
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
 output_options = options_of(json_option, force_option, debug_option)
 
-FILM = ("young_modulus", "poisson_ratio", "thickness")
-"""What describes a film, by the names of its options."""
+#: Those of memscal.model.film, which takes longer to import than help may; a test compares them.
+FILM_LAWS = ("linear", "neo-hookean", "mooney-rivlin")
+FILM, LAW = ("young_modulus", "poisson_ratio", "thickness"), ("film_law", "mooney_rivlin_ratio")
+"""What describes a film, and its law, by the names of its options."""
 
 #: The paper's film, in the units of the command line.
-PAPER_FILM = {
+PAPER_FILM: Mapping[str, float | str | None] = {
     "young-modulus": 2.2,
     "poisson-ratio": 0.5,
     "thickness": 2.0,
     "young-modulus-uncertainty": 0.1,
     "poisson-ratio-uncertainty": 0.005,
     "thickness-uncertainty": 0.02,
+    "film-law": "neo-hookean",
 }
 
 _UNCERTAINTY = "Standard uncertainty (k = 1) of "
 
 
 def film_options(
-    *, defaults: Mapping[str, float] | None = None, uncertainties: bool = True
+    *, defaults: Mapping[str, float | str | None] | None = None, uncertainties: bool = True
 ) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
     values = {} if defaults is None else defaults
     ratio = Quantity("ratio", high=0.5, open_low=False)
-    entries: list[tuple[str, Quantity, str]] = [
+    entries: list[tuple[str, click.ParamType[Any], str]] = [
         ("young-modulus", Quantity("MPa"), "Young's modulus of the film, in MPa."),
         ("poisson-ratio", ratio, "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."),
         ("thickness", Quantity("mm"), "Thickness of the film, in mm."),
@@ -134,10 +137,22 @@ def film_options(
     if uncertainties:
         words = ("Young's modulus, in MPa.", "Poisson's ratio.", "the thickness, in mm.")
         entries += [
-            (f"{name}-uncertainty", Quantity(kind.unit, open_low=False), _UNCERTAINTY + about)
+            (f"{name}-uncertainty", Quantity(kind.name, open_low=False), _UNCERTAINTY + about)
             for (name, kind, _), about in zip(entries, words, strict=True)
         ]
+    ratio = Quantity("ratio", open_low=False)
+    entries += [
+        ("film-law", click.Choice(FILM_LAWS), "Law of the film's stress: small strain, or rubber."),
+        ("mooney-rivlin-ratio", ratio, "C2/C1 of a film of --film-law mooney-rivlin."),
+    ]
     return _all_of(entries, values)
+
+
+rod_friction_option = option(
+    "--rod-friction",
+    click.Choice(["0", "inf"]),
+    callback=lambda _, __, text: None if text is None else float(text),
+)("Rod: 0, the film slides freely under it; inf, it sticks.")
 
 
 def radius_options(
@@ -148,7 +163,7 @@ def radius_options(
     uncertainties: bool = True,
 ) -> _Adder:
     """Return the option of the indenter's radius, with or without its uncertainty."""
-    entries: list[tuple[str, Quantity, str]] = [
+    entries: list[tuple[str, click.ParamType[Any], str]] = [
         ("radius", Quantity("mm"), f"Radius of {of} (not the diameter), in mm.")
     ]
     if uncertainties:
@@ -158,7 +173,9 @@ def radius_options(
     return _all_of(entries, {name: v for name, v in values.items() if v is not None})
 
 
-def _all_of(entries: list[tuple[str, Quantity, str]], defaults: Mapping[str, float]) -> _Adder:
+def _all_of(
+    entries: list[tuple[str, click.ParamType[Any], str]], defaults: Mapping[str, float | str | None]
+) -> _Adder:
     return options_of(
         *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in entries)
     )
@@ -180,6 +197,11 @@ def si(value: float | None, power: int) -> float | None:
 def film_from(options: Mapping[str, Any]) -> ElasticFilm:
     """Return the film that the options describe."""
     _require("The film", options, FILM)
+    law, ratio = options["film_law"] or "", options["mooney_rivlin_ratio"]
+    if (law == FILM_LAWS[-1]) != (ratio is not None):
+        raise click.UsageError(
+            "--film-law mooney-rivlin and --mooney-rivlin-ratio go together: give both or neither."
+        )
     from memscal.model.film import ElasticFilm
 
     return ElasticFilm(
@@ -189,7 +211,8 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
         young_modulus_uncertainty=si(options.get("young_modulus_uncertainty"), 6),
         poisson_ratio_uncertainty=options.get("poisson_ratio_uncertainty"),
         thickness_uncertainty=si(options.get("thickness_uncertainty"), -3),
-        law=options.get("film_law") or "",
+        law=law,
+        mooney_rivlin_ratio=ratio,
     )
 
 

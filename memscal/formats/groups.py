@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -135,9 +136,22 @@ def _unit_scale(file: SafeFile, path: str) -> float:
 _ROUND: dict[str, type[RoundIndenter]] = {shape.shape: shape for shape in (Rod, Sphere)}
 
 
+@contextmanager
+def placed(where: str) -> Iterator[None]:
+    """Say in an error about a value at which path of which file it stands."""
+    try:
+        yield
+    except InputError as error:
+        if where in error.problem:
+            raise
+        problem = f"{where}: {error.problem}"
+        raise type(error)(problem, why=error.why, cure=error.cure) from error
+
+
 def read_film(file: SafeFile, path: str) -> ElasticFilm:
     """Read a film."""
-    return ElasticFilm(**read_record(records.FILM, file, path))
+    with placed(file.where(path)):
+        return ElasticFilm(**read_record(records.FILM, file, path))
 
 
 def sample_group(film: ElasticFilm, lubrication: str = "", lubricant: str = "") -> Group:

@@ -258,6 +258,7 @@ SOLUTION = (
     CONTACT.quantities[5],
     Quantity("backend", "text", "method of solution"),
     Quantity("strain", "text", "linear or finite strain"),
+    Quantity("film_law", "text", "law of the film"),
     Quantity("convergence", _ONE, "change"),
     Quantity("steps", _COUNT, "steps"),
     Quantity("elastic_energy", "energy", "elastic energy of the film"),

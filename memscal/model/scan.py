@@ -236,6 +236,16 @@ def require_contacts(scan: _Contacts) -> None:
         )
 
 
+def require_rod_friction(friction: float | None) -> None:
+    """Refuse a friction of the rod that no film of rubber is solved with."""
+    if friction not in (None, 0.0, math.inf):
+        raise InputError(
+            f"The rod's friction is {friction:g}.",
+            why="Only a rod that slides freely or sticks is solved at finite strain.",
+            cure="Give 0 or inf, or leave it out: the difference is then counted.",
+        )
+
+
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
     values = np.asarray(stated)
@@ -536,12 +546,7 @@ class Scan:
             )
         if self.load_uncertainty is not None:
             require_non_negative("standard uncertainty of the load", self.load_uncertainty)
-        if self.rod_friction not in (None, 0.0, math.inf):
-            raise InputError(
-                f"The rod's friction is {self.rod_friction:g}.",
-                why="Only a rod that slides freely or sticks is solved at finite strain.",
-                cure="Give 0 or inf, or leave it out: the difference is then counted.",
-            )
+        require_rod_friction(self.rod_friction)
         errors, loads = self.u_zz_errors, self.normal_load
         if errors is not None and np.any((errors < 0) | np.isinf(errors)):
             raise InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -207,11 +208,13 @@ def rehearsal_table(
     film = scan.film
     missing = f", {points.missing} missing" if points.missing else ""
     elasticity = f"E = {film.young_modulus / 1e6:.4g} MPa, Poisson's ratio {film.poisson_ratio:.4g}"
+    slip = {None: "", 0.0: ", sliding freely", math.inf: ", sticking"}[scan.rod_friction]
+    rod = f"{scan.indenter.shape} of radius {scan.indenter.radius / MM:.4g} mm{slip}"
     rows = [
         ("scan", f"{scan.kind}, {points.u.size} points{missing}"),
-        ("indenter", f"{scan.indenter.shape} of radius {scan.indenter.radius / MM:.4g} mm"),
+        ("indenter", rod),
         ("load", f"{scan.load:.4g} N"),
-        ("film", f"{film.thickness / MM:.4g} mm, {elasticity}"),
+        ("film", f"{film.thickness / MM:.4g} mm, {elasticity}, {film.law_text}"),
         ("reference", _origin(stress)),
         ("method", method),
         *(("would write", str(path)) for path in outputs),

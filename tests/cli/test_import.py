@@ -31,7 +31,8 @@ def table(folder: Path) -> Path:
 
 
 def test_an_imported_scan_can_be_calibrated(run: Run, table: Path):
-    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP).exits(0)
+    law = ["--film-law", "neo-hookean", "--rod-friction", "inf"]
+    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *law).exits(0)
     assert run("calibrate", "scan.h5").code == 0
     found = memscal.load_apparatus("scan.apparatus.h5")
     direct = memscal.calibrate(memscal.simulate(seed=1, state_noise=False)).apparatus
@@ -50,6 +51,17 @@ def test_the_options_say_what_the_table_does_not(run: Run, table: Path):
     assert (scan.load, scan.load_uncertainty) == (1.0, 0.01)
     assert (scan.sensor.name, scan.sensor.model, scan.sensor.channel) == ("S1", "MEMS", "zz")
     assert scan.title == "Monday's scan"
+
+
+def test_the_law_of_the_film_and_the_friction_of_the_rod_are_stated(run: Run, table: Path):
+    law = ["--film-law", "mooney-rivlin", "--mooney-rivlin-ratio", 0.2]
+    run("import", table, "-o", "a.h5", *COLUMNS, *SET_UP, *law, "--rod-friction", "inf").exits(0)
+    scan = memscal.read_scan("a.h5")
+    assert (scan.film.law, scan.film.mooney_rivlin_ratio) == ("mooney-rivlin", 0.2)
+    assert scan.rod_friction == np.inf
+    assert "mooney-rivlin " in run("inspect", "a.h5").out
+    sphere = ["--indenter", "sphere", "--rod-friction", "0"]
+    run("import", table, "-o", "b.h5", *COLUMNS, *SET_UP, *sphere).exits(2, "--indenter rod")
 
 
 def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(run: Run, folder: Path):
@@ -112,7 +124,8 @@ def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: R
 
 def test_a_fem_table_becomes_a_reference(run: Run, folder: Path):
     film = memscal.simulate().film
-    profile = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=1.0).profile()
+    rod = memscal.Rod(radius=0.25e-3)
+    profile = memscal.indent(film, rod, load=1.0, strain="linear").profile()
     rows = np.stack([profile.r * 1e3, -profile.sigma_zz * 1e-6], axis=1)
     write_table(folder / "fem.csv", "r,S33", rows)
     columns = ["--r", "r", "--r-unit", "mm", "--sigma", "S33", "--sigma-unit", "MPa", "--load", 1]
@@ -146,7 +159,8 @@ def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folde
     ).exits(0)  # fmt: skip
     assert "SYNTHETIC" in done.out
     found = memscal.read_reference("rod.h5")
-    ours = memscal.indent(memscal.simulate().film, memscal.Rod(radius=0.25e-3), load=1.0)
+    film, rod = memscal.simulate().film, memscal.Rod(radius=0.25e-3)
+    ours = memscal.indent(film, rod, load=1.0, strain="linear")
     shear = ours.base_shear(found.r)
     np.testing.assert_allclose(found.sigma_rz, shear, atol=2e-3 * np.abs(shear).max())
     assert found.force == pytest.approx(1.0, abs=1e-4)

@@ -293,6 +293,19 @@ def test_a_wrong_unit_is_named_with_its_path_and_the_right_one(tmp_path: Path, p
     assert caught.value.cure
 
 
+@pytest.mark.parametrize(("path", "value", "cure"), [
+    ("/entry/sample/film/law", "rubber", "linear, neo-hookean, mooney-rivlin"),
+    ("/entry/indenter/friction_coefficient", 0.3, "Give 0 or inf"),
+])  # fmt: skip
+def test_an_unknown_law_or_friction_is_refused_by_its_place(tmp_path: Path, path, value, cure):
+    other_program(tmp_path / "scan.h5")
+    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+        file[path] = value
+    place = path.removesuffix("/law")
+    with pytest.raises(InputError, match=rf"scan\.h5: {place}: .*{value}(.|\n)*{cure}"):
+        read_scan(tmp_path / "scan.h5")
+
+
 def edit(path: Path, name: str, value: Any, units: str) -> None:
     with h5py.File(path, "r+") as file:
         if name in file:

@@ -141,7 +141,7 @@ def test_a_file_of_version_1_0_is_read_with_what_it_holds(tmp_path: Path):
     [profile] = found.profiles
     assert (profile.load, profile.force, profile.lubrication) == (0.5, 0.505, "dry")
     assert [scan.source.file_name for scan in found.scans if scan.source] == ["dry.h5", "wet.h5"]
-    assert found.scans[1].film == make_film()
+    assert found.scans[1].film == make_film(law="", mooney_rivlin_ratio=None)
     assert not profile.points
     apparatus = known_apparatus()
     with pytest.raises(InputError, match="holds no measured points") as caught:
