@@ -6,7 +6,7 @@ import skfem
 
 from memscal import Contact, ElasticFilm, Rod, Sphere, indent
 from memscal.errors import ConvergenceError
-from memscal.mechanics.finite_strain.film_elements import FilmElements, NeoHookean
+from memscal.mechanics.finite_strain.film_elements import FilmElements, Rubber
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.problem import Depth, Load
@@ -21,7 +21,7 @@ RADII = np.array([0.0, 0.5, 1.0, 2.0]) * 1e-3
 def cylinder(nu: float = 0.5) -> FilmElements:
     film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
     mesh = skfem.MeshTri.init_tensor(np.linspace(0, 1.5, 5), np.linspace(0, 2, 4))
-    return FilmElements(mesh, NeoHookean.of(film))
+    return FilmElements(mesh, Rubber.of(film))
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["sliding", "sticking"])
