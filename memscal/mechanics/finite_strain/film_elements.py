@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
+from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
 # Share of K that does not go through the pressure, in shear moduli: enough to keep elements from
@@ -80,6 +80,11 @@ class Rubber:
     def shear_modulus(self) -> float:
         """Shear modulus G at small strain."""
         return 2 * (self.c1 + self.c2)
+
+    @property
+    def law(self) -> str:
+        """Name of the law."""
+        return MOONEY_RIVLIN if self.c2 else NEO_HOOKEAN
 
     def energy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the stored energy per undeformed volume, shape (...), where p has settled."""
@@ -281,7 +286,7 @@ class FilmElements:
     def tangent(self, x: FloatArray) -> sparse.csr_array:
         """Return the derivative of the forces by the unknowns: symmetric, of shape (size, size)."""
         F, p = self._state(x)
-        gradients, pressures, volumes, moving, pressing = self._shape
+        gradients, pressures, volumes, *_ = self._shape
         cells = p.shape[0]
         stiffness = self.material.tangent(F, p) * volumes[..., None, None]
         flat = gradients.reshape(cells, -1, 12)

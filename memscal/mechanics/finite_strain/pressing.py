@@ -228,16 +228,16 @@ class Pressing:
             reduced = change.T @ tangent @ change + sparse.diags_array(curvature[free])
         # The matrix is symmetric, and needs pivots off the diagonal only for the pressures.
         factors = splu(reduced.tocsc(), diag_pivot_thresh=1e-4)
-        solution, sunk = factors.solve(-(change.T @ forces)), 0.0
+        solution, sunk = factors.solve(-np.asarray(change.T @ forces)), 0.0
         if goal.is_load:
             sinking = np.zeros(size)
             sinking[touching + n] = -1.0
             pushed = tangent @ sinking
-            along = factors.solve(-(change.T @ pushed))
+            along = factors.solve(-np.asarray(change.T @ pushed))
             lacking = goal.value - sinking @ forces - pushed @ (change @ solution)
             sunk = float(lacking / (sinking @ pushed + pushed @ (change @ along)))
             solution += sunk * along
-        steps = change @ solution
+        steps = np.asarray(change @ solution)
         place = state.place
         if not self.sticking:
             steps = np.zeros(size)
