@@ -14,6 +14,14 @@ SIGMA = 561e-6
 CONVERSION = 3.0e-8
 
 
+BARE: dict[str, Any] = {
+    **dict.fromkeys(("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")),
+    **dict.fromkeys(("title", "start_time", "end_time", "notes"), ""),
+    "channels": {},
+}
+"""Changes that leave a scan without all that is optional."""
+
+
 def make_film(**changes: Any) -> ElasticFilm:
     """The paper's film."""
     film = ElasticFilm(

@@ -11,7 +11,6 @@ from scipy.stats import chi2
 
 import memscal
 from memscal.measurement.restoration import Restoration
-from memscal.simulation.rod_scan import PAPER_FILM
 
 EXACT = known_apparatus()
 FEW = 6
@@ -35,13 +34,6 @@ def apparatus_part(found: Restoration, source: str, r: np.ndarray) -> np.ndarray
 def restored(load: float, friction: float, seed: int, noise: float = NOISE) -> Restoration:
     contact = pressed(load, friction)
     return memscal.restore(sphere_scan(contact, noise=noise, seed=seed), EXACT, expected=contact)
-
-
-def assert_force_as_stated(found: list[Restoration]) -> None:
-    """Assert that z of the force has a mean square of one, or of half that: any shape may be."""
-    z = [(f.force - f.scan.load) / f.force_uncertainty for f in found]
-    low, high = chi2.ppf([1e-4, 1 - 1e-4], len(z)) / len(z)
-    assert 0.4 * low < np.mean(np.square(z)) < high
 
 
 @pytest.mark.parametrize("load", [0.34, 1.0, 2.75])
@@ -70,13 +62,6 @@ def test_the_blur_is_that_of_the_apparatus_function() -> None:
     np.testing.assert_allclose(
         found.blurred_stress(r), EXACT.convolve(r, found.stress(r)), atol=2e-3 * found.sigma_zz[0]
     )
-
-
-def test_the_total_force_is_the_load_within_its_uncertainty() -> None:
-    cases = [(load, mu, seed) for load in (0.34, 2.75) for mu in (0.0, np.inf) for seed in range(4)]
-    found = [restored(*case) for case in cases]
-    assert_force_as_stated(found)
-    assert all(f.passed for f in found if np.all(f.posterior.estimate.outlier_weight > 0.5))
 
 
 def test_a_calculated_contact_is_told_from_another() -> None:
@@ -142,7 +127,10 @@ def test_less_noise_resolves_more() -> None:
 )
 def test_a_rod_s_stress_comes_back_from_several_loads_and_from_a_raster(setting) -> None:
     found = [memscal.restore(memscal.simulate(seed=s, **setting), EXACT) for s in range(FEW)]
-    assert_force_as_stated(found)
+    z = [(f.force - f.scan.load) / f.force_uncertainty for f in found]
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], len(z)) / len(z)
+    # Half of a mean square of one: any shape may be.
+    assert 0.4 * low < np.mean(np.square(z)) < high
     raster, bounds = "raster" in setting, cramer_rao(0.005, **setting)
     for f in found:
         assert ("axisymmetry" in {check.name for check in f.checks}) == raster
@@ -184,10 +172,6 @@ def test_the_table_is_a_reference_with_uncertainties() -> None:
     profile = found.profile()
     np.testing.assert_allclose(profile.sigma_zz_errors, found.stress_uncertainty(found.r))
     assert profile.load == found.scan.load
-
-
-def test_the_paper_s_film_adds_its_uncertainty() -> None:
-    assert memscal.restore(replace(SCAN, film=PAPER_FILM), EXACT).force_budget["film"] > 0
 
 
 OTHER, NOISE = memscal.StressSensor(name="other"), np.random.default_rng(0).normal(0, 1e-5, 33)
