@@ -21,6 +21,7 @@ from memscal.calibration.uncertainty import InputEffect, Results, input_effects,
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import InputError
 from memscal.estimation.bayesian import HYPOTHESES, Bayesian
+from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import (
     reference_profile,
@@ -396,6 +397,7 @@ def calibrate(
     method: str | Method = "white-noise",
     centre: str | None = None,
     correlations: Mapping[tuple[str, str], float] | None = None,
+    free: str | Sequence[str] = (),
     seed: int = 0,
     **options: Any,
 ) -> Calibration:
@@ -430,6 +432,10 @@ def calibrate(
         by an F test at 1/1000 (check ``repeat_centres``); a message says so.
     correlations : mapping of (str, str) to float, optional
         Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
+    free : str or sequence of str
+        ``"thickness"`` estimates the thickness of the film from scans with several rods, or at
+        several loads on a film of a stated law that is not linear; what the film states is its
+        Gaussian prior.  The film of the result has the posterior mean and standard uncertainty.
     seed : int, default 0
         Seed of methods that draw random numbers.
     **options
@@ -463,6 +469,14 @@ def calibrate(
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
         raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
+    freed = None
+    if free:
+        from memscal.calibration.film_inference import free_thickness, require_free
+
+        require_free(free, scans, references)
+        freed = free_thickness(solve(scans, stresses, chosen, channel, both=False, centre=centre))
+        scans = tuple(freed.of(scans))
+        stresses = [reference_profile(s, None) for s in scans]
     solution = solve(scans, stresses, chosen, channel, centre=centre)
     effects = _effects(solution, None if alternative is None else _references(alternative, scans))
     results = uncertainties(solution, solution.deconvolution, effects, pairs)
@@ -473,6 +487,15 @@ def calibrate(
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
+    if freed is not None:
+        messages = (*freed.messages, *messages)
+        configuration["free"] = freed.record
+    if loads_differ([s.load for s in solution.scans]):
+        from memscal.calibration.film_inference import weigh_laws
+
+        if (compared := weigh_laws(solution)) is not None:
+            messages = (compared.message, *messages)
+            configuration["film_laws"] = compared.record
     if channel != "zz":
         configuration["channel"] = channel
     if centre is not None or solution.apart is not None:

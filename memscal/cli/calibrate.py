@@ -190,6 +190,10 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "Whether the repeats of a scan share their centre, or each has a centre, baseline and drift of "
     "its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
 )
+@option("--free", click.Choice(("thickness",)), multiple=True)(
+    "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
+    "film of a stated law that is not linear; the stated thickness is its prior."
+)
 @option("--option options", multiple=True, metavar="NAME=VALUE")(
     "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
     "the rule chooses). May be repeated."
@@ -224,6 +228,7 @@ def command(
     channel: str,
     method: str | None,
     centre: str | None,
+    free: tuple[str, ...],
     options: tuple[str, ...],
     seed: int | None,
     as_json: bool,
@@ -257,7 +262,7 @@ def command(
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs.paths, force=force, inputs=inputs)
     if dry_run:
-        _rehearse(data, profile, channel, regulariser, outputs, as_json, centre)
+        _rehearse(data, profile, channel, regulariser, outputs, as_json, centre, free)
         return DONE
 
     from memscal.calibration.calibrate import calibrate
@@ -271,6 +276,7 @@ def command(
             method=regulariser,
             centre=centre,
             correlations=dict(pairs),
+            free=free,
             seed=seed or 0,
         )
     sweep, drawn = None, None
@@ -325,6 +331,7 @@ def _rehearse(
     outputs: Outputs,
     as_json: bool,
     centre: str | None,
+    free: tuple[str, ...],
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.stages import require_channel_method
@@ -338,6 +345,10 @@ def _rehearse(
 
     require_one_sensor(scans)
     require_channel_method(channel, regulariser)
+    if free:
+        from memscal.calibration.film_inference import require_free
+
+        require_free(free, scans, [profile])
     if centre == "per-repeat":
         scans = scans_of_repeats(scans, channel)[0]
     readings = [measured_points(scan, channel) for scan in scans]
