@@ -23,6 +23,7 @@ from memscal.calibration.uncertainty import InputEffect, Results, input_effects,
 from memscal.deconvolution.division import Method, chosen_method
 from memscal.errors import InputError, MemscalError
 from memscal.estimation.bayesian import Bayesian
+from memscal.estimation.points import loads_differ, scans_by_load
 from memscal.estimation.reference import (
     press_neo_hookean,
     reference_profile,
@@ -240,6 +241,7 @@ def calibrate(
     method: str | Method = "white-noise",
     centre: str | None = None,
     correlations: Mapping[tuple[str, str], float] | None = None,
+    free: str | Sequence[str] = (),
     seed: int = 0,
     override: bool = False,
     **options: Any,
@@ -283,6 +285,10 @@ def calibrate(
         by an F test at 1/1000 (check ``repeat_centres``); a message says so.
     correlations : mapping of (str, str) to float, optional
         Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
+    free : str or sequence of str
+        ``"thickness"`` estimates the thickness of the film from scans with several rods, or at
+        several loads on a film of a stated law that is not linear; what the film states is its
+        Gaussian prior.  The film of the result has the posterior mean and standard uncertainty.
     seed : int, default 0
         Seed of methods that draw random numbers.
     override : bool, default False
@@ -317,12 +323,27 @@ def calibrate(
     scans = tuple(_of_law(s, r, *known) for s, r in zip(scans, references, strict=True))
     alternatives = None if alternative is None else _references(alternative, scans)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
+    owners: Sequence[int] | None = None
+    stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
+    if not any(stated) and any(s.film.law != LINEAR for s in scans):
+        # Under another law than the linear one each load has a stress of its own shape.
+        of_loads, owners = scans_by_load(scans)
+        scans, references = tuple(of_loads), [None] * len(of_loads)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
         raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
-    solution = solve(scans, stresses, chosen, channel, centre=centre)
+    freed = None
+    if free:
+        from memscal.calibration.film_inference import free_thickness, require_free
+
+        require_free(free, scans, references)
+        start = solve(scans, stresses, chosen, channel, both=False, centre=centre, owners=owners)
+        freed = free_thickness(start)
+        scans = tuple(freed.of(scans))
+        stresses = [reference_profile(s, None) for s in scans]
+    solution = solve(scans, stresses, chosen, channel, centre=centre, owners=owners)
     effects = _effects(solution, alternatives)
     results = uncertainties(solution, solution.deconvolution, effects, pairs)
     beside = solution.other
@@ -333,6 +354,15 @@ def calibrate(
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
+    if freed is not None:
+        messages = (*freed.messages, *messages)
+        configuration["free"] = freed.record
+    if loads_differ([s.load for s in solution.scans]):
+        from memscal.calibration.film_inference import weigh_laws
+
+        if (compared := weigh_laws(solution)) is not None:
+            messages = (compared.message, *messages)
+            configuration["film_laws"] = compared.record
     if channel != "zz":
         configuration["channel"] = channel
     if film_law is not None:
@@ -423,7 +453,8 @@ def _effects(
         # Two laws differ by too much for the first order: calibrated by the other one, too.
         with suppress(MemscalError):
             channel = estimate.points.channel
-            exact = solve(scans, others, solution.method, channel, both=solution.other is not None)
+            both = solution.other is not None
+            exact = solve(scans, others, solution.method, channel, both=both)
             effects["model_form"] = replace(effects["model_form"], exact=exact)
     return effects
 

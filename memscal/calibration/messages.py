@@ -11,6 +11,7 @@ from memscal.calibration.drawn_scatter import draw_count, is_linear
 from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.estimation.bayesian import HYPOTHESES
+from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import RECTANGLE
 from memscal.mechanics.contact import Contact
@@ -61,7 +62,9 @@ def _centres(solution: Solution) -> list[Message]:
     owners, centres = np.array(solution.owners), solution.estimate.centres
     apart = max(float(np.ptp(centres[owners == i], axis=0).max()) for i in set(owners))
     test, way = solution.apart, "as asked for (--centre per-repeat)"
-    if test is not None:
+    if loads_differ([scan.load for scan in solution.scans]):
+        way = "as their loads differ, and with them the shape of the stress"
+    elif test is not None:
         way = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
     text = (
         f"Each of the {owners.size} repeats has its own centre, baseline and drift, {way}. The "

@@ -55,13 +55,15 @@ def solve(
     *,
     both: bool = True,
     centre: str | None = COMMON,
+    owners: Sequence[int] | None = None,
 ) -> Solution:
     """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back.
 
-    ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test.
+    ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test.  ``owners``:
+    the number of the scan that each is a part of.
     """
     require_channel_method(channel, method)
-    owners, apart = tuple(range(len(scans))), None
+    owners, apart = tuple(owners or range(len(scans))), None
     if centre != PER_REPEAT:
         estimate = require_profile(scans, stresses, channel)
         apart = repeat_centres_test(estimate)
@@ -70,7 +72,7 @@ def solve(
             separate, numbers = scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
             estimate = require_profile(separate, of_repeats, channel)
-            scans, stresses, owners = separate, of_repeats, numbers
+            scans, stresses, owners = separate, of_repeats, tuple(owners[i] for i in numbers)
         except MemscalError:
             # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
             if centre == PER_REPEAT:

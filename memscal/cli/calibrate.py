@@ -201,6 +201,10 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "Whether the repeats of a scan share their centre, or each has a centre, baseline and drift of "
     "its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
 )
+@option("--free", click.Choice(("thickness",)), multiple=True)(
+    "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
+    "film of a stated law that is not linear; the stated thickness is its prior."
+)
 @option("--option options", multiple=True, metavar="NAME=VALUE")(
     "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
     "the rule chooses). May be repeated."
@@ -241,6 +245,7 @@ def command(
     channel: str,
     method: str | None,
     centre: str | None,
+    free: tuple[str, ...],
     options: tuple[str, ...],
     seed: int | None,
     override: bool,
@@ -292,6 +297,7 @@ def command(
             method=regulariser,
             centre=centre,
             correlations=dict(pairs),
+            free=free,
             seed=seed or 0,
             override=override,
         )

@@ -254,6 +254,46 @@ def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], t
     return separate, tuple(owners)
 
 
+#: Loads that differ by more than this share are several.
+_SAME_LOAD = 0.02
+
+
+def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
+    """Split scans whose repeats have loads of their own; return each one's number, too."""
+    split: list[Scan] = []
+    owners: list[int] = []
+    for i, scan in enumerate(scans):
+        groups: list[list[tuple[float, int]]] = []
+        for load, number in sorted(_loads_of_passes(scan)):
+            if not groups or load > (1 + _SAME_LOAD) * groups[-1][0][0]:
+                groups.append([])
+            groups[-1].append((load, number))
+        if len(groups) < 2:
+            split.append(scan)
+        for group in groups if len(groups) > 1 else ():
+            part = scan.only_passes(sorted(number for _, number in group))
+            load = float(np.mean([load for load, _ in group]))
+            u = None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
+            split.append(replace(part, load=load, load_uncertainty=u))
+        owners += [i] * (len(split) - len(owners))
+    return split, tuple(owners)
+
+
+def loads_differ(loads: Sequence[float]) -> bool:
+    """Whether loads (N) differ by more than repeats of one load do."""
+    return max(loads) > (1 + _SAME_LOAD) * min(loads)
+
+
+def _loads_of_passes(scan: Scan) -> list[tuple[float, int]]:
+    """Mean load (N) and number of each pass that states loads."""
+    loads = scan.normal_load
+    if loads is None:
+        return []
+    passes, stated = scan.passes, np.isfinite(loads)
+    numbers = np.unique(passes[stated])
+    return [(float(loads[stated & (passes == n)].mean()), int(n)) for n in numbers]
+
+
 def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     """Join the points of several scans, of which all state their noise, or none."""
     if len(scans) == 1:

@@ -45,13 +45,13 @@ from memscal.friction.marginal_likelihood import (
     uniform_prior,
 )
 from memscal.friction.results import (
-    BayesFactor,
     InterfaceComparison,
     InterfaceLaw,
     LawComparison,
     PriorChoice,
 )
 from memscal.model.arrays import require_positive
+from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
 
 if TYPE_CHECKING:
@@ -152,9 +152,7 @@ def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
     """Weigh the last law against each of the others."""
     *others, last = laws
     return tuple(
-        BayesFactor(last.name, law.name, last.log_evidence - law.log_evidence)
-        if last.log_evidence >= law.log_evidence
-        else BayesFactor(law.name, last.name, law.log_evidence - last.log_evidence)
+        BayesFactor.between(last.name, law.name, last.log_evidence - law.log_evidence)
         for law in others
     )
 

@@ -29,6 +29,8 @@ _IN_JSON = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved
             "baseline")  # fmt: skip
 _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm",
                "noise_equivalent_area")  # fmt: skip
+#: What scans tell of the film, where they do.
+_OF_FILM = ("film_laws", "free")
 #: Checks that a G that is Gaussian passes.
 _OF_GAUSSIAN = ("gaussian_misfit", "width_agreement")
 
@@ -118,6 +120,8 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]
         values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
+    configuration = apparatus.process.configuration
+    values |= {name: configuration[name] for name in _OF_FILM if name in configuration}
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
         values["reconvolution"] = {
