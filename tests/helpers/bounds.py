@@ -58,7 +58,8 @@ def cramer_rao(
     variance = np.diag(np.linalg.inv(jacobian.T @ jacobian)) * deviation**2
     if inexact:
         changes = {"thickness": 1.01 * EXACT_FILM.thickness}, {"poisson_ratio": 0.495}
-        others = [1.01 * signal, *(voltage(film=replace(EXACT_FILM, **c)) for c in changes)]
+        film = setting.get("film", EXACT_FILM)
+        others = [1.01 * signal, *(voltage(film=replace(film, **c)) for c in changes)]
         shifts = [np.linalg.pinv(jacobian) @ (other - signal) for other in others]
         variance += np.sum(np.square(shifts), axis=0)
     bounds = np.sqrt(variance) * [*steps.values(), signal.max()]
