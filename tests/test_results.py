@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.records import assert_same
 from helpers.scans import contact_scan
 
 import memscal
@@ -70,19 +71,9 @@ def test_an_artifact_from_a_file_shows_what_it_holds(calibration, loaded) -> Non
             assert value["value"] == pytest.approx(expected, rel=1e-9)
     for name, value in shown.items():
         if isinstance(value, dict):
-            assert_same_numbers(value, values[name])
+            assert_same(value, values[name], rtol=1e-9)
         else:
             assert name == "checks" or value == values[name]
-
-
-def assert_same_numbers(ours: object, theirs: object) -> None:
-    """The same keys, texts and numbers, to 1e-9, at every depth."""
-    if isinstance(theirs, dict):
-        assert list(ours) == list(theirs)
-        for name, value in theirs.items():
-            assert_same_numbers(ours[name], value)
-    else:
-        assert ours == (pytest.approx(theirs, rel=1e-9) if isinstance(theirs, float) else theirs)
 
 
 @pytest.mark.parametrize("methods", [("white-noise", "bayesian"), ("bayesian", "white-noise")])
@@ -102,7 +93,7 @@ def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan: Path, met
     assert list(values["estimates"]) == [*methods, "gaussian"]
     assert loaded.other.method == methods[1]
     first, other = (values["estimates"][method]["conversion_constant"] for method in methods)
-    assert_same_numbers(first, values["conversion_constant"])
+    assert_same(first, values["conversion_constant"], rtol=1e-9)
     in_volts = [a, loaded.other.parameters["conversion_constant"]]
     assert [first["value"], other["value"]] == pytest.approx(1e3 * np.array(in_volts), rel=1e-9)
     assert first["value"] != pytest.approx(other["value"], rel=1e-6)

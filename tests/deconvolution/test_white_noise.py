@@ -78,7 +78,9 @@ def test_the_noise_has_the_spectral_amplitude_that_it_claims(amplitude: float, s
     # No voltage, and a stress of unit transform without noise: the quotient is the noise.
     # By Parseval the sum of its squares is that of the pixels' normal deviates.
     grid = square_lattice(101, 0.03)
-    image = noise_alone(grid, amplitude, seed, weakest_voltage=7e-3)
+    # So weak a reference brings no noise of its own.
+    problem = DivisionProblem(grid, spike(grid, 0.0), spike(grid, 1.0), 7e-3, 1e-100)
+    image = WhiteNoiseDraw(amplitude=amplitude, seed=seed).divide(problem).field
     spectrum = np.fft.fft2(image) * grid.cell_area
     s = amplitude * 0.1 * 7e-3
     low, high = chi2.ppf([RARE, 1 - RARE], 101**2) / 101**2
@@ -90,14 +92,6 @@ def test_the_noise_has_the_spectral_amplitude_that_it_claims(amplitude: float, s
     pairs = int(inner.sum()) // 2
     low, high = gamma.ppf([RARE, 1 - RARE], pairs) / pairs
     assert low < np.mean(np.abs(spectrum[inner]) ** 2) / s**2 < high
-
-
-def noise_alone(
-    grid: Lattice, amplitude: float, seed: int, *, weakest_voltage: float
-) -> np.ndarray:
-    # So weak a reference brings no noise of its own.
-    problem = DivisionProblem(grid, spike(grid, 0.0), spike(grid, 1.0), weakest_voltage, 1e-100)
-    return WhiteNoiseDraw(amplitude=amplitude, seed=seed).divide(problem).field
 
 
 @pytest.mark.parametrize(("weakest", "error"), [(1e-3, 0.03), (1e-5, 5e-3), (1e-7, 1e-3)])

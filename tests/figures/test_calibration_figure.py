@@ -5,11 +5,13 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from helpers.scans import shear_scan
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
+import memscal
 from memscal.figures.calibration import calibration_figure
-from memscal.model.apparatus import ParameterSet
+from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.scan import StressSensor
 
 
@@ -69,10 +71,9 @@ def test_the_scan_panel_holds_the_points_and_both_reconvolutions(make_apparatus,
 @pytest.mark.parametrize("order", [np.arange(33)[::-1] * 7 % 33, np.tile(np.arange(33), 3)])
 def test_points_out_of_order_and_repeats_of_a_position_share_one_line(make_apparatus, order):
     data = make_apparatus(points=33)
-    scan = data.reconvolution
-    for name in ("x", "u_zz", "u_zz_errors", "u_zz_predicted", "u_zz_gaussian", "residual"):
-        object.__setattr__(scan, name, getattr(scan, name)[order])
-    joined = curve(panels(calibration_figure(data))["scan"], "reconvolved, G")
+    scan = replace(data.reconvolution, **{n: v[order] for n, v in vars(data.reconvolution).items()})
+    figure = calibration_figure(replace(data, reconvolution=scan))
+    joined = curve(panels(figure)["scan"], "reconvolved, G")
     assert (joined.get_linestyle(), joined.get_xdata().size) == ("-", 33)
     assert np.all(np.diff(joined.get_xdata()) > 0)
 
@@ -127,13 +128,13 @@ def test_a_drift_is_taken_off_before_the_logarithm(make_apparatus, drawn):
     data = make_apparatus()
     scan, known = data.reconvolution, data.parameters
     tilt = 5e-4 * scan.x / 8e-3  # V: a tenth of the maximum at the scan's end
-    for name in ("u_zz", "u_zz_predicted", "u_zz_gaussian"):
-        object.__setattr__(scan, name, getattr(scan, name) + tilt)
+    names = ("u_zz", "u_zz_predicted", "u_zz_gaussian")
+    scan = replace(scan, **{name: getattr(scan, name) + tilt for name in names})
     more = ParameterSet(
         (*known.names, "drift"), np.append(known.values, 1e-3), np.diag(np.full(6, 1e-12))
     )
-    object.__setattr__(data, "parameters", more)
-    tilted, level = panels(calibration_figure(data))["scan_log"], panels(drawn())["scan_log"]
+    figure = calibration_figure(replace(data, reconvolution=scan, parameters=more))
+    tilted, level = panels(figure)["scan_log"], panels(drawn())["scan_log"]
     for label in ("reconvolved, G", "less than 2u"):
         np.testing.assert_allclose(line(tilted, label)[1], line(level, label)[1], rtol=1e-6)
 
@@ -285,12 +286,37 @@ def test_the_settings_of_matplotlib_are_given_back(make_apparatus):
     assert panels(figure)["scan"].get_facecolor() == (1.0, 1.0, 1.0, 1.0)
 
 
-@pytest.mark.parametrize("joint", [False, True])
-def test_no_line_joins_the_points_of_several_scans(make_apparatus, joint):
+def test_no_line_joins_the_points_of_several_scans(make_apparatus):
     data = make_apparatus(points=33)
-    if joint:
-        configuration = {**data.process.configuration, "further_scans": [None]}
-        data = replace(data, process=replace(data.process, configuration=configuration))
-    axes = panels(calibration_figure(data))["scan"]
-    found = curve(axes, "reconvolved, G")
-    assert (found.get_linestyle() == "None") is joint
+    configuration = {**data.process.configuration, "further_scans": [None]}
+    joint = replace(data, process=replace(data.process, configuration=configuration))
+    found = curve(panels(calibration_figure(joint))["scan"], "reconvolved, G")
+    assert found.get_linestyle() == "None"
+
+
+@pytest.fixture(scope="module")
+def sheared() -> ApparatusData:
+    """An artifact of channel xz."""
+    return memscal.calibrate(shear_scan(seed=1), channel="xz", method="evidence").apparatus
+
+
+def test_axes_and_curves_name_the_channel(sheared: ApparatusData):
+    figure = calibration_figure(sheared)
+    labels = " ".join(axes.get_ylabel() for axes in figure.axes)
+    assert "U_{xz}" in labels
+    assert "G_{xz}" in labels
+    assert "zz" not in labels
+
+
+def test_the_reference_is_the_shear_with_its_sides(sheared: ApparatusData):
+    x, y = line(panels(calibration_figure(sheared))["scan"], "reference")
+    scan = sheared.reconvolution
+    # The scan is the reference, blurred: they rise and fall together.
+    along = np.interp(scan.x * 1e3, x, y)
+    assert np.corrcoef(along, scan.u_zz)[0, 1] > 0.95
+
+
+def test_both_sides_stand_above_zero_on_the_logarithmic_axis(sheared: ApparatusData):
+    x, y = line(panels(calibration_figure(sheared))["scan_log"], "reconvolved, G")
+    for side in (x < -0.5, x > 0.8):
+        assert np.isfinite(y[side]).mean() > 0.9

@@ -1,6 +1,7 @@
 """Figures of a comparison: what is drawn are the comparison's numbers, and nothing is lost."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -82,8 +83,7 @@ def test_a_logarithmic_scale_shows_every_stress_of_three_decades(found: Friction
 def test_a_load_has_one_colour_in_all_panels():
     found = comparison()
     fewer = {name: loads[:-2] for name, loads in found.loads.items()}
-    object.__setattr__(found, "loads", fewer)
-    panels = likelihood_figure(found).axes
+    panels = likelihood_figure(replace(found, loads=fewer)).axes
     colours = [
         {line.get_label(): line.get_color() for line in axes.lines if "N" in line.get_label()}
         for axes in panels
@@ -108,9 +108,8 @@ def test_a_set_of_coefficients_is_less_the_frictionless_profile(found: FrictionC
 def test_more_loads_than_fit_in_a_row_keep_the_smallest_and_the_largest():
     found = comparison()
     doubled = {name: (*loads, *loads) for name, loads in found.loads.items()}
-    many = comparison()
-    object.__setattr__(many, "loads", doubled)
-    titles = [axes.get_title() for axes in friction_set_figure(many).axes if axes.get_title()]
+    figure = friction_set_figure(replace(found, loads=doubled))
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert len(titles) == 4
     assert (titles[0], titles[-1]) == ("0.34 N", "2.75 N")
 
@@ -194,12 +193,6 @@ def test_all_figures_have_the_names_that_the_command_line_proves():
     found = comparison(interface=interface_comparison())
     stems = figure_stems(["dry", "lubricated"], interface=True)
     assert list(of_friction.comparison_figures(found)) == stems
-
-
-@pytest.mark.parametrize("stem", figure_stems(["dry", "lubricated"]))
-def test_every_figure_renders(found: FrictionComparison, stem):
-    figure = of_friction.comparison_figures(found)[stem]()
-    assert render_figure(figure, "png", dpi=50).startswith(b"\x89PNG")
 
 
 def test_the_likelihood_of_a_slip_length_touches_zero_at_it():

@@ -191,11 +191,14 @@ def test_a_folder_in_which_nothing_can_be_made_is_refused_before_the_work():
     assert caught.value.exit_code == 4
 
 
-@pytest.mark.parametrize("call", ["write", "fsync"])
-def test_a_full_disk_is_found_before_the_work(target: Path, monkeypatch: pytest.MonkeyPatch, call):
+@pytest.mark.parametrize(("call", "code", "cure"), [
+    ("write", errno.ENOSPC, "Free some space"), ("fsync", errno.ENOSPC, "Free some space"),
+    ("open", errno.EROFS, "read-only"),
+])  # fmt: skip
+def test_a_disk_that_refuses_is_found_before_the_work(target: Path, monkeypatch, call, code, cure):
     with monkeypatch.context() as patch:
-        patch.setattr(os, call, fail_with(errno.ENOSPC))
-        with pytest.raises(OutputError, match="Free some space"):
+        patch.setattr(os, call, fail_with(code))
+        with pytest.raises(OutputError, match=cure):
             ensure_writable(target, overwrite=True)
     assert_untouched(target)
 

@@ -62,13 +62,6 @@ def test_a_file_that_was_cut_off_is_not_found_and_is_replaced(tmp_path: Path, sh
     assert find_contact_table(tmp_path, KEY) is not None
 
 
-def test_a_number_that_was_changed_is_noticed(tmp_path: Path):
-    keep_contact_table(tmp_path, KEY, table())
-    with h5py.File(entry(tmp_path), "r+") as file:
-        file["/entry/contacts/load"][0] = 0.35
-    assert find_contact_table(tmp_path, KEY) is None
-
-
 def test_bytes_that_were_changed_never_give_other_numbers(tmp_path: Path):
     keep_contact_table(tmp_path, KEY, table())
     data, one = entry(tmp_path).read_bytes(), table()

@@ -25,6 +25,7 @@ def assert_same(
         assert len(found) == len(expected), where
         pairs = {f"[{i}]": pair for i, pair in enumerate(zip(found, expected, strict=True))}
     elif isinstance(expected, np.ndarray | float):
+        assert found is not None, where
         np.testing.assert_allclose(found, expected, rtol=rtol, atol=0, err_msg=where)
         return
     else:
