@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,7 +25,7 @@ from memscal.figures.friction_readings import (
     effective_friction_figure,
     likelihood_figure,
 )
-from memscal.figures.friction_scale import LUBRICATIONS, friction_name, friction_position
+from memscal.figures.friction_scale import friction_name, friction_position
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.friction.family import FRICTION_SCALE
 from memscal.friction.results import (
@@ -122,7 +123,7 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
         if reading.value is not None:
             place = friction_position([reading.value])
             axes.plot([at_load.load], place, "o", color=COLOURS["measured"], ms=4)
-    scale.friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
+    scale.friction_axis(axes, "y")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
     legend_above(axes, columns=1)
@@ -141,16 +142,15 @@ def maxima_figure(comparison: FrictionComparison) -> Figure:
         count = len(comparison.loadings)
         panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
         for axes, loading in zip(panels, comparison.loadings, strict=True):
-            draw_maxima(axes, comparison, loading)
+            _draw_maxima(axes, comparison, loading)
         panel_letters(panels)
         for axes in panels[1:]:
             axes.set_ylabel("")
     return figure
 
 
-def draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str | None = None) -> None:
+def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> None:
     """Draw the ratios of one definition of the loading, and the calculated curves."""
-    loading = scale.main_loading(comparison, loading)
     loads, curves = _curves(comparison, loading)
     ends = []
     ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
@@ -182,15 +182,10 @@ def _curves(comparison: FrictionComparison, loading: str) -> tuple[FloatArray, F
 
 def _draw_ratios(axes: Axes, loads: Sequence[LoadComparison], lubrication: str) -> None:
     measured = [load for load in loads if load.lubrication == lubrication]
-    marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
-    black = COLOURS["measured"]
-    axes.errorbar(
-        [load.load for load in measured],
-        [load.ratio for load in measured],
-        [load.ratio_uncertainty for load in measured],
-        fmt=marker, color=black, mfc=black if filled else "white", ms=4, mew=0.8,
-        elinewidth=0.8, capsize=2, label=scale.lubricated_words(lubrication), zorder=3,
-    )  # fmt: skip
+    values = [(load.load, load.ratio, load.ratio_uncertainty) for load in measured]
+    look = scale.mark(lubrication, COLOURS["measured"]) | {"ms": 4, "mew": 0.8, "ls": "none"}
+    look |= {"elinewidth": 0.8, "capsize": 2, "label": scale.lubricated_words(lubrication)}
+    axes.errorbar(*zip(*values, strict=True), zorder=3, **look)
 
 
 def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
@@ -228,16 +223,15 @@ def comparison_figure(
     Panel a, profiles between no friction and full stick; b, maxima over frictionless ones; c,
     residuals against the frictionless profiles; d, the effective friction coefficient.
     """
-    loading = scale.main_loading(comparison, loading)
     loads = scale.chosen(comparison, loading, lubrication)
     with house_style():
         figure = new_figure(5.6)
         panels = figure.subplots(2, 2)
         draw_profiles(panels[0, 0], comparison, loads)
-        draw_maxima(panels[0, 1], comparison, loading)
+        _draw_maxima(panels[0, 1], comparison, loads[0].loading)
         draw_residuals(panels[1, 0], comparison, loads, 0)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
-        draw_effective(panels[1, 1], comparison, loads[0].lubrication, loading)
+        draw_effective(panels[1, 1], comparison, loads)
         legend_above(panels[1, 1], columns=2)
         panel_letters(panels.flat)
     return figure
@@ -249,17 +243,12 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     measured = (profile.lubrication for profile in comparison.measured.profiles)
     for lubrication in dict.fromkeys(measured):
         tail = f"-{lubrication}" if lubrication else ""
-        figures[f"profiles{tail}"] = _of(profile_figure, comparison, lubrication)
-        figures[f"friction-set{tail}"] = _of(friction_set_figure, comparison, lubrication)
-    figures["maxima"] = lambda: maxima_figure(comparison)
-    figures["effective-friction"] = lambda: effective_friction_figure(comparison)
-    figures["likelihood"] = lambda: likelihood_figure(comparison)
+        of_state = {"lubrication": lubrication}
+        figures[f"profiles{tail}"] = partial(profile_figure, comparison, **of_state)
+        figures[f"friction-set{tail}"] = partial(friction_set_figure, comparison, **of_state)
+    figures["maxima"] = partial(maxima_figure, comparison)
+    figures["effective-friction"] = partial(effective_friction_figure, comparison)
+    figures["likelihood"] = partial(likelihood_figure, comparison)
     if comparison.interface is not None:
-        figures["interface"] = lambda: interface_figure(comparison)
+        figures["interface"] = partial(interface_figure, comparison)
     return figures
-
-
-def _of(
-    draw: Callable[..., Figure], comparison: FrictionComparison, lubrication: str
-) -> Callable[[], Figure]:
-    return lambda: draw(comparison, lubrication=lubrication)

@@ -9,9 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.figures import friction_scale as scale
-from memscal.figures.friction_scale import LUBRICATIONS, friction_colours, friction_name, on_axis
+from memscal.figures.friction_scale import friction_colours, friction_name, on_axis
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.friction.results import FrictionComparison, LoadComparison
+from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
 
 _FINE = 241
@@ -29,7 +30,6 @@ def profile_figure(
     Panels a and b, stress on a linear and a logarithmic scale; c and d, residuals over standard
     uncertainties against the frictionless profile and that of the largest coefficient.
     """
-    loading = scale.main_loading(comparison, loading)
     loads = scale.chosen(comparison, loading, lubrication)
     with house_style():
         figure = new_figure(4.6)
@@ -89,17 +89,22 @@ def draw_residuals(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], index: int
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
-    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
-    axes.axhline(0.0, color="0.4", lw=0.6)
     looks = scale.load_looks(comparison)
-    for at_load in loads:
-        colour, _ = looks[at_load.load]
-        z = (at_load.profile.s_zz - at_load.calculated[index]) / at_load.profile.s_zz_errors
-        marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
-        (points,) = axes.plot(at_load.profile.r / MM, z, marker, color=colour, ms=2.5, mew=0.6)
-        points.set_markerfacecolor(colour if filled else "white")
+    colours = [looks[at_load.load][0] for at_load in loads]
+    _plot_residuals(axes, loads, index, colours)
     axes.set_xlabel("distance from the centre (mm)")
     axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(comparison.friction[index])}}})/u$")
+
+
+def _plot_residuals(
+    axes: Axes, loads: Sequence[LoadComparison], index: int, colours: Sequence[str]
+) -> None:
+    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
+    axes.axhline(0.0, color="0.4", lw=0.6)
+    for at_load, colour in zip(loads, colours, strict=True):
+        profile, look = at_load.profile, scale.mark(at_load.lubrication, colour)
+        z = (profile.s_zz - at_load.calculated[index]) / profile.s_zz_errors
+        axes.plot(profile.r / MM, z, ls="none", ms=2.5, mew=0.6, **look)
 
 
 def friction_set_figure(
@@ -110,7 +115,6 @@ def friction_set_figure(
     A column for each of at most four loads: stress near the centre, the same less the frictionless
     profile (percent of its maximum), residuals against the coefficient of least chi-square.
     """
-    loading = scale.main_loading(comparison, loading)
     loads = scale.chosen(comparison, loading, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
@@ -119,8 +123,11 @@ def friction_set_figure(
         rows = (1.5, 1.5, 1.0)
         panels = figure.subplots(3, len(loads), height_ratios=rows, sharex="col", squeeze=False)
         for column, at_load in zip(panels.T, loads, strict=True):
-            _draw_set(column[0], comparison, at_load)
-            _draw_differences(column[1], comparison, at_load)
+            frictionless = at_load.calculated[0]
+            column[0].set_title(f"{at_load.load:.3g} N", fontsize=8)
+            _draw_set(column[0], comparison, at_load, 0.0 * frictionless, KPA)
+            column[0].set_ylim(bottom=0)
+            _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
             _draw_best(column[2], comparison, at_load)
         scale.share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
@@ -131,7 +138,7 @@ def friction_set_figure(
             axes.set_ylabel(label)
         figure.align_ylabels(panels[:, 0])
         figure.supxlabel("distance from the centre (mm)", fontsize=8)
-        _legend_of_friction(figure, comparison, loads[0].lubrication, loading)
+        _legend_of_friction(figure, comparison, loads[0])
     return figure
 
 
@@ -147,45 +154,33 @@ def _core(at_load: LoadComparison) -> float:
     return float(at_load.profile.r[np.flatnonzero(strong)[-1]])
 
 
-def _draw_set(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    axes.set_title(f"{at_load.load:.3g} N", fontsize=8)
+def _draw_set(
+    axes: Axes,
+    comparison: FrictionComparison,
+    at_load: LoadComparison,
+    less: FloatArray,
+    unit: float,
+) -> None:
+    """Draw stress less that of some profile at its radii, in a unit (Pa)."""
+    profile, black = at_load.profile, COLOURS["measured"]
     r = np.linspace(0.0, _core(at_load), _FINE)
     for i in _shown_indices(comparison):
-        curve = on_axis(at_load.profile.r, at_load.calculated[[i]], r)[0]
-        axes.plot(r / MM, curve / KPA, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    scale.draw_points(axes, at_load, COLOURS["measured"], "", False)
+        curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
+        axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
+    beyond, u = (profile.s_zz - less) / unit, profile.s_zz_errors / unit
+    scale.draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=black)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
-    axes.set_ylim(bottom=0)
-
-
-def _draw_differences(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    """Draw what friction adds to the frictionless stress, in percent of its maximum."""
-    unit = at_load.p0_max / 100
-    r = np.linspace(0.0, _core(at_load), _FINE)
-    for i in _shown_indices(comparison):
-        change = (at_load.calculated[i] - at_load.calculated[0])[None, :]
-        colour = friction_colours(comparison.friction[i])[0]
-        axes.plot(r / MM, on_axis(at_load.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
-    profile = at_load.profile
-    beyond, u = (profile.s_zz - at_load.calculated[0]) / unit, profile.s_zz_errors / unit
-    scale.draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=COLOURS["measured"])
 
 
 def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     best = int(np.argmin(at_load.chi_square))
-    z = (at_load.profile.s_zz - at_load.calculated[best]) / at_load.profile.s_zz_errors
-    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
-    axes.axhline(0.0, color="0.4", lw=0.6)
-    marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
-    black = COLOURS["measured"]
-    face = black if filled else "white"
-    axes.plot(at_load.profile.r / MM, z, marker, color=black, ms=2.5, mew=0.6, mfc=face)
+    _plot_residuals(axes, [at_load], best, [COLOURS["measured"]])
     label = rf"least $\chi^2$: $\mu$ = {friction_name(comparison.friction[best])}"
     axes.annotate(label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 def _legend_of_friction(
-    figure: Figure, comparison: FrictionComparison, lubrication: str, loading: str
+    figure: Figure, comparison: FrictionComparison, at_load: LoadComparison
 ) -> None:
     from matplotlib.lines import Line2D
 
@@ -194,12 +189,9 @@ def _legend_of_friction(
                label=rf"$\mu$ = {friction_name(comparison.friction[i])}")
         for i in _shown_indices(comparison)
     ]  # fmt: skip
-    marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
-    point = Line2D(
-        [], [], color="k", marker=marker, ms=3, mfc="k" if filled else "white", ls="none"
-    )
-    point.set_label(f"measured, {scale.lubricated_words(lubrication)}")
-    title = f"{loading} loading" if loading else "profiles as given"
+    point = Line2D([], [], ms=3, ls="none", **scale.mark(at_load.lubrication, "k"))
+    point.set_label(f"measured, {scale.lubricated_words(at_load.lubrication)}")
+    title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
     figure.legend(
         handles=[point, *handles], loc="outside upper center", ncols=len(handles) + 1, title=title,
         title_fontsize=8,

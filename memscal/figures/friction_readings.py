@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.figures import friction_scale as scale
-from memscal.figures.friction_scale import LUBRICATIONS, friction_position, lubricated_words
+from memscal.figures.friction_scale import friction_position, lubricated_words
 from memscal.figures.style import COLOURS, house_style, new_figure, panel_letters
-from memscal.friction.results import BoundedEstimate, FrictionComparison
+from memscal.friction.results import BoundedEstimate, FrictionComparison, LoadComparison
 
 _READINGS = {
     "by_maximum": ("by the maximum", "gaussian", -1),
@@ -38,36 +38,27 @@ def effective_friction_figure(comparison: FrictionComparison) -> Figure:
 
 
 def draw_effective(
-    axes: Axes,
-    comparison: FrictionComparison,
-    lubrication: str | None = None,
-    loading: str | None = None,
+    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
 ) -> None:
     """Draw both readings of each load, the joint interval, and the macroscopic coefficient."""
-    loading = scale.main_loading(comparison, loading)
-    loads = scale.chosen(comparison, loading, lubrication)
     span = loads[-1].load - loads[0].load or loads[0].load
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
             reading, x = getattr(at_load, name), at_load.load + side * _ASIDE * span
-            marker = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
-            _draw_reading(axes, reading, x, COLOURS[colour], words if i == 0 else "", marker)
-    _draw_joint(axes, comparison.joint[loads[0].lubrication][loading])
+            look = scale.mark(at_load.lubrication, COLOURS[colour])
+            _draw_reading(axes, reading, x, words if i == 0 else "", look)
+    _draw_joint(axes, comparison.joint[loads[0].lubrication][loads[0].loading])
     _draw_macroscopic(axes, comparison.macroscopic)
-    scale.friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
+    scale.friction_axis(axes, "y")
     axes.set_xlim(0, loads[-1].load + 0.08 * span)
     axes.set_xlabel("load (N)")
 
 
 def _draw_reading(
-    axes: Axes,
-    reading: BoundedEstimate,
-    x: float,
-    colour: str,
-    label: str,
-    marker: tuple[str, bool],
+    axes: Axes, reading: BoundedEstimate, x: float, label: str, look: dict[str, Any]
 ) -> None:
     """Draw a value with its interval; where there is none, the open interval as an arrow."""
+    colour = look["color"]
     low, high = reading.interval.low, reading.interval.high
     ends = friction_position([low, math.inf if high is None else high])
     (bar,) = axes.plot([x, x], ends, color=colour, lw=1.0, solid_capstyle="butt")
@@ -78,12 +69,10 @@ def _draw_reading(
     else:
         axes.plot([x], ends[1:], "_", color=colour, ms=5, mew=1.0)
     if reading.value is not None:
-        axes.plot(
-            [x], friction_position([reading.value]), marker[0], color=colour, ms=4, mew=0.8,
-            mfc=colour if marker[1] else "white", zorder=3, label="_value",
-        )  # fmt: skip
+        (value,) = axes.plot([x], friction_position([reading.value]), ms=4, mew=0.8, **look)
+        value.set(ls="none", zorder=3, label="_value")
     if label:
-        axes.plot([], [], marker[0], color=colour, ms=4, ls="-", lw=1.0, label=label)
+        axes.plot([], [], look["marker"], color=colour, ms=4, ls="-", lw=1.0, label=label)
 
 
 def _draw_joint(axes: Axes, joint: BoundedEstimate) -> None:
@@ -107,7 +96,7 @@ def _draw_macroscopic(axes: Axes, macroscopic: tuple[float, float | None] | None
 
 def _panels(
     comparison: FrictionComparison,
-    draw: Callable[[Axes, FrictionComparison, str, str], None],
+    draw: Callable[[Axes, FrictionComparison, Sequence[LoadComparison]], None],
     height: float,
 ) -> Figure:
     """Draw a row of ``height`` inches for each lubrication, a panel for each loading."""
@@ -119,7 +108,7 @@ def _panels(
         )
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
-                draw(axes, comparison, lubrication, loading)
+                draw(axes, comparison, scale.chosen(comparison, loading, lubrication))
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
         panel_letters(panels.flat)
@@ -144,25 +133,20 @@ def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
 
 def likelihood_figure(comparison: FrictionComparison) -> Figure:
     """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
-    return _panels(comparison, draw_likelihood, 2.4)
+    return _panels(comparison, _draw_likelihood, 2.4)
 
 
-def draw_likelihood(
-    axes: Axes,
-    comparison: FrictionComparison,
-    lubrication: str | None = None,
-    loading: str | None = None,
+def _draw_likelihood(
+    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
 ) -> None:
     """Draw chi-square above its least value of each load and of all loads together."""
-    loading = scale.main_loading(comparison, loading)
-    loads = scale.chosen(comparison, loading, lubrication)
     looks = scale.load_looks(comparison)
     for at_load in loads:
         _draw_curve(axes, at_load.by_profile, *looks[at_load.load], 1.0)
-    joint = comparison.joint[loads[0].lubrication][loading]
+    joint = comparison.joint[loads[0].lubrication][loads[0].loading]
     _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
     draw_levels(axes)
-    scale.friction_axis(axes, "x", r"effective friction coefficient $\mu_e$")
+    scale.friction_axis(axes, "x")
     axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
 
 

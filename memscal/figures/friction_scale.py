@@ -21,8 +21,8 @@ _ALIKE = 1.05
 #: Radii closer than this, in m, count as one.
 _CLOSE = 1e-6
 _TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
-#: Marker and filling of a lubrication, distinct in grey print.
-LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
+#: Marker and filling of a lubrication.
+_LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
 
 
 def friction_position(friction: ArrayLike) -> FloatArray:
@@ -33,13 +33,13 @@ def friction_position(friction: ArrayLike) -> FloatArray:
     return np.where(finite, bounded / (bounded + FRICTION_SCALE), 1.0)
 
 
-def friction_axis(axes: Axes, which: Literal["x", "y"], label: str) -> None:
-    """Give an axis the ticks of friction coefficients from 0 to infinity."""
+def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Give an axis the ticks of effective friction coefficients from 0 to infinity."""
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_ticks(list(friction_position(_TICKS)), [friction_name(mu) for mu in _TICKS])
     margin = 0.02
     (axes.set_xlim if which == "x" else axes.set_ylim)(-margin, 1 + margin)
-    axis.set_label_text(label)
+    axis.set_label_text(r"effective friction coefficient $\mu_e$")
 
 
 def friction_name(friction: float) -> str:
@@ -77,27 +77,27 @@ def load_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
     }
 
 
+def mark(lubrication: str, colour: str) -> dict[str, Any]:
+    """Return marker and colours of points by their lubrication, distinct in grey print."""
+    marker, filled = _LUBRICATIONS.get(lubrication, _LUBRICATIONS[""])
+    return {"marker": marker, "color": colour, "mfc": colour if filled else "white"}
+
+
 def lubricated_words(lubrication: str) -> str:
     """Return a lubrication in words."""
     return lubrication or "lubrication not stated"
 
 
-def main_loading(comparison: FrictionComparison, loading: str | None) -> str:
-    """Return the definition of the loading to draw: the first one unless another is named."""
-    if loading is None:
-        return comparison.loadings[0]
+def chosen(
+    comparison: FrictionComparison, loading: str | None, lubrication: str | None
+) -> list[LoadComparison]:
+    """Return the loads of one loading and lubrication, increasing; of the first by default."""
+    loading = comparison.loadings[0] if loading is None else loading
     if loading not in comparison.loads:
         raise InputError(
             f"The loading {loading!r} was not compared.",
             cure=f"There is {', '.join(repr(name) for name in comparison.loadings)}.",
         )
-    return loading
-
-
-def chosen(
-    comparison: FrictionComparison, loading: str, lubrication: str | None
-) -> list[LoadComparison]:
-    """Return the loads of one lubrication, increasing; the first one measured by default."""
     measured = [at_load.lubrication for at_load in comparison.loads[loading]]
     state = measured[0] if lubrication is None else lubrication
     if state not in measured:
@@ -167,11 +167,9 @@ def draw_errorbar(
     strength: float = 1.0,
 ) -> None:
     """Draw points with their standard uncertainties, in the marker of their lubrication."""
-    marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
-    style: dict[str, Any] = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7}
-    face = colour if filled else "white"
+    style = mark(at_load.lubrication, colour) | {"ls": "none", "ms": 3.0, "mew": 0.6}
     style |= {"label": label or "_points", "alpha": None if strength == 1.0 else strength}
-    axes.errorbar(x, y, u, fmt=marker, color=colour, mfc=face, **style)
+    axes.errorbar(x, y, u, elinewidth=0.7, **style)
 
 
 def share_limits(panels: Sequence[Axes]) -> None:
