@@ -85,7 +85,7 @@ from .model.scan import StressSensor as StressSensor
 from .model.stress import StressProfile as StressProfile
 from .planning.design import design as design
 from .planning.expected import Design as Design
-from .planning.plan import Plan as Plan
+from .planning.expected import Plan as Plan
 from .simulation.experiment import Experiment as Experiment
 from .simulation.experiment import simulate_experiment as simulate_experiment
 from .simulation.rod_scan import simulate as simulate

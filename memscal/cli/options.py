@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
@@ -39,7 +39,6 @@ class Quantity(_Number):
         infinite: bool = False,
     ) -> None:
         self.name = unit
-        self.unit = unit
         self.low, self.high, self.open_low, self.infinite = low, high, open_low, infinite
 
     def convert(
@@ -58,11 +57,11 @@ class Quantity(_Number):
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Return the unit as the name of the value: MM, but MPa."""
-        return self.name.upper() if self.unit.islower() else self.unit
+        return self.name.upper() if self.name.islower() else self.name
 
     @property
     def _in_unit(self) -> str:
-        return f" (in {self.unit})" if self.unit != "ratio" else ""
+        return f" (in {self.name})" if self.name != "ratio" else ""
 
     @property
     def _range(self) -> str:
@@ -124,20 +123,15 @@ def film_options(
     *, defaults: Mapping[str, float] | None = None, uncertainties: bool = True
 ) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
-    values = {} if defaults is None else defaults
     ratio = Quantity("ratio", high=0.5, open_low=False)
-    entries: list[tuple[str, Quantity, str]] = [
-        ("young-modulus", Quantity("MPa"), "Young's modulus of the film, in MPa."),
-        ("poisson-ratio", ratio, "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."),
-        ("thickness", Quantity("mm"), "Thickness of the film, in mm."),
-    ]
-    if uncertainties:
-        words = ("Young's modulus, in MPa.", "Poisson's ratio.", "the thickness, in mm.")
-        entries += [
-            (f"{name}-uncertainty", Quantity(kind.unit, open_low=False), _UNCERTAINTY + about)
-            for (name, kind, _), about in zip(entries, words, strict=True)
-        ]
-    return _all_of(entries, values)
+    modulus_text = "Young's modulus of the film, in MPa."
+    ratio_text = "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."
+    entries = (
+        ("young-modulus", Quantity("MPa"), modulus_text, "Young's modulus, in MPa."),
+        ("poisson-ratio", ratio, ratio_text, "Poisson's ratio."),
+        ("thickness", Quantity("mm"), "Thickness of the film, in mm.", "the thickness, in mm."),
+    )
+    return _measured(entries, defaults or {}, uncertainties)
 
 
 def radius_options(
@@ -148,19 +142,26 @@ def radius_options(
     uncertainties: bool = True,
 ) -> _Adder:
     """Return the option of the indenter's radius, with or without its uncertainty."""
-    entries: list[tuple[str, Quantity, str]] = [
-        ("radius", Quantity("mm"), f"Radius of {of} (not the diameter), in mm.")
-    ]
-    if uncertainties:
-        spread = Quantity("mm", open_low=False)
-        entries.append(("radius-uncertainty", spread, _UNCERTAINTY + "the radius, in mm."))
+    about = f"Radius of {of} (not the diameter), in mm."
     values = {"radius": default, "radius-uncertainty": uncertainty}
-    return _all_of(entries, {name: v for name, v in values.items() if v is not None})
+    radius = ("radius", Quantity("mm"), about, "the radius, in mm.")
+    return _measured([radius], values, uncertainties)
 
 
-def _all_of(entries: list[tuple[str, Quantity, str]], defaults: Mapping[str, float]) -> _Adder:
+def _measured(
+    entries: Sequence[tuple[str, Quantity, str, str]],
+    defaults: Mapping[str, float | None],
+    uncertainties: bool,
+) -> _Adder:
+    """Return the options of quantities, then those of their uncertainties (the last texts)."""
+    options = [(name, kind, about) for name, kind, about, _ in entries]
+    if uncertainties:
+        options += [
+            (f"{name}-uncertainty", Quantity(kind.name, open_low=False), _UNCERTAINTY + of)
+            for name, kind, _, of in entries
+        ]
     return options_of(
-        *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in entries)
+        *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.figures.style import COLOURS
-from memscal.friction.family import FRICTION_SCALE
+from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
@@ -27,10 +27,7 @@ _LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)
 
 def friction_position(friction: ArrayLike) -> FloatArray:
     """Return where a friction coefficient stands on an axis from 0 to infinity: mu/(mu + 0.3)."""
-    mu = np.asarray(friction, dtype=np.float64)
-    finite = np.isfinite(mu)
-    bounded = np.where(finite, mu, 0.0)
-    return np.where(finite, bounded / (bounded + FRICTION_SCALE), 1.0)
+    return bounded(friction, FRICTION_SCALE)
 
 
 def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:

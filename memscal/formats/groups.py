@@ -12,7 +12,7 @@ from memscal.formats.codec import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import Group, Node, Number, index_axis, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
-from memscal.formats.values import any_scalar, json_value, require_array, require_text, units_of
+from memscal.formats.values import any_scalar, require_array, require_text, text_list, units_of
 from memscal.model import records
 from memscal.model.apparatus import ParameterSet
 from memscal.model.checks import QualityCheck
@@ -73,7 +73,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
 
 def read_parameters(file: SafeFile, path: str) -> ParameterSet:
     """Read the parameters, in SI units."""
-    names = tuple(str(name) for name in json_value(file, f"{path}/names", list, []))
+    names = tuple(text_list(file, f"{path}/names"))
     if not names or len(set(names)) != len(names):
         raise FormatError(
             f"{file.where(path)}/names is missing or names a parameter twice.",
@@ -96,8 +96,8 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
 
 def estimated_record(file: SafeFile, path: str) -> Record:
     """Return what the group of the parameters holds, by the names that the file gives them."""
-    names = json_value(file, f"{path}/names", list, [])
-    return record("NXcollection", *(estimated_quantity(str(name)) for name in names))
+    names = text_list(file, f"{path}/names")
+    return record("NXcollection", *map(estimated_quantity, names))
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
@@ -114,15 +114,10 @@ def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[
 
 def read_budget(file: SafeFile, path: str) -> dict[str, dict[str, float]]:
     """Read the uncertainty budget, in SI units; empty where there is none."""
-    if not file.has(path):
-        return {}
-
-    def names(group: str) -> list[str]:
-        return [str(name) for name in json_value(file, f"{group}/names", list, [])]
-
+    groups = {name: f"{path}/{name}" for name in text_list(file, f"{path}/names")}
     return {
-        q: {source: any_scalar(file, f"{path}/{q}/{source}")[0] for source in names(f"{path}/{q}")}
-        for q in names(path)
+        name: {s: any_scalar(file, f"{group}/{s}")[0] for s in text_list(file, f"{group}/names")}
+        for name, group in groups.items()
     }
 
 
@@ -274,4 +269,4 @@ def read_quality(file: SafeFile, path: str) -> tuple[QualityCheck, ...]:
         defaults = {"name": name, "meaning": ""}
         return QualityCheck(**read_record(records.CHECK, file, f"{path}/{name}", defaults=defaults))
 
-    return tuple(check(str(name)) for name in json_value(file, f"{path}/names", list, []))
+    return tuple(map(check, text_list(file, f"{path}/names")))

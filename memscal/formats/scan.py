@@ -17,7 +17,7 @@ from memscal.formats.files import ensure_writable
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si
-from memscal.formats.values import any_scalar, json_value, optional_text
+from memscal.formats.values import any_scalar, optional_text, text_list
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import by_name
@@ -245,11 +245,11 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
     path = "/entry/synthetic"
     if not file.is_group(path):
         return None
-    truth: dict[str, Any] = {}
-    for name in json_value(file, f"{path}/names", list, []):
-        item = f"{path}/{name}"
-        truth[str(name)] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
-    return truth
+    items = {name: f"{path}/{name}" for name in text_list(file, f"{path}/names")}
+    return {
+        name: file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
+        for name, item in items.items()
+    }
 
 
 def ensure_folder_writable(

@@ -124,6 +124,11 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     return value
 
 
+def text_list(file: SafeFile, path: str) -> list[str]:
+    """Return the texts of a JSON list, such as names; none where there is no list."""
+    return [str(text) for text in json_value(file, path, list, [])]
+
+
 _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")
 
 

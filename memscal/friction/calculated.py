@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -178,11 +179,10 @@ class LawFamilies:
     def __init__(
         self, profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
     ) -> None:
-        scan = profiles[0].scan
-        self.film: ElasticFilm = scan.film
+        self.film: ElasticFilm = profiles[0].scan.film
+        self.indenter: Indenter = profiles[0].scan.indenter
         reach = _REACH * max(float(profile.r[-1]) for profile in profiles)
-        how = {"indenter": scan.indenter, "reach": reach, "cache": cache, "workers": workers}
-        self._how: dict[str, Any] = how
+        self._how: dict[str, Any] = {"reach": reach, "cache": cache, "workers": workers}
 
     def rigid(
         self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
@@ -190,10 +190,7 @@ class LawFamilies:
         """Return incremental contacts of Amontons' law, from no friction to full stick."""
         if calculated is not None and tuple(calculated.values[[0, -1]]) != (0.0, math.inf):
             calculated = None
-
-        def family(loads: FloatArray) -> ProfileFamily:
-            return amontons_family(self.film, loads=loads, **self._how)
-
+        family = partial(amontons_family, self.film, self.indenter, **self._how)
         return _at_loads(profiles, calculated, family)
 
     def slipping(
@@ -206,7 +203,7 @@ class LawFamilies:
         """Return contacts of the elasto-plastic law at a macroscopic coefficient."""
 
         def family(loads: FloatArray) -> ProfileFamily:
-            how = {"loads": loads, **self._how}
+            how = {"indenter": self.indenter, "loads": loads, **self._how}
             made = elasto_plastic_family(self.film, friction=friction, **how)
             if uncertainty is None:
                 return made
@@ -227,10 +224,7 @@ class LawFamilies:
         self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
     ) -> ProfileFamily:
         """Return contacts without friction that yield normally."""
-
-        def family(loads: FloatArray) -> ProfileFamily:
-            return normal_compliance_family(self.film, loads=loads, **self._how)
-
+        family = partial(normal_compliance_family, self.film, self.indenter, **self._how)
         return _at_loads(profiles, calculated, family)
 
 

@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.friction.family import bounded
 from memscal.model.arrays import FloatArray
 
 #: Paths through the loads along which a parameter of each load is drawn: a power of two.
@@ -176,12 +177,7 @@ class Prior:
 
 def bounded_prior(scale: float, words: str) -> Prior:
     """Return the prior that is uniform in the bounded coordinate about a ``scale``."""
-
-    def below(values: FloatArray) -> FloatArray:
-        finite = np.where(np.isfinite(values), values, 0.0)
-        return np.where(np.isfinite(values), finite / (finite + scale), 1.0)
-
-    return Prior(words, below)
+    return Prior(words, lambda values: bounded(values, scale))
 
 
 def log_uniform_prior(low: float, high: float, words: str) -> Prior:

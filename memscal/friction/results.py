@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck
+from memscal.model.checks import Message, QualityCheck, state_of_checks
 from memscal.model.notation import format_bound
 from memscal.model.result import Result
 
@@ -222,9 +222,7 @@ class FrictionComparison(Result):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        failed = [check.name for check in self.checks if not check.passed]
-        state = f"failed: {', '.join(failed)}" if failed else "all checks passed"
-        return f"<FrictionComparison: {_joint_text(self.joint)}; {state}>"
+        return f"<FrictionComparison: {_joint_text(self.joint)}; {state_of_checks(self.checks)}>"
 
     @property
     def passed(self) -> bool:

@@ -6,7 +6,7 @@ import math
 import platform
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 
 import numpy as np
@@ -19,8 +19,8 @@ from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement.measured_profile import (
     ContactSignal,
     PreparedScan,
-    SingleLoad,
     contact_signal,
+    load_of,
     measured_profile,
     measured_scan,
     place_of,
@@ -109,12 +109,6 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
     """Standard uncertainties of force over load, by source."""
     budget = {source: u / profile.load for source, u in profile.force_budget.items()}
     return {**budget, "load": (profile.load_uncertainty or 0.0) / profile.load}
-
-
-def checks_of_restoration(restoration: Restoration, *, stated: bool) -> tuple[QualityCheck, ...]:
-    """Return the checks of a restoration that hold for its profile; ``stated``: the noise is."""
-    left_out = {_REPLACED} if stated else {_REPLACED, *_OF_STATED_NOISE}
-    return tuple(check for check in restoration.checks if check.name not in left_out)
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:
@@ -215,8 +209,8 @@ def measure_stress(
         for origin, data in zip(origins, scans, strict=True)
         for single in single_loads(data)
     ]
-    profiles = tuple(load.profile for load in loads)
-    checks = stress_checks(profiles, [load.checks for load in loads])
+    profiles, restored, notes = zip(*loads, strict=True)
+    checks = stress_checks(profiles, restored)
     return MeasuredStress(
         profiles=profiles,
         scans=origins,
@@ -234,7 +228,7 @@ def measure_stress(
                 "numpy": np.__version__,
                 "scipy": scipy.__version__,
             },
-            messages=tuple(_messages(loads, sensor, checks, overridden)),
+            messages=tuple(_messages(notes, sensor, checks, overridden)),
         ),
         artifact=sensor.source,
         artifact_digest=sensor.content_digest,
@@ -282,55 +276,45 @@ def _files_of(measured: MeasuredStress) -> str:
     return ", ".join(names) or f"{measured.profiles[0].label} and on"
 
 
-@dataclass(frozen=True, eq=False)
-class _MeasuredLoad:
-    """The profile of one load, with checks and messages of its restoration."""
-
-    profile: MeasuredProfile
-    checks: tuple[QualityCheck, ...]
-    messages: tuple[Message, ...]
-
-
-def _measure(origin: MeasuredScan, single: SingleLoad, sensor: ApparatusFunction) -> _MeasuredLoad:
-    signal = contact_signal(single, sensor)
-    require_points(single, signal)
-    prepared = _prepared(single, sensor, signal)
+def _measure(
+    origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction
+) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
+    """Return the profile of a scan of one load, with checks and messages of its restoration."""
+    signal = contact_signal(scan, sensor)
+    require_points(scan, signal)
+    prepared = _prepared(scan, sensor, signal)
     try:
         restored = restore_known(prepared.scan, sensor)
     except (FitError, InputError) as failure:
-        raise _placed(failure, single) from failure
-    require_ends(single, signal, restored.centre)
-    profile = measured_profile(origin, single, prepared, restored, signal)
+        raise _placed(failure, scan) from failure
+    require_ends(scan, signal, restored.centre)
+    profile = measured_profile(origin, scan, prepared, restored, signal)
     estimated = prepared.noise_estimated or restored.points.u_errors is None
     noise = profile.points["zz"].noise if estimated else None
-    return _MeasuredLoad(
-        profile=profile,
-        checks=checks_of_restoration(restored, stated=not estimated),
-        messages=tuple(_of_profile(single.scan, restored, noise)),
-    )
+    left_out = {_REPLACED, *_OF_STATED_NOISE} if estimated else {_REPLACED}
+    checks = [check for check in restored.checks if check.name not in left_out]
+    return profile, checks, list(_of_profile(scan, restored, noise))
 
 
-def _prepared(single: SingleLoad, sensor: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
+def _prepared(scan: Scan, sensor: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
     try:
-        return prepared_scan(single, sensor, signal)
+        return prepared_scan(scan, sensor, signal)
     except (FitError, InputError) as failure:
         # A scan that is too short fails here already, and in less plain words.
-        scan = single.scan
         if scan.y is None:
             top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
-            require_ends(single, signal, np.full(2, scan.x[top]))
-        raise _placed(failure, single) from failure
+            require_ends(scan, signal, np.full(2, scan.x[top]))
+        raise _placed(failure, scan) from failure
 
 
-def _placed(failure: FitError | InputError, single: SingleLoad) -> FitError | InputError:
+def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
     """Return the error with its file and load in front."""
-    return type(failure)(
-        f"{place_of(single.scan, single)}: {failure.problem}", why=failure.why, cure=failure.cure
-    )
+    problem = f"{load_of(scan)}: {failure.problem}"
+    return type(failure)(problem, why=failure.why, cure=failure.cure)
 
 
 def _messages(
-    loads: Sequence[_MeasuredLoad],
+    notes: Sequence[Sequence[Message]],
     sensor: ApparatusFunction,
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
@@ -342,11 +326,11 @@ def _messages(
     yield from failed_calibration_messages(sensor)
     # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}
-    for i, load in enumerate(loads):
-        for message in load.messages:
-            numbers.setdefault(message, []).append(str(i + 1))
+    for i, of_load in enumerate(notes, start=1):
+        for message in of_load:
+            numbers.setdefault(message, []).append(str(i))
     for message, of_profiles in numbers.items():
-        place = "" if len(of_profiles) == len(loads) else f"Profile {', '.join(of_profiles)}: "
+        place = "" if len(of_profiles) == len(notes) else f"Profile {', '.join(of_profiles)}: "
         yield replace(message, text=f"{place}{message.text}")
 
 

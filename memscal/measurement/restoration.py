@@ -18,7 +18,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck, chi_square_limit
+from memscal.model.checks import Message, QualityCheck, chi_square_limit, state_of_checks
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.result import Result
@@ -167,8 +167,7 @@ class Restoration(Result):
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
         force = format_measured(self.force, self.force_uncertainty, "N")
-        failed = [check.name for check in self.checks if not check.passed]
-        state = f"failed: {', '.join(failed)}" if failed else "all checks passed"
+        state = state_of_checks(self.checks)
         return f"<Restoration: force {force}, {self.r.size} radii, {state}>"
 
     @property

@@ -16,8 +16,7 @@ from memscal.errors import FitError, InputError
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.parallel import single_threaded
-from memscal.planning.expected import Design, evaluate
-from memscal.planning.plan import Plan
+from memscal.planning.expected import Design, Plan, evaluate
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 TARGETS = {

@@ -6,8 +6,7 @@ from helpers.scans import shear_scan
 from matplotlib.figure import Figure
 
 import memscal
-from memscal.figures.calibration import calibration_figure
-from memscal.figures.scan import draw_scan, draw_scan_log
+from memscal.figures.calibration import calibration_figure, draw_scan, draw_scan_log
 from memscal.model.apparatus import ApparatusData
 
 

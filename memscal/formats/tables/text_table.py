@@ -187,18 +187,13 @@ def _find_decimal(rows: tuple[tuple[str, ...], ...], delimiter: str) -> str:
     return "," if any("," in c for c in cells) and not any("." in c for c in cells) else "."
 
 
-def read_indenter_table(
-    path: str | os.PathLike[str],
-    *,
-    r: str | int = 1,
-    z: str | int = 2,
-    r_unit: str = "mm",
-    z_unit: str = "um",
-) -> Profile:
-    r"""Read an indenter's profile from a table with one row per radius."""
+def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: str) -> Profile:
+    """Read an indenter's profile from a table with one row per radius: radius and height."""
     table = read_table(path)
-    radii = to_si(table.column(r), r_unit, "length", table.where(r))
-    heights = to_si(table.column(z), z_unit, "length", table.where(z))
+    radii, heights = (
+        to_si(table.column(column), unit, "length", table.where(column))
+        for column, unit in ((1, r_unit), (2, z_unit))
+    )
     try:
         # What a microscope calls zero is anywhere.
         return Profile(r=radii, z=heights - heights.min())
