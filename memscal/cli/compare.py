@@ -236,7 +236,7 @@ def _show(
 
     from memscal.formats.files import read_bytes
     from memscal.model.provenance import SourceFile
-    from memscal.summaries.comparison import file_json, notes, tables
+    from memscal.summaries.comparison import file_json, notes
 
     if as_json:
         source = SourceFile(artifact.name, hashlib.sha256(read_bytes(artifact)).hexdigest())
@@ -247,5 +247,5 @@ def _show(
         }
         out.emit_json(comparison.to_dict() | files)
     else:
-        out.emit_tables(*tables(comparison))
+        out.emit_tables(*comparison.tables())
     out.show_messages(notes(comparison))

@@ -129,9 +129,7 @@ def command(
     if as_json:
         out.emit_json({"schema_version": "1", **planned.to_dict()})
     else:
-        from memscal.summaries.design import tables
-
-        out.emit_tables(*tables(planned))
+        out.emit_tables(*planned.tables())
     out.note(_HIDDEN.format(what=_BY_PRIOR if planned.method == "bayesian" else _BY_WINDOW))
     for path in figures:
         out.message(f"Written: {path}")

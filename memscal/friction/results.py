@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck, state_of_checks
+from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.notation import format_bound
 from memscal.model.result import Result
 
@@ -201,7 +201,7 @@ def _joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrictionComparison(Result):
+class FrictionComparison(Result, Checked):
     """Measured stress against calculated contacts, with the friction that explains it.
 
     Printed, it is the tables of ``memscal compare``.
@@ -223,11 +223,6 @@ class FrictionComparison(Result):
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
         return f"<FrictionComparison: {_joint_text(self.joint)}; {state_of_checks(self.checks)}>"
-
-    @property
-    def passed(self) -> bool:
-        """Whether every quality check passed."""
-        return all(check.passed for check in self.checks)
 
     @property
     def loadings(self) -> tuple[str, ...]:

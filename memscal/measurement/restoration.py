@@ -18,7 +18,7 @@ from memscal.estimation.points import ScanPoints
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Message, QualityCheck, chi_square_limit, state_of_checks
+from memscal.model.checks import Checked, Message, QualityCheck, chi_square_limit, state_of_checks
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.result import Result
@@ -128,7 +128,7 @@ def read_expected(expected: Expected) -> StressProfile | Contact:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Restoration(Result):
+class Restoration(Result, Checked):
     r"""The stress at the film's base that explains a scan, with its uncertainty.
 
     Parameters
@@ -169,11 +169,6 @@ class Restoration(Result):
         force = format_measured(self.force, self.force_uncertainty, "N")
         state = state_of_checks(self.checks)
         return f"<Restoration: force {force}, {self.r.size} radii, {state}>"
-
-    @property
-    def passed(self) -> bool:
-        """Whether every quality check passed."""
-        return all(check.passed for check in self.checks)
 
     @property
     def points(self) -> ScanPoints:

@@ -146,16 +146,8 @@ class Plan:
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Expected:
-    """Steps and results (parameters, budget, covariances) of a planned scan's calibration."""
-
-    solution: Solution
-    results: Results
-
-
-def expected_calibration(plan: Plan, method: Method) -> Expected:
-    """Calibrate the planned scan, with expected squares in place of data."""
+def _expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]:
+    """Calibrate the planned scan, with expected squares in place of data: steps and results."""
     scan = plan.scan()
     require_calibration_rod(scan)
     stress = reference_contact(plan.film, plan.rod, plan.load)
@@ -183,7 +175,7 @@ def expected_calibration(plan: Plan, method: Method) -> Expected:
     effects = input_effects(solution.scans, solution.stresses, estimate)
     wavenumbers = fields.along_axis(deconvolution.quotient.window)[0]
     results = propagate(solution, deconvolution, wavenumbers, effects, {}, drawn_scatter(solution))
-    return Expected(solution, results)
+    return solution, results
 
 
 def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
@@ -266,8 +258,7 @@ class Design(Result):
 def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> Design:
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
     chosen = chosen_method(method, {}, seed=seed)
-    expected = expected_calibration(plan, chosen)
-    solution, results = expected.solution, expected.results
+    solution, results = _expected_calibration(plan, chosen)
     deconvolution, fields = solution.deconvolution, solution.fields
     k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)))
     return Design(

@@ -25,10 +25,7 @@ _RESULTS = (
 
 def tables(result: Sweep) -> list[Table]:
     """Return every second amplitude: the exact expectation, and the median of the draws."""
-    # The power of ten stands in the head in place of a row of zeros.
-    values = result.conversion_constant / MV
-    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
-    power = int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
+    power = power_of_ten(result.conversion_constant / MV)
     scales, forms = (MV * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
     for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
@@ -43,6 +40,12 @@ def tables(result: Sweep) -> list[Table]:
     head = ("amplitude", f"A (1e{power} mV/Pa)", "σ(G) (mm)", "rms (%)")
     rows = list(zip(*columns, strict=True))[::2]
     return [Table(title, (*head, "A, draws", "σ(G), draws", "rms, draws"), rows)]
+
+
+def power_of_ten(values: FloatArray) -> int:
+    """Return the power of ten to name in a head or label in place of a row of zeros."""
+    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+    return int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
 
 
 def mapping(result: Sweep) -> dict[str, Any]:

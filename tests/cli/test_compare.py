@@ -14,8 +14,7 @@ from helpers.scans import known_apparatus
 import memscal
 from memscal.cli.compare import cache_from, user_cache_folder
 from memscal.cli.failures import CHECK_FAILED
-from memscal.simulation.contact_scan import PAPER_SPHERE
-from memscal.simulation.experiment import simulate_experiment
+from memscal.simulation.experiment import PAPER_SPHERE, simulate_experiment
 from memscal.simulation.rod_scan import PAPER_FILM
 
 CHECKED, USAGE, REFUSED, NOT_WRITTEN = CHECK_FAILED, 2, 3, 4
