@@ -14,13 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
+from memscal.figures import friction_profiles as profiles
 from memscal.figures import friction_scale as scale
-from memscal.figures.friction_profiles import (
-    draw_profiles,
-    draw_residuals,
-    friction_set_figure,
-    profile_figure,
-)
 from memscal.figures.friction_scale import friction_name, friction_position, lubricated_words
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
 from memscal.friction.family import bounded
@@ -225,9 +220,9 @@ def comparison_figure(
     with house_style():
         figure = new_figure(5.6)
         panels = figure.subplots(2, 2)
-        draw_profiles(panels[0, 0], comparison, loads)
+        profiles.draw_profiles(panels[0, 0], comparison, loads)
         _draw_maxima(panels[0, 1], comparison, loads[0].loading)
-        draw_residuals(panels[1, 0], comparison, loads, 0)
+        profiles.draw_residuals(panels[1, 0], comparison, loads, 0)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
         draw_effective(panels[1, 1], comparison, loads)
         legend_above(panels[1, 1], columns=2)
@@ -242,8 +237,10 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     for lubrication in dict.fromkeys(measured):
         tail = f"-{lubrication}" if lubrication else ""
         of_state = {"lubrication": lubrication}
-        figures[f"profiles{tail}"] = partial(profile_figure, comparison, **of_state)
-        figures[f"friction-set{tail}"] = partial(friction_set_figure, comparison, **of_state)
+        figures[f"profiles{tail}"] = partial(profiles.profile_figure, comparison, **of_state)
+        figures[f"friction-set{tail}"] = partial(
+            profiles.friction_set_figure, comparison, **of_state
+        )
     figures["maxima"] = partial(maxima_figure, comparison)
     figures["effective-friction"] = partial(effective_friction_figure, comparison)
     figures["likelihood"] = partial(likelihood_figure, comparison)

@@ -14,16 +14,9 @@ from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
+from memscal.friction import effective
 from memscal.friction.calculated import FRICTIONS, amontons_family
 from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
-from memscal.friction.effective import (
-    Confrontation,
-    confront,
-    dry_against_lubricated,
-    load_comparison,
-    lubricated_pairs,
-    with_loading,
-)
 from memscal.friction.external import external_family
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import load_points, sensor_of
@@ -253,7 +246,9 @@ def compare_measured(
     """Compare measured stress with families by loading, which hold every measured load."""
     confronted = _confronted(measured, apparatus, families)
     loads = {
-        name: tuple(load_comparison(p, of_family, i) for i, p in enumerate(measured.profiles))
+        name: tuple(
+            effective.load_comparison(p, of_family, i) for i, p in enumerate(measured.profiles)
+        )
         for name, of_family in confronted.items()
     }
     loads, joint = _loading_counted(loads, _joint(measured, confronted))
@@ -315,12 +310,12 @@ def _confronted(
     apparatus: ApparatusFunction,
     families: Mapping[str, ProfileFamily],
     channel: str = "zz",
-) -> dict[str, Confrontation]:
+) -> dict[str, effective.Confrontation]:
     """Hold the points of every profile against each family."""
     points = [load_points(profile, channel) for profile in measured.profiles]
     reach = float(max(of_load.radius.max() for of_load in points))
     return {
-        name: confront(
+        name: effective.confront(
             family,
             sensor_of(apparatus, family, reach),
             points,
@@ -331,7 +326,7 @@ def _confronted(
 
 
 def _joint(
-    measured: MeasuredStress, confronted: Mapping[str, Confrontation]
+    measured: MeasuredStress, confronted: Mapping[str, effective.Confrontation]
 ) -> dict[str, dict[str, BoundedEstimate]]:
     """Return the coefficient of all loads together, for each state of lubrication."""
     by_lubrication: dict[str, list[int]] = {}
@@ -356,24 +351,26 @@ def _loading_counted(
         name: tuple(
             replace(
                 mine,
-                by_maximum=with_loading(mine.by_maximum, theirs.by_maximum),
-                by_profile=with_loading(mine.by_profile, theirs.by_profile),
+                by_maximum=effective.with_loading(mine.by_maximum, theirs.by_maximum),
+                by_profile=effective.with_loading(mine.by_profile, theirs.by_profile),
             )
             for mine, theirs in zip(loads[name], loads[other[name]], strict=True)
         )
         for name in names
     }
     together = {
-        kind: {name: with_loading(by[name], by[other[name]]) for name in names}
+        kind: {name: effective.with_loading(by[name], by[other[name]]) for name in names}
         for kind, by in joint.items()
     }
     return counted, together
 
 
-def _pairs(measured: MeasuredStress, confronted: Confrontation) -> tuple[DryAgainstLubricated, ...]:
+def _pairs(
+    measured: MeasuredStress, confronted: effective.Confrontation
+) -> tuple[DryAgainstLubricated, ...]:
     frictionless = confronted.family.at(confronted.family.values[:1])
     pairs = (
-        dry_against_lubricated(
+        effective.dry_against_lubricated(
             (measured.profiles[i], measured.profiles[j]),
             (confronted.points[i], confronted.points[j]),
             confronted.sensor,
@@ -381,7 +378,7 @@ def _pairs(measured: MeasuredStress, confronted: Confrontation) -> tuple[DryAgai
             (confronted.loads[i], confronted.loads[j]),
             measured.conversion_constant_uncertainty / measured.conversion_constant,
         )
-        for i, j in lubricated_pairs(measured.profiles)
+        for i, j in effective.lubricated_pairs(measured.profiles)
     )
     return tuple(pair for pair in pairs if pair is not None)
 

@@ -16,27 +16,9 @@ from scipy.special import erfc
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
 from memscal.formats.opened import Scans, opened_scans
-from memscal.measurement.measured_profile import (
-    ContactSignal,
-    PreparedScan,
-    contact_signal,
-    load_of,
-    measured_profile,
-    measured_scan,
-    place_of,
-    prepared_scan,
-    require_ends,
-    require_points,
-    single_loads,
-)
+from memscal.measurement import measured_profile as one_load
+from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
-from memscal.measurement.restore import (
-    accept_mismatches,
-    failed_calibration_messages,
-    noise_unstated_message,
-    require_covariance,
-    restore_known,
-)
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
     FAILED_CALIBRATION,
@@ -197,17 +179,19 @@ def measure_stress(
     True
     """
     sensor, scans = opened_apparatus(apparatus), opened_scans(scan)
-    require_covariance(sensor)
+    restore.require_covariance(sensor)
     overridden = tuple(
         text
         for data in scans
-        for text in accept_mismatches(data, sensor, place_of(data), override=override)
+        for text in restore.accept_mismatches(
+            data, sensor, one_load.place_of(data), override=override
+        )
     )
-    origins = tuple(measured_scan(data) for data in scans)
+    origins = tuple(one_load.measured_scan(data) for data in scans)
     loads = [
         _measure(origin, single, sensor)
         for origin, data in zip(origins, scans, strict=True)
-        for single in single_loads(data)
+        for single in one_load.single_loads(data)
     ]
     profiles, restored, notes = zip(*loads, strict=True)
     checks = stress_checks(profiles, restored)
@@ -280,15 +264,15 @@ def _measure(
     origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction
 ) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
     """Return the profile of a scan of one load, with checks and messages of its restoration."""
-    signal = contact_signal(scan, sensor)
-    require_points(scan, signal)
+    signal = one_load.contact_signal(scan, sensor)
+    one_load.require_points(scan, signal)
     prepared = _prepared(scan, sensor, signal)
     try:
-        restored = restore_known(prepared.scan, sensor)
+        restored = restore.restore_known(prepared.scan, sensor)
     except (FitError, InputError) as failure:
         raise _placed(failure, scan) from failure
-    require_ends(scan, signal, restored.centre)
-    profile = measured_profile(origin, scan, prepared, restored, signal)
+    one_load.require_ends(scan, signal, restored.centre)
+    profile = one_load.measured_profile(origin, scan, prepared, restored, signal)
     estimated = prepared.noise_estimated or restored.points.u_errors is None
     noise = profile.points["zz"].noise if estimated else None
     left_out = {_REPLACED, *_OF_STATED_NOISE} if estimated else {_REPLACED}
@@ -296,20 +280,22 @@ def _measure(
     return profile, checks, list(_of_profile(scan, restored, noise))
 
 
-def _prepared(scan: Scan, sensor: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
+def _prepared(
+    scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
+) -> one_load.PreparedScan:
     try:
-        return prepared_scan(scan, sensor, signal)
+        return one_load.prepared_scan(scan, sensor, signal)
     except (FitError, InputError) as failure:
         # A scan that is too short fails here already, and in less plain words.
         if scan.y is None:
             top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
-            require_ends(scan, signal, np.full(2, scan.x[top]))
+            one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
         raise _placed(failure, scan) from failure
 
 
 def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
     """Return the error with its file and load in front."""
-    problem = f"{load_of(scan)}: {failure.problem}"
+    problem = f"{one_load.load_of(scan)}: {failure.problem}"
     return type(failure)(problem, why=failure.why, cure=failure.cure)
 
 
@@ -323,7 +309,7 @@ def _messages(
     yield from failed_check_messages(checks)
     for text in overridden:
         yield Message("overridden", f"Overridden: {text}.", "warning")
-    yield from failed_calibration_messages(sensor)
+    yield from restore.failed_calibration_messages(sensor)
     # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}
     for i, of_load in enumerate(notes, start=1):
@@ -337,7 +323,7 @@ def _messages(
 def _of_profile(scan: Scan, restored: Restoration, noise: FloatArray | None) -> Iterator[Message]:
     """Yield the messages of one load; ``noise``: where it was estimated, in V."""
     if noise is not None:
-        yield noise_unstated_message(float(noise.min()))
+        yield restore.noise_unstated_message(float(noise.min()))
     if scan.normal_load is not None and scan.normal_load_errors is None:
         yield Message(
             "load_errors_unstated",

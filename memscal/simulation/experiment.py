@@ -18,14 +18,8 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan, StressSensor
 from memscal.parallel import single_threaded
+from memscal.simulation import sensor
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, simulate
-from memscal.simulation.sensor import (
-    Disturbances,
-    apparatus_function,
-    blurred_stress,
-    disturbance,
-    shear_channel,
-)
 
 # Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
 # its smallest value: closer ones would show the solver's own error.
@@ -42,7 +36,9 @@ class LoadPath:
 
     def at_nominal(self, kernel: RadialKernel, radius: FloatArray) -> FloatArray:
         """Return the blurred stress at every nominal load, shape (loads, *radius.shape), in Pa."""
-        return blurred_stress([state[len(state) // 2] for state in self.states], kernel, radius)
+        return sensor.blurred_stress(
+            [state[len(state) // 2] for state in self.states], kernel, radius
+        )
 
     def near(
         self,
@@ -53,7 +49,7 @@ class LoadPath:
         order: int = 0,  # one for the shear's radial component
     ) -> FloatArray:
         """Return the blurred stress (Pa) at ``radius`` (m); ``ratio``: load over nominal."""
-        values = blurred_stress(self.states[index], kernel, radius, order=order)
+        values = sensor.blurred_stress(self.states[index], kernel, radius, order=order)
         if len(values) == 1:
             return np.asarray(values[0])
         below, middle, above = values
@@ -150,8 +146,8 @@ def simulate_contacts(
             f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
             "largest signal; they must be finite."
         )
-    interface, truth = interface or Interface(), apparatus_function(kernel)
-    shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
+    interface, truth = interface or Interface(), sensor.apparatus_function(kernel)
+    shear = sensor.shear_channel(channels, shear_kernel, shear_conversion_constant)
     law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
     path = pressed_path(
         lambda at: indent(film, sphere, load=at, strain="linear", **law),
@@ -167,14 +163,14 @@ def simulate_contacts(
     nominal = path.at_nominal(truth, np.hypot(x - centre[0], centre[1]))
     largest = conversion_constant * float(nominal.max())
     signal = np.stack([path.near(int(j), truth, away[i], ratio[i]) for i, j in enumerate(row)])
-    added = disturbance(x, baseline, drift) + noise * draws["noise"]
+    added = sensor.disturbance(x, baseline, drift) + noise * draws["noise"]
     u = conversion_constant * signal + largest * added
     stated = np.broadcast_to(loads[row, None], u.shape)
     unsure = load_scatter
     if record_loads:
         stated, unsure = stated * ratio * (1 + load_reading * draws["reading"]), load_reading
     shape = u.shape[1:] if len(u) == 1 else u.shape
-    disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
+    disturbed = sensor.Disturbances(noise, baseline, drift, state_noise, seed)
     channel_data: dict[str, FloatArray] = {}
     shear_truth: dict[str, float | str] = {}
     if shear is not None:

@@ -10,13 +10,7 @@ from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.formats.meshes.mesh_files import Cells, Mesh, read_mesh
-from memscal.formats.tables.reference import (
-    ImportedProfile,
-    Samples,
-    profile_of,
-    require_numbers,
-    require_sign,
-)
+from memscal.formats.tables import reference
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes
@@ -292,16 +286,16 @@ def read_reference_mesh(
     film: ElasticFilm | None = None,
     indenter: Indenter | None = None,
     solver: str = "",
-) -> ImportedProfile:
+) -> reference.ImportedProfile:
     """Read the stress at the base of the film from a mesh: a section, or a film in 3-D.
 
     ``sigma`` is a field of the normal stress or of a tensor of 4, 6 or 9 components, ``"name:2"``
     component 2.  ``base`` and ``centre`` are in m, ``load`` in N.  Without ``shear_sign`` the shear
     is taken for the stress component rz; with 1, for the radial traction of the base on the film.
     """
-    require_sign("sign", sign)
+    reference.require_sign("sign", sign)
     if shear_sign is not None:
-        require_sign("shear sign", shear_sign)
+        reference.require_sign("shear sign", shear_sign)
     mesh = read_mesh(path)
     name = mesh.source.file_name
     frame = find_frame(mesh, to_si(mesh.points, r_unit, "length", name), vertical)
@@ -324,7 +318,7 @@ def read_reference_mesh(
         values = _at_base(mesh, frame, footing, tangential)[1]
         columns["sigma_rz"] = turned * to_si(values, sigma_unit, "stress", name)
         notes.append(_component_note(tangential, "Radial shear", f"times {turned}"))
-    samples = Samples(
+    samples = reference.Samples(
         columns=columns,
         source=mesh.source,
         notes=notes,
@@ -336,12 +330,12 @@ def read_reference_mesh(
         discretisation=f"{mesh.size}, {len(footing.nodes)} nodes on the base",
     )
     samples = _along_radius(samples, frame, places, centre or (0.0, 0.0))
-    return profile_of(samples, load=load, film=film, indenter=indenter, solver=solver)
+    return reference.profile_of(samples, load=load, film=film, indenter=indenter, solver=solver)
 
 
 def _along_radius(
-    samples: Samples, frame: Frame, places: FloatArray, centre: tuple[float, float]
-) -> Samples:
+    samples: reference.Samples, frame: Frame, places: FloatArray, centre: tuple[float, float]
+) -> reference.Samples:
     """Give samples their radii: those of a section as they are, those of a plane by circles."""
     if len(frame.radial) == 1:
         r = np.where(np.abs(places[:, 0]) <= frame.tolerance, 0.0, places[:, 0])
@@ -352,7 +346,7 @@ def _along_radius(
                 cure="Name the axis across the film (vertical; --vertical), or give a finer mesh.",
             )
         return replace(samples, columns={"r": r, **samples.columns})
-    require_numbers(samples)  # a mean would leave out what is missing
+    reference.require_numbers(samples)  # a mean would leave out what is missing
     columns, note = average_over_circles(places - np.array(centre), samples.columns)
     return replace(samples, columns=columns, notes=[*samples.notes, *import_notes([note])])
 
