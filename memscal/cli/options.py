@@ -39,6 +39,7 @@ class Quantity(_Number):
         infinite: bool = False,
     ) -> None:
         self.name = unit
+        self.unit = unit
         self.low, self.high, self.open_low, self.infinite = low, high, open_low, infinite
 
     def convert(
@@ -57,11 +58,11 @@ class Quantity(_Number):
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Return the unit as the name of the value: MM, but MPa."""
-        return self.name.upper() if self.name.islower() else self.name
+        return self.name.upper() if self.unit.islower() else self.unit
 
     @property
     def _in_unit(self) -> str:
-        return f" (in {self.name})" if self.name != "ratio" else ""
+        return f" (in {self.unit})" if self.unit != "ratio" else ""
 
     @property
     def _range(self) -> str:
@@ -157,7 +158,7 @@ def _measured(
     options = [(name, kind, about) for name, kind, about, _ in entries]
     if uncertainties:
         options += [
-            (f"{name}-uncertainty", Quantity(kind.name, open_low=False), _UNCERTAINTY + of)
+            (f"{name}-uncertainty", Quantity(kind.unit, open_low=False), _UNCERTAINTY + of)
             for name, kind, _, of in entries
         ]
     return options_of(

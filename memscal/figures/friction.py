@@ -17,7 +17,7 @@ from memscal.errors import InputError
 from memscal.figures import friction_profiles as profiles
 from memscal.figures import friction_scale as scale
 from memscal.figures.friction_scale import friction_name, friction_position, lubricated_words
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
+from memscal.figures.style import COLOURS, legend_above, panels_of
 from memscal.friction.family import bounded
 from memscal.friction.results import (
     BoundedEstimate,
@@ -51,17 +51,14 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
             "There is no law of the interface to draw.",
             cure="Compare with interface=True and a macroscopic friction coefficient.",
         )
-    with house_style():
-        figure = new_figure(3.0)
-        slip = laws.tangential
-        implied = None if slip is None else slip.implied
-        panels = figure.subplots(1, 2 if implied is None else 3)
+    slip = laws.tangential
+    implied = None if slip is None else slip.implied
+    with panels_of(3.0, 1, 2 if implied is None else 3) as (figure, panels):
         _draw_lengths(panels[0], laws.by_direction)
         _draw_marginal_likelihoods(panels[1], laws.by_direction)
         if slip is not None and implied is not None:
             measured = [load for load in loads if load.lubrication == slip.lubrication]
             _draw_implied(panels[2], implied, measured)
-        panel_letters(panels)
     return figure
 
 
@@ -129,14 +126,11 @@ _ROOM = 0.22
 
 def maxima_figure(comparison: FrictionComparison) -> Figure:
     """Draw measured and calculated S_max/p0_max against the load, a panel for each loading."""
-    with house_style():
-        figure = new_figure(3.4)
-        count = len(comparison.loadings)
-        panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
-        for axes, loading in zip(panels, comparison.loadings, strict=True):
+    count = len(comparison.loadings)
+    with panels_of(3.4, 1, count, sharey=True, squeeze=False) as (figure, panels):
+        for axes, loading in zip(panels.flat, comparison.loadings, strict=True):
             _draw_maxima(axes, comparison, loading)
-        panel_letters(panels)
-        for axes in panels[1:]:
+        for axes in panels.flat[1:]:
             axes.set_ylabel("")
     return figure
 
@@ -217,16 +211,13 @@ def comparison_figure(
     residuals against the frictionless profiles; d, the effective friction coefficient.
     """
     loads = scale.chosen(comparison, loading, lubrication)
-    with house_style():
-        figure = new_figure(5.6)
-        panels = figure.subplots(2, 2)
+    with panels_of(5.6, 2, 2) as (figure, panels):
         profiles.draw_profiles(panels[0, 0], comparison, loads)
         _draw_maxima(panels[0, 1], comparison, loads[0].loading)
         profiles.draw_residuals(panels[1, 0], comparison, loads, 0)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
         draw_effective(panels[1, 1], comparison, loads)
         legend_above(panels[1, 1], columns=2)
-        panel_letters(panels.flat)
     return figure
 
 
@@ -335,17 +326,14 @@ def _panels(
 ) -> Figure:
     """Draw a row of ``height`` inches for each lubrication, a panel for each loading."""
     lubrications = list(comparison.joint)
-    with house_style():
-        figure = new_figure(0.6 + height * len(lubrications))
-        panels = figure.subplots(
-            len(lubrications), len(comparison.loadings), sharex=True, sharey=True, squeeze=False
-        )
+    rows, columns = len(lubrications), len(comparison.loadings)
+    shared = {"sharex": True, "sharey": True, "squeeze": False}
+    with panels_of(0.6 + height * rows, rows, columns, **shared) as (figure, panels):
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
                 draw(axes, comparison, scale.chosen(comparison, loading, lubrication))
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
-        panel_letters(panels.flat)
         for axes in panels.flat:
             axes.label_outer()
         _one_legend(figure, panels.flat)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from memscal.figures import friction_scale as scale
 from memscal.figures.friction_scale import friction_colours, friction_name, on_axis
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panels_of
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
@@ -31,15 +31,12 @@ def profile_figure(
     uncertainties against the frictionless profile and that of the largest coefficient.
     """
     loads = scale.chosen(comparison, loading, lubrication)
-    with house_style():
-        figure = new_figure(4.6)
-        panels = figure.subplots(2, 2, height_ratios=(2.2, 1), sharex=True)
+    with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
         for axes, index in zip(panels[1], (0, -1), strict=True):
             draw_residuals(axes, comparison, loads, index)
         scale.share_limits(panels[1])
-        panel_letters(panels.flat)
     return figure
 
 

@@ -8,11 +8,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
@@ -96,6 +98,18 @@ def new_figure(height: float) -> Figure:
     figure = Figure(figsize=(FIGURE_WIDTH, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
+
+
+@contextmanager
+def panels_of(
+    height: float, rows: int = 1, columns: int = 1, **layout: Any
+) -> Iterator[tuple[Figure, NDArray[Any]]]:
+    """Yield a figure of a height in inches and its panels, in the house's style, with letters."""
+    with house_style():
+        figure = new_figure(height)
+        panels = np.asarray(figure.subplots(rows, columns, **layout))
+        yield figure, panels
+        panel_letters(panels.flat)
 
 
 def panel_letters(panels: Iterable[Axes]) -> None:

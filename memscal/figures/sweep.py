@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.calibration.sweep import Sweep
-from memscal.figures.style import COLOURS, house_style, new_figure, panel_letters
+from memscal.figures.style import COLOURS, panels_of
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM, MV
 from memscal.summaries.sweep import power_of_ten
@@ -32,13 +32,10 @@ def sweep_figure(sweep: Sweep) -> Figure:
         (r"$\sigma$ of deconvolved $G$ (mm)", *widths, MM),
         ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
     )
-    with house_style():
-        figure = new_figure(6.6)
-        panels = figure.subplots(3, 1, sharex=True)
+    with panels_of(6.6, 3, sharex=True) as (figure, panels):
         for axes, (label, exact, draws, scale) in zip(panels, rows, strict=True):
             _draw_row(axes, sweep.amplitude, exact / scale, draws / scale)
             axes.set_ylabel(label)
-        panel_letters(panels)
         for axes in panels[:2]:
             _relative_axis(axes, sweep.amplitude)
         axes = panels[2]

@@ -12,8 +12,8 @@ from typing import Any
 
 from memscal.errors import FormatError, OutputError
 from memscal.formats import groups, values
-from memscal.formats.codec import read_record, write_record
 from memscal.formats.files import ensure_writable
+from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si

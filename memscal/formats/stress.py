@@ -11,7 +11,7 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats import groups, values
-from memscal.formats.codec import read_record, read_source, write_record, write_source
+from memscal.formats.groups import read_record, read_source, write_record, write_source
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si, to_json

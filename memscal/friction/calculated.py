@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,9 +18,7 @@ from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, I
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
-
-if TYPE_CHECKING:
-    from memscal.model.measured_stress import MeasuredProfile
+from memscal.model.measured_stress import MeasuredProfile
 
 FRICTIONS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0, math.inf)
 """Friction coefficients between which profiles are interpolated to 1e-3 of their maximum."""

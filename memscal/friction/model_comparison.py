@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -51,9 +50,7 @@ from memscal.friction.results import (
 )
 from memscal.model.arrays import FloatArray, require_positive
 from memscal.model.checks import Message
-
-if TYPE_CHECKING:
-    from memscal.model.measured_stress import MeasuredProfile
+from memscal.model.measured_stress import MeasuredProfile
 
 #: Slip lengths that are thought possible: of the order of the roughness of surfaces that touch.
 _SLIP_LENGTHS = (1e-7, 1e-4)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from memscal.apparatus import ApparatusFunction
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
 from memscal.model.result import Result
-
-if TYPE_CHECKING:
-    from memscal.apparatus import ApparatusFunction
-    from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 _UM = 1e-6
 

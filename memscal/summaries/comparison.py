@@ -22,6 +22,7 @@ from memscal.friction.results import (
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FAILED_CHECK, Message, QualityCheck, failed_check_messages
+from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import MM, measured
@@ -32,8 +33,6 @@ from memscal.summaries.table import Table, checks_json, checks_table, finite, te
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from memscal.model.measured_stress import MeasuredProfile
 
 
 def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:

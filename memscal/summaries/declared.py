@@ -77,29 +77,21 @@ def cell(quantity: Quantity, holder: object, /, *, unit: str | None = None, **va
     return format_measured(value / quantity.scale, spread, shown)
 
 
-def columns(quantities: Iterable[Quantity], holder: object, /) -> dict[str, Any]:
-    """Return the quantities of an object as one row of a data frame, by column."""
+def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
+    """Return the quantities of an object by the names of their columns in a data frame."""
+    held = {quantity: _value(quantity.name, holder, values) for quantity in quantities}
     return {
-        quantity.column: getattr(holder, quantity.name) / quantity.scale
-        if quantity.dimension in DIMENSIONS
-        else getattr(holder, quantity.name)
-        for quantity in quantities
+        quantity.column: value / quantity.scale if quantity.dimension in DIMENSIONS else value
+        for quantity, value in held.items()
     }
 
 
-def data_frame(quantities: Iterable[Quantity], values: Mapping[str, ArrayLike]) -> pd.DataFrame:
+def data_frame(quantities: Iterable[Quantity], values: Mapping[str, FloatArray]) -> pd.DataFrame:
     """Return columns of the values (SI) in the units in which they are shown."""
     import pandas as pd
 
-    return pd.DataFrame(
-        {
-            quantity.column: np.asarray(values[quantity.name]) / quantity.scale
-            if quantity.dimension in DIMENSIONS
-            else values[quantity.name]
-            for quantity in quantities
-            if quantity.name in values
-        }
-    )
+    stated = [quantity for quantity in quantities if quantity.name in values]
+    return pd.DataFrame(columns(stated, None, **values))
 
 
 def labelled_dataset(
