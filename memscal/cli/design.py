@@ -15,7 +15,7 @@ from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from memscal.planning.expected import Design
+    from memscal.planning.design import Design
 
     _TargetType = click.ParamType[tuple[str, float]]
 else:  # generic since click 8.2 only

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from memscal.errors import InputError
 from memscal.figures.style import COLOURS, legend_above, panels_of
 from memscal.model.quantities import MM, PER_MM, PER_MM2
-from memscal.planning.design import varied_designs
-from memscal.planning.expected import Design
+from memscal.planning.design import Design, varied_designs
 
 #: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
 _WIDTHS, _BANDS = 4.0, 2.0

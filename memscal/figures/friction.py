@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
 from memscal.figures import friction_profiles as profiles
-from memscal.figures import friction_scale as scale
-from memscal.figures.friction_scale import friction_name, friction_position, lubricated_words
+from memscal.figures.friction_profiles import friction_name, friction_position, lubricated_words
 from memscal.figures.style import COLOURS, legend_above, panels_of
 from memscal.friction.family import bounded
 from memscal.friction.results import (
@@ -70,7 +69,7 @@ def length_position(length: ArrayLike) -> FloatArray:
 def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     for direction, compared in by_direction.items():
         rise = np.asarray(compared.length.chi_square) - float(np.min(compared.length.chi_square))
-        label = f"{direction}, {scale.lubricated_words(compared.lubrication)}"
+        label = f"{direction}, {profiles.lubricated_words(compared.lubrication)}"
         colour = COLOURS[_COLOURS[direction]]
         axes.plot(length_position(compared.length.values), rise, color=colour, label=label)
     draw_levels(axes)
@@ -112,7 +111,7 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
         if reading.value is not None:
             place = friction_position([reading.value])
             axes.plot([at_load.load], place, "o", color=COLOURS["measured"], ms=4)
-    scale.friction_axis(axes, "y")
+    profiles.friction_axis(axes, "y")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
     legend_above(axes, columns=1)
@@ -143,7 +142,7 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
     usual = {float(mu) for mu in comparison.friction if mu in _SHOWN}
     for mu in sorted(usual.union(ends_of_all)):
         curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
-        (line,) = axes.plot(loads, curve, color=scale.friction_colours(mu)[0], lw=0.9)
+        (line,) = axes.plot(loads, curve, color=profiles.friction_colours(mu)[0], lw=0.9)
         line.set_gid(f"mu={mu:g}")
         ends.append((float(curve[-1]), mu))
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
@@ -170,8 +169,8 @@ def _draw_ratios(axes: Axes, loads: Sequence[LoadComparison], lubrication: str) 
     measured = [load for load in loads if load.lubrication == lubrication]
     values = [(load.load, load.ratio, load.ratio_uncertainty) for load in measured]
     x, ratio, u = zip(*values, strict=True)
-    look = scale.mark(lubrication, COLOURS["measured"]) | {"ms": 4, "mew": 0.8, "ls": "none"}
-    look |= {"elinewidth": 0.8, "capsize": 2, "label": scale.lubricated_words(lubrication)}
+    look = profiles.mark(lubrication, COLOURS["measured"]) | {"ms": 4, "mew": 0.8, "ls": "none"}
+    look |= {"elinewidth": 0.8, "capsize": 2, "label": profiles.lubricated_words(lubrication)}
     axes.errorbar(x, ratio, u, zorder=3, **look)
 
 
@@ -190,7 +189,7 @@ def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
         axes.annotate(
             text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
             (x, height), (7, 0), textcoords="offset points", va="center", fontsize=6.5,
-            color=scale.friction_colours(max(mu for _, mu in group))[0],
+            color=profiles.friction_colours(max(mu for _, mu in group))[0],
         )  # fmt: skip
 
 
@@ -210,7 +209,7 @@ def comparison_figure(
     Panel a, profiles between no friction and full stick; b, maxima over frictionless ones; c,
     residuals against the frictionless profiles; d, the effective friction coefficient.
     """
-    loads = scale.chosen(comparison, loading, lubrication)
+    loads = profiles.chosen(comparison, loading, lubrication)
     with panels_of(5.6, 2, 2) as (figure, panels):
         profiles.draw_profiles(panels[0, 0], comparison, loads)
         _draw_maxima(panels[0, 1], comparison, loads[0].loading)
@@ -270,11 +269,11 @@ def draw_effective(
     for name, (words, colour, side) in _READINGS.items():
         for i, at_load in enumerate(loads):
             reading, x = getattr(at_load, name), at_load.load + side * _ASIDE * span
-            look = scale.mark(at_load.lubrication, COLOURS[colour])
+            look = profiles.mark(at_load.lubrication, COLOURS[colour])
             _draw_reading(axes, reading, x, words if i == 0 else "", look)
     _draw_joint(axes, comparison.joint[loads[0].lubrication][loads[0].loading])
     _draw_macroscopic(axes, comparison.macroscopic)
-    scale.friction_axis(axes, "y")
+    profiles.friction_axis(axes, "y")
     axes.set_xlim(0, loads[-1].load + 0.08 * span)
     axes.set_xlabel("load (N)")
 
@@ -331,7 +330,7 @@ def _panels(
     with panels_of(0.6 + height * rows, rows, columns, **shared) as (figure, panels):
         for row, lubrication in zip(panels, lubrications, strict=True):
             for axes, loading in zip(row, comparison.loadings, strict=True):
-                draw(axes, comparison, scale.chosen(comparison, loading, lubrication))
+                draw(axes, comparison, profiles.chosen(comparison, loading, lubrication))
                 words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
                 axes.set_title(words, fontsize=8, loc="left")
         for axes in panels.flat:
@@ -362,13 +361,13 @@ def _draw_likelihood(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
 ) -> None:
     """Draw chi-square above its least value of each load and of all loads together."""
-    looks = scale.load_looks(comparison)
+    looks = profiles.load_looks(comparison)
     for at_load in loads:
         _draw_curve(axes, at_load.by_profile, *looks[at_load.load], 1.0)
     joint = comparison.joint[loads[0].lubrication][loads[0].loading]
     _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
     draw_levels(axes)
-    scale.friction_axis(axes, "x")
+    profiles.friction_axis(axes, "x")
     axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
 
 

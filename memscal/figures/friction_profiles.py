@@ -1,19 +1,187 @@
-"""Measured stress profiles beside calculated ones: the limits of friction, and a set of it."""
+"""Measured stress profiles beside calculated ones, and what all figures of friction share."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
-from memscal.figures import friction_scale as scale
-from memscal.figures.friction_scale import friction_colours, friction_name, on_axis
+from memscal.errors import InputError
 from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panels_of
+from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
+
+#: Loads up to this multiple of another one look alike.
+_ALIKE = 1.05
+#: Radii closer than this, in m, count as one.
+_CLOSE = 1e-6
+_TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
+#: Marker and filling of a lubrication.
+_LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
+
+
+def friction_position(friction: ArrayLike) -> FloatArray:
+    """Return where a friction coefficient stands on an axis from 0 to infinity: mu/(mu + 0.3)."""
+    return bounded(friction, FRICTION_SCALE)
+
+
+def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Give an axis the ticks of effective friction coefficients from 0 to infinity."""
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_ticks(list(friction_position(_TICKS)), [friction_name(mu) for mu in _TICKS])
+    margin = 0.02
+    (axes.set_xlim if which == "x" else axes.set_ylim)(-margin, 1 + margin)
+    axis.set_label_text(r"effective friction coefficient $\mu_e$")
+
+
+def friction_name(friction: float) -> str:
+    """Return a coefficient as a label: ``0.15``, or the sign of infinity."""
+    return "∞" if np.isinf(friction) else f"{friction:.3g}"
+
+
+def friction_colours(friction: ArrayLike) -> list[str]:
+    """Return colours of friction coefficients, by their place between 0 and infinity."""
+    import matplotlib as mpl
+
+    shades = mpl.colormaps["plasma"](0.92 * (1.0 - friction_position(friction)))
+    return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
+
+
+def load_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
+    """Return colour and name of each load: darker as it grows; within 5 % loads look alike."""
+    import matplotlib as mpl
+
+    groups: list[list[float]] = []
+    for load in sorted({profile.load for profile in comparison.measured.profiles}):
+        if groups and load <= _ALIKE * groups[-1][0]:
+            groups[-1].append(load)
+        else:
+            groups.append([load])
+    shades = mpl.colormaps["viridis_r"](np.linspace(0.2, 1.0, len(groups)))
+    colours = [mpl.colors.to_hex(shade) for shade in shades]
+    if len(groups) == 1:
+        colours = [COLOURS["deconvolved"]]
+    names = [f"{np.mean(group):.3g} N" for group in groups]
+    return {
+        load: (colour, name)
+        for group, colour, name in zip(groups, colours, names, strict=True)
+        for load in group
+    }
+
+
+def mark(lubrication: str, colour: str) -> dict[str, Any]:
+    """Return marker and colours of points by their lubrication, distinct in grey print."""
+    marker, filled = _LUBRICATIONS.get(lubrication, _LUBRICATIONS[""])
+    return {"marker": marker, "color": colour, "mfc": colour if filled else "white"}
+
+
+def lubricated_words(lubrication: str) -> str:
+    """Return a lubrication in words."""
+    return lubrication or "lubrication not stated"
+
+
+def chosen(
+    comparison: FrictionComparison, loading: str | None, lubrication: str | None
+) -> list[LoadComparison]:
+    """Return the loads of one loading and lubrication, increasing; of the first by default."""
+    loading = comparison.loadings[0] if loading is None else loading
+    if loading not in comparison.loads:
+        raise InputError(
+            f"The loading {loading!r} was not compared.",
+            cure=f"There is {', '.join(repr(name) for name in comparison.loadings)}.",
+        )
+    measured = [at_load.lubrication for at_load in comparison.loads[loading]]
+    state = measured[0] if lubrication is None else lubrication
+    if state not in measured:
+        raise InputError(
+            f"No profile is {lubricated_words(state)!r}.",
+            cure=f"There is {', '.join(sorted({lubricated_words(name) for name in measured}))}.",
+        )
+    loads = [at_load for at_load in comparison.loads[loading] if at_load.lubrication == state]
+    return sorted(loads, key=lambda at_load: at_load.load)
+
+
+def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
+    """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones.
+
+    Radii closer than a micrometre count as one.
+    """
+    from scipy.interpolate import CubicSpline
+
+    kept = _apart(r)
+    inner, samples = r[kept], values[:, kept]
+    start = 1 if inner[0] < _CLOSE else 0
+    mirrored = np.concatenate([-inner[start:][::-1], inner])
+    both = np.concatenate([samples[:, start:][:, ::-1], samples], axis=1)
+    return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
+
+
+def _apart(r: FloatArray) -> Sequence[int]:
+    kept, last = [], -np.inf
+    for i, radius in enumerate(r):
+        if radius - last > _CLOSE:
+            kept.append(i)
+            last = radius
+    return kept
+
+
+#: Coverage factor of the grey band, and of points distinct from zero.
+EXPANDED = 2.0
+#: How strongly points are drawn that are not distinct from zero.
+_PALE = 0.25
+_LEAST_LIMIT = 3.5
+
+
+def draw_points(
+    axes: Axes, at_load: LoadComparison, colour: str, label: str, logarithmic: bool
+) -> None:
+    """Draw the measured points; on a logarithmic scale those below 2u are pale or left out."""
+    profile = at_load.profile
+    r, s, u = (np.asarray(v) for v in (profile.r, profile.s_zz, profile.s_zz_errors))
+    clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
+    for shown, strength in ((clear, 1.0), (~clear & (s > 0), _PALE)):
+        if shown.any():
+            draw_errorbar(
+                axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA, at_load,
+                colour=colour, label=label, strength=strength,
+            )  # fmt: skip
+
+
+def draw_errorbar(
+    axes: Axes,
+    x: FloatArray,
+    y: FloatArray,
+    u: FloatArray,
+    at_load: LoadComparison,
+    *,
+    colour: str,
+    label: str = "",
+    strength: float = 1.0,
+) -> None:
+    """Draw points with their standard uncertainties, in the marker of their lubrication."""
+    style = mark(at_load.lubrication, colour) | {"ls": "none", "ms": 3.0, "mew": 0.6}
+    style |= {"label": label or "_points", "alpha": None if strength == 1.0 else strength}
+    axes.errorbar(x, y, u, elinewidth=0.7, **style)
+
+
+def share_limits(panels: Sequence[Axes]) -> None:
+    """Give residual panels one scale that shows every point, and at least the band."""
+    sizes = [
+        np.abs(np.asarray(line.get_ydata()))
+        for axes in panels
+        for line in axes.lines
+        if line.get_marker() not in ("None", "", None)
+    ]
+    limit = max(_LEAST_LIMIT, 1.1 * float(np.max(np.concatenate(sizes))))
+    for axes in panels:
+        axes.set_ylim(-limit, limit)
+
 
 _FINE = 241
 _DECADES = 3.3
@@ -30,13 +198,13 @@ def profile_figure(
     Panels a and b, stress on a linear and a logarithmic scale; c and d, residuals over standard
     uncertainties against the frictionless profile and that of the largest coefficient.
     """
-    loads = scale.chosen(comparison, loading, lubrication)
+    loads = chosen(comparison, loading, lubrication)
     with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
         for axes, index in zip(panels[1], (0, -1), strict=True):
             draw_residuals(axes, comparison, loads, index)
-        scale.share_limits(panels[1])
+        share_limits(panels[1])
     return figure
 
 
@@ -48,14 +216,14 @@ def draw_profiles(
     logarithmic: bool = False,
 ) -> None:
     """Draw measured points with their uncertainties, and the calculated limits through them."""
-    looks = scale.load_looks(comparison)
+    looks = load_looks(comparison)
     for at_load in loads:
         colour, name = looks[at_load.load]
         r = np.linspace(0.0, at_load.profile.r[-1], _FINE)
         limits = on_axis(at_load.profile.r, at_load.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
         axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
-        scale.draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
+        draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
         top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
         axes.set_yscale("log")
@@ -74,7 +242,7 @@ def draw_profiles(
 def _annotate_curves(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     """Name the scan and the curves inside the frame, where no data are."""
     ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
-    lines = [scale.lubricated_words(at_load.lubrication)]
+    lines = [lubricated_words(at_load.lubrication)]
     lines += [f"{at_load.loading} loading"] if at_load.loading else []
     lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
     axes.annotate(
@@ -86,7 +254,7 @@ def draw_residuals(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], index: int
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
-    looks = scale.load_looks(comparison)
+    looks = load_looks(comparison)
     colours = [looks[at_load.load][0] for at_load in loads]
     _plot_residuals(axes, loads, index, colours)
     axes.set_xlabel("distance from the centre (mm)")
@@ -96,10 +264,10 @@ def draw_residuals(
 def _plot_residuals(
     axes: Axes, loads: Sequence[LoadComparison], index: int, colours: Sequence[str]
 ) -> None:
-    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
+    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
     axes.axhline(0.0, color="0.4", lw=0.6)
     for at_load, colour in zip(loads, colours, strict=True):
-        profile, look = at_load.profile, scale.mark(at_load.lubrication, colour)
+        profile, look = at_load.profile, mark(at_load.lubrication, colour)
         z = (profile.s_zz - at_load.calculated[index]) / profile.s_zz_errors
         axes.plot(profile.r / MM, z, ls="none", ms=2.5, mew=0.6, **look)
 
@@ -112,7 +280,7 @@ def friction_set_figure(
     A column for each of at most four loads: stress near the centre, the same less the frictionless
     profile (percent of its maximum), residuals against the coefficient of least chi-square.
     """
-    loads = scale.chosen(comparison, loading, lubrication)
+    loads = chosen(comparison, loading, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
     with house_style():
@@ -126,7 +294,7 @@ def friction_set_figure(
             column[0].set_ylim(bottom=0)
             _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
             _draw_best(column[2], comparison, at_load)
-        scale.share_limits(panels[2])
+        share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
         for axes in panels[1]:
             axes.set_ylim(min(low), max(high))
@@ -165,7 +333,7 @@ def _draw_set(
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
     beyond, u = (profile.s_zz - less) / unit, profile.s_zz_errors / unit
-    scale.draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=black)
+    draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=black)
     axes.set_xlim(0, 1.03 * r[-1] / MM)
 
 
@@ -186,8 +354,8 @@ def _legend_of_friction(
                label=rf"$\mu$ = {friction_name(comparison.friction[i])}")
         for i in _shown_indices(comparison)
     ]  # fmt: skip
-    point = Line2D([], [], ms=3, ls="none", **scale.mark(at_load.lubrication, "k"))
-    point.set_label(f"measured, {scale.lubricated_words(at_load.lubrication)}")
+    point = Line2D([], [], ms=3, ls="none", **mark(at_load.lubrication, "k"))
+    point.set_label(f"measured, {lubricated_words(at_load.lubrication)}")
     title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
     figure.legend(
         handles=[point, *handles], loc="outside upper center", ncols=len(handles) + 1, title=title,

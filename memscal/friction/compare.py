@@ -15,9 +15,8 @@ from memscal.estimation.points import TANGENTIAL
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction import effective
-from memscal.friction.calculated import FRICTIONS, amontons_family
+from memscal.friction.calculated import FRICTIONS, amontons_family, external_family
 from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
-from memscal.friction.external import external_family
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import load_points, sensor_of
 from memscal.friction.model_comparison import compare_interface

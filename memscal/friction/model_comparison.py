@@ -294,7 +294,7 @@ class LawCurve:
 
     def log_evidence(self, prior: Prior) -> float:
         """Return the logarithm of the likelihood averaged over a prior."""
-        return evidence_of_one(self.log_likelihood, prior.weights(self.edges)).log
+        return evidence_of_one(self.log_likelihood, prior.weights(self.edges))
 
 
 def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] = ()) -> LawCurve:
@@ -344,12 +344,12 @@ def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: in
     """Return the law with one parameter of each load; arguments as for :func:`one_of_all`."""
     tables, near = zip(*(_where_it_matters(along) for along in curves), strict=True)
     weights = [prior.weights(along.edges)[nodes] for along, nodes in zip(curves, near, strict=True)]
-    evidence = evidence_of_each(tables, weights)
+    log_evidence, error = evidence_of_each(tables, weights)
     start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
     chosen, top, chi_square = _best_of_each(tables, start)
     triples = zip(curves, near, chosen, strict=True)
     best = tuple(float(along.values[nodes][place]) for along, nodes, place in triples)
-    return _law(name, best, evidence.log, evidence.error, top, chi_square, degrees - len(curves))
+    return _law(name, best, log_evidence, error, top, chi_square, degrees - len(curves))
 
 
 def _law(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,12 +27,9 @@ from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import MM, measured
 from memscal.summaries import interface_laws
-from memscal.summaries.declared import cell, columns, correlated_numbers, members
+from memscal.summaries.declared import DataFrame, cell, columns, correlated_numbers, members
 from memscal.summaries.interface_laws import friction_name
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
@@ -77,7 +74,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
     }
 
 
-def frame(comparison: FrictionComparison | ShearComparison) -> pd.DataFrame:
+def frame(comparison: FrictionComparison | ShearComparison) -> DataFrame:
     """Return one row for each load and definition of the loading; open ends are infinite."""
     import pandas as pd
 

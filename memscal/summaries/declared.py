@@ -15,8 +15,10 @@ from memscal.model.quantities import DIMENSIONS, Quantity, Record, by_name, para
 from memscal.summaries.table import finite
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray
+    from pandas import DataFrame as DataFrame
+    from xarray import Dataset as Dataset
+else:  # their libraries are imported when they are needed
+    DataFrame = Dataset = Any
 
 _UNCERTAINTY = "_uncertainty"
 
@@ -86,7 +88,7 @@ def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) ->
     }
 
 
-def data_frame(quantities: Iterable[Quantity], values: Mapping[str, FloatArray]) -> pd.DataFrame:
+def data_frame(quantities: Iterable[Quantity], values: Mapping[str, FloatArray]) -> DataFrame:
     """Return columns of the values (SI) in the units in which they are shown."""
     import pandas as pd
 
@@ -98,7 +100,7 @@ def labelled_dataset(
     quantities: Iterable[Quantity],
     values: Mapping[str, ArrayLike],
     axes: Mapping[str, tuple[str, ...]] | None = None,
-) -> xarray.Dataset:
+) -> Dataset:
     """Return values in SI units by the names of their quantities, which give axes and words.
 
     ``axes``: those of quantities that here run along others than declared.

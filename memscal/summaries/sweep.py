@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from memscal.calibration.sweep import Sweep
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import ESTIMATED, MM, MV, Quantity
-from memscal.summaries.declared import plain
+from memscal.summaries.declared import Dataset, plain
 from memscal.summaries.table import Table
-
-if TYPE_CHECKING:
-    import xarray
 
 #: Results of a sweep, with the attribute of their draws.
 _RESULTS = (
@@ -60,7 +57,7 @@ def mapping(result: Sweep) -> dict[str, Any]:
     }
 
 
-def dataset(result: Sweep) -> xarray.Dataset:
+def dataset(result: Sweep) -> Dataset:
     """Return the results over amplitude, and those of the draws over amplitude and draw."""
     import xarray
 

@@ -19,8 +19,7 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import smooth_profile
-from memscal.planning.design import varied_designs
-from memscal.planning.expected import Design, expected_calibration
+from memscal.planning.design import Design, expected_calibration, varied_designs
 
 EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 
