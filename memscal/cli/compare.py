@@ -26,23 +26,6 @@ def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> lis
     return [*stems, "interface"] if interface else stems
 
 
-def _prove_figures(
-    single: Sequence[Path],
-    folder: Path | None,
-    named: Mapping[str, Path],
-    *,
-    force: bool,
-    inputs: Sequence[Path],
-) -> None:
-    """Prove that all can be written; a folder that is not there yet is made at the end."""
-    in_folder = [*named.values()]
-    if folder is not None and not folder.is_dir():
-        if folder.exists():
-            raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
-        in_folder = [folder]
-    out.prove_writable([*single, *in_folder], force=force, inputs=inputs)
-
-
 def _rendered(
     comparison: FrictionComparison, single: Sequence[Path], named: Mapping[str, Path]
 ) -> dict[Path, bytes]:
@@ -169,7 +152,12 @@ def command(
         stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
     inputs, friction = [artifact, *scans, *options["references"]], options["friction"]
-    _prove_figures(single, folder, named, force=force, inputs=inputs)
+    outputs = [*single, *named.values()]
+    if folder is not None and not folder.is_dir():
+        if folder.exists():
+            raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
+        outputs = [*single, folder]  # which is made at the end
+    out.prove_writable(outputs, force=force, inputs=inputs)
 
     with out.working("Comparing with calculated contacts"):
         comparison = compare(

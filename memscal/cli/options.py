@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
@@ -104,8 +104,8 @@ json_option = option("--json as_json", is_flag=True)("Print one JSON object in p
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
 output_options = options_of(json_option, force_option, debug_option)
 
-FILM = ("young_modulus", "poisson_ratio", "thickness")
-"""What describes a film, by the names of its options."""
+FILM = {"young_modulus": 6, "poisson_ratio": 0, "thickness": -3}
+"""What describes a film, by the names of its options, with the powers of ten of their units."""
 
 #: The paper's film, in the units of the command line.
 PAPER_FILM = {
@@ -184,14 +184,12 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
     _require("The film", options, FILM)
     from memscal.model.film import ElasticFilm
 
-    return ElasticFilm(
-        young_modulus=si(options["young_modulus"], 6),
-        poisson_ratio=options["poisson_ratio"],
-        thickness=si(options["thickness"], -3),
-        young_modulus_uncertainty=si(options.get("young_modulus_uncertainty"), 6),
-        poisson_ratio_uncertainty=options.get("poisson_ratio_uncertainty"),
-        thickness_uncertainty=si(options.get("thickness_uncertainty"), -3),
-    )
+    numbers: dict[str, Any] = {
+        name: si(options.get(name), power)
+        for quantity, power in FILM.items()
+        for name in (quantity, f"{quantity}_uncertainty")
+    }
+    return ElasticFilm(**numbers)
 
 
 def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
@@ -204,7 +202,7 @@ def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
     return kind(radius=si(options["radius"], -3), radius_uncertainty=spread)
 
 
-def _require(subject: str, options: Mapping[str, Any], names: tuple[str, ...]) -> None:
+def _require(subject: str, options: Mapping[str, Any], names: Iterable[str]) -> None:
     missing = ["--" + name.replace("_", "-") for name in names if options[name] is None]
     if missing:
         raise click.UsageError(f"{subject} is not fully given: add {', '.join(missing)}.")

@@ -11,15 +11,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from memscal.figures import style
-from memscal.figures.style import (
-    COLOURS,
-    channel_indices,
-    drawable,
-    house_style,
-    legend_above,
-    new_figure,
-    panel_letters,
-)
+from memscal.figures.style import COLOURS, channel_indices, legend_above
 from memscal.model.apparatus import ApparatusData, ApparatusRadial
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import REPEAT_CENTRES, failed_check_messages
@@ -39,7 +31,7 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
     limit_to_scan(axes, scan.x)
     axes.set_ylabel(f"voltage $U_{{{channel_indices(data)}}}$ (mV)")
     _stress_axis(axes, data, baseline=_baseline(data))
-    style.legend_above(axes, points=scan.x.size)
+    legend_above(axes, points=scan.x.size)
 
 
 def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
@@ -270,7 +262,7 @@ def draw_residuals(axes: Axes, data: ApparatusData) -> None:
     axes.set_ylim(-limit, limit)
     axes.set_ylabel(f"residual / {scale}")
     limit_to_scan(axes, scan.x)
-    style.legend_above(axes, points=scan.x.size)
+    legend_above(axes, points=scan.x.size)
 
 
 def _residual_scale(data: ApparatusData) -> tuple[FloatArray, str]:
@@ -417,10 +409,10 @@ def calibration_figure(result: Calibrated) -> Figure:
     with its band (k = 2) and the Gaussian; f, the transfer function.
     """
     data = apparatus_of(result)
-    with house_style():
+    with style.house_style():
         lines = _text_lines(data)
         text_height = _LINE_HEIGHT * (len(lines) + 0.6)
-        figure = new_figure(_PANELS_HEIGHT + text_height)
+        figure = style.new_figure(_PANELS_HEIGHT + text_height)
         outer = figure.add_gridspec(2, 2, height_ratios=[text_height, _PANELS_HEIGHT])
         _write_lines(figure, lines)
         figure.add_subplot(outer[0, :]).set_axis_off()
@@ -440,7 +432,7 @@ def calibration_figure(result: Calibrated) -> Figure:
         draw_transfer(transfer, data)
         for axes in (scan, residuals, radial):
             axes.tick_params(labelbottom=False)
-        panel_letters((scan, residuals, scan_log, radial, radial_log, transfer))
+        style.panel_letters((scan, residuals, scan_log, radial, radial_log, transfer))
         # One pass of the layout, then none, so that rendering twice gives the same picture.
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
@@ -494,9 +486,8 @@ def _write_lines(figure: Figure, lines: list[tuple[str, str, str]]) -> None:
     for i, (line, colour, weight) in enumerate(lines):
         y = 1.0 - (0.08 + _LINE_HEIGHT * i) / height
         # A sensor's name may hold a dollar sign: it is text, not mathematics.
-        text = figure.text(
-            _MARGIN, y, drawable(line), color=colour, weight=weight, va="top", parse_math=False
-        )
+        text = figure.text(_MARGIN, y, style.drawable(line), color=colour, weight=weight, va="top")
+        text.set_parse_math(False)
         size = 9.0 if i == 0 else 7.5
         text.set_fontsize(size)
         text.set_in_layout(False)

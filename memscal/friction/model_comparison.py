@@ -20,6 +20,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
@@ -361,8 +362,6 @@ def _law(
     least: float,
     degrees: int,
 ) -> InterfaceLaw:
-    from scipy.special import chdtrc
-
     p_value = float(chdtrc(degrees, least)) if degrees > 0 else 1.0
     return InterfaceLaw(name, best, log_evidence, top, error, least, degrees, p_value)
 

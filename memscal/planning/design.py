@@ -145,7 +145,7 @@ class Plan:
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
 
 
-def _expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]:
+def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]:
     """Calibrate the planned scan, with expected squares in place of data: steps and results."""
     scan = plan.scan()
     reference.require_calibration_rod(scan)
@@ -257,7 +257,7 @@ class Design(Result):
 def evaluate(plan: Plan, method: str | Method = "bayesian", seed: int = 0) -> Design:
     """Return what to expect of a plan by a method; ``seed`` for one that draws random numbers."""
     chosen = chosen_method(method, {}, seed=seed)
-    solution, results = _expected_calibration(plan, chosen)
+    solution, results = expected_calibration(plan, chosen)
     deconvolution, fields = solution.deconvolution, solution.fields
     k, modulus = fields.along_axis(np.abs(fields.grid.transfer(deconvolution.quotient.values)))
     return Design(
