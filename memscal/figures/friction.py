@@ -104,8 +104,7 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
     axes.plot(implied.loads, best, color=blue, label="what the slip length means")
     for i, at_load in enumerate(measured):
         reading = at_load.by_profile
-        top = np.inf if reading.interval.high is None else reading.interval.high
-        ends = friction_position([reading.interval.low, top])
+        ends = _ends(reading)
         label = "found at each load" if i == 0 else "_found"
         axes.plot([at_load.load] * 2, ends, color=COLOURS["measured"], lw=1.0, label=label)
         if reading.value is not None:
@@ -136,7 +135,9 @@ def maxima_figure(comparison: FrictionComparison) -> Figure:
 
 def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> None:
     """Draw the ratios of one definition of the loading, and the calculated curves."""
-    loads, curves = _curves(comparison, loading)
+    by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
+    loads = sorted(by_load)
+    curves = np.array([by_load[load] for load in loads])
     ends = []
     ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
     usual = {float(mu) for mu in comparison.friction if mu in _SHOWN}
@@ -147,7 +148,7 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         ends.append((float(curve[-1]), mu))
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
         _draw_ratios(axes, comparison.loads[loading], lubrication)
-    first, last = float(loads[0]), float(loads[-1])
+    first, last = loads[0], loads[-1]
     # Room at the right for the curves' names.
     axes.set_xlim(min(0.0, first), last + _ROOM * max(last - first, 0.2 * last))
     _name_ends(axes, last, ends)
@@ -156,13 +157,6 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
     words = f"{loading} loading" if loading else "as given"
     axes.annotate(words, (0.03, 0.96), xycoords="axes fraction", va="top", fontsize=7)
     legend_above(axes, columns=3)
-
-
-def _curves(comparison: FrictionComparison, loading: str) -> tuple[FloatArray, FloatArray]:
-    """Return loads, increasing, and the calculated maxima over the frictionless ones there."""
-    by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
-    loads = sorted(by_load)
-    return np.array(loads), np.array([by_load[load] for load in loads])
 
 
 def _draw_ratios(axes: Axes, loads: Sequence[LoadComparison], lubrication: str) -> None:
@@ -283,8 +277,7 @@ def _draw_reading(
 ) -> None:
     """Draw a value with its interval; where there is none, the open interval as an arrow."""
     colour = look["color"]
-    low, high = reading.interval.low, reading.interval.high
-    ends = friction_position([low, math.inf if high is None else high])
+    low, high, ends = reading.interval.low, reading.interval.high, _ends(reading)
     (bar,) = axes.plot([x, x], ends, color=colour, lw=1.0, solid_capstyle="butt")
     bar.set_gid("interval")
     axes.plot([x], ends[:1], "_" if low > 0 else "", color=colour, ms=5, mew=1.0)
@@ -299,9 +292,14 @@ def _draw_reading(
         axes.plot([], [], look["marker"], color=colour, ms=4, ls="-", lw=1.0, label=label)
 
 
+def _ends(reading: BoundedEstimate) -> FloatArray:
+    """Return where the ends of an interval stand on the axis."""
+    low, high = reading.interval.low, reading.interval.high
+    return friction_position([low, math.inf if high is None else high])
+
+
 def _draw_joint(axes: Axes, joint: BoundedEstimate) -> None:
-    high = math.inf if joint.interval.high is None else joint.interval.high
-    low, top = friction_position([joint.interval.low, high])
+    low, top = _ends(joint)
     axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
     if joint.value is not None:
         axes.axhline(float(friction_position(joint.value)), color=COLOURS["reference"], lw=0.8)

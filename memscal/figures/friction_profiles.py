@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panels_of
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panels_of, shades
 from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import FrictionComparison, LoadComparison
 from memscal.model.arrays import FloatArray
@@ -55,18 +55,13 @@ def friction_colours(friction: ArrayLike) -> list[str]:
 
 def load_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
     """Return colour and name of each load: darker as it grows; within 5 % loads look alike."""
-    import matplotlib as mpl
-
     groups: list[list[float]] = []
     for load in sorted({profile.load for profile in comparison.measured.profiles}):
         if groups and load <= _ALIKE * groups[-1][0]:
             groups[-1].append(load)
         else:
             groups.append([load])
-    shades = mpl.colormaps["viridis_r"](np.linspace(0.2, 1.0, len(groups)))
-    colours = [mpl.colors.to_hex(shade) for shade in shades]
-    if len(groups) == 1:
-        colours = [COLOURS["deconvolved"]]
+    colours = shades(len(groups), 0.2)
     names = [f"{np.mean(group):.3g} N" for group in groups]
     return {
         load: (colour, name)
@@ -138,36 +133,30 @@ _PALE = 0.25
 _LEAST_LIMIT = 3.5
 
 
-def draw_points(
+def _draw_points(
     axes: Axes, at_load: LoadComparison, colour: str, label: str, logarithmic: bool
 ) -> None:
     """Draw the measured points; on a logarithmic scale those below 2u are pale or left out."""
     profile = at_load.profile
-    r, s, u = (np.asarray(v) for v in (profile.r, profile.s_zz, profile.s_zz_errors))
+    r, s, u = profile.r / MM, profile.s_zz / KPA, profile.s_zz_errors / KPA
     clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
-    for shown, strength in ((clear, 1.0), (~clear & (s > 0), _PALE)):
+    for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
         if shown.any():
-            draw_errorbar(
-                axes, r[shown] / MM, s[shown] / KPA, u[shown] / KPA, at_load,
-                colour=colour, label=label, strength=strength,
-            )  # fmt: skip
+            points = (r[shown], s[shown], u[shown])
+            _draw_errorbar(axes, at_load, colour, points, label=label or "_points", alpha=alpha)
 
 
-def draw_errorbar(
+def _draw_errorbar(
     axes: Axes,
-    x: FloatArray,
-    y: FloatArray,
-    u: FloatArray,
     at_load: LoadComparison,
-    *,
     colour: str,
-    label: str = "",
-    strength: float = 1.0,
+    points: tuple[FloatArray, FloatArray, FloatArray],
+    **style: Any,
 ) -> None:
-    """Draw points with their standard uncertainties, in the marker of their lubrication."""
-    style = mark(at_load.lubrication, colour) | {"ls": "none", "ms": 3.0, "mew": 0.6}
-    style |= {"label": label or "_points", "alpha": None if strength == 1.0 else strength}
-    axes.errorbar(x, y, u, elinewidth=0.7, **style)
+    """Draw x, y and the standard uncertainty of y, in the marker of the lubrication."""
+    look = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7, **style}
+    x, y, u = points
+    axes.errorbar(x, y, u, **mark(at_load.lubrication, colour), **look)
 
 
 def share_limits(panels: Sequence[Axes]) -> None:
@@ -223,7 +212,7 @@ def draw_profiles(
         limits = on_axis(at_load.profile.r, at_load.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
         axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
-        draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
+        _draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
         top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
         axes.set_yscale("log")
@@ -313,12 +302,6 @@ def _shown_indices(comparison: FrictionComparison) -> list[int]:
     return sorted(names | {0, comparison.friction.size - 1})
 
 
-def _core(at_load: LoadComparison) -> float:
-    """Return the radius within which the frictionless profile exceeds a twentieth of its top."""
-    strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
-    return float(at_load.profile.r[np.flatnonzero(strong)[-1]])
-
-
 def _draw_set(
     axes: Axes,
     comparison: FrictionComparison,
@@ -328,12 +311,14 @@ def _draw_set(
 ) -> None:
     """Draw stress less that of some profile at its radii, in a unit (Pa)."""
     profile, black = at_load.profile, COLOURS["measured"]
-    r = np.linspace(0.0, _core(at_load), _FINE)
+    # As far as the frictionless profile exceeds a twentieth of its top.
+    strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
+    r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)
     for i in _shown_indices(comparison):
         curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
         axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    beyond, u = (profile.s_zz - less) / unit, profile.s_zz_errors / unit
-    draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=black)
+    points = (profile.r / MM, (profile.s_zz - less) / unit, profile.s_zz_errors / unit)
+    _draw_errorbar(axes, at_load, black, points, label="_points")
     axes.set_xlim(0, 1.03 * r[-1] / MM)
 
 

@@ -180,22 +180,12 @@ def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
         raise InputError("There is no contact to draw.")
     several = len(contacts) > 1
     with style.panels_of(2.9, 1, 3 if several else 2) as (figure, panels):
-        colours = _shades(len(contacts))
+        colours = style.shades(len(contacts), 0.15)
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
         if several:
             _draw_loading(panels[2], contacts, colours)
     return figure
-
-
-def _shades(count: int) -> list[str]:
-    """Return colours that get darker along the path, also in grey."""
-    import matplotlib as mpl
-
-    if count == 1:
-        return [COLOURS["deconvolved"]]
-    shades = mpl.colormaps["viridis_r"](np.linspace(0.15, 1.0, count))
-    return [mpl.colors.to_hex(shade) for shade in shades]
 
 
 def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:

@@ -136,6 +136,14 @@ def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:
     )
 
 
+def shades(count: int, first: float) -> list[str]:
+    """Return colours that get darker along a path, also in grey; the first from 0 to 1."""
+    if count == 1:
+        return [COLOURS["deconvolved"]]
+    colours = mpl.colormaps["viridis_r"](np.linspace(first, 1.0, count))
+    return [mpl.colors.to_hex(colour) for colour in colours]
+
+
 def marker_size(points: int) -> float:
     """Return a marker size in points that keeps 33 points visible and 400 apart."""
     return float(min(4.0, max(1.5, 4.0 * (40.0 / max(points, 1)) ** 0.5)))

@@ -11,7 +11,7 @@ from memscal.calibration.sweep import Sweep
 from memscal.figures.style import COLOURS, panels_of
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM, MV
-from memscal.summaries.sweep import power_of_ten
+from memscal.summaries.declared import power_of_ten
 
 _INNER = (0.16, 0.84)  # of the draws: what one standard deviation holds of a normal law
 _SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge

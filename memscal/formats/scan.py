@@ -119,11 +119,9 @@ def scan_from(file: SafeFile) -> Scan:
 def _read_arrays(file: SafeFile, along: str) -> dict[str, Any]:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", *(("y_errors",) if along == "x" else ("x", "x_errors"))}
-    arrays: dict[str, Any] = {
-        "position_scale_uncertainty": values.optional_scalar(
-            file, f"{_DATA}/position_scale_errors", "dimensionless"
-        )
-    }
+    arrays: dict[str, Any] = {}
+    if file.has(scale := f"{_DATA}/position_scale_errors"):
+        arrays["position_scale_uncertainty"] = values.require_scalar(file, scale, "dimensionless")
     for name, quantity in _DECLARED.items():
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):

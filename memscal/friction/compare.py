@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
+from typing import Any
 
 import numpy as np
 
@@ -185,19 +186,11 @@ def compare(
     opened, sensor = opened_contacts(contacts), opened_apparatus(apparatus)
     require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
     measured = _measured(opened, sensor, override)
+    setting = _setting(measured, cache, workers)
     if references is None:
-        families = _families(measured, friction, loading, cache, workers)
+        families = _families(setting, friction, loading)
     else:
-        scan = measured.scans[0]
-        family = external_family(
-            references,
-            np.unique(measured.loads),
-            reach=_reach(measured),
-            film=scan.film,
-            indenter=scan.indenter,
-            cache=cache,
-            workers=workers,
-        )
+        family = external_family(references, **setting)
         families = {family.loading: family}
     sliding = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
     comparison = compare_measured(measured, sensor, families, macroscopic=sliding)
@@ -264,21 +257,21 @@ def compare_measured(
     )
 
 
-def _reach(measured: MeasuredStress) -> float:
-    """Return how far from the axis stresses are calculated, in m: whole millimetres."""
-    return math.ceil(_REACH * max(scan.width for scan in measured.scans) / _MM) * _MM
+def _setting(measured: MeasuredStress, cache: CacheFolder, workers: int) -> dict[str, Any]:
+    """Return film, sphere, loads and reach (whole millimetres) of the contacts to calculate."""
+    scan = measured.scans[0]
+    reach = math.ceil(_REACH * max(scan.width for scan in measured.scans) / _MM) * _MM
+    contacts = {"film": scan.film, "indenter": scan.indenter, "loads": np.unique(measured.loads)}
+    return {**contacts, "reach": reach, "cache": cache, "workers": workers}
 
 
 def _families(
-    measured: MeasuredStress,
+    setting: Mapping[str, Any],
     friction: Sequence[float] | None,
     loading: str | Sequence[str],
-    cache: CacheFolder,
-    workers: int,
     order: int = 0,
 ) -> dict[str, ProfileFamily]:
     """Return the calculated profiles at every load that was measured, by loading."""
-    scan = measured.scans[0]
     values = FRICTIONS if friction is None else tuple(float(mu) for mu in friction)
     if len(values) < 2:
         raise InputError(
@@ -289,17 +282,7 @@ def _families(
     if not loadings:
         raise InputError('No loading was given: "incremental", "total", or both.')
     return {
-        name: amontons_family(
-            scan.film,
-            scan.indenter,
-            np.unique(measured.loads),
-            friction=values,
-            loading=name,
-            reach=_reach(measured),
-            cache=cache,
-            workers=workers,
-            order=order,
-        )
+        name: amontons_family(friction=values, loading=name, order=order, **setting)
         for name in loadings
     }
 
@@ -445,7 +428,7 @@ def compare_shear(
     require_contacts(measured.scans)
     _require_tangential(sensor, measured.scans[0])
     channel = sensor.sensor.channel
-    families = _families(measured, friction, loading, cache, workers, order=1)
+    families = _families(_setting(measured, cache, workers), friction, loading, order=1)
     confronted = _confronted(measured, sensor, families, channel)
     note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
     return ShearComparison(

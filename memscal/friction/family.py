@@ -415,19 +415,10 @@ class FamilySetup:
         nodes = base_wavenumbers(film.thickness, reach)
         return cls(film, indenter, require_loads(loads), nodes, cache, workers, order)
 
-    def path(
-        self, *, friction: float, loading: str = "incremental", interface: Interface | None = None
-    ) -> LoadingPath:
-        """Return the loading path of one member."""
-        return LoadingPath(
-            film=self.film,
-            indenter=self.indenter,
-            loads=tuple(float(load) for load in self.loads),
-            friction=friction,
-            loading=loading,
-            interface=interface or Interface(),
-            order=self.order,
-        )
+    def path(self, **law: Any) -> LoadingPath:
+        """Return the loading path of one member; ``law``: its friction, loading and interface."""
+        law |= {"loads": tuple(float(load) for load in self.loads), "order": self.order}
+        return LoadingPath(film=self.film, indenter=self.indenter, **law)
 
     def family(
         self,

@@ -239,12 +239,12 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
         if (numbered := _NUMBERED.fullmatch(check.name))
     ]
     # The checks, under their new numbers, state what failed.
-    messages = [
-        replace(message, text=f"{_files_of(stress)}: {message.text}")
-        for stress in stresses
-        for message in stress.messages
-        if message.kind != FAILED_CHECK
-    ]
+    messages = []
+    for stress in stresses:
+        names = ", ".join(scan.source.file_name for scan in stress.scans if scan.source)
+        place = names or f"{stress.profiles[0].label} and on"
+        others = (message for message in stress.messages if message.kind != FAILED_CHECK)
+        messages += [replace(message, text=f"{place}: {message.text}") for message in others]
     return replace(
         first,
         profiles=profiles,
@@ -253,11 +253,6 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
         overridden=tuple(text for stress in stresses for text in stress.overridden),
         process=replace(first.process, messages=tuple(dict.fromkeys(messages))),
     )
-
-
-def _files_of(measured: MeasuredStress) -> str:
-    names = [scan.source.file_name for scan in measured.scans if scan.source]
-    return ", ".join(names) or f"{measured.profiles[0].label} and on"
 
 
 def _measure(

@@ -192,11 +192,10 @@ def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
     measured = np.isfinite(scan.u_zz)
     if scan.y is None:
         x = scan.x[measured.reshape(-1, scan.x.size).any(axis=0)]
-        along = centre[0 if scan.direction == "x" else 1]
-        ends = [abs(float(x.min() - along)), abs(float(x.max() - along))]
+        axes = [(x, centre[0 if scan.direction == "x" else 1])]
     else:
-        axes = (scan.x, centre[0]), (scan.y, centre[1])
-        ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
+        axes = [(scan.x, centre[0]), (scan.y, centre[1])]
+    ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
     left = max(signal.share(end) for end in ends)
     if left > _LARGEST_END:
         raise FitError(

@@ -34,12 +34,6 @@ class LoadPath:
     states: Sequence[Sequence[Contact]]  # at each nominal load one contact, or three
     spread: float  # their distance in ln P
 
-    def at_nominal(self, kernel: RadialKernel, radius: FloatArray) -> FloatArray:
-        """Return the blurred stress at every nominal load, shape (loads, *radius.shape), in Pa."""
-        return sensor.blurred_stress(
-            [state[len(state) // 2] for state in self.states], kernel, radius
-        )
-
     def near(
         self,
         index: int,
@@ -160,7 +154,8 @@ def simulate_contacts(
     ratio = 1 + load_scatter * draws["load"]
     along = x + position_error * draws["position"] - centre[0]
     away = np.hypot(along, centre[1])
-    nominal = path.at_nominal(truth, np.hypot(x - centre[0], centre[1]))
+    at_nominal = [state[len(state) // 2] for state in path.states]
+    nominal = sensor.blurred_stress(at_nominal, truth, np.hypot(x - centre[0], centre[1]))
     largest = conversion_constant * float(nominal.max())
     signal = np.stack([path.near(int(j), truth, away[i], ratio[i]) for i, j in enumerate(row)])
     added = sensor.disturbance(x, baseline, drift) + noise * draws["noise"]

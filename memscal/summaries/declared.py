@@ -62,6 +62,12 @@ def plain(value: Any, scale: float = 1.0) -> Any:
     return value if isinstance(value, int) and scale == 1 else finite(float(value) / scale)
 
 
+def power_of_ten(values: FloatArray) -> int:
+    """Return the power of ten to name in a head or label in place of a row of zeros."""
+    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+    return int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
+
+
 def parameter_json(parameters: ParameterSet, name: str) -> dict[str, Any]:
     """Return a parameter's value and standard uncertainty in the unit in which it is shown."""
     quantity = parameter_quantity(parameters, name)

@@ -101,16 +101,15 @@ def mapping(planned: Design) -> dict[str, Any]:
         "method": planned.method,
         "plan": declared.members(PLAN, planned.plan),
         "wanted_si": dict(planned.want),
-        "expected": {name: _expected_json(planned, name) for name in _SHOWN},
+        "expected": {
+            name: {
+                **declared.parameter_json(planned.parameters, name),
+                "relative_uncertainty": planned.relative_uncertainty(name),
+                "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
+            }
+            for name in _SHOWN
+        },
         **declared.members(EXPECTED, planned, **axis),
-    }
-
-
-def _expected_json(planned: Design, name: str) -> dict[str, Any]:
-    return {
-        **declared.parameter_json(planned.parameters, name),
-        "relative_uncertainty": planned.relative_uncertainty(name),
-        "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from memscal.calibration.sweep import Sweep
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import ESTIMATED, MM, MV, Quantity
-from memscal.summaries.declared import Dataset, plain
+from memscal.summaries.declared import Dataset, plain, power_of_ten
 from memscal.summaries.table import Table
 
 #: Results of a sweep, with the attribute of their draws.
@@ -37,12 +37,6 @@ def tables(result: Sweep) -> list[Table]:
     head = ("amplitude", f"A (1e{power} mV/Pa)", "σ(G) (mm)", "rms (%)")
     rows = list(zip(*columns, strict=True))[::2]
     return [Table(title, (*head, "A, draws", "σ(G), draws", "rms, draws"), rows)]
-
-
-def power_of_ten(values: FloatArray) -> int:
-    """Return the power of ten to name in a head or label in place of a row of zeros."""
-    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
-    return int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
 
 
 def mapping(result: Sweep) -> dict[str, Any]:

@@ -181,11 +181,6 @@ class Component:
     meaning: str
     tensor: bool = False
 
-    def __str__(self) -> str:
-        """Return its name in notes."""
-        place = "at the nodes" if self.at_points else "of the cells"
-        return f"{self.meaning} of the field {self.field!r} {place}"
-
 
 def _find(mesh: Mesh, frame: Frame, field: str, axis: int) -> Component:
     """Return the stress along an axis on the base; ``name:number`` takes a component, from 1."""
@@ -406,7 +401,9 @@ def _at_base(
 
 
 def _component_note(component: Component, name: str, treatment: str) -> Message:
-    text = f"{name}: {component}, {treatment}"
+    place = "at the nodes" if component.at_points else "of the cells"
+    field = f"{component.meaning} of the field {component.field!r} {place}"
+    text = f"{name}: {field}, {treatment}"
     if not component.at_points:
         text += "; each value is taken at the middle of its cell's side on the base"
     return Message("import", f"{text}.")

@@ -50,6 +50,10 @@ class Table:
             values[k] = self._number(row[i] if i < len(row) else "", k, column_name, words or {})
         return values
 
+    def quantity(self, column_name: str | int, unit: str, dimension: str) -> FloatArray:
+        """Return a column of numbers in a unit, in SI units."""
+        return to_si(self.column(column_name), unit, dimension, self.where(column_name))
+
     def where(self, column_name: str | int) -> str:
         """Return file and column as messages name them."""
         return f"{self.source.file_name}: column {column_name!r}"
@@ -190,10 +194,7 @@ def _find_decimal(rows: tuple[tuple[str, ...], ...], delimiter: str) -> str:
 def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: str) -> Profile:
     """Read an indenter's profile from a table with one row per radius: radius and height."""
     table = read_table(path)
-    radii, heights = (
-        to_si(table.column(column), unit, "length", table.where(column))
-        for column, unit in ((1, r_unit), (2, z_unit))
-    )
+    radii, heights = table.quantity(1, r_unit, "length"), table.quantity(2, z_unit, "length")
     try:
         # What a microscope calls zero is anywhere.
         return Profile(r=radii, z=heights - heights.min())
