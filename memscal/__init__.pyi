@@ -33,7 +33,6 @@ from .formats.scan import write_scan as write_scan
 from .formats.stress import read_stress as read_stress
 from .friction.compare import compare as compare
 from .friction.compare import compare_shear as compare_shear
-from .friction.results import BayesFactor as BayesFactor
 from .friction.results import BoundedEstimate as BoundedEstimate
 from .friction.results import DryAgainstLubricated as DryAgainstLubricated
 from .friction.results import FrictionComparison as FrictionComparison
@@ -63,6 +62,7 @@ from .model.apparatus import OtherEstimate as OtherEstimate
 from .model.apparatus import ParameterSet as ParameterSet
 from .model.apparatus import Reconvolution as Reconvolution
 from .model.apparatus import TransferFunction as TransferFunction
+from .model.bayes_factor import BayesFactor as BayesFactor
 from .model.checks import Message as Message
 from .model.checks import QualityCheck as QualityCheck
 from .model.field_mesh import FieldMesh as FieldMesh

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from os import PathLike
 from typing import Any, ClassVar, TypeAlias
@@ -14,19 +15,22 @@ import scipy
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
-from memscal.calibration.drawn_scatter import draw_count, drawn_scatter, is_linear
+from memscal.calibration.drawn_scatter import drawn_scatter
+from memscal.calibration.messages import calibration_messages
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
 from memscal.calibration.uncertainty import InputEffect, Results, input_effects, propagate
 from memscal.deconvolution.division import Method, chosen_method
-from memscal.errors import InputError
-from memscal.estimation.bayesian import HYPOTHESES, Bayesian
-from memscal.estimation.profile import ProfileEstimate
+from memscal.errors import InputError, MemscalError
+from memscal.estimation.bayesian import Bayesian
+from memscal.estimation.points import loads_differ, scans_by_load
 from memscal.estimation.reference import (
+    press_neo_hookean,
     reference_profile,
     reference_spectra,
     require_calibration_rod,
     require_one_sensor,
+    require_same_set_up,
 )
 from memscal.formats.opened import Scans, opened_scans
 from memscal.mechanics.contact import Contact
@@ -38,14 +42,11 @@ from memscal.model.apparatus import (
     TransferFunction,
 )
 from memscal.model.checks import (
-    NOISE_UNSTATED,
-    OUTLIER_WEIGHT,
-    REPEAT_CENTRES,
     Message,
     QualityCheck,
-    failed_check_messages,
+    override_messages,
 )
-from memscal.model.indenter import RoundIndenter
+from memscal.model.film import LINEAR
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result
 from memscal.model.scan import Scan
@@ -161,167 +162,8 @@ def _reconvolution(solution: Solution) -> Reconvolution:
     )
 
 
-#: Methods whose window is that of the stress's transform: nothing is left to say of them.
-_WINDOWS = ("white-noise", "tikhonov", "bayesian")
-_LINEAR = (*_WINDOWS, "wiener")
-#: Tails of less probability are not told.
-_LEAST_TOLD = 0.001
-#: Relative difference below which two lengths or ratios are the same.
-_SAME = 1e-6
-
-
-def calibration_messages(
-    solution: Solution, checks: tuple[QualityCheck, ...]
-) -> tuple[Message, ...]:
-    """Return the messages that accompany a result, warnings first."""
-    scan, channel = solution.scan, solution.estimate.points.channel
-    messages = failed_check_messages(checks)
-    if solution.estimate.model.order:
-        text = (
-            f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
-            "those of the shear at the base; the voltage is positive where the film pulls the "
-            f"sensor towards larger {channel[0]}."
-        )
-        messages.append(Message("experimental", text))
-    messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
-    messages += _method(solution) + _reference(solution)
-    messages += _unstated(scan)
-    if scan.synthetic is not None:
-        messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
-    return tuple(messages)
-
-
-def _centres(solution: Solution) -> list[Message]:
-    """Return that repeats have centres of their own, and why."""
-    if not solution.per_repeat:
-        return []
-    owners, centres = np.array(solution.owners), solution.estimate.centres
-    apart = max(float(np.ptp(centres[owners == i], axis=0).max()) for i in set(owners))
-    test, way = solution.apart, "as asked for (--centre per-repeat)"
-    if test is not None:
-        way = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
-    text = (
-        f"Each of the {owners.size} repeats has its own centre, baseline and drift, {way}. The "
-        f"centres are up to {apart * 1e6:.3g} um apart."
-    )
-    return [Message(REPEAT_CENTRES, text)]
-
-
-def _points(estimate: ProfileEstimate) -> list[Message]:
-    points = estimate.points
-    messages: list[Message] = []
-    if points.missing:
-        text = f"{points.missing} points of the scan are missing and were left out."
-        messages.append(Message("missing_points", text))
-    for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]:
-        place = f"x = {points.x[i] * 1e3:.4g} mm"
-        if points.planar:
-            place += f", y = {points.y[i] * 1e3:.4g} mm"
-        if points.repeat.any():
-            place += f" of repeat {points.repeat[i]}"
-        voltages = f"{points.u[i] * 1e3:.4g} mV instead of {estimate.predicted[i] * 1e3:.4g} mV"
-        text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
-        messages.append(Message("outlier", text))
-    if points.u_errors is None:
-        text = (
-            f"u_{points.channel}_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV "
-            "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
-            "misfit of the same size, and has no p-value."
-        )
-        messages.append(Message(NOISE_UNSTATED, text))
-    return messages
-
-
-def _tails(estimate: ProfileEstimate) -> list[Message]:
-    """Return what a tail that the scan hardly tells from the baseline would change in A."""
-    probability, change = estimate.weighed.of_kind("wide tail")
-    if probability < _LEAST_TOLD:
-        return []
-    prior = sum(h.estimate for h in HYPOTHESES if h.kind == "wide tail")
-    a = estimate.conversion_constant
-    text = (
-        "Tails of G two to three times as wide as its core have a probability of "
-        f"{probability:.2g} (prior {prior:.2g}). With them A by method bayesian is "
-        f"{abs(change) / a:.2%} {'larger' if change > 0 else 'smaller'} than without; it is the "
-        "mean of both."
-    )
-    return [Message("wide_tails", text)]
-
-
-def _method(solution: Solution) -> list[Message]:
-    """Return where the uncertainty comes from if the method is no plain window."""
-    method = solution.method
-    if method.name in _WINDOWS:
-        return []
-    way = "uncertainties are first-order through its effective window"
-    if not is_linear(method):
-        way = "what noise adds to the uncertainties is the scatter of "
-        way += f"{draw_count(solution)} draws of the voltages"
-        way += " and of its own random numbers" if hasattr(method, "seed") else ""
-    return [Message("method", f"Method {method.name}: {way}. {method.fails}")]
-
-
-def _reference(solution: Solution) -> list[Message]:
-    stress, scan = solution.stress, solution.scan
-    if isinstance(stress, Contact):
-        return [Message("model_form", _model_form(stress))]
-    messages = _other_set_up(scan, stress)
-    if stress.convergence is None:
-        text = "The reference states no convergence: its own error is not counted."
-        messages.append(Message("convergence_unstated", text))
-    return messages
-
-
-def _model_form(contact: Contact) -> str:
-    """Return what the reference assumes."""
-    way = "frictionless" if contact.friction == 0 else "sticking"
-    depth = f"{contact.depth / contact.film.thickness:.0%} of its thickness at {contact.load:.3g} N"
-    if contact.strain == "finite":
-        return (
-            f"The reference is the {way} rod on a neo-Hookean film at finite strain, indented by "
-            f"{depth}; it is used in proportion to the load, and how far the film's own law "
-            "departs from it is not part of the uncertainties."
-        )
-    return (
-        f"The reference is the {way} rod on the linear elastic film, indented by {depth}; the "
-        "error of linear elasticity there is not part of the uncertainties. A reference at finite "
-        "strain (memscal reference rod --strain finite --friction inf) shows what it changes."
-    )
-
-
-def _other_set_up(scan: Scan, stress: StressProfile) -> list[Message]:
-    """Return where a reference was made for another film or indenter than the scan's."""
-    pairs = []
-    if stress.film is not None:
-        for name, unit in (("thickness", 1e3), ("poisson_ratio", 1.0)):
-            ours, theirs = getattr(scan.film, name), getattr(stress.film, name)
-            pairs.append((f"film {name.replace('_', ' ')}", ours * unit, theirs * unit))
-    if isinstance(stress.indenter, RoundIndenter):
-        pairs.append(("rod radius", scan.indenter.radius * 1e3, stress.indenter.radius * 1e3))
-    return [
-        Message(
-            "other_set_up",
-            f"The reference was made for another {name} than the scan's: {theirs:.4g} instead of "
-            f"{ours:.4g}{'' if 'ratio' in name else ' mm'}.",
-        )
-        for name, ours, theirs in pairs
-        if abs(theirs - ours) > _SAME * abs(ours)
-    ]
-
-
-def _unstated(scan: Scan) -> list[Message]:
-    film = scan.film
-    missing = {
-        "film thickness": film.thickness_uncertainty,
-        "Poisson's ratio": film.poisson_ratio_uncertainty,
-        "rod radius": scan.indenter.radius_uncertainty,
-        "load": scan.load_uncertainty,
-    }
-    names = [name for name, value in missing.items() if value is None]
-    pronoun = "them" if len(names) > 1 else "it"
-    text = f"No uncertainty is stated for {', '.join(names)}: nothing is counted for {pronoun}."
-    return [Message("uncertainty_unstated", text)] if names else []
-
+#: Methods whose derivatives are complete.
+_LINEAR = ("white-noise", "tikhonov", "bayesian", "wiener")
 
 Reference: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 """A base stress, the path of a file that holds one, or nothing: the rod is solved."""
@@ -392,11 +234,16 @@ def calibrate(
     *,
     reference: Reference | Sequence[Reference] = None,
     alternative: Reference | Sequence[Reference] = None,
+    film_law: str | None = None,
+    mooney_rivlin_ratio: float | None = None,
+    rod_friction: float | None = None,
     channel: str = "zz",
     method: str | Method = "white-noise",
     centre: str | None = None,
     correlations: Mapping[tuple[str, str], float] | None = None,
+    free: str | Sequence[str] = (),
     seed: int = 0,
+    override: bool = False,
     **options: Any,
 ) -> Calibration:
     r"""Find the apparatus function of a sensor from a rod scan, or from several.
@@ -414,8 +261,16 @@ def calibrate(
         Stress at the base of the film, one for each scan.  By default the one that travels with
         the scan; without that, the rod is solved on the film.
     alternative : StressProfile, Contact or path, optional
-        The same by another model of the film, such as finite strain.  Its difference is counted
-        as a rectangular uncertainty of the model's form, ``model_form``.
+        The same by another model of the film.  Its difference is counted as a rectangular
+        uncertainty of the model's form, ``model_form``, in place of the neo-Hookean film's.
+    film_law : str, optional
+        Law by which the rod is solved: ``"linear"``, ``"neo-hookean"`` or ``"mooney-rivlin"`` (with
+        ``mooney_rivlin_ratio``, :math:`C_2/C_1`).  By default the law that scan or reference
+        state; it counts as known.  Where none is stated the reference is that of a linear film,
+        and its difference from a neo-Hookean one is counted as ``model_form``.
+    rod_friction : float, optional
+        0 or ``inf``: whether the film slides freely under the rod or sticks, which matters at
+        finite strain.  By default as the scan states it; else the difference is counted.
     channel : str, default "zz"
         ``"xz"`` or ``"yz"`` calibrates a tangential channel with the scan's ``u_xz`` or ``u_yz``,
         by method ``"bayesian"``; see docs/tangential.md.
@@ -430,8 +285,14 @@ def calibrate(
         by an F test at 1/1000 (check ``repeat_centres``); a message says so.
     correlations : mapping of (str, str) to float, optional
         Coefficients of the inputs' errors, such as ``{("thickness", "poisson_ratio"): 0.5}``.
+    free : str or sequence of str
+        ``"thickness"`` estimates the thickness of the film from scans with several rods, or at
+        several loads on a film of a stated law that is not linear; what the film states is its
+        Gaussian prior.  The film of the result has the posterior mean and standard uncertainty.
     seed : int, default 0
         Seed of methods that draw random numbers.
+    override : bool, default False
+        Accept a reference or alternative of another film, rod or load than the scan's; recorded.
     **options
         Parameters of the method, such as ``amplitude``.
 
@@ -443,7 +304,7 @@ def calibrate(
     Raises
     ------
     InputError
-        If the scan or the reference cannot be used.
+        If the scan or the reference cannot be used, or not together.
     FitError
         If the scan does not determine the parameters.
 
@@ -458,32 +319,95 @@ def calibrate(
     for rod_scan in scans:
         require_calibration_rod(rod_scan)
     references = _references(reference, scans)
+    known = (film_law, mooney_rivlin_ratio, rod_friction)
+    scans = tuple(_of_law(s, r, *known) for s, r in zip(scans, references, strict=True))
+    alternatives = None if alternative is None else _references(alternative, scans)
+    overridden = require_same_set_up(scans, references, alternatives or (), override=override)
+    owners: Sequence[int] | None = None
+    stated = [r or s.reference for s, r in zip(scans, references, strict=True)]
+    if not any(stated) and any(s.film.law != LINEAR for s in scans):
+        # Under another law than the linear one each load has a stress of its own shape.
+        of_loads, owners = scans_by_load(scans)
+        scans, references = tuple(of_loads), [None] * len(of_loads)
     stresses = [reference_profile(s, r) for s, r in zip(scans, references, strict=True)]
     chosen = chosen_method(method, options, seed=seed)
     if centre not in (None, COMMON, PER_REPEAT):
         problem = f"There is no choice of centre {centre!r}."
         raise InputError(problem, cure=f"Give {COMMON!r} or {PER_REPEAT!r}, or leave it out.")
-    solution = solve(scans, stresses, chosen, channel, centre=centre)
-    effects = _effects(solution, None if alternative is None else _references(alternative, scans))
+    freed = None
+    if free:
+        from memscal.calibration.film_inference import free_thickness, require_free
+
+        require_free(free, scans, references)
+        start = solve(scans, stresses, chosen, channel, both=False, centre=centre, owners=owners)
+        freed = free_thickness(start)
+        scans = tuple(freed.of(scans))
+        stresses = [reference_profile(s, None) for s in scans]
+    solution = solve(scans, stresses, chosen, channel, centre=centre, owners=owners)
+    effects = _effects(solution, alternatives)
     results = uncertainties(solution, solution.deconvolution, effects, pairs)
     beside = solution.other
     other = None if beside is None else uncertainties(solution, beside, effects, pairs)
     checks = quality_checks(solution, results)
-    messages = calibration_messages(solution, checks)
+    messages = calibration_messages(solution, results, checks)
+    messages = (*override_messages(overridden), *messages)
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
+    if freed is not None:
+        messages = (*freed.messages, *messages)
+        configuration["free"] = freed.record
+    if loads_differ([s.load for s in solution.scans]):
+        from memscal.calibration.film_inference import weigh_laws
+
+        if (compared := weigh_laws(solution)) is not None:
+            messages = (compared.message, *messages)
+            configuration["film_laws"] = compared.record
     if channel != "zz":
         configuration["channel"] = channel
+    if film_law is not None:
+        configuration["film_law"] = film_law
+    if rod_friction is not None:
+        configuration["rod_friction"] = rod_friction
     if centre is not None or solution.apart is not None:
         choice = PER_REPEAT if solution.per_repeat else COMMON
         configuration["centre"] = {"choice": choice, "chosen_by": "option" if centre else "test"}
         if solution.apart is not None:
             configuration["centre"]["p_value"] = solution.apart.p_value
+    if overridden:
+        configuration["override"] = overridden
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
     apparatus = assemble(solution, results, other, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(pairs))
+
+
+def _of_law(
+    scan: Scan,
+    reference: StressProfile | Contact | None,
+    law: str | None,
+    ratio: float | None,
+    friction: float | None,
+) -> Scan:
+    """Return the scan with the law and the rod's friction that are known: asked for, or stated."""
+    if law is not None:
+        if reference is not None:
+            raise InputError(
+                f"A film law ({law}) and a reference are given.",
+                why="A reference has been calculated by a law already.",
+                cure="Give one of them (film_law, --film-law; reference, --reference).",
+            )
+        film = replace(scan.film, law=law, mooney_rivlin_ratio=ratio)
+        scan = replace(scan, film=film, reference=None)
+    stress = scan.reference if reference is None else reference
+    theirs = stress.film_of_law if isinstance(stress, Contact) else stress and stress.film
+    if stress is not None and theirs and theirs.law and not scan.film.law:
+        stated = {name: getattr(theirs, name) for name in ("law", "mooney_rivlin_ratio")}
+        scan = replace(scan, film=replace(scan.film, **stated))
+        used = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
+        if theirs.law != LINEAR and scan.rod_friction is None and used in (0.0, np.inf):
+            scan = replace(scan, rod_friction=used)
+    return scan if friction is None else replace(scan, rod_friction=friction)
 
 
 def _references(
@@ -516,14 +440,23 @@ def _read(reference: Reference) -> StressProfile | Contact | None:
 def _effects(
     solution: Solution, alternatives: Sequence[StressProfile | Contact | None] | None
 ) -> Mapping[str, InputEffect]:
-    scans, estimate = solution.scans, solution.estimate
-    spectra = None
+    scans, estimate, spectra, others = solution.scans, solution.estimate, None, None
     if alternatives is not None:
         pairs = zip(solution.owners, solution.stresses, strict=True)
-        stresses = [alternatives[i] or stress for i, stress in pairs]
+        others = [alternatives[i] or stress for i, stress in pairs]
         points = [estimate.points.only(i) for i in range(len(scans))]
-        spectra = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
-    return input_effects(scans, solution.stresses, estimate, spectra)
+        spectra = reference_spectra(others, points, [scan.film.thickness for scan in scans])
+    elif all(isinstance(stress, Contact) for stress in solution.stresses):
+        others = [press_neo_hookean(scan) for scan in scans]
+    effects = dict(input_effects(scans, solution.stresses, estimate, spectra))
+    if others is not None and "model_form" in effects:
+        # Two laws differ by too much for the first order: calibrated by the other one, too.
+        with suppress(MemscalError):
+            channel = estimate.points.channel
+            both = solution.other is not None
+            exact = solve(scans, others, solution.method, channel, both=both)
+            effects["model_form"] = replace(effects["model_form"], exact=exact)
+    return effects
 
 
 def uncertainties(

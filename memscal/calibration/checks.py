@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
@@ -21,7 +23,6 @@ from memscal.estimation.assumptions import (
     load_groups,
     symmetry_test,
 )
-from memscal.estimation.band import RESOLVED
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import carried_force
@@ -36,6 +37,8 @@ from memscal.estimation.residuals import (
     residuals_of,
     runs_test,
 )
+from memscal.estimation.smoothing import RESOLVED
+from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.checks import (
     FALSE_ALARM,
@@ -46,6 +49,7 @@ from memscal.model.checks import (
     check,
     chi_square_limit,
 )
+from memscal.model.film import LINEAR
 from memscal.model.notation import format_measured
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
@@ -263,6 +267,8 @@ _ROUTES_LIMIT = 3.2
 _HALF_WIDTH = float(np.sqrt(8 * np.log(2)))
 #: By simulation, docs/quality.md: beyond sound results, in which G may be a disc or a ring.
 _SHAPE_WIDTH_LIMIT = 2.5
+#: The base stress of a neo-Hookean film differs there from a linear one's by a tenth.
+INDENTATION_LIMIT = 0.1
 _NEGATIVE_LIMIT = 0.4
 _ROUGHNESS_LIMIT = 0.1
 _BEYOND = 1.5
@@ -281,6 +287,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_agreements(solution, results),
         *_shape(solution, results.parameters),
         *_set_up(solution),
+        _indentation(solution),
         *_noise(estimate),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
@@ -437,6 +444,36 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "name.",
     }
     return [check(name, *values[name], meanings[name]) for name in values]
+
+
+def _indentation(solution: Solution) -> QualityCheck:
+    """Compare the depth with the thickness: beyond the limit a linear film is formal."""
+    film, depths = solution.scan.film, []
+    for scan, stress in zip(solution.scans, solution.stresses, strict=True):
+        depth = stress.depth
+        if depth is None:
+            linear = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None)
+            depth = press_rod(linear, scan.indenter, scan.load).depth
+        depths.append(depth / scan.film.thickness)
+    meaning = "Largest depth of the rod over the film's thickness. "
+    if film.law == LINEAR:
+        meaning += (
+            "A failure means that a film that is taken as linear elastic is strained too far for "
+            "that: give its law (film/law, --film-law), or leave it out to have the law's form "
+            "counted, or calibrate at a lighter load."
+        )
+    elif not film.law:
+        meaning += (
+            "It passes at any depth, for the form of the film's law, which is not stated, is "
+            "counted (model_form); a failure means that a film was stated to be linear."
+        )
+    else:
+        meaning += (
+            f"It passes at any depth, for the reference is that of a {film.law} film; a failure "
+            "means that a film was stated to be linear."
+        )
+    passed = film.law != LINEAR or max(depths) <= INDENTATION_LIMIT
+    return QualityCheck("indentation", max(depths), INDENTATION_LIMIT, passed, meaning)
 
 
 def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:

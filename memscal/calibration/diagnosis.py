@@ -19,8 +19,9 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints, joined_points, mistaken_unit
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
-from memscal.estimation.reference import reference_contact, reference_spectra
+from memscal.estimation.reference import reference_spectra
 from memscal.mechanics.contact import Contact
+from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
@@ -259,7 +260,7 @@ def _scaled(stress: StressProfile | Contact, path: str, factor: float) -> Stress
             rod = replace(rod, radius=rod.radius * factor)
         else:
             film = replace(film, thickness=film.thickness * factor)
-        return reference_contact(film, rod, _LOAD)
+        return press_rod(replace(film, law="", mooney_rivlin_ratio=None), rod, _LOAD)
     profile = stress.profile() if isinstance(stress, Contact) else stress
     shear = None if profile.sigma_rz is None else profile.sigma_rz / factor**2
     zz = profile.sigma_zz / factor**2

@@ -15,17 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from memscal.axisymmetry.hankel import radial_spline
 from memscal.calibration.fields import choose_grid
-from memscal.calibration.stages import Deconvolution, Solution, deconvolve, prepare_fields
-from memscal.calibration.uncertainty import DrawnScatter, kernel_functionals
+from memscal.calibration.stages import Solution, deconvolve, prepare_fields
+from memscal.calibration.uncertainty import DrawnScatter, read_off
 from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw
 from memscal.deconvolution.scikit_image import Wiener
 from memscal.errors import FitError
-from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.smoothing import smooth_profile
+from memscal.estimation.smoothing import find_band, smooth_profile
 from memscal.model.arrays import FloatArray
 
 #: Draws: their standard deviation is known to 1/sqrt(2 n), 10 % for 50.  Restorations of large
@@ -116,12 +114,3 @@ def _divided(
     wavenumbers = solution.fields.along_axis(solution.deconvolution.quotient.window)[0]
     transfer = np.interp(wavenumbers, *fields.along_axis(spectrum), right=0.0)
     return *read_off(drawn, solution.deconvolution.g.r), transfer
-
-
-def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float], FloatArray]:
-    """A and the numbers read off G, and G at other radii (m), zero beyond its support."""
-    g = result.g
-    numbers = {f.name: f.value for f in kernel_functionals(g, result.gaussian_sigma)}
-    inside = radial_spline(g.r, g.radial)(np.minimum(radii, g.r[-1]))
-    numbers["conversion_constant"] = result.conversion_constant
-    return numbers, np.where(radii <= g.r[-1], inside, 0.0)

@@ -16,11 +16,10 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
-from memscal.estimation.band import Band
 from memscal.estimation.forward import elliptic_departure
 from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
-from memscal.estimation.smoothing import SmoothedProfile
+from memscal.estimation.smoothing import Band, SmoothedProfile
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import EvenAxis, even_lattice
 

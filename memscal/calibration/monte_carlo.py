@@ -17,7 +17,6 @@ from scipy.special import ndtr, ndtri
 
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.calibration.calibrate import Calibration, uncertainties
-from memscal.calibration.drawn_scatter import read_off
 from memscal.calibration.stages import Solution, solve
 from memscal.calibration.uncertainty import (
     BUDGETED,
@@ -26,11 +25,12 @@ from memscal.calibration.uncertainty import (
     correlation_matrix,
     drawn_about,
     expected_values,
+    read_off,
 )
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
-from memscal.mechanics.indent import indent
+from memscal.estimation.reference import law_at_once, rod_spectrum
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.result import Result
@@ -165,7 +165,7 @@ class DrawnScans:
     @cached_property
     def _nominal(self) -> list[FloatArray]:
         pairs = zip(self.solution.scans, self.solution.estimate.model.references, strict=True)
-        return [_rod_spectrum(scan, reference) for scan, reference in pairs]
+        return [rod_spectrum(scan, ref, law_at_once(scan)) for scan, ref in pairs]
 
     def _reference_changes(self, standard: Mapping[str, FloatArray]) -> tuple[RadialSpectrum, ...]:
         """True reference of each scan less the nominal one, by the ratio of the rod's solutions."""
@@ -176,9 +176,10 @@ class DrawnScans:
                 owner = replace(getattr(true[i], item.component), **{item.attribute: float(value)})
                 true[i] = replace(true[i], **{item.component: owner})
         rods = zip(true, self.solution.estimate.model.references, self._nominal, strict=True)
+        laws = [law_at_once(scan) for scan in self.solution.scans]
         return tuple(
-            replace(ref, values=ref.values * (_rod_spectrum(scan, ref) / nominal - 1))
-            for scan, ref, nominal in rods
+            replace(ref, values=ref.values * (rod_spectrum(scan, ref, law) / nominal - 1))
+            for (scan, ref, nominal), law in zip(rods, laws, strict=True)
         )
 
     def _calibrated(self, scans: list[Scan]) -> FloatArray:
@@ -189,12 +190,6 @@ class DrawnScans:
         numbers, g = read_off(solution.deconvolution, first.deconvolution.g.r)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
-
-
-def _rod_spectrum(scan: Scan, reference: RadialSpectrum) -> FloatArray:
-    contact = indent(scan.film, scan.indenter, load=scan.load, strain="linear")
-    k = reference.wavenumbers.k
-    return contact.base_shear_spectrum(k) if reference.order else contact.base_spectrum(k)
 
 
 def _with_voltages(scan: Scan, channel: str, voltages: FloatArray) -> Scan:

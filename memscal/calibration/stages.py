@@ -24,7 +24,6 @@ from memscal.deconvolution.fourier_ratio import (
 )
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.assumptions import CentresApart, repeat_centres_test
-from memscal.estimation.band import Band, find_band
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.points import (
     channel_order,
@@ -34,7 +33,7 @@ from memscal.estimation.points import (
 )
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
-from memscal.estimation.smoothing import SmoothedProfile, smooth_profile
+from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
@@ -56,13 +55,15 @@ def solve(
     *,
     both: bool = True,
     centre: str | None = COMMON,
+    owners: Sequence[int] | None = None,
 ) -> Solution:
     """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back.
 
-    ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test.
+    ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test.  ``owners``:
+    the number of the scan that each is a part of.
     """
     require_channel_method(channel, method)
-    owners, apart = tuple(range(len(scans))), None
+    owners, apart = tuple(owners or range(len(scans))), None
     if centre != PER_REPEAT:
         estimate = require_profile(scans, stresses, channel)
         apart = repeat_centres_test(estimate)
@@ -71,7 +72,7 @@ def solve(
             separate, numbers = scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
             estimate = require_profile(separate, of_repeats, channel)
-            scans, stresses, owners = separate, of_repeats, numbers
+            scans, stresses, owners = separate, of_repeats, tuple(owners[i] for i in numbers)
         except MemscalError:
             # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
             if centre == PER_REPEAT:

@@ -36,7 +36,7 @@ from memscal.calibration.stages import Deconvolution, Solution
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
 from memscal.estimation.profile import ProfileEstimate
-from memscal.estimation.reference import carried_force, film_sensitivities, rod_sensitivities
+from memscal.estimation.reference import RECTANGLE, carried_force, reference_sensitivities
 from memscal.estimation.smoothing import SmoothedProfile
 from memscal.mechanics.contact import Contact
 from memscal.model.apparatus import ParameterSet
@@ -46,8 +46,6 @@ from memscal.model.stress import StressProfile
 
 #: Points per step of the profile between which the half maximum is interpolated.
 _FINE = 20
-#: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
-_RECTANGLE = 1 / np.sqrt(3)
 #: Windows below this have closed; what sums of squares lose to rounding.
 _CLOSED = _ROUNDING = 1e-9
 #: Parameters whose uncertainty is broken down by source.
@@ -131,6 +129,7 @@ class InputEffect:
 
     voltage: FloatArray  # (n,): change of the voltages that it would be mistaken for, in V
     scaling: float = 0.0  # relative change of A beside that
+    exact: Solution | None = None  # of the bound, where the first order does not serve
 
 
 def input_effects(
@@ -140,17 +139,8 @@ def input_effects(
     alternatives: Sequence[RadialSpectrum] | None = None,
 ) -> Mapping[str, InputEffect]:
     """Return the effect of every input whose uncertainty is stated, by its name."""
-    # Scans share the error of a common film or rod, of the balance and of the stage.
     model = estimate.model
-    changes: dict[str, list[FloatArray]] = {}
-    for attribute, sensitivities in [("film", film_sensitivities), ("indenter", rod_sensitivities)]:
-        owners = [getattr(scan, attribute) for scan in scans]
-        distinct = list(dict.fromkeys(owners))
-        for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
-            suffix = _number(distinct.index(owner))
-            for source, change in sensitivities(scan, model.references[i]).items():
-                blank = [np.zeros_like(change) for _ in scans]
-                changes.setdefault(source + suffix, blank)[i] = change
+    changes = reference_sensitivities(scans, model.references)
     # Stated errors are those of the normal stress, not of the shear.
     for i, stress in enumerate(() if model.order else stresses):
         if isinstance(stress, StressProfile) and stress.sigma_zz_errors is not None:
@@ -159,7 +149,7 @@ def input_effects(
             changes.setdefault("reference_stress", blank)[i] = errors
     if alternatives is not None:
         pairs = zip(alternatives, model.references, strict=True)
-        changes["model_form"] = [_RECTANGLE * (a.values - ours.values) for a, ours in pairs]
+        changes["model_form"] = [RECTANGLE * (a.values - ours.values) for a, ours in pairs]
     effects = {source: _of_reference(estimate, change) for source, change in changes.items()}
     return effects | _of_positions(scans, estimate) | _of_loads(scans, stresses, estimate)
 
@@ -234,6 +224,7 @@ class Results:
     """Everything a calibration states with an uncertainty."""
 
     parameters: ParameterSet  # scalars with their joint covariance
+    changes: Mapping[str, FloatArray]  # (p,) by input: of the parameters, by one uncertainty of it
     budget: Mapping[str, Mapping[str, float]]  # standard uncertainties by parameter and source
     radial_covariance: FloatArray  # (n, n): covariance of G(r), in 1/m^4
     cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
@@ -300,6 +291,8 @@ def propagate(
     for source, effect in effects.items():
         column = by_voltage @ effect.voltage
         column[: len(names)] += np.where(scaled, values, 0.0) * effect.scaling
+        if effect.exact is not None:
+            _replace_exactly(column, names, values, deconvolution, effect.exact, wavenumbers)
         columns[source] = column[:, None]
     if effects:
         together = np.hstack([columns[name] for name in effects])
@@ -310,12 +303,44 @@ def propagate(
     scatter = [columns["noise"], *(independent[-1:] if effects else [])]
     return Results(
         parameters=ParameterSet(names, values, stored[:count, :count]),
+        changes={source: columns[source][:count, 0] for source in effects},
         budget={name: _budget(names.index(name), columns, stored) for name in BUDGETED},
         radial_covariance=stored[count:, count:],
         cross_covariance=stored[count:, :count],
         transfer_errors=np.linalg.norm(everything[stop:], axis=1),
         radial_scatter=np.linalg.norm(np.hstack(scatter)[count:stop], axis=1),
     )
+
+
+def _replace_exactly(
+    column: FloatArray,
+    names: Sequence[str],
+    values: FloatArray,
+    deconvolution: Deconvolution,
+    exact: Solution,
+    wavenumbers: FloatArray,
+) -> None:
+    """Put differences from another calibration, over the root of three, for the first order."""
+    # Those of centre, baseline and drift stay.
+    routes = [route for route in (exact.deconvolution, exact.other) if route is not None]
+    other = next(route for route in routes if route.divided == deconvolution.divided)
+    r, fit, count = deconvolution.g.r, exact.estimate.gaussian, len(names)
+    numbers, g = read_off(other, r)
+    of_fit = {"gaussian_sigma": fit.sigma, "conversion_constant_gaussian": fit.conversion_constant}
+    for name, value in (numbers | of_fit).items():
+        column[names.index(name)] = RECTANGLE * (value - values[names.index(name)])
+    change = RECTANGLE * (g - deconvolution.g.radial)
+    column[count : count + r.size] = change
+    column[count + r.size :] = (j0(np.multiply.outer(wavenumbers, r)) * ring_areas(r)) @ change
+
+
+def read_off(result: Deconvolution, radii: FloatArray) -> tuple[dict[str, float], FloatArray]:
+    """A and the numbers read off G, and G at other radii (m), zero beyond its support."""
+    g = result.g
+    numbers = {f.name: f.value for f in kernel_functionals(g, result.gaussian_sigma)}
+    inside = radial_spline(g.r, g.radial)(np.minimum(radii, g.r[-1]))
+    numbers["conversion_constant"] = result.conversion_constant
+    return numbers, np.where(radii <= g.r[-1], inside, 0.0)
 
 
 def expected_values(solution: Solution) -> dict[str, float]:

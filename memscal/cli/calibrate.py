@@ -13,7 +13,7 @@ import click
 
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, force_option, json_option, option
+from memscal.cli.options import FILE, FILM_LAWS, Quantity, force_option, json_option, option
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -169,8 +169,19 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "else the rod is solved on the film."
 )
 @option("--alternative", FILE, metavar="FILE")(
-    "The same stress by another model of the film (memscal-reference), such as finite strain: "
-    "its difference is counted as an uncertainty of the model's form."
+    "The same stress by another model of the film (memscal-reference): its difference is counted "
+    "as an uncertainty of the model's form, in place of the neo-Hookean film's."
+)
+@option("--film-law", click.Choice(FILM_LAWS))(
+    "Law of the film by which the rod is solved, taken as known. By default the one that scan or "
+    "reference state; else linear, and its difference from neo-hookean is counted (model_form)."
+)
+@option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
+    "C2/C1 of --film-law mooney-rivlin."
+)
+@option("--rod-friction", click.Choice(("0", "inf")))(
+    "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite "
+    "strain. By default as the scan states it; else it sticks, and the difference is counted."
 )
 @option("--correlation correlations", multiple=True, metavar="INPUT,INPUT=R")(
     "Correlation coefficient of two inputs' errors: thickness,poisson_ratio=0.5. Repeatable."
@@ -190,11 +201,18 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "Whether the repeats of a scan share their centre, or each has a centre, baseline and drift of "
     "its own.  [default: per-repeat where a common centre has a p-value below 1/1000]"
 )
+@option("--free", click.Choice(("thickness",)), multiple=True)(
+    "Estimate the film's thickness, too, from scans with several rods, or at several loads on a "
+    "film of a stated law that is not linear; the stated thickness is its prior."
+)
 @option("--option options", multiple=True, metavar="NAME=VALUE")(
     "A parameter of the method, such as amplitude=0.5 (a factor on the noise amplitude that "
     "the rule chooses). May be repeated."
 )
 @option("--seed", click.IntRange(min=0), metavar="N")("Seed of random numbers.  [default: 0]")
+@option("--override", is_flag=True)(
+    "Go on although a reference is of another film, rod or load than its scan: recorded."
+)
 @json_option
 @option("--report", FILE, metavar="FILE.html")("Write a report as one HTML page.")
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
@@ -220,12 +238,17 @@ def command(
     output: Path | None,
     reference: Path | None,
     alternative: Path | None,
+    film_law: str | None,
+    mooney_rivlin_ratio: float | None,
+    rod_friction: str | None,
     correlations: tuple[str, ...],
     channel: str,
     method: str | None,
     centre: str | None,
+    free: tuple[str, ...],
     options: tuple[str, ...],
     seed: int | None,
+    override: bool,
     as_json: bool,
     report: Path | None,
     figures: tuple[Path, ...],
@@ -257,7 +280,7 @@ def command(
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
     out.prove_writable(outputs.paths, force=force, inputs=inputs)
     if dry_run:
-        _rehearse(data, profile, channel, regulariser, outputs, as_json, centre)
+        _rehearse(data, profile, other, override, channel, regulariser, outputs, as_json, centre)
         return DONE
 
     from memscal.calibration.calibrate import calibrate
@@ -267,11 +290,16 @@ def command(
             data,
             reference=profile,
             alternative=other,
+            film_law=film_law,
+            mooney_rivlin_ratio=mooney_rivlin_ratio,
+            rod_friction=None if rod_friction is None else float(rod_friction),
             channel=channel,
             method=regulariser,
             centre=centre,
             correlations=dict(pairs),
+            free=free,
             seed=seed or 0,
+            override=override,
         )
     sweep, drawn = None, None
     if sweeping or sweep_figure:
@@ -320,6 +348,8 @@ def _read_reference(path: Path) -> StressProfile:
 def _rehearse(
     scans: list[Scan],
     profile: StressProfile | None,
+    alternative: StressProfile | None,
+    override: bool,
     channel: str,
     regulariser: Method,
     outputs: Outputs,
@@ -333,11 +363,15 @@ def _rehearse(
         reference_profile,
         reference_spectra,
         require_one_sensor,
+        require_same_set_up,
     )
+    from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
     require_one_sensor(scans)
     require_channel_method(channel, regulariser)
+    given = [profile] * len(scans), [alternative] * len(scans)
+    out.show_messages(override_messages(require_same_set_up(scans, *given, override=override)))
     if centre == "per-repeat":
         scans = scans_of_repeats(scans, channel)[0]
     readings = [measured_points(scan, channel) for scan in scans]

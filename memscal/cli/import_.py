@@ -66,7 +66,7 @@ reference_options = options_of(
 def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting = _stated(options, (*_SHARED, "load"))
-    if any(options[name] is not None for name in common.FILM):
+    if any(options[name] is not None for name in (*common.FILM, *common.LAW)):
         setting["film"] = common.film_from(options)
     if options["radius"] is not None:
         setting["indenter"] = common.indenter_from(options["indenter"], options)
@@ -107,7 +107,7 @@ Meshes (.vtu, .vtk, .xdmf) need the extra fem-io: pip install "memscal[fem-io]".
 _SCAN_NAMES = [
     *("x", "x_unit", "u", "u_unit", "u_scale", "u_sign", "y", "repeat", "branch", "u_xz"),
     *("u_yz", "load_column", "load_unit", "load_uncertainty", "title"),
-    *("lubrication", "lubricant"),
+    *("lubrication", "lubricant", "rod_friction"),
 ]
 _SENSOR_NAMES = {"name": "sensor_name", "model": "sensor_model", "channel": "channel"}
 _SIGNS = ("u_sign", "sign", "shear_sign")
@@ -175,6 +175,7 @@ _NEEDED = {
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
+@common.rod_friction_option
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options
@@ -233,6 +234,8 @@ def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> 
     other = "reference" if kind == "scan" else "scan"
     if misplaced := _stated(options, _ONLY[other]):
         raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
+    if options["rod_friction"] is not None and options["indenter"] != "rod":
+        raise click.UsageError("--rod-friction belongs to --indenter rod.")
     unused = _stated(options, (*_OF_TABLES, *_READING) if mesh else _OF_MESHES)
     if unused and kind == "reference":
         raise click.UsageError(f"A {'mesh' if mesh else 'table'} has no use for {_named(unused)}.")

@@ -104,24 +104,29 @@ json_option = option("--json as_json", is_flag=True)("Print one JSON object in p
 force_option = option("--force", is_flag=True)("Replace outputs that exist.")
 output_options = options_of(json_option, force_option, debug_option)
 
+#: Those of memscal.model.film, which takes longer to import than help may; a test compares them.
+FILM_LAWS = ("linear", "neo-hookean", "mooney-rivlin")
 FILM = {"young_modulus": 6, "poisson_ratio": 0, "thickness": -3}
 """What describes a film, by the names of its options, with the powers of ten of their units."""
+LAW = ("film_law", "mooney_rivlin_ratio")
+"""What describes its law."""
 
 #: The paper's film, in the units of the command line.
-PAPER_FILM = {
+PAPER_FILM: Mapping[str, float | str | None] = {
     "young-modulus": 2.2,
     "poisson-ratio": 0.5,
     "thickness": 2.0,
     "young-modulus-uncertainty": 0.1,
     "poisson-ratio-uncertainty": 0.005,
     "thickness-uncertainty": 0.02,
+    "film-law": "neo-hookean",
 }
 
 _UNCERTAINTY = "Standard uncertainty (k = 1) of "
 
 
 def film_options(
-    *, defaults: Mapping[str, float] | None = None, uncertainties: bool = True
+    *, defaults: Mapping[str, float | str | None] | None = None, uncertainties: bool = True
 ) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
     ratio = Quantity("ratio", high=0.5, open_low=False)
@@ -132,7 +137,21 @@ def film_options(
         ("poisson-ratio", ratio, ratio_text, "Poisson's ratio."),
         ("thickness", Quantity("mm"), "Thickness of the film, in mm.", "the thickness, in mm."),
     )
-    return _measured(entries, defaults or {}, uncertainties)
+    values = defaults or {}
+    law = option("--film-law", click.Choice(FILM_LAWS), values.get("film-law"))
+    constants = option("--mooney-rivlin-ratio", Quantity("ratio", open_low=False))
+    return options_of(
+        _measured(entries, values, uncertainties),
+        law("Law of the film's stress: small strain, or rubber."),
+        constants("C2/C1 of a film of --film-law mooney-rivlin."),
+    )
+
+
+rod_friction_option = option(
+    "--rod-friction",
+    click.Choice(["0", "inf"]),
+    callback=lambda _, __, text: None if text is None else float(text),
+)("Rod: 0, the film slides freely under it; inf, it sticks.")
 
 
 def radius_options(
@@ -151,7 +170,7 @@ def radius_options(
 
 def _measured(
     entries: Sequence[tuple[str, Quantity, str, str]],
-    defaults: Mapping[str, float | None],
+    defaults: Mapping[str, float | str | None],
     uncertainties: bool,
 ) -> _Adder:
     """Return the options of quantities, then those of their uncertainties (the last texts)."""
@@ -182,6 +201,11 @@ def si(value: float | None, power: int) -> float | None:
 def film_from(options: Mapping[str, Any]) -> ElasticFilm:
     """Return the film that the options describe."""
     _require("The film", options, FILM)
+    law, ratio = options["film_law"] or "", options["mooney_rivlin_ratio"]
+    if (law == FILM_LAWS[-1]) != (ratio is not None):
+        raise click.UsageError(
+            "--film-law mooney-rivlin and --mooney-rivlin-ratio go together: give both or neither."
+        )
     from memscal.model.film import ElasticFilm
 
     numbers: dict[str, Any] = {
@@ -189,7 +213,7 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
         for quantity, power in FILM.items()
         for name in (quantity, f"{quantity}_uncertainty")
     }
-    return ElasticFilm(**numbers)
+    return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 
 def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:

@@ -94,7 +94,7 @@ EXAMPLES = """\b
 Examples:
   memscal reference rod
   memscal reference rod --load 0.5 --load 1 --load 2
-  memscal reference rod --strain finite --friction inf -o finite.h5
+  memscal reference rod --film-law neo-hookean -o rubber.h5
   memscal reference sphere --load 0.34 --load 1.37 --load 2.75 --friction 0.3 --figure sphere.png
   memscal reference sphere --depth 20 --friction inf --loading total --backend fem --json
   memscal reference sphere --friction 1.6 --slip-length 1.82
@@ -121,19 +121,20 @@ Examples:
 )
 @option("--r-unit", default="mm")("Profile: unit of the radii.")
 @option("--z-unit", default="um")("Profile: unit of the heights.")
-@option("--friction", Quantity("ratio", open_low=False, infinite=True), 0.0, metavar="MU")(
-    "Friction coefficient between indenter and film; inf: it sticks wherever it touches."
+@option("--friction", Quantity("ratio", open_low=False, infinite=True), metavar="MU")(
+    "Friction coefficient between indenter and film; inf: it sticks wherever it touches.  "
+    "[default: 0; inf of a rod on a film that is not linear]"
 )
 @option("--loading", click.Choice(["incremental", "total"]), "incremental")(
     "A point sticks where it first touched, or as if loaded in one step. The same under a rod."
 )
 @interface_options
-@common.film_options(defaults=PAPER_FILM, uncertainties=False)
+@common.film_options(defaults={**PAPER_FILM, "film-law": None}, uncertainties=False)
 @option("--backend", click.Choice(["hankel", "fem"]), "hankel")(
     "Hankel transforms on an infinite film, or finite elements on one with a free edge."
 )
-@option("--strain", click.Choice(["linear", "finite"]), "linear")(
-    "finite: a neo-Hookean film, by finite elements; friction 0 or inf."
+@option("--strain", click.Choice(["linear", "finite"]))(
+    "finite: --film-law neo-hookean, unless another is given; linear: --film-law linear."
 )
 @option("--film-radius", Quantity("mm"))(
     "Radius of the film's free edge, in mm, for finite elements.  [default: 12 thicknesses "
@@ -167,7 +168,7 @@ def command(
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
     Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and thickness 2 mm; a
-    rod of radius 0.25 mm, a sphere of radius 128.8 mm.
+    rod of radius 0.25 mm, a sphere of radius 128.8 mm. Without --film-law the film is linear.
     """
     _check_usage(loads, depths, output, mesh, options)
     files = [path for path in (output, mesh, *figures) if path is not None]
@@ -196,10 +197,22 @@ def _check_usage(
             raise click.UsageError(
                 f"A file holds one load: with --{name} give one --load or one --depth."
             )
-    if mesh is not None and options["backend"] != "fem" and options["strain"] != "finite":
+    _choose_law(options)
+    if mesh is not None and options["backend"] != "fem" and options["film_law"] == "linear":
         raise click.UsageError("--mesh shows finite elements: add --backend fem.")
     if mesh is not None and mesh.suffix.lower() != ".vtu":
         raise click.UsageError(f"{mesh} does not end in .vtu, the format of --mesh.")
+
+
+def _choose_law(options: dict[str, Any]) -> None:
+    """Choose the film's law by --strain where it is not given."""
+    law, strain = options["film_law"], options["strain"]
+    if strain == "linear":
+        options |= {"film_law": "linear", "mooney_rivlin_ratio": None}
+    elif strain == "finite" and law == "linear":
+        raise click.UsageError("--film-law linear has no finite strain: leave --strain out.")
+    else:
+        options["film_law"] = law or ("neo-hookean" if strain else "linear")
 
 
 def _pressed(
@@ -209,8 +222,12 @@ def _pressed(
     interface = interface_of(options)
     from memscal.mechanics.indent import indent
 
-    names = ("friction", "loading", "backend", "strain", "rings")
-    settings: dict[str, Any] = {name: options[name] for name in names}
+    friction = options["friction"]
+    if friction is None:
+        # A film that slides is drawn out from under a rod, and is not solved to any depth.
+        friction = math.inf if indenter == "rod" and film.law != "linear" else 0.0
+    names = ("loading", "backend", "rings")
+    settings: dict[str, Any] = {"friction": friction} | {name: options[name] for name in names}
     settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
     if depths:
         return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)

@@ -34,6 +34,9 @@ Examples:
     "adds the check expected_stress. By default the scan's indenter is pressed on its film without "
     "friction, to be shown beside the result."
 )
+@option("--override", is_flag=True)(
+    "Go on although sensor, channel or film of artifact and scan differ: recorded in the output."
+)
 @option("--figure figures", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
@@ -43,6 +46,7 @@ def command(
     scan: Path,
     output: Path | None,
     expected: Path | None,
+    override: bool,
     figures: tuple[Path, ...],
     as_json: bool,
     force: bool,
@@ -67,7 +71,7 @@ def command(
     from memscal.measurement.restore import restore
 
     with out.working("Restoring"):
-        restored = restore(data, apparatus, expected=stress)
+        restored = restore(data, apparatus, expected=stress, override=override)
         if stress is None:
             restored = _beside_calculated(restored)
     with out.working("Drawing"):

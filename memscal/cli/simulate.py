@@ -75,7 +75,7 @@ _sphere_options = options_of(
 
 
 #: Options whose values are given on as they are, and those in other units, by the power of ten.
-_SHARED = ("repeats", "state_noise", "seed")
+_SHARED = ("repeats", "state_noise", "state_law", "rod_friction", "seed")
 _SCALED = {"conversion_constant": -3} | dict.fromkeys(
     ("noise", "baseline", "drift", "load_uncertainty"), -2
 )
@@ -165,7 +165,7 @@ EXAMPLES = """\b
 Examples:
   memscal simulate -o scan.h5
   memscal simulate -o scan.h5 --points 33 --noise 0.5 --seed 7
-  memscal simulate -o loads.h5 --load 0.5 --load 1 --load 2 --repeats 3
+  memscal simulate -o loads.h5 --load 0.1 --load 0.3 --load 1 --repeats 3
   memscal simulate -o raster.h5 --raster --points 33 --half-range 6
   memscal simulate -o ring.h5 --sigma 700 --weight 1.5 --sigma 400 --weight -0.5
   memscal simulate -o disc.h5 --disc-radius 800 --sigma 300
@@ -195,6 +195,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 )
 @common.radius_options(default=0.25, uncertainty=0.0025)
 @common.film_options(defaults=PAPER_FILM)
+@common.rod_friction_option
 @option("--half-range", Quantity("mm"), 8.0)(
     "Rod scan alone: positions run from minus to plus this, in mm."
 )
@@ -222,6 +223,9 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 @option("--state-noise/--no-state-noise", default=True)(
     "Whether the scan states its noise (u_zz_errors)."
 )
+@option("--state-law/--no-state-law", default=True)(
+    "Whether the scan states the film's law and the rod's friction."
+)
 @option("--seed", click.IntRange(min=0), 0, metavar="N")("Seed of the noise.")
 @_sphere_options
 @output_options
@@ -230,9 +234,10 @@ def command(
 ) -> int:
     """Make a synthetic scan, or the scans of an experiment, from a known apparatus function.
 
-    The base stress of a frictionless rod on the bonded film, or of a sphere's contacts, is
-    convolved with the apparatus function; noise, an offset and a drift are added. Every file is
-    labelled as synthetic and holds its truth. Defaults are the paper's.
+    The base stress of a rod on the bonded film, or of a sphere's contacts, is convolved with the
+    apparatus function; noise, an offset and a drift are added. Under the rod the film follows
+    --film-law, under the sphere linear elasticity. Every file is labelled as synthetic and holds
+    its truth. Defaults are the paper's.
     """
     _check_usage(experiment, options)
     if experiment == "sphere":

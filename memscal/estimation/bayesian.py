@@ -462,7 +462,9 @@ class WeighedFit:
     probability: FloatArray  # (h,): posterior probability of each of HYPOTHESES
     residual: FloatArray  # (n,): voltages that are not explained, in V
     change_of_a: FloatArray  # (h,): by each hypothesis, in V/Pa; NaN where it is unlikely
-    log_marginal_likelihood: float = 0.0  # of all hypotheses, up to a constant of the scan
+    # Of all hypotheses, up to a constant of the scan, by the priors of estimate and uncertainty.
+    log_marginal_likelihood: float = 0.0
+    log_marginal_of_uncertainty: float = 0.0
 
     @property
     def gaussian_probability(self) -> float:
@@ -547,9 +549,8 @@ def _average(
 ) -> WeighedFit:
     """Average mean and gain by one set of probabilities, squared errors by the other."""
     log_marginal = np.array([-np.inf if c is None else c.log_marginal for c in conditionals])
-    prior = np.array([h.estimate for h in HYPOTHESES])
-    estimate = _posterior(log_marginal, prior)
-    uncertainty = _posterior(log_marginal, np.array([h.uncertainty for h in HYPOTHESES]))
+    priors = np.array([[h.estimate, h.uncertainty] for h in HYPOTHESES]).T
+    estimate, uncertainty = (_posterior(log_marginal, prior) for prior in priors)
     change_of_a = np.full(estimate.size, np.nan)
     posteriors = []
     for i, conditional in enumerate(conditionals):
@@ -566,11 +567,10 @@ def _average(
         if added and q:
             covariance += q * added * ((g - gain) @ (g - gain).T)
     scatter = np.array([0.0 if c is None else c.scatter for c in conditionals])
-    possible = (prior > 0) & np.isfinite(log_marginal)
-    likelihood = float(np.logaddexp.reduce(log_marginal[possible] + np.log(prior[possible])))
+    sums = (np.logaddexp.reduce(log_marginal[p > 0] + np.log(p[p > 0])) for p in priors)
     noise, gain = float(np.sqrt(estimate @ scatter)), gain + moving
     # The gain is that of the standardised data, and the residual is left to be computed.
-    return WeighedFit(mean, covariance, gain, noise, estimate, mean, change_of_a, likelihood)
+    return WeighedFit(mean, covariance, gain, noise, estimate, mean, change_of_a, *map(float, sums))
 
 
 def supported(basis: DepartureBasis, weighed: WeighedFit) -> tuple[DepartureBasis, WeighedFit]:

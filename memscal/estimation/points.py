@@ -8,6 +8,7 @@ the voltage falls where the indenter stands at larger x than the sensor.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -18,12 +19,18 @@ from numpy.typing import NDArray
 
 from memscal.errors import FitError, InputError
 from memscal.model.arrays import FloatArray
+from memscal.model.provenance import SourceFile
+from memscal.model.quantities import Record
 from memscal.model.scan import Places, Scan, places_of
 
 #: Channels that measure the shear along x and along y.
 TANGENTIAL = ("xz", "yz")
 #: All, the normal one first.
 CHANNELS = ("zz", *TANGENTIAL)
+#: Stated values agree within this many standard uncertainties of their difference ...
+COVERAGE = 2.0
+#: ... and within this share of them where none is stated.
+_SAME = 1e-6
 
 
 def channel_order(channel: str) -> int:
@@ -247,6 +254,46 @@ def scans_of_repeats(scans: Sequence[Scan], channel: str) -> tuple[list[Scan], t
     return separate, tuple(owners)
 
 
+#: Loads that differ by more than this share are several.
+_SAME_LOAD = 0.02
+
+
+def scans_by_load(scans: Sequence[Scan]) -> tuple[list[Scan], tuple[int, ...]]:
+    """Split scans whose repeats have loads of their own; return each one's number, too."""
+    split: list[Scan] = []
+    owners: list[int] = []
+    for i, scan in enumerate(scans):
+        groups: list[list[tuple[float, int]]] = []
+        for load, number in sorted(_loads_of_passes(scan)):
+            if not groups or load > (1 + _SAME_LOAD) * groups[-1][0][0]:
+                groups.append([])
+            groups[-1].append((load, number))
+        if len(groups) < 2:
+            split.append(scan)
+        for group in groups if len(groups) > 1 else ():
+            part = scan.only_passes(sorted(number for _, number in group))
+            load = float(np.mean([load for load, _ in group]))
+            u = None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
+            split.append(replace(part, load=load, load_uncertainty=u))
+        owners += [i] * (len(split) - len(owners))
+    return split, tuple(owners)
+
+
+def loads_differ(loads: Sequence[float]) -> bool:
+    """Whether loads (N) differ by more than repeats of one load do."""
+    return max(loads) > (1 + _SAME_LOAD) * min(loads)
+
+
+def _loads_of_passes(scan: Scan) -> list[tuple[float, int]]:
+    """Mean load (N) and number of each pass that states loads."""
+    loads = scan.normal_load
+    if loads is None:
+        return []
+    passes, stated = scan.passes, np.isfinite(loads)
+    numbers = np.unique(passes[stated])
+    return [(float(loads[stated & (passes == n)].mean()), int(n)) for n in numbers]
+
+
 def joined_points(scans: Sequence[ScanPoints]) -> ScanPoints:
     """Join the points of several scans, of which all state their noise, or none."""
     if len(scans) == 1:
@@ -443,3 +490,60 @@ def _cure(lengths: dict[str, float], thickness: float) -> str:
     if not causes:
         return "Check the units of /entry/data/x, /entry/sample/film/thickness and /entry/indenter."
     return f"Check the units. The scan would be a usual one with {'; or with '.join(causes)}."
+
+
+def file_in_words(source: SourceFile | None, kind: str) -> str:
+    """Name what a file holds, for messages: "the scan rod.h5"."""
+    return f"the {kind} {source.file_name}" if source else f"the {kind}"
+
+
+def stated_differences(
+    record: Record,
+    names: Sequence[str],
+    stated: Sequence[object],
+    places: Sequence[str],
+    of: str = "",
+) -> list[str]:
+    """Return in words which quantities two sides both state, and with values that do not agree.
+
+    Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of them
+    where no uncertainty is stated; texts if they are equal.
+    """
+    differences = []
+    for quantity in (q for q in record.quantities if q.name in names):
+        values: list[Any] = [getattr(side, quantity.name, None) for side in stated]
+        spreads = [getattr(side, f"{quantity.name}_uncertainty", None) for side in stated]
+        if None in values or "" in values or _agree(values, spreads):
+            continue
+        words = quantity.words if " of the " in quantity.words else f"{of} {quantity.words}"
+        sides = []
+        for value, spread, place in zip(values, spreads, places, strict=True):
+            shown = f'"{value}"'
+            if not isinstance(value, str):
+                u = "not stated" if spread is None else f"{spread / quantity.scale:.2g}"
+                unit = quantity.unit and f" {quantity.unit}"
+                shown = f"{value / quantity.scale:.7g}{unit} (u {u})"
+            sides.append(f"{shown} in {place}")
+        differences.append(f"{words.strip()} {', '.join(sides)}")
+    return differences
+
+
+def _agree(values: Sequence[Any], spreads: Sequence[float | None]) -> bool:
+    if isinstance(values[0], str):
+        return bool(values[0] == values[1])
+    allowed = COVERAGE * math.hypot(*(u or 0.0 for u in spreads))
+    return math.isclose(*values, rel_tol=_SAME, abs_tol=allowed)
+
+
+def accepted_differences(
+    differences: Sequence[str], *, override: bool, problem: str, why: str, cure: str
+) -> list[str]:
+    """Refuse what does not agree; with ``override`` return it, each difference once."""
+    if differences and not override:
+        raise InputError(
+            f"{problem}: {'; '.join(dict.fromkeys(differences))}.",
+            why=why,
+            cure=f"{cure} To go on all the same, override it (override=True; --override on the "
+            "command line): that is recorded.",
+        )
+    return list(dict.fromkeys(differences))

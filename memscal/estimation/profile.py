@@ -169,8 +169,7 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     stated = _stated_weights(points, _position_noise(model, fit))
     residual = points.u - fit.predicted
     outlier = outlier_weights(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
-    floor = NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
-    least = floor if points.u_errors is None else 1.0
+    least = _least_noise(fit)
     for _ in range(_WEIGHING_ROUNDS):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
@@ -183,6 +182,43 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, outlier, basis)
     _require_determined(estimate)
     return estimate
+
+
+def log_marginal_likelihood(
+    estimate: ProfileEstimate, inputs: FloatArray | None = None, noise: float = 1.0
+) -> FloatArray:
+    """Logarithm of p(u) of all voltages by the references of an estimate, at its weights, (2,).
+
+    The first is by the hypotheses' priors of the estimate, the second by those of the uncertainty.
+    It is comparable between references for the same points, weights and ``noise``.  ``inputs``
+    (n, q), in V: what one standard uncertainty of each uncertain input changes, each a Gaussian of
+    unit variance that is integrated, beside ``noise``, that of a point of weight one.
+    """
+    points, weights, volume = estimate.points, estimate.weights, 0.0
+    if inputs is not None and inputs.size:
+        # The covariance 1 + S S^T of standardised voltages is made white by its inverse root.
+        changes = points.standardised(inputs, weights) / noise
+        left, singular, _ = np.linalg.svd(changes, full_matrices=False)
+        white = np.eye(len(left)) + (left * (1 / np.hypot(1, singular) - 1)) @ left.T
+        factor = points.decorrelation
+        points = replace(points, decorrelation=white if factor is None else white @ factor)
+        volume = float(np.log1p(singular**2).sum())
+    model = ForwardModel(points, estimate.model.references)
+    fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
+    if not fit.has_width(weights, noise):
+        # The flat prior of ln(width) has no end there, where the width changes no voltage.
+        return np.full(2, -np.inf)
+    basis, count = departure_basis(model, fit, weights), float(estimate.outlier_weight.sum())
+    weighed = weigh_departures(model, fit, basis, weights, count, least_noise=_least_noise(fit))
+    both = weighed.log_marginal_likelihood, weighed.log_marginal_of_uncertainty
+    return np.asarray(both) - volume / 2
+
+
+def _least_noise(fit: GaussianFit) -> float:
+    """Least noise of a point of weight one: as stated, or beyond rounding (V)."""
+    if fit.points.u_errors is not None:
+        return 1.0
+    return NUMERICAL_FLOOR * float(np.abs(fit.predicted).max())
 
 
 def _stated_weights(points: ScanPoints, position_noise: float | FloatArray = 0.0) -> FloatArray:

@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import InputError
-from memscal.estimation.points import ScanPoints, require_plausible
+from memscal.estimation.points import (
+    COVERAGE,
+    ScanPoints,
+    accepted_differences,
+    file_in_words,
+    require_plausible,
+    stated_differences,
+)
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.indent import indent
+from memscal.mechanics.press_rod import is_tabulated, largest_tabulated_load, press_rod
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
+#: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
+RECTANGLE = 1 / math.sqrt(3)
+#: Rods of somewhat larger load are in the table, too, where it serves for varied inputs.
+_MARGIN = 1.1
 #: A table that ends inside the scan must have decayed to this share of its maximum.
 _DECAYED = 1e-3
 
@@ -63,10 +77,81 @@ def require_calibration_rod(scan: Scan) -> None:
     require_plausible(scan)
 
 
-@lru_cache(maxsize=64)
-def reference_contact(film: ElasticFilm, indenter: RoundIndenter, load: float) -> Contact:
-    """Solve the rod of a scan, frictionless: friction changes its base stress by about 1e-3."""
-    return indent(film, indenter, load=load, strain="linear")
+def require_same_set_up(
+    scans: Sequence[Scan],
+    references: Sequence[StressProfile | Contact | None],
+    alternatives: Sequence[StressProfile | Contact | None] = (),
+    *,
+    override: bool,
+) -> list[str]:
+    """Refuse a reference of another film, rod or load than its scan; or return the differences.
+
+    :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
+    alternative may have another law and friction, which it is given for.
+    """
+    differences: list[str] = []
+    for scan, given in zip(scans, references, strict=True):
+        if (stress := scan.reference if given is None else given) is not None:
+            differences += _other_set_up(scan, stress, "reference")
+    for scan, given in zip(scans, alternatives, strict=False):
+        if given is not None:
+            differences += _other_set_up(scan, given, "alternative")
+    cure = "Give a stress that was calculated for the scan (memscal reference), or correct the "
+    cure += "value that is wrong."
+    if any(text.startswith("load") for text in differences):
+        cure += " If the film of the reference is linear, state it (memscal import --film-law "
+        cure += "linear; ElasticFilm(law='linear') in Python)."
+    return accepted_differences(
+        differences,
+        override=override,
+        problem="Scan and calculated stress are not of one set-up",
+        why="A calibration divides by the stress that this rod makes below this film, in "
+        "proportion to the load where the film's law is linear.",
+        cure=cure,
+    )
+
+
+def _other_set_up(scan: Scan, stress: StressProfile | Contact, kind: str) -> list[str]:
+    """Return in words what of film, rod and load a stress was not calculated for."""
+    source = None if isinstance(stress, Contact) else stress.source
+    places = file_in_words(scan.source, "scan"), file_in_words(source, kind)
+    film = stress.film_of_law if isinstance(stress, Contact) else stress.film
+    law = "" if film is None else film.law
+    names = ["thickness", "poisson_ratio"]
+    finite = {scan.film.law, law} - {"", LINEAR}
+    if finite:
+        # Equilibrium of a linear film holds its modulus as a factor on both sides: at a given load
+        # the modulus changes depths, and no stress.
+        names.append("young_modulus")
+    if kind == "reference":
+        names += ["law", "mooney_rivlin_ratio"]
+    differences = []
+    if film is not None:
+        differences += stated_differences(FILM, names, (scan.film, film), places, "film")
+    if stress.indenter is not None:
+        pair = scan.indenter, stress.indenter
+        differences += stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+    if kind == "reference" and finite:
+        friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
+        rods = scan, SimpleNamespace(rod_friction=friction)
+        differences += stated_differences(LOAD, ("rod_friction",), rods, places)
+    if law == LINEAR:
+        return differences
+    stated = f"law is {law}" if law else "law is not stated"
+    return differences + [
+        f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
+        for text in stated_differences(LOAD, ("load",), (_farthest(scan, stress), stress), places)
+    ]
+
+
+def _farthest(scan: Scan, stress: StressProfile | Contact) -> SimpleNamespace:
+    """Return the load of the scan that agrees least with a stress's, and its uncertainty, in N."""
+    loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
+    stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
+    spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
+    i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
+    uncertainty = float(spread.flat[i]) if stated else None
+    return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 
 
 def reference_profile(
@@ -77,7 +162,7 @@ def reference_profile(
         return reference
     if scan.reference is not None:
         return scan.reference
-    return reference_contact(scan.film, scan.indenter, scan.load)
+    return press_rod(scan.film, scan.indenter, scan.load, scan.rod_friction)
 
 
 def reference_spectra(
@@ -163,14 +248,40 @@ def _require_coverage(profile: StressProfile, stress: FloatArray, span: float) -
         )
 
 
+def reference_sensitivities(
+    scans: Sequence[Scan], references: Sequence[RadialSpectrum]
+) -> dict[str, list[FloatArray]]:
+    """Change of each scan's transform by one standard uncertainty of each input, by its name."""
+    # Scans share the error of a common film or rod, and that of the film's law.
+    changes: dict[str, list[FloatArray]] = {}
+    films, rods = ([getattr(scan, of) for scan in scans] for of in ("film", "indenter"))
+    for sensitivities, owners in (
+        (film_sensitivities, films),
+        (rod_sensitivities, rods),
+        (law_sensitivities, [None] * len(scans)),
+    ):
+        distinct = list(dict.fromkeys(owners))
+        for i, (scan, owner) in enumerate(zip(scans, owners, strict=True)):
+            number = distinct.index(owner)
+            suffix = f"_{number + 1}" if number else ""
+            for source, change in sensitivities(scan, references[i]).items():
+                blank = [np.zeros_like(change) for _ in scans]
+                changes.setdefault(source + suffix, blank)[i] = change
+    return changes
+
+
 def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
     """Change of the reference's transform by one standard uncertainty of each film property."""
     # Centred differences of the rod's solution (one-sided at nu = 1/2), or its relative change
-    # for a reference from elsewhere.  Young's modulus does not change the stress at a given load.
+    # for a reference from elsewhere.
     film = scan.film
     changes: dict[str, FloatArray] = {}
-    if film.young_modulus_uncertainty is not None:
+    if (u := film.young_modulus_uncertainty) is not None:
+        # At a given load it does not change the stress in a linear film.
         changes["young_modulus"] = np.zeros_like(reference.values)
+        if u and film.law not in ("", LINEAR):
+            films = [replace(film, young_modulus=film.young_modulus + step) for step in (u, -u)]
+            changes["young_modulus"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
     if u := film.thickness_uncertainty:
         films = [replace(film, thickness=film.thickness + step) for step in (u, -u)]
         changes["thickness"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
@@ -192,6 +303,36 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     return {"rod_radius": _difference(scan, reference, [scan.film] * 2, rods) / 2}
 
 
+def press_neo_hookean(scan: Scan) -> Contact:
+    """Press the rod of a scan on its film as if that were neo-Hookean; it sticks unless stated."""
+    rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    return press_rod(rubber, scan.indenter, scan.load, scan.rod_friction)
+
+
+def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
+    """Change of the reference's transform by what is not known of the film's law.
+
+    Rectangles, of which the standard uncertainty is the half width over the root of three: where
+    no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
+    at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
+    sliding.
+    """
+    film, rod, load = scan.film, scan.indenter, scan.load
+    if film.law == LINEAR or (film.law and scan.rod_friction is not None):
+        return {}
+    k, order = reference.wavenumbers.k.tobytes(), reference.order
+    if not film.law:
+        pair = press_neo_hookean(scan), press_rod(film, rod, load)
+    else:
+        rubber = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+        # A film that slides is drawn out from under the rod, and is not solved to any depth.
+        end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False))
+        pair = press_rod(rubber, rod, end, math.inf), press_rod(rubber, rod, end, 0.0)
+    change = np.subtract(*(_base_spectrum(c, k, order) / c.load for c in pair))
+    name = "rod_friction" if film.law else "model_form"
+    return {name: RECTANGLE * change * load / pair[0].load}
+
+
 def _difference(
     scan: Scan,
     reference: RadialSpectrum,
@@ -199,10 +340,25 @@ def _difference(
     rods: Sequence[RoundIndenter],
 ) -> FloatArray:
     """Difference of two rods' solutions, scaled from the rod's own to the reference."""
-    k = reference.wavenumbers.k
+    law = law_at_once(scan)
+    upper, lower = (
+        rod_spectrum(replace(scan, film=film, indenter=rod), reference, law)
+        for film, rod in zip(films, rods, strict=True)
+    )
+    return np.asarray((upper - lower) * (reference.values / rod_spectrum(scan, reference, law)))
 
-    def transform(film: ElasticFilm, rod: RoundIndenter) -> FloatArray:
-        return _base_spectrum(reference_contact(film, rod, scan.load), k.tobytes(), reference.order)
 
-    upper, lower = (transform(film, rod) for film, rod in zip(films, rods, strict=True))
-    return np.asarray((upper - lower) * (reference.values / transform(scan.film, scan.indenter)))
+def law_at_once(scan: Scan) -> str:
+    """Law by which rods like the scan's are solved in milliseconds: its own, or the nearest one."""
+    if scan.film.law in ("", LINEAR):
+        return LINEAR
+    rubber = replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    within = is_tabulated(rubber, scan.indenter, _MARGIN * scan.load, scan.rod_friction)
+    return NEO_HOOKEAN if within else LINEAR
+
+
+def rod_spectrum(scan: Scan, reference: RadialSpectrum, law: str) -> FloatArray:
+    """Transform of the base stress of a scan's rod, by a law, at the nodes of a reference (N)."""
+    film = replace(scan.film, law=law, mooney_rivlin_ratio=None)
+    contact = press_rod(film, scan.indenter, scan.load, scan.rod_friction)
+    return _base_spectrum(contact, reference.wavenumbers.k.tobytes(), reference.order)

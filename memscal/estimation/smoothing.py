@@ -16,6 +16,10 @@ profile goes on as the film's own decay, that of the reference: its amplitude is
 spline, whose logarithmic slope at R is that of the reference.
 
 For given centre, weights and :math:`\lambda` the result is linear in the voltages.
+
+Components are relevant to a division while the transform of the profile stands above its noise.
+G is resolved while the posterior standard uncertainty of its transfer function stays below a third
+of the fitted Gaussian's, which has no zeros and no lobes.
 """
 
 from __future__ import annotations
@@ -29,6 +33,7 @@ from numpy.typing import NDArray
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import RadialSpectrum, gauss_between
+from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.profile import OUTLIER_THRESHOLD, ProfileEstimate, outlier_weights
 from memscal.model.arrays import FloatArray
 
@@ -233,3 +238,78 @@ def _even_splines(knots: FloatArray) -> Callable[[FloatArray, int], FloatArray]:
         return np.asarray(folded)
 
     return values
+
+
+#: A spectral component is relevant while it stands this many times above its noise: with the
+#: paper's tenth of the weakest one, noise and loss at the edge of the band are then about equal...
+RELEVANT = 15.0
+#: ...and resolved while the Gaussian's transfer function is this many standard uncertainties.
+RESOLVED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Signal and noise of the voltage's transform, and the relevant and resolved wavenumbers."""
+
+    k: FloatArray  # (n,): wavenumbers, in rad/m
+    signal: FloatArray  # (n,): modulus of the voltage's transform and its noise, in V m^2 / N
+    noise: FloatArray
+    # Both wavenumbers in rad/m, and at most the last one that the scan's step samples.
+    relevant: float  # beyond it the signal is less than 15 times the noise
+    resolved: float  # up to it the uncertainty is less than a third of the Gaussian
+    weakest_voltage: float  # moduli of both fields' transforms at the relevant wavenumber
+    weakest_reference: float
+
+
+def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Band:
+    """Find the band of a scan, of a tangential channel (nothing to divide) by its estimate."""
+    k, yardstick = estimate.model.k, gaussian_transfer(estimate.model.k, estimate.gaussian.sigma)
+    reference = np.abs(estimate.model.reference.values)
+    error = np.maximum(transfer_uncertainty(estimate), np.finfo(float).tiny)
+    if smoothed is None:
+        signal = np.abs(estimate.spectrum.values)
+        noise = error * estimate.conversion_constant * reference
+    else:
+        signal = np.abs(smoothed.spectrum.values)
+        noise = _planar_noise(estimate) if estimate.points.as_raster else smoothed.noise
+    noise = np.maximum(noise, np.finfo(float).tiny)
+    # Nothing finer than two steps of the scan was sampled, whatever its signal.
+    sampled = np.pi / estimate.points.step
+    relevant = min(_falls_below(k, signal / noise, RELEVANT), sampled)
+    resolved = min(_first_below(k, yardstick / error, RESOLVED), sampled)
+    weakest_voltage = float(np.interp(relevant, k, signal))
+    weakest_reference = float(np.interp(relevant, k, reference))
+    return Band(k, signal, noise, relevant, resolved, weakest_voltage, weakest_reference)
+
+
+def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
+    """Posterior standard uncertainty of K(k)/K(0) at the nodes, K = A G; the reference is exact."""
+    basis, a = estimate.basis, estimate.conversion_constant
+    rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
+    variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _first_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
+    """Return where a ratio first falls below a threshold, log-interpolated."""
+    below = ratio < threshold
+    end = int(np.argmax(below)) + 1 if below.any() else k.size
+    return _falls_below(k[:end], ratio[:end], threshold)
+
+
+def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
+    """Return where a ratio falls below a threshold for good, log-interpolated."""
+    # The transform of a ring-shaped G passes through zero and comes back: such a gap ends no band.
+    i = int(np.flatnonzero(ratio >= threshold).max(initial=-1)) + 1
+    if i in (0, k.size):
+        return float(k[max(i - 1, 0)])
+    upper, lower = np.log(ratio[i - 1]), np.log(max(ratio[i], np.finfo(float).tiny))
+    return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
+
+
+def _planar_noise(estimate: ProfileEstimate) -> FloatArray:
+    """Noise of a component of a raster's transform, of all points: equal at all wavenumbers."""
+    points = estimate.points
+    share = points.cell / points.of_places("readings")
+    noise = estimate.noise / points.load * estimate.outlier_weight
+    return np.full(estimate.model.k.size, np.sqrt(np.sum((share * noise) ** 2)))

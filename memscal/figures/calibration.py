@@ -457,10 +457,11 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
     name = textwrap.shorten(name, 82, placeholder=" …")
     title = textwrap.shorten(f"{name}, channel {channel}", 95, placeholder=" …")
     film = data.film
+    law = f", {film.law_text}" if film.law else ""
     setting = (
         f"{data.indenter.shape} of radius {data.indenter.radius / MM:.3g} mm, {data.load:.3g} N; "
         f"film {film.thickness / MM:.3g} mm, E = {film.young_modulus / KPA / 1e3:.3g} MPa, "
-        f"ν = {film.poisson_ratio:.3g}; ± is the standard uncertainty (k = 1)"
+        f"ν = {film.poisson_ratio:.3g}{law}; ± is the standard uncertainty (k = 1)"
     )
     rows = [(title, ink, "bold"), (setting, COLOURS["muted"], "normal")]
     rows.append((values_text(data), ink, "normal"))
@@ -472,7 +473,7 @@ def _text_lines(data: ApparatusData) -> list[tuple[str, str, str]]:
         for line in _wrapped(message.text)
     ]
     if len(failed) > _MAX_FAILED_LINES:
-        ending = "… and more failed checks: see the report, or `memscal inspect`."
+        ending = "… and more failed checks, which the artifact names."
         failed = [*failed[: _MAX_FAILED_LINES - 1], (ending, COLOURS["failed"], "normal")]
     return [(line, ink, weight) for row, ink, weight in rows for line in _wrapped(row)] + failed
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -295,9 +296,22 @@ def _unit_scale(file: SafeFile, path: str) -> float:
 _ROUND: dict[str, type[RoundIndenter]] = {shape.shape: shape for shape in (Rod, Sphere)}
 
 
+@contextmanager
+def placed(where: str) -> Iterator[None]:
+    """Say in an error about a value at which path of which file it stands."""
+    try:
+        yield
+    except InputError as error:
+        if where in error.problem:
+            raise
+        problem = f"{where}: {error.problem}"
+        raise type(error)(problem, why=error.why, cure=error.cure) from error
+
+
 def read_film(file: SafeFile, path: str) -> ElasticFilm:
     """Read a film."""
-    return ElasticFilm(**read_record(records.FILM, file, path))
+    with placed(file.where(path)):
+        return ElasticFilm(**read_record(records.FILM, file, path))
 
 
 def sample_group(film: ElasticFilm, lubrication: str = "", lubricant: str = "") -> Group:
@@ -308,9 +322,12 @@ def sample_group(film: ElasticFilm, lubrication: str = "", lubricant: str = "") 
 
 
 def indenter_group(
-    indenter: Indenter, load: float | None = None, load_uncertainty: float | None = None
+    indenter: Indenter,
+    load: float | None = None,
+    load_uncertainty: float | None = None,
+    rod_friction: float | None = None,
 ) -> Group:
-    """Return an indenter as an NXcollection, with its nominal load."""
+    """Return an indenter as an NXcollection, with its nominal load, and a rod's friction."""
     children: dict[str, Node] = {"shape": indenter.shape}
     if isinstance(indenter, Profile):
         children["face"] = write_record(records.INDENTER_FACE, indenter)
@@ -318,7 +335,7 @@ def indenter_group(
         round_or_cone = records.CONE if isinstance(indenter, Cone) else records.ROUND_INDENTER
         children |= write_record(round_or_cone, indenter).children
     if load is not None:
-        stated = {"load": load, "load_uncertainty": load_uncertainty}
+        stated = {"load": load, "load_uncertainty": load_uncertainty, "rod_friction": rod_friction}
         children |= write_record(records.LOAD, stated).children
     return Group("NXcollection", children)
 

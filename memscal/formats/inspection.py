@@ -161,10 +161,15 @@ def _layout(file: SafeFile, schema: str) -> Iterator[tuple[str, Record]]:
 
 def _quantity_row(file: SafeFile, path: str, name: str) -> dict[str, Any]:
     text = file.is_text(path)
+    if text:
+        value: Any = file.text(path)
+    else:
+        numbers = file.array(path)
+        value = "inf" if np.all(numbers == np.inf) else _plain(numbers)
     return {
         "path": path,
         "name": name,
-        "value": file.text(path) if text else _plain(file.array(path)),
+        "value": value,
         "standard_uncertainty": _uncertainty(file, path),
         "unit": None if text else units_of(file, path) or "1",
     }

@@ -21,7 +21,7 @@ from memscal.formats.values import any_scalar, optional_text, text_list
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import by_name
-from memscal.model.scan import BRANCHES, Scan, branch_numbers
+from memscal.model.scan import BRANCHES, Scan, branch_numbers, require_rod_friction
 
 _CHANNELS = ("u_xz", "u_xz_errors", "u_yz", "u_yz_errors")
 _DATA = "/entry/data"
@@ -80,6 +80,8 @@ def scan_from(file: SafeFile) -> Scan:
     """Read the scan of an open memscal-scan file."""
     values.require_schema(file, writer.SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter")
+    with groups.placed(file.where("/entry/indenter/friction_coefficient")):
+        require_rod_friction(load.get("rod_friction"))
     film = groups.read_film(file, f"{_SAMPLE}/film")
     indenter = groups.read_round_indenter(file, "/entry/indenter")
     axes = _check_axes(file)
@@ -157,7 +159,9 @@ def _entry(scan: Scan) -> Group:
     children |= {
         **texts,
         "data": _data_group(scan),
-        "indenter": groups.indenter_group(scan.indenter, scan.load, scan.load_uncertainty),
+        "indenter": groups.indenter_group(
+            scan.indenter, scan.load, scan.load_uncertainty, scan.rod_friction
+        ),
         "sample": groups.sample_group(scan.film, scan.lubrication, scan.lubricant),
         "instrument": groups.instrument_group(scan.sensor),
         **notes,

@@ -12,7 +12,7 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import InputError
-from memscal.estimation.points import TANGENTIAL
+from memscal.estimation.points import TANGENTIAL, accepted_differences
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
 from memscal.friction import effective
@@ -29,8 +29,9 @@ from memscal.friction.results import (
     ShearComparison,
 )
 from memscal.measurement.measure_stress import joined_stress, measure_stress
+from memscal.measurement.restore import accept_other_sensor
 from memscal.model.arrays import require_non_negative
-from memscal.model.checks import Message
+from memscal.model.checks import Message, override_messages
 from memscal.model.indenter import Sphere
 from memscal.model.measured_stress import MeasuredScan, MeasuredStress
 from memscal.model.scan import Scan
@@ -72,18 +73,18 @@ def same_apparatus(
     name = f" ({measured.artifact.file_name})" if measured.artifact else ""
     other = f" ({apparatus.source.file_name})" if apparatus.source else ""
     text = f"the stress was measured with another apparatus function{name} than the given{other}"
-    if not override:
-        raise InputError(
-            f"{text[0].upper()}{text[1:]}: their content digests differ.",
-            why="The stress on the axis, centres and noise are those of the calibration by which "
-            "they were measured.",
-            cure="Give its artifact, or measure again with memscal apply. To go on all the same, "
-            "override it (override=True; --override on the command line): that is recorded.",
-        )
-    messages = (*measured.messages, Message("overridden", f"Overridden: {text}.", "warning"))
+    differences = accepted_differences(
+        [text],
+        override=override,
+        problem="Measured stress and artifact do not belong together",
+        why="The stress on the axis, centres and noise are those of the calibration by which "
+        "they were measured.",
+        cure="Give its artifact, or measure again with memscal apply.",
+    )
+    messages = (*measured.messages, *override_messages(differences))
     return replace(
         measured,
-        overridden=(*measured.overridden, text),
+        overridden=(*measured.overridden, *differences),
         process=replace(measured.process, messages=messages),
     )
 
@@ -372,6 +373,7 @@ def compare_shear(
     *,
     friction: Sequence[float] = FRICTIONS,
     loading: str | Sequence[str] = ("incremental", "total"),
+    override: bool = False,
     cache: CacheFolder = None,
     workers: int = 1,
 ) -> ShearComparison:
@@ -392,6 +394,8 @@ def compare_shear(
         Friction coefficients between which to interpolate; the last may be ``inf``.
     loading : str or sequence of str
         ``"incremental"``, ``"total"``, or both.
+    override : bool
+        Accept an artifact of another sensor or film: a message records it.
     cache : path, optional
         A folder in which calculated contacts are kept; without it nothing is written.
     workers : int
@@ -404,8 +408,8 @@ def compare_shear(
     Raises
     ------
     InputError
-        If the artifact is of no tangential channel, or of another sensor, if a scan is not a
-        sphere's, or if it holds no voltage of the channel with its noise.
+        If the artifact is of no tangential channel, or of another sensor or film, if a scan is not
+        a sphere's, or if it holds no voltage of the channel with its noise.
 
     Examples
     --------
@@ -426,7 +430,8 @@ def compare_shear(
     """
     sensor, measured = opened_apparatus(apparatus), opened_stress(measured)
     require_contacts(measured.scans)
-    _require_tangential(sensor, measured.scans[0])
+    _require_tangential(sensor)
+    overridden = accept_other_sensor(measured.scans[0], sensor, ("name",), override=override)
     channel = sensor.sensor.channel
     families = _families(_setting(measured, cache, workers), friction, loading, order=1)
     confronted = _confronted(measured, sensor, families, channel)
@@ -440,22 +445,19 @@ def compare_shear(
             for name, of_family in confronted.items()
         },
         joint=_joint(measured, confronted),
-        messages=(Message("experimental", note), *synthetic_messages(measured)),
+        messages=(
+            *override_messages(overridden),
+            Message("experimental", note),
+            *synthetic_messages(measured),
+        ),
     )
 
 
-def _require_tangential(apparatus: ApparatusFunction, scan: MeasuredScan) -> None:
+def _require_tangential(apparatus: ApparatusFunction) -> None:
     channel = apparatus.sensor.channel
     if channel not in TANGENTIAL:
         raise InputError(
             f"The artifact is of channel {channel}, not of a tangential one.",
             cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="evidence"); '
             "compare the normal channel with memscal.compare().",
-        )
-    ours, theirs = scan.sensor.name, apparatus.sensor.name
-    if ours and theirs and ours != theirs:
-        raise InputError(
-            f'The scan is of sensor "{ours}", the artifact of "{theirs}".',
-            why="An apparatus function belongs to one sensor.",
-            cure="Give the artifact of the scan's sensor.",
         )

@@ -40,7 +40,6 @@ from memscal.friction.marginal_likelihood import (
     uniform_prior,
 )
 from memscal.friction.results import (
-    BayesFactor,
     BoundedEstimate,
     ImpliedFriction,
     InterfaceComparison,
@@ -50,6 +49,7 @@ from memscal.friction.results import (
     PriorChoice,
 )
 from memscal.model.arrays import FloatArray, require_positive
+from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
 from memscal.model.measured_stress import MeasuredProfile
 
@@ -146,9 +146,7 @@ def _factors(laws: Sequence[InterfaceLaw]) -> tuple[BayesFactor, ...]:
     """Weigh the last law against each of the others."""
     *others, last = laws
     return tuple(
-        BayesFactor(last.name, law.name, last.log_evidence - law.log_evidence)
-        if last.log_evidence >= law.log_evidence
-        else BayesFactor(law.name, last.name, law.log_evidence - last.log_evidence)
+        BayesFactor.between(last.name, law.name, last.log_evidence - law.log_evidence)
         for law in others
     )
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from memscal.apparatus import ApparatusFunction
 from memscal.model.arrays import FloatArray
+from memscal.model.bayes_factor import POSITIVE, BayesFactor
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
@@ -251,15 +252,6 @@ class ShearComparison(Result):
         return tuple(self.loads)
 
 
-#: Steps of twice the natural logarithm of a Bayes factor, in words.
-_WORDS = (
-    (2.0, "not worth more than a bare mention"),
-    (6.0, "positive"),
-    (10.0, "strong"),
-    (math.inf, "very strong"),
-)
-
-
 @dataclass(frozen=True)
 class InterfaceLaw:
     r"""One law of the interface, weighed over all loads together.
@@ -284,32 +276,6 @@ class InterfaceLaw:
     def log_occam(self) -> float:
         """Logarithm of Occam's factor: what the law loses for what it leaves free."""
         return self.log_evidence - self.log_likelihood
-
-
-@dataclass(frozen=True)
-class BayesFactor:
-    r"""Ratio of the evidences of two laws, by their names.
-
-    :math:`\ln B = \ln p(u | \text{favoured}) - \ln p(u | \text{against})` is not negative.
-
-    >>> factor = BayesFactor("elasto-plastic", "Amontons", 4.0)
-    >>> print(f"{factor.value:.0f}: {factor.words}")
-    55: strong
-    """
-
-    favoured: str
-    against: str
-    log_factor: float
-
-    @property
-    def value(self) -> float:
-        """The factor itself; ``inf`` where it is beyond all numbers."""
-        return math.exp(self.log_factor) if self.log_factor < 700 else math.inf
-
-    @property
-    def words(self) -> str:
-        r"""Evidence in words, by :math:`2\ln B` (Kass and Raftery, JASA 90 (1995) 773)."""
-        return next(words for limit, words in _WORDS if 2 * self.log_factor < limit)
 
 
 @dataclass(frozen=True)
@@ -360,7 +326,7 @@ class LawComparison:
     def yielding_preferred(self) -> bool:
         """Whether the evidence for the law that yields is positive against every other."""
         others = max(law.log_evidence for law in self.laws[:-1])
-        return 2 * (self.laws[-1].log_evidence - others) >= _WORDS[0][0]
+        return 2 * (self.laws[-1].log_evidence - others) >= POSITIVE
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,6 +28,7 @@ from memscal.model.checks import (
     QualityCheck,
     check,
     failed_check_messages,
+    override_messages,
 )
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process, timestamp
@@ -180,13 +181,8 @@ def measure_stress(
     """
     sensor, scans = opened_apparatus(apparatus), opened_scans(scan)
     restore.require_covariance(sensor)
-    overridden = tuple(
-        text
-        for data in scans
-        for text in restore.accept_mismatches(
-            data, sensor, one_load.place_of(data), override=override
-        )
-    )
+    mismatches = (restore.accept_mismatches(data, sensor, override=override) for data in scans)
+    overridden = tuple(text for of_scan in mismatches for text in of_scan)
     origins = tuple(one_load.measured_scan(data) for data in scans)
     loads = [
         _measure(origin, single, sensor)
@@ -206,7 +202,7 @@ def measure_stress(
             program="memscal",
             version=__version__,
             date=timestamp(),
-            configuration={"override": bool(override)},
+            configuration={"override": list(overridden)},
             environment={
                 "python": platform.python_version(),
                 "numpy": np.__version__,
@@ -302,8 +298,7 @@ def _messages(
 ) -> Iterator[Message]:
     """Yield the messages of a measured stress, warnings first."""
     yield from failed_check_messages(checks)
-    for text in overridden:
-        yield Message("overridden", f"Overridden: {text}.", "warning")
+    yield from override_messages(overridden)
     yield from restore.failed_calibration_messages(sensor)
     # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}

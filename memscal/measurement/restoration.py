@@ -18,7 +18,14 @@ from memscal.estimation.points import ScanPoints
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import Checked, Message, QualityCheck, chi_square_limit, state_of_checks
+from memscal.model.checks import (
+    OVERRIDE,
+    Checked,
+    Message,
+    QualityCheck,
+    chi_square_limit,
+    state_of_checks,
+)
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.result import Result
@@ -35,6 +42,7 @@ Expected: TypeAlias = StressProfile | Contact | str | PathLike[str] | None
 _EXPANDED = 1.96
 #: Differences below this share of the largest stress are negligible.
 _NEGLIGIBLE = 1e-3
+_OF_RESTORED = "Measured, not calculated: restored with an apparatus function."
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,6 +312,7 @@ class Restoration(Result, Checked):
 
     def profile(self) -> StressProfile:
         """Return the restored stress as a table with its uncertainty, as a file holds it."""
+        overridden = (message.text for message in self.messages if message.kind == OVERRIDE)
         return StressProfile(
             r=self.r,
             sigma_zz=self.sigma_zz,
@@ -312,7 +321,7 @@ class Restoration(Result, Checked):
             film=self.scan.film,
             indenter=self.scan.indenter,
             solver="memscal, restored from a scan",
-            notes="Measured, not calculated: restored with an apparatus function.",
+            notes=" ".join([_OF_RESTORED, *overridden]),
         )
 
     @property

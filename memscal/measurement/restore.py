@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 
@@ -14,7 +13,13 @@ from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
 from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
-from memscal.estimation.points import ScanPoints, measured_points
+from memscal.estimation.points import (
+    ScanPoints,
+    accepted_differences,
+    file_in_words,
+    measured_points,
+    stated_differences,
+)
 from memscal.estimation.profile import CentreError, ProfileEstimate, estimate_profile
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
@@ -37,30 +42,24 @@ from memscal.model.checks import (
     check,
     chi_square_limit,
     failed_check_messages,
+    override_messages,
+    state_of_checks,
 )
 from memscal.model.indenter import Rod
-from memscal.model.records import FILM
+from memscal.model.measured_stress import MeasuredScan
+from memscal.model.records import FILM, SENSOR
 from memscal.model.scan import Scan
 from memscal.parallel import single_threaded
 
-#: Properties of one film agree within this share where no uncertainty is stated ...
-_SAME = 0.02
-#: ... and within this many standard uncertainties of their difference where it is.
-_COVERAGE = 2.0
-_COMPARED = ("young_modulus", "poisson_ratio", "thickness")
+#: What tells films apart; the modulus, too, by which a curved indenter's contact grows.
+_OF_THE_FILM = (
+    *("young_modulus", "poisson_ratio", "thickness"),
+    *("law", "mooney_rivlin_ratio", "name"),
+)
 
 
 def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
-    """Refuse a scan of another sensor, of several loads of a curved indenter, or without cov(G)."""
-    ours, theirs = scan.sensor, apparatus.sensor
-    other_name = bool(ours.name and theirs.name and ours.name != theirs.name)
-    if other_name or ours.channel != theirs.channel:
-        raise InputError(
-            f"The scan is of sensor {ours.name or 'unnamed'} ({ours.channel}), the apparatus "
-            f"function of sensor {theirs.name or 'unnamed'} ({theirs.channel}).",
-            why="An apparatus function belongs to one sensor and channel.",
-            cure="Give the artifact of the scan's sensor; check /entry/instrument/stress_sensor.",
-        )
+    """Refuse a scan of several loads of a curved indenter, or without cov(G)."""
     require_covariance(apparatus)
     load = scan.normal_load
     if load is None or isinstance(scan.indenter, Rod):
@@ -91,49 +90,35 @@ def require_covariance(apparatus: ApparatusFunction) -> None:
         )
 
 
-def accept_mismatches(
-    scan: Scan, apparatus: ApparatusFunction, place: str, *, override: bool
-) -> tuple[str, ...]:
+def accept_mismatches(scan: Scan, apparatus: ApparatusFunction, *, override: bool) -> list[str]:
     """Refuse a scan of another sensor, channel or film; with ``override`` return what differs."""
     if apparatus.order:
         raise InputError(
-            f"The artifact is of the tangential channel {apparatus.sensor.channel}, but {place} is "
-            "to be read as normal stress.",
+            f"The artifact is of the tangential channel {apparatus.sensor.channel}, but "
+            f"{file_in_words(scan.source, 'scan')} is to be read as normal stress.",
             why="A shear is no normal stress: this cannot be overridden.",
             cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
         )
-    differences = list(_differences(scan, apparatus))
-    if differences and not override:
-        raise InputError(
-            f"{place} does not belong to the artifact: {'; '.join(differences)}.",
-            why="An apparatus function holds for one channel of one sensor, as it was calibrated "
-            "under its film.",
-            cure="Give the artifact of this sensor and film. If they are the same under other "
-            "names, override it (override=True; --override on the command line): that is recorded.",
-        )
-    return tuple(f"{place}: {text}" for text in differences)
+    return accept_other_sensor(scan, apparatus, ("name", "channel"), override=override)
 
 
-def _differences(scan: Scan, apparatus: ApparatusFunction) -> Iterator[str]:
-    """Yield in words what a scan and an artifact do not have in common."""
-    for what, quote, ours, theirs in (
-        ("sensor", '"', scan.sensor.name, apparatus.sensor.name),
-        ("channel", "", scan.sensor.channel, apparatus.sensor.channel),
-        ("film", '"', scan.film.name, apparatus.film.name),
-    ):
-        unnamed = what != "channel" and not (ours and theirs)
-        if ours != theirs and not unnamed:
-            yield f"{what} {quote}{ours}{quote} in the scan, {quote}{theirs}{quote} in the artifact"
-    films = scan.film, apparatus.film
-    for quantity in FILM.quantities:
-        if quantity.name not in _COMPARED:
-            continue
-        values = [getattr(film, quantity.name) for film in films]
-        spreads = [getattr(film, f"{quantity.name}_uncertainty") or 0.0 for film in films]
-        if abs(values[0] - values[1]) > max(_SAME * values[1], _COVERAGE * math.hypot(*spreads)):
-            ours, theirs = (f"{v / quantity.scale:.4g} {quantity.unit}".rstrip() for v in values)
-            words = quantity.name.replace("_", " ").replace("poisson ratio", "Poisson's ratio")
-            yield f"film {words} {ours} in the scan, {theirs} in the artifact"
+def accept_other_sensor(
+    scan: Scan | MeasuredScan, apparatus: ApparatusFunction, names: Sequence[str], *, override: bool
+) -> list[str]:
+    """Refuse a scan whose sensor (its ``names``) or film is not the artifact's, or return that."""
+    places = file_in_words(scan.source, "scan"), file_in_words(apparatus.source, "artifact")
+    sensors, films = (scan.sensor, apparatus.sensor), (scan.film, apparatus.film)
+    return accepted_differences(
+        [
+            *stated_differences(SENSOR, names, sensors, places),
+            *stated_differences(FILM, _OF_THE_FILM, films, places, "film"),
+        ],
+        override=override,
+        problem="Scan and artifact do not belong together",
+        why="An apparatus function holds for one channel of one sensor, as it was calibrated "
+        "under its film.",
+        cure="Give the artifact of this sensor and film, or correct the value that is wrong.",
+    )
 
 
 _FORCE_LIMIT = 3.0
@@ -143,7 +128,7 @@ _NEGLIGIBLE_FORCE = 0.01
 
 def restoration_checks(restored: Restoration) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
-    checks = [_reconvolution(restored), _force(restored), _film(restored), *_noise(restored)]
+    checks = [_reconvolution(restored), _force(restored), *_noise(restored)]
     checks += [_symmetry(restored), _outliers(restored)]
     if restored.comparison is not None:
         checks.append(_expected(restored.comparison))
@@ -174,19 +159,6 @@ def _force(restored: Restoration) -> QualityCheck:
         f"of {load:.4g} N, in their standard uncertainty. A failure means that A, the load or the "
         "unit of one of them is wrong, or that the film's Poisson's ratio, which decides how much "
         "lies beyond the scan, is.",
-    )
-
-
-def _film(restored: Restoration) -> QualityCheck:
-    ours, theirs = restored.scan.film, restored.apparatus.film
-    spread = np.hypot(ours.thickness_uncertainty or 0.0, theirs.thickness_uncertainty or 0.0)
-    return check(
-        "film_agreement",
-        abs(ours.thickness / theirs.thickness - 1),
-        max(_SAME, 2 * float(spread) / theirs.thickness),
-        f"Relative difference of the film's thickness, {ours.thickness * 1e3:.4g} mm, from that of "
-        f"the calibration, {theirs.thickness * 1e3:.4g} mm. A failure means that the sensor was "
-        "calibrated under another film; G may not be the same under this one.",
     )
 
 
@@ -297,7 +269,7 @@ def restoration_messages(
 
 def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
     """Return one message if a check of the calibration had failed, else none."""
-    text = "A quality check of the calibration itself had failed: see its artifact."
+    text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
     return [] if apparatus.passed else [Message(FAILED_CALIBRATION, text)]
 
 
@@ -319,6 +291,7 @@ def restore(
     apparatus: ApparatusFunction | str | PathLike[str],
     *,
     expected: Expected = None,
+    override: bool = False,
 ) -> Restoration:
     r"""Restore the stress at the base of the film from a scan with a calibrated sensor.
 
@@ -334,6 +307,8 @@ def restore(
         The calibrated sensor.
     expected : StressProfile, Contact or path, optional
         A calculated base stress to hold against the restored one: adds a check.
+    override : bool
+        Accept a scan whose sensor, channel or film is not the artifact's: a message records it.
 
     Returns
     -------
@@ -357,7 +332,9 @@ def restore(
     """
     sensor, measured = opened_apparatus(apparatus), opened_scan(scan)
     require_measurement(measured, sensor)
-    return restore_known(measured, sensor, expected)
+    overridden = override_messages(accept_mismatches(measured, sensor, override=override))
+    restored = restore_known(measured, sensor, expected)
+    return replace(restored, messages=(*overridden, *restored.messages))
 
 
 def restore_known(

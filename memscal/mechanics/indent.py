@@ -86,7 +86,8 @@ def indent(
     strain : str, optional
         ``"linear"``: small strain, whatever the film's law; ``"finite"``: by finite elements, under
         a rod or a sphere that slides freely or sticks (a sphere with loading ``"total"``), a film
-        that states no law as neo-Hookean.  By default as the film's law has it.
+        that states no law as neo-Hookean.  By default a rod is pressed as the film's law has it,
+        and other indenters, which sink less, at small strain.
     film_radius : float, optional
         Radius of the film's free edge in m, for finite elements; by default twelve thicknesses
         away from the contact.
@@ -132,7 +133,8 @@ def indent(
     16.9 um, 1.98 mm
     30.7 um, 2.83 mm
     """
-    strain = strain or ("linear" if film.law in ("", LINEAR) else "finite")
+    by_law = isinstance(indenter, Rod) and film.law not in ("", LINEAR)
+    strain = strain or ("finite" if by_law else "linear")
     _check_request(friction, loading, backend, strain, rings)
     if film_radius is not None:
         require_positive("film_radius", film_radius, "m")

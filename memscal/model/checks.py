@@ -20,6 +20,7 @@ FAILED_CHECK = "failed_check"
 FAILED_CALIBRATION = "failed_calibration"
 NOISE_UNSTATED = "noise_unstated"
 REPEAT_CENTRES = "repeat_centres"
+OVERRIDE = "override"
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,11 @@ def failed_check_messages(checks: Iterable[QualityCheck]) -> list[Message]:
         for check in checks
         if not check.passed
     ]
+
+
+def override_messages(differences: Iterable[str]) -> list[Message]:
+    """Return a warning for each difference that was accepted."""
+    return [Message(OVERRIDE, f"Overridden: {text}.", "warning") for text in differences]
 
 
 def import_notes(texts: Iterable[str]) -> list[Message]:

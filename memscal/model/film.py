@@ -89,3 +89,10 @@ class ElasticFilm:
     def contact_modulus(self) -> float:
         r"""Plane-strain modulus :math:`E^* = E / (1 - \nu^2)` of a rigid contact, in Pa."""
         return self.young_modulus / (1 - self.poisson_ratio**2)
+
+    @property
+    def law_text(self) -> str:
+        """The law in words, with its ratio C2/C1."""
+        ratio = self.mooney_rivlin_ratio
+        words = self.law or "of a law that is not stated"
+        return words if ratio is None else f"{words} of C2/C1 = {ratio:.4g}"

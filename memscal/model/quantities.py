@@ -177,6 +177,8 @@ _TRUTH = (
     Quantity("indenter_radius", _L, "radius of the indenter", "R"),
     Quantity("load", "force", "true load", "P"),
     Quantity("friction", _ONE, "friction coefficient", "μ"),
+    Quantity("rod_friction", _ONE, "friction of the rod"),
+    Quantity("mooney_rivlin_ratio", _ONE, "C2/C1 of the film"),
     Quantity("slip_length", _L, "slip length", shown="um"),
     Quantity("roughness", _L, "rms height of the asperities", shown="um"),
     Quantity("asperity_density", "per area", "asperities", shown="1/mm^2"),

@@ -33,9 +33,10 @@ INDENTER_FACE = record(
     signal="z",
 )
 _LOAD = measured(Quantity("load", "force", "load", "P", required=True))
-LOAD = record("NXcollection", *_LOAD)
+_ROD_FRICTION = Quantity("rod_friction", _ONE, "friction of the rod", stored="friction_coefficient")
+LOAD = record("NXcollection", *_LOAD, _ROD_FRICTION)
 _SHAPE = Quantity("shape", "text", "shape of the indenter", required=True)
-INDENTER = record("NXcollection", _SHAPE, *_RADIUS, _SLOPE, *_LOAD)
+INDENTER = record("NXcollection", _SHAPE, *_RADIUS, _SLOPE, *_LOAD, _ROD_FRICTION)
 """What the group of an indenter may hold, by its shape."""
 
 SAMPLE = record(
@@ -257,6 +258,7 @@ SOLUTION = (
     CONTACT.quantities[5],
     Quantity("backend", "text", "method of solution"),
     Quantity("strain", "text", "linear or finite strain"),
+    Quantity("film_law", "text", "law of the film"),
     Quantity("convergence", _ONE, "change"),
     Quantity("steps", _COUNT, "steps"),
     Quantity("elastic_energy", "energy", "elastic energy of the film"),

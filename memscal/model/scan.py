@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
@@ -235,6 +236,16 @@ def require_contacts(scan: _Contacts) -> None:
         )
 
 
+def require_rod_friction(friction: float | None) -> None:
+    """Refuse a friction of the rod that no film of rubber is solved with."""
+    if friction not in (None, 0.0, math.inf):
+        raise InputError(
+            f"The rod's friction is {friction:g}.",
+            why="Only a rod that slides freely or sticks is solved at finite strain.",
+            cure="Give 0 or inf, or leave it out: the difference is then counted.",
+        )
+
+
 def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
     """Return branches, given by number or by word, as an array of numbers."""
     values = np.asarray(stated)
@@ -328,6 +339,8 @@ class Scan:
         Nominal load of the indenter and its standard uncertainty, common to all points, in N.
     indenter, film, sensor
         What was pressed, on what, measured by what.
+    rod_friction : float, optional
+        0 where a rod slides freely under the film, ``inf`` where it sticks.
     y : ndarray, shape (m,) of a raster, (n,) of points, optional
         Second axis of a raster, or second position of each point, in m.
     repeat : ndarray of int, shape (n,), optional
@@ -395,6 +408,7 @@ class Scan:
     position_scale_uncertainty: float | None = None
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     load_uncertainty: float | None = None
+    rod_friction: float | None = None
     lubrication: str = ""
     lubricant: str = ""
     title: str = ""
@@ -532,6 +546,7 @@ class Scan:
             )
         if self.load_uncertainty is not None:
             require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        require_rod_friction(self.rod_friction)
         errors, loads = self.u_zz_errors, self.normal_load
         if errors is not None and np.any((errors < 0) | np.isinf(errors)):
             raise InputError(

@@ -25,13 +25,13 @@ from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.deconvolution.division import Method, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation import reference
-from memscal.estimation.band import find_band
 from memscal.estimation.bayesian import departure_basis, supported, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
-from memscal.estimation.smoothing import smooth_profile
+from memscal.estimation.smoothing import find_band, smooth_profile
+from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, freeze_arrays, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
@@ -114,7 +114,7 @@ class Plan:
     def signal(self) -> float:
         """Voltage to expect with the rod right above the sensor, in V."""
         wavenumbers = Wavenumbers.covering(_LARGEST_KH / self.film.thickness, self.film.thickness)
-        contact = reference.reference_contact(self.film, self.rod, self.load)
+        contact = press_rod(self.film, self.rod, self.load)
         spectrum = contact.base_spectrum(wavenumbers.k) * self.kernel.transform(wavenumbers.k)
         peak = RadialSpectrum(wavenumbers, spectrum).at(np.zeros(1))[0]
         return float(self.conversion_constant * peak)
@@ -149,7 +149,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     """Calibrate the planned scan, with expected squares in place of data: steps and results."""
     scan = plan.scan()
     reference.require_calibration_rod(scan)
-    stress = reference.reference_contact(plan.film, plan.rod, plan.load)
+    stress = reference.reference_profile(scan, None)
     points = measured_points(scan)
     references = reference.reference_spectra([stress], [points], [plan.film.thickness])
     estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)

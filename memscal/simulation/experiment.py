@@ -19,7 +19,7 @@ from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan, StressSensor
 from memscal.parallel import single_threaded
 from memscal.simulation import sensor
-from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, simulate
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, simulate, without_law
 
 # Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
 # its smallest value: closer ones would show the solver's own error.
@@ -298,6 +298,7 @@ def simulate_experiment(
     *,
     film: ElasticFilm = PAPER_FILM,
     rod: Rod = PAPER_ROD,
+    rod_friction: float | None = None,
     sphere: Sphere = PAPER_SPHERE,
     kernel: RadialKernel | None = None,
     conversion_constant: float = 1e-7,
@@ -327,6 +328,7 @@ def simulate_experiment(
     baseline: float = 0.01,
     drift: float = 0.005,
     state_noise: bool = True,
+    state_law: bool = True,
     draw_inputs: bool = False,
     gain: float = 1.0,
     thickness_factor: float = 1.0,
@@ -341,7 +343,10 @@ def simulate_experiment(
     Parameters
     ----------
     film, rod, sphere
-        What is pressed on what, as the files state it; the paper's where absent.
+        What is pressed on what, as the files state it; the paper's where absent.  The film's law is
+        that under the rod; the sphere's contacts, which sink by 2 %, are solved linearly.
+    rod_friction
+        Friction of the rod, as of :func:`memscal.simulate`.
     kernel : RadialKernel, optional
         The apparatus function G; the paper's Gaussian of 561 um where absent.
     conversion_constant : float
@@ -369,8 +374,8 @@ def simulate_experiment(
     centre, baseline, drift
         Position of the sensor in m; offset and its drift across each scan, as shares of the
         scan's largest signal.
-    state_noise : bool
-        Whether the scans state their noise.
+    state_noise, state_law : bool
+        Whether the scans state their noise, and the film's law with the rod's friction.
     draw_inputs : bool
         Draw the true values from the stated uncertainties: modulus, Poisson's ratio
         (reflected at 0.5) and thickness of the film, the radii, and the common errors of the
@@ -441,6 +446,8 @@ def simulate_experiment(
     }
     calibration = simulate(
         rod=reality.rod,
+        rod_friction=rod_friction,
+        state_law=state_law,
         conversion_constant=conversion_constant,
         shear_conversion_constant=shear_conversion_constant,
         load=reality.rod_load_scale * rod_load,
@@ -461,6 +468,7 @@ def simulate_experiment(
         seed=seeds["lubricated"],
         **contacts,
     )
+    film = film if state_law else without_law(film)
     common = {"conversion_constant": conversion_constant, "gain": gain, "seed": float(seed)}
     if len(channels) > 1:
         common["conversion_constant_xz"] = shear_conversion_constant

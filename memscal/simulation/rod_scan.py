@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from memscal.axisymmetry.kernels import RadialKernel
 from memscal.errors import InputError
-from memscal.mechanics.indent import indent
+from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray, require_non_negative, require_positive, require_range
-from memscal.model.film import ElasticFilm
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, StressSensor
 from memscal.parallel import single_threaded
@@ -32,6 +34,7 @@ PAPER_FILM = ElasticFilm(
     poisson_ratio_uncertainty=0.005,
     thickness_uncertainty=0.02e-3,
     roughness_rms_uncertainty=0.10e-6,
+    law=NEO_HOOKEAN,
 )
 PAPER_ROD = Rod(radius=0.25e-3, radius_uncertainty=2.5e-6)
 
@@ -41,6 +44,7 @@ def simulate(
     *,
     film: ElasticFilm = PAPER_FILM,
     rod: Rod = PAPER_ROD,
+    rod_friction: float | None = None,
     kernel: RadialKernel | None = None,
     conversion_constant: float = 1e-7,
     channels: Sequence[str] = ("zz",),
@@ -57,17 +61,22 @@ def simulate(
     drift: float = 0.005,
     load_uncertainty: float | None = 0.01,
     state_noise: bool = True,
+    state_law: bool = True,
     seed: int = 0,
 ) -> Scan:
     """Simulate a rod scan through a known apparatus function.
 
-    The base stress of the frictionless rod on the bonded film is convolved with G exactly, by
-    Hankel transforms; Gaussian noise, an offset and a linear drift are added.
+    The base stress of the rod on the bonded film, by the film's law and at each load, is convolved
+    with G exactly, by Hankel transforms; Gaussian noise, an offset and a linear drift are added.
 
     Parameters
     ----------
     film, rod
-        What is pressed on what; the paper's where absent.
+        What is pressed on what; the paper's where absent, its film neo-Hookean.  A film that states
+        no law is taken as linear.
+    rod_friction : float, optional
+        0: the film slides freely under the rod; ``inf``: it sticks.  By default a linear film
+        slides, and one of another law sticks.
     kernel : RadialKernel, optional
         The apparatus function; the paper's Gaussian of 561 um where absent.  Besides
         :class:`memscal.GaussianMixture` and :class:`memscal.SmoothedDisc`, any object of unit
@@ -90,9 +99,9 @@ def simulate(
         as a share of the largest signal that the scan meets, at the (mean) load.
     centre : tuple of float
         Position of the sensor, in m.
-    load_uncertainty, state_noise : float or None, bool
-        Relative standard uncertainty that the scan states for the load, and whether it states its
-        noise (``u_zz_errors``).
+    load_uncertainty, state_noise, state_law : float or None, bool, bool
+        Relative standard uncertainty that the scan states for the load; whether it states its
+        noise (``u_zz_errors``), and the film's law with the rod's friction.
     seed : int
         Seed of the noise.
 
@@ -129,11 +138,21 @@ def simulate(
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
     x = np.linspace(-half_range, half_range, points)
     radius = np.hypot.outer((x if raster else np.zeros(1)) - centre[1], x - centre[0])
-    contact = indent(film, rod, load=float(loads.max()), strain="linear")
-    per_newton = conversion_constant * blurred_stress([contact], truth, radius)[0] / contact.load
+    linear = film.law in ("", LINEAR)
+    if rod_friction is None and not linear:
+        rod_friction = math.inf
+    # The stress in a linear film is proportional to the load: one contact serves for all.
+    solved = loads.max(keepdims=True) if linear else loads
+    contacts = [press_rod(film, rod, float(value), rod_friction) for value in solved]
+
+    def blurred(kernel: RadialKernel, order: int = 0) -> FloatArray:
+        stress = blurred_stress(contacts, kernel, radius, order=order)
+        stress = stress * (loads / solved)[:, None, None]
+        return np.asarray(stress[0] if raster else np.repeat(stress[:, 0], repeats, axis=0))
+
     row_loads = np.repeat(loads, repeats)
-    signal = per_newton * row_loads[:, None] if not raster else per_newton * loads[0]
-    largest = float(per_newton.max() * loads.mean())
+    signal = conversion_constant * blurred(truth)
+    largest = float(signal.max() if raster else signal.max(axis=1).mean())
     clean = signal + largest * disturbance(x, baseline, drift)
     u = clean + np.random.default_rng(seed).normal(0.0, noise * largest, clean.shape)
     if not raster and row_loads.size == 1:
@@ -142,10 +161,8 @@ def simulate(
     channel_data: dict[str, FloatArray] = {}
     shear_truth: dict[str, float | str] = {}
     if shear is not None:
-        blurred = blurred_stress([contact], shear.kernel, radius, order=1)[0] / contact.load
-        sheared = blurred * shear.side(x - centre[0], radius)
-        rows = sheared * (loads[0] if raster else row_loads[:, None])
-        channel_data, shear_truth = shear.recorded(rows.reshape(u.shape), x, disturbed)
+        sheared = blurred(shear.kernel, order=1) * shear.side(x - centre[0], radius)
+        channel_data, shear_truth = shear.recorded(sheared.reshape(u.shape), x, disturbed)
     return Scan(
         x=x,
         y=x if raster else None,
@@ -156,7 +173,8 @@ def simulate(
         load=float(loads.mean()),
         load_uncertainty=None if load_uncertainty is None else load_uncertainty * loads.mean(),
         indenter=rod,
-        film=film,
+        rod_friction=rod_friction if state_law else None,
+        film=film if state_law else without_law(film),
         sensor=StressSensor(name="a simulated sensor", channel="zz"),
         title="Synthetic rod scan",
         notes="Synthetic data made by memscal simulate; nothing here was measured.",
@@ -165,11 +183,24 @@ def simulate(
             "conversion_constant": conversion_constant,
             "centre": centre[0],
             "centre_y": centre[1],
+            **described_law(film, rod_friction),
             **disturbed.in_volts(largest),
             "seed": float(seed),
             **shear_truth,
         },
     )
+
+
+def without_law(film: ElasticFilm) -> ElasticFilm:
+    """Return the film without a law, as a scan that does not state it has it."""
+    return replace(film, law="", mooney_rivlin_ratio=None)
+
+
+def described_law(film: ElasticFilm, rod_friction: float | None) -> dict[str, float | str]:
+    """Return the film's law and the rod's friction, by the names of a truth."""
+    numbers = {"mooney_rivlin_ratio": film.mooney_rivlin_ratio, "rod_friction": rod_friction}
+    stated = {name: value for name, value in numbers.items() if value is not None}
+    return {"film_law": film.law or LINEAR, **stated}
 
 
 def checked_loads(load: float | Sequence[float]) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -31,6 +32,8 @@ _IN_JSON = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved
             "baseline")  # fmt: skip
 _OF_A_ROUTE = ("conversion_constant", "gaussian_sigma_deconvolved", "fwhm",
                "noise_equivalent_area")  # fmt: skip
+#: What scans tell of the film, where they do.
+_OF_FILM = ("film_laws", "free")
 #: Checks that a G that is Gaussian passes.
 _OF_GAUSSIAN = ("gaussian_misfit", "width_agreement")
 
@@ -65,7 +68,23 @@ def advice(apparatus: ApparatusData) -> str:
         else f"use G(r), for the Gaussian fails the check {' and '.join(failed)}."
     ).replace("_", " ")
     by = f" (method {method})" if method else ""
-    return f"Use A = {measured_text(parameters, 'conversion_constant')}{by}; {which}"
+    a = measured_text(parameters, "conversion_constant")
+    return f"{_of_the_law(apparatus)}Use A = {a}{by}; {which}"
+
+
+def _of_the_law(apparatus: ApparatusData) -> str:
+    """Return that the law of the film, which is not stated, dominates the uncertainty, if so."""
+    shares = {}
+    for symbol, name in (("A", "conversion_constant"), ("sigma", "gaussian_sigma")):
+        form = apparatus.budget.get(name, {}).get("model_form", 0.0)
+        shares[symbol] = (form / apparatus.parameters.uncertainty(name)) ** 2
+    dominated = [f"{share:.0%} of that of {of}" for of, share in shares.items() if share > 0.5]
+    if not dominated:
+        return ""
+    return (
+        "The film's law, which is not stated, dominates the uncertainty: it makes up "
+        f"{' and '.join(dominated)} (of the variance).\n"
+    )
 
 
 def _method(apparatus: ApparatusData) -> str:
@@ -99,10 +118,13 @@ def mapping(result: Calibrated) -> dict[str, Any]:
         **members(records.TRANSFER.quantities[-1:], apparatus),
         "estimates": _estimates_json(apparatus),
     }
+    values["film_law"] = apparatus.film.law or None
     choice = apparatus.process.configuration.get("centre")
     if isinstance(choice, Mapping):
         centres = [name for name in parameters.names if name.startswith("centre")]
         values["centres"] = {**choice, "values": [parameter_json(parameters, n) for n in centres]}
+    configuration = apparatus.process.configuration
+    values |= {name: configuration[name] for name in _OF_FILM if name in configuration}
     if isinstance(result, Calibration):
         misfit, gaussian = result.solution.deconvolution.misfit, result.solution.gaussian_misfit
         values["reconvolution"] = {
@@ -193,11 +215,13 @@ def rehearsal_table(
     film = scan.film
     missing = f", {points.missing} missing" if points.missing else ""
     elasticity = f"E = {film.young_modulus / 1e6:.4g} MPa, Poisson's ratio {film.poisson_ratio:.4g}"
+    slip = {None: "", 0.0: ", sliding freely", math.inf: ", sticking"}[scan.rod_friction]
+    rod = f"{scan.indenter.shape} of radius {scan.indenter.radius / MM:.4g} mm{slip}"
     rows = [
         ("scan", f"{scan.kind}, {points.u.size} points{missing}"),
-        ("indenter", f"{scan.indenter.shape} of radius {scan.indenter.radius / MM:.4g} mm"),
+        ("indenter", rod),
         ("load", f"{scan.load:.4g} N"),
-        ("film", f"{film.thickness / MM:.4g} mm, {elasticity}"),
+        ("film", f"{film.thickness / MM:.4g} mm, {elasticity}, {film.law_text}"),
         ("reference", _origin(stress)),
         ("method", method),
         *(("would write", str(path)) for path in outputs),

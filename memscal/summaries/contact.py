@@ -11,10 +11,12 @@ import numpy as np
 
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import changes_by_inputs
+from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message
-from memscal.model.indenter import Cone, RoundIndenter
-from memscal.model.quantities import MM, Quantity, by_name
+from memscal.model.film import NEO_HOOKEAN
+from memscal.model.indenter import Cone, Rod, RoundIndenter
+from memscal.model.quantities import KPA, MM, Quantity, by_name
 from memscal.model.records import PROFILE, SOLUTION
 from memscal.summaries.declared import (
     DataFrame,
@@ -42,7 +44,8 @@ _PROFILE = (
 
 def mapping(contact: Contact) -> dict[str, Any]:
     """Return one solution of ``reference --json``; the contract fixes its form."""
-    return members(SOLUTION, contact, sticking=math.isinf(contact.friction))
+    law = contact.film_of_law.law
+    return members(SOLUTION, contact, sticking=math.isinf(contact.friction), film_law=law)
 
 
 def depth_messages(contacts: Sequence[Contact]) -> tuple[list[Message], list[str]]:
@@ -60,7 +63,22 @@ def _deep(contact: Contact) -> str:
     return (
         f"At {contact.load:.4g} N the {contact.indenter.shape} sinks by {share:.0%} of the film's "
         "thickness: linear elasticity is formal there, and its error is not part of the "
-        "convergence. --strain finite shows what it changes, under a rod or a sphere."
+        f"convergence.{_in_rubber(contact)}"
+    )
+
+
+def _in_rubber(contact: Contact) -> str:
+    """Say what a neo-Hookean film changes under a rod, where that is in the table."""
+    film, rod, load = replace(contact.film, law=NEO_HOOKEAN), contact.indenter, contact.load
+    if not isinstance(rod, Rod) or not is_tabulated(film, rod, load, math.inf):
+        return ""
+    rubber = press_rod(film, rod, load, math.inf)
+    stress, depth = rubber.max_base_stress / KPA, rubber.depth / MM
+    changes = (rubber.max_base_stress / contact.max_base_stress, rubber.depth / contact.depth)
+    shares = [f"{change - 1:+.0%}" for change in changes]
+    return (
+        f" In a neo-Hookean film that sticks to the rod the largest base stress is {stress:.3g} "
+        f"kPa ({shares[0]}) and the depth {depth:.3g} mm ({shares[1]})."
     )
 
 
@@ -103,7 +121,7 @@ def _title(contact: Contact) -> str:
     friction = friction if contact.friction else "frictionless"
     loading = f", {contact.loading} loading" if contact.loading and contact.friction else ""
     interface = f"; interface: {text}" if (text := contact.interface.description) else ""
-    strain = ", finite strain" if contact.strain == "finite" else ""
+    strain = f", {contact.film_of_law.law_text}" if contact.strain == "finite" else ""
     return (
         f"{_name(contact)} on a film of {film.thickness / MM:.4g} mm, "
         f"E = {film.young_modulus * 1e-6:.4g} MPa, Poisson's ratio {film.poisson_ratio:.4g}: "

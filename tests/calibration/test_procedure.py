@@ -36,7 +36,8 @@ def test_with_hardly_any_noise_the_truth_returns(kernel: memscal.GaussianMixture
 
 def test_a_scan_without_noise_is_known_to_the_error_of_the_model() -> None:
     calibration = memscal.calibrate(simulated(noise=0.0))
-    assert calibration.passed
+    failed = [check.name for check in calibration.apparatus.checks if not check.passed]
+    assert failed == ["indentation"]  # of a film that is stated to be linear
     for name in ("gaussian_sigma", "gaussian_sigma_deconvolved"):
         assert calibration.apparatus.parameters[name] == pytest.approx(SIGMA, rel=1e-3)
 
@@ -256,16 +257,6 @@ def test_ripples_and_spikes_are_no_sound_shape(method: str) -> None:
     kernel = memscal.GaussianMixture((1.0,), (0.9e-3,))
     for seed in range(3):
         assert not shapely(simulated(kernel=kernel, seed=seed), method, seed)
-
-
-def test_a_reference_for_another_film_or_rod_is_noticed() -> None:
-    scan = simulated()
-    thicker = replace(scan.film, thickness=2.1e-3)
-    other = memscal.indent(thicker, memscal.Rod(radius=0.3e-3), load=1.0).profile()
-    text = "\n".join(map(str, memscal.calibrate(scan, reference=other).apparatus.process.messages))
-    assert "another film thickness than the scan's: 2.1 instead of 2 mm" in text
-    assert "another rod radius" in text
-    assert "poisson ratio" not in text
 
 
 def test_a_raster_may_miss_whole_rows_and_columns() -> None:

@@ -22,14 +22,16 @@ from memscal.formats.inspection import check
 
 DATA = Path(__file__).parents[2] / "calibration_data"
 README = (DATA / "README.md").read_text(encoding="utf-8")
-SCANS = ["rod_scan_33.h5", "rod_scan_65.h5", "rod_scan_three_loads.h5", "rod_scan_raster.h5"]
+SCANS = [f"rod_scan_{name}.h5" for name in ("33", "65", "three_loads", "raster", "light")]
 EXPERIMENT = [
     f"sphere_experiment/{name}.h5" for name in ("rod_scan", "sphere_dry", "sphere_lubricated")
 ]
 OWN = [f"tables/{name}.csv" for name in ("rod", "sphere_dry", "sphere_lubricated")]
 TABLES = ["rod_scan_messy.csv", "rod_reference_fem.csv", *OWN]
 ARTIFACT = "rod_scan_65.apparatus.h5"
-SETTINGS = {SCANS[2]: {"load": (0.5, 1.0, 1.5)}, SCANS[3]: {"raster": True}}
+SETTINGS = {
+    SCANS[2]: {"load": (0.1, 0.3, 1.0)}, SCANS[3]: {"raster": True}, SCANS[4]: {"load": 0.05}
+}  # fmt: skip
 
 
 def commands(block: str) -> list[list[str]]:

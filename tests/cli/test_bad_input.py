@@ -1,5 +1,6 @@
 """What cannot be calibrated: plain words, the right exit code, and the old output still there."""
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -35,23 +36,19 @@ def refused(run: Run, folder: Path) -> Refused:
     return refused_
 
 
-def test_a_voltage_without_units_is_refused_by_its_path(refused: Refused, scan: Path):
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda signal: signal.attrs.__delitem__("units"), (f"scan.h5: {SIGNAL}", "unit")),
+    (lambda signal: signal.write_direct(np.full(65, np.nan)), ("missing (NaN)",)),
+], ids=["no unit", "no number"])  # fmt: skip
+def test_a_file_that_was_spoilt_is_refused(refused: Refused, scan: Path, change, words):
     with h5py.File(scan, "r+") as file:
-        del file[SIGNAL].attrs["units"]
-    refused(scan, words=(f"scan.h5: {SIGNAL}", "unit"))
+        change(file[SIGNAL])
+    refused(scan, words=words)
 
 
-def test_a_scan_of_missing_points_is_refused(refused: Refused, scan: Path):
-    with h5py.File(scan, "r+") as file:
-        file[SIGNAL][...] = np.nan
-    refused(scan, words=("missing (NaN)",))
-
-
-def test_a_hostile_file_is_refused_unread(refused: Refused, scan: Path):
-    with h5py.File(scan, "r+") as file:
-        del file[SIGNAL]
-        file[SIGNAL] = h5py.ExternalLink("/proc/self/fd/0", SIGNAL)
-    refused(scan, words=(SIGNAL,))
+@pytest.mark.parametrize("command", ["restore", "compare"])
+def test_files_in_the_wrong_order_are_refused(run: Run, scan: Path, command):
+    assert run(command, scan, scan).exits(3, "memscal-artifact").out == ""
 
 
 @pytest.mark.parametrize(("scan", "words"), [
@@ -74,6 +71,7 @@ def test_a_reference_shorter_than_the_scan_is_refused(refused: Refused, scan: Pa
 def test_a_scan_is_no_reference_and_a_missing_scan_is_named(refused: Refused, scan: Path):
     refused(scan, "--reference", scan, words=("memscal-reference",))
     refused("missing.h5", words=("missing.h5 cannot be read: No such file",))
+    refused(os.devnull, words=("not a regular file",))
 
 
 def test_a_name_that_would_steer_the_terminal_is_shown_without_its_controls(run: Run, folder: Path):

@@ -1,7 +1,5 @@
 """Outputs that cannot be written: known before anything is computed, and nothing is lost."""
 
-import errno
-import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -12,14 +10,6 @@ from helpers.console import Run, names
 OLD = b"an artifact from last week"
 CALIBRATE = "memscal.calibration.calibrate.calibrate"
 Patch = pytest.MonkeyPatch
-
-
-@pytest.fixture
-def old(folder: Path) -> Path:
-    """An artifact from before."""
-    path = folder / "out.h5"
-    path.write_bytes(OLD)
-    return path
 
 
 def raising(error: BaseException) -> Callable[..., None]:
@@ -35,28 +25,6 @@ def raising(error: BaseException) -> Callable[..., None]:
 def no_computing(monkeypatch: Patch) -> None:
     """Fail the test if the calibration is reached."""
     monkeypatch.setattr(CALIBRATE, raising(AssertionError("The calibration was reached.")))
-
-
-@pytest.mark.usefixtures("no_computing")
-def test_a_full_disk_is_known_first(run: Run, scan: Path, old: Path, monkeypatch: Patch):
-    monkeypatch.setattr("os.fsync", raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))))
-    run("calibrate", scan, "-o", old, "--force").exits(4, "No space left", "Free some space")
-    assert old.read_bytes() == OLD
-    assert names(old.parent) == ["out.h5", "scan.h5"]
-
-
-@pytest.mark.usefixtures("no_computing")
-def test_a_read_only_disk_is_known_first(run: Run, scan: Path, old: Path, monkeypatch: Patch):
-    real_open = os.open
-
-    def read_only(path: str, flags: int, *rest: int, **more: int) -> int:
-        if flags & os.O_CREAT:
-            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
-        return real_open(path, flags, *rest, **more)
-
-    monkeypatch.setattr("os.open", read_only)
-    run("calibrate", scan, "-o", old, "--force").exits(4, "Read-only file system")
-    assert old.read_bytes() == OLD
 
 
 @pytest.mark.usefixtures("no_computing")
@@ -84,14 +52,9 @@ def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
     assert Path("rod.h5").read_bytes() == before
 
 
-@pytest.mark.usefixtures("no_computing")
-@pytest.mark.parametrize("name", [".", "/dev/null", "scan.h5/out.h5", "a" * 300])
-def test_what_cannot_be_a_file_is_no_output(run: Run, scan: Path, name):
-    refused = run("calibrate", scan, "-o", name, "--force").exits(4)
-    assert refused.err.startswith("Error: The output ")
-
-
-def test_an_interruption_keeps_the_old(run: Run, scan: Path, old: Path, monkeypatch: Patch):
+def test_an_interruption_keeps_the_old(run: Run, scan: Path, monkeypatch: Patch):
+    old = scan.with_name("out.h5")
+    old.write_bytes(OLD)
     monkeypatch.setattr("memscal.formats.artifact.write_tree", raising(KeyboardInterrupt()))
     stopped = run("calibrate", scan, "-o", old, "--force").exits(130)
     assert "Interrupted" in stopped.err

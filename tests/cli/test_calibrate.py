@@ -91,6 +91,22 @@ def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, scan: Path
     assert memscal.load_apparatus("given.h5").process.input_reference.file_name == "rod.h5"
 
 
+def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Run, scan: Path):
+    run("reference", "rod", "--thickness", "2.1", "-o", "thick.h5")
+    for further in ([], ["--dry-run"]):
+        refused = run("calibrate", scan, "--reference", "thick.h5", *further).exits(3, "--override")
+        assert (
+            "2 mm (u 0.02) in the scan scan.h5, 2.1 mm (u not stated) in the reference thick.h5"
+            in refused.err
+        )
+    done = run("calibrate", scan, "--reference", "thick.h5", "--override")
+    assert "Overridden: film thickness 2 mm" in done.err
+    process = memscal.load_apparatus("scan.apparatus.h5").process
+    (message,) = (m for m in process.messages if m.kind == "override")
+    assert message.severity == "warning"
+    assert [f"Overridden: {text}." for text in process.configuration["override"]] == [message.text]
+
+
 def test_a_reference_that_is_a_table_is_sent_to_import(run: Run, scan: Path):
     Path("fem.csv").write_text("r,s\n0,1\n1,0\n")
     refused = run("calibrate", scan, "--reference", "fem.csv")

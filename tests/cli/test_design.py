@@ -18,24 +18,10 @@ def test_options_reach_the_plan(run: Run):
     assert told["expected"]["conversion_constant"]["budget"]["load"] == 0
 
 
-def test_a_wish_is_reached(run: Run):
-    told = run("design", "--noise", 1, "--want", "sigma=2.8%", "--vary", "repeats", "--json").json
-    assert told["wanted_si"] == {"sigma": 0.028}
-    assert told["expected"]["gaussian_sigma"]["relative_uncertainty"] <= 0.028
-    assert told["plan"]["repeats"] > 1
-
-
 def test_a_resolved_wavenumber_is_wanted_in_rad_per_mm(run: Run):
     told = run("design", "--want", "resolved=3", "--vary", "step", "--json").json
     assert told["resolved_wavenumber"]["value"] >= 3
     assert told["plan"]["step"]["value"] > 0.25
-
-
-def test_a_wish_out_of_reach_is_an_error_with_the_best(run: Run):
-    failed = run("design", "--want", "sigma=1%", "--vary", "repeats")
-    assert (failed.code, failed.out) == (3, "")
-    assert "the best is" in failed.err
-    assert "thickness" in failed.err
 
 
 @pytest.mark.parametrize(("code", "arguments", "told"), [
@@ -49,22 +35,21 @@ def test_a_wish_out_of_reach_is_an_error_with_the_best(run: Run):
     (2, ["--want", "resolved=4%", "--vary", "step"], "without %"),
     (2, ["--weight", 0.5, "--weight", 0.5], "--weight"), (3, ["--method", "magic"], "magic"),
     (3, ["--want", "colour=1%", "--vary", "step"], "no known target"),
-    (3, ["--half-range", 2, "--centre", 3], "not passed over"), (3, ["--step", 4], "positions"),
-    (3, ["--half-range", 0.8, "--step", 0.1, "--noise", 1], "not distinct from zero"),
+    (3, ["--half-range", 2, "--centre", 3], "not passed over"),
     (3, ["--radius", 1.5], "rod's width is 3 mm"),
+    (3, ["--want", "sigma=1%", "--vary", "repeats"], "the best is"),
 ])  # fmt: skip
 def test_wrong_use_and_a_plan_that_cannot_be_are_refused(run: Run, code, arguments, told):
     assert run("design", *arguments).exits(code, told).out == ""
 
 
 def test_figures_are_written_and_not_overwritten(run: Run, folder: Path):
-    assert run("design", "--figure", "d.svg", "--figure", "d.png").code == 0
+    (folder / "d.png").write_bytes(b"mine")
+    assert run("design", "--figure", "d.svg", "--figure", "d.png").code == 4
+    assert (folder / "d.png").read_bytes() == b"mine"
+    assert run("design", "--figure", "d.svg", "--figure", "d.png", "--force").code == 0
     assert names(folder) == ["d.png", "d.svg"]
-    before = (folder / "d.png").read_bytes()
-    assert run("design", "--noise", 2, "--figure", "d.png").code == 4
-    assert (folder / "d.png").read_bytes() == before
-    assert run("design", "--noise", 2, "--figure", "d.png", "--force").code == 0
-    assert (folder / "d.png").read_bytes() != before
+    assert (folder / "d.png").read_bytes() != b"mine"
 
 
 @pytest.mark.parametrize(

@@ -30,14 +30,6 @@ def table(folder: Path) -> Path:
     return write_table(folder / "scan.csv", "position,voltage", rows)
 
 
-def test_an_imported_scan_can_be_calibrated(run: Run, table: Path):
-    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP).exits(0)
-    assert run("calibrate", "scan.h5").code == 0
-    found = memscal.load_apparatus("scan.apparatus.h5")
-    direct = memscal.calibrate(memscal.simulate(seed=1, state_noise=False)).apparatus
-    assert found.conversion_constant == pytest.approx(direct.conversion_constant, rel=1e-6)
-
-
 def test_the_options_say_what_the_table_does_not(run: Run, table: Path):
     labels = ["--sensor-name", "S1", "--sensor-model", "MEMS", "--title", "Monday's scan"]
     run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *labels)
@@ -50,6 +42,19 @@ def test_the_options_say_what_the_table_does_not(run: Run, table: Path):
     assert (scan.load, scan.load_uncertainty) == (1.0, 0.01)
     assert (scan.sensor.name, scan.sensor.model, scan.sensor.channel) == ("S1", "MEMS", "zz")
     assert scan.title == "Monday's scan"
+    run("import", table, "-o", "turned.h5", *COLUMNS, *SET_UP, "--u-sign", -1).exits(0)
+    np.testing.assert_allclose(memscal.read_scan("turned.h5").u_zz, -scan.u_zz, rtol=1e-12)
+
+
+def test_the_law_of_the_film_and_the_friction_of_the_rod_are_stated(run: Run, table: Path):
+    law = ["--film-law", "mooney-rivlin", "--mooney-rivlin-ratio", 0.2]
+    run("import", table, "-o", "a.h5", *COLUMNS, *SET_UP, *law, "--rod-friction", "inf").exits(0)
+    scan = memscal.read_scan("a.h5")
+    assert (scan.film.law, scan.film.mooney_rivlin_ratio) == ("mooney-rivlin", 0.2)
+    assert scan.rod_friction == np.inf
+    assert "mooney-rivlin " in run("inspect", "a.h5").out
+    sphere = ["--indenter", "sphere", "--rod-friction", "0"]
+    run("import", table, "-o", "b.h5", *COLUMNS, *SET_UP, *sphere).exits(2, "--indenter rod")
 
 
 def test_contacts_state_their_lubrication_and_the_scatter_of_their_loads(run: Run, folder: Path):
@@ -110,84 +115,44 @@ def test_a_sphere_s_line_at_several_loads_is_warned_of_and_a_rod_s_is_not(run: R
     assert (rod.code, "--repeat" in rod.err) == (0, False)
 
 
-def test_a_fem_table_becomes_a_reference(run: Run, folder: Path):
-    film = memscal.simulate().film
-    profile = memscal.indent(film, memscal.Rod(radius=0.25e-3), load=1.0).profile()
-    rows = np.stack([profile.r * 1e3, -profile.sigma_zz * 1e-6], axis=1)
-    write_table(folder / "fem.csv", "r,S33", rows)
-    columns = ["--r", "r", "--r-unit", "mm", "--sigma", "S33", "--sigma-unit", "MPa", "--load", 1]
-    wrong = run("import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns)
-    wrong.exits(3, "--sign -1")
-    run(
-        "import", "fem.csv", "--format", "reference", "-o", "rod.h5", *columns, "--sign", "-1",
-        "--solver", "a FEM program",
-    ).exits(0)  # fmt: skip
-    found = memscal.read_reference("rod.h5")
-    np.testing.assert_allclose(found.sigma_zz, profile.sigma_zz, rtol=1e-12, atol=1e-9)
-    assert found.solver == "a FEM program"
-    assert found.film is None
-    warned = ["import", "fem.csv", "--format", "reference", "-o", "w.h5", "--sign", "-1", *columns]
-    done = run(*warned[:-1], 1.1).exits(0, "Warning: the table's force differs from the load")
-    assert "Warning" not in done.out
-    lossy = run(
-        "import", "fem.csv", "--format", "reference", "-o", "kilo.h5", *columns[:-3], "kPa",
-        "--load", 1, "--sign", "-1",
-    )  # fmt: skip
-    lossy.exits(3, '"kPa"', "times the load")
-
-
 def test_the_shear_sign_brings_an_independent_solution_onto_ours(run: Run, folder: Path):
     """The shipped table is by finite elements, with S13 for the third axis upward."""
     table = Path(__file__).parents[2] / "calibration_data" / "rod_reference_fem.csv"
     done = run(
         "import", table, "--format", "reference", "-o", "rod.h5", "--load", 1, "--sign", "-1",
         "--r", "r (mm)", "--r-unit", "mm", "--sigma", "S33 (MPa)", "--sigma-unit", "MPa",
-        "--shear", "S13 (MPa)", "--shear-sign", "-1",
+        "--shear", "S13 (MPa)", "--shear-sign", "-1", "--solver", "a FEM program",
     ).exits(0)  # fmt: skip
     assert "SYNTHETIC" in done.out
     found = memscal.read_reference("rod.h5")
-    ours = memscal.indent(memscal.simulate().film, memscal.Rod(radius=0.25e-3), load=1.0)
+    assert (found.solver, found.film) == ("a FEM program", None)
+    film, rod = memscal.simulate().film, memscal.Rod(radius=0.25e-3)
+    ours = memscal.indent(film, rod, load=1.0, strain="linear")
     shear = ours.base_shear(found.r)
     np.testing.assert_allclose(found.sigma_rz, shear, atol=2e-3 * np.abs(shear).max())
     assert found.force == pytest.approx(1.0, abs=1e-4)
 
 
-def test_shear_and_voltage_have_options_for_their_signs(run: Run, folder: Path):
+def test_a_force_that_differs_from_the_load_is_warned_of_on_standard_error(run: Run, folder: Path):
     r = np.linspace(0, 8, 81)
     sigma = np.exp(-(r**2) / 2) / (2 * np.pi)
-    write_table(folder / "fem.csv", "r,S33,S13", np.stack([r, -sigma, -0.1 * r * sigma], axis=1))
-    run(
-        "import", "fem.csv", "--format", "reference", "-o", "rod.h5", "--r", "r", "--r-unit", "mm",
-        "--sigma", "S33", "--sigma-unit", "MPa", "--sign", "-1", "--load", 1,
-        "--shear", "S13", "--shear-sign", "-1",
-    ).exits(0)  # fmt: skip
-    shear = memscal.read_reference("rod.h5").sigma_rz
-    np.testing.assert_allclose(shear, 0.1e6 * r * sigma, rtol=1e-12)
-    write_table(folder / "scan.csv", "position,voltage", np.stack([r, -sigma], axis=1))
-    run("import", "scan.csv", "-o", "scan.h5", *COLUMNS, *SET_UP, "--u-sign", "-1").exits(0)
-    np.testing.assert_allclose(memscal.read_scan("scan.h5").u_zz, sigma * 1e-3, rtol=1e-12)
-    refused = run("import", "scan.csv", "-o", "s.h5", *COLUMNS, *SET_UP, "--shear-sign", "-1")
-    refused.exits(2, "--shear-sign")
+    write_table(folder / "fem.csv", "r,S33", np.stack([r, -sigma], axis=1))
+    columns = ["--r", "r", "--r-unit", "mm", "--sigma", "S33", "--sigma-unit", "MPa", "--load", 1.1]
+    done = run("import", "fem.csv", "--format", "reference", "-o", "w.h5", "--sign", -1, *columns)
+    done.exits(0, "Warning: the table's force differs from the load")
+    assert "Warning" not in done.out
 
 
 @pytest.mark.parametrize(("arguments", "hints"), [
     ([], ["--x", "--x-unit", "--u", "--u-unit"]), (COLUMNS, ["--load-column"]),
     ([*COLUMNS, "--load", 1], ["--young-modulus", "--poisson-ratio", "--thickness"]),
     ([*COLUMNS, *SET_UP, "--sigma", "s"], ["--sigma", "--format reference"]),
+    ([*COLUMNS, *SET_UP, "--shear-sign", -1], ["--shear-sign"]),
     (["--format", "reference"], ["--r", "--r-unit", "--sigma", "--sigma-unit", "--load"]),
 ])  # fmt: skip
 def test_all_that_is_missing_is_named(run: Run, table: Path, folder: Path, arguments, hints):
     refused = run("import", table, "-o", "scan.h5", *arguments).exits(2)
     assert all(hint in refused.err for hint in hints), refused.err
-    assert names(folder) == ["scan.csv"]
-
-
-@pytest.mark.parametrize(("change", "word"), [
-    (["--x", "place"], "Its columns are: position, voltage"), (["--x-unit", "mV"], "mV"),
-    (["--u-unit", "bananas"], "bananas"),
-])  # fmt: skip
-def test_a_wrong_column_or_unit_is_named(run: Run, table: Path, folder: Path, change, word):
-    run("import", table, "-o", "scan.h5", *COLUMNS, *SET_UP, *change).exits(3, word)
     assert names(folder) == ["scan.csv"]
 
 

@@ -54,9 +54,7 @@ def test_lengths_on_the_command_line_are_in_mm(run: Run, folder: Path):
 
 @pytest.mark.parametrize(("options", "code", "words"), [
     ([*MESH, "--sigma", "Stress"], 3, ["at the nodes: S (6)", "in the cells: S33 (1)"]),
-    ([*MESH, "--sigma", "S", "--sign", "1"], 3, ["--sign -1"]),
     ([*MESH, "--sigma", "S", "--base", 0.1], 3, ["--base", "0.1 mm"]),
-    ([*MESH, "--sigma", "S", "--vertical", "z"], 3, ["x and y"]),
     ([*MESH, "--sigma", "S", "--r", "x"], 2, ["A mesh has no use for --r"]),
     (["--format", "reference"], 2, ["--r-unit", "--sigma", "--sigma-unit", "--load"]),
     ([], 2, ["film.vtu is a mesh", "--format reference"]),

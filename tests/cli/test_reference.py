@@ -7,6 +7,7 @@ import pytest
 from helpers.console import Run, names
 
 import memscal
+from memscal.mechanics.press_rod import press_rod
 
 
 def test_the_papers_rod_has_the_known_stiffness(run: Run):
@@ -28,7 +29,7 @@ def test_options_of_the_film_and_the_rod_reach_the_file(run: Run, folder: Path):
     done.exits(0, "Written: rod.h5")
     profile = memscal.read_reference("rod.h5")
     assert profile.film == memscal.ElasticFilm(
-        young_modulus=1.5e6, poisson_ratio=0.45, thickness=3e-3
+        young_modulus=1.5e6, poisson_ratio=0.45, thickness=3e-3, law="linear"
     )
     assert profile.indenter == memscal.Rod(radius=0.4e-3)
     assert profile.load == 0.7
@@ -54,8 +55,15 @@ def test_a_reference_is_not_replaced_unless_forced(run: Run, folder: Path):
     assert memscal.read_reference("rod.h5").load == 1
 
 
-def test_a_depth_beyond_linear_elasticity_is_pointed_out(run: Run):
-    assert "29% of the film's thickness" in run("reference", "rod").err
+def test_a_depth_beyond_linear_elasticity_is_pointed_out_with_what_a_rubber_does(run: Run):
+    noted = run("reference", "rod").err
+    assert "29% of the film's thickness" in noted
+    film = memscal.ElasticFilm(
+        young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, law="neo-hookean"
+    )
+    rubber = press_rod(film, memscal.Rod(radius=0.25e-3), 1.0)
+    assert f"the largest base stress is {rubber.max_base_stress * 1e-3:.3g} kPa (+" in noted
+    assert "--" not in noted
     assert run("reference", "rod", "--depth", 100).err == ""
 
 
@@ -104,6 +112,8 @@ def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
     (3, ["sphere", "--film-radius", "25"], "a film has no end"),
     (3, ["sphere", "--backend", "fem", "--film-radius", "1"], "the film's edge at 1 mm"),
     (3, ["profile", "--profile-table", "absent.csv"], "absent.csv"),
+    (2, ["rod", "--strain", "finite", "--film-law", "linear"], "leave --strain out"),
+    (2, ["rod", "--film-law", "mooney-rivlin"], "--mooney-rivlin-ratio"),
     (2, ["cone"], "needs --inclination"), (2, ["profile"], "needs --profile-table"),
     (2, ["cone", "--inclination", "5", "--radius", "1"], "--radius does not describe a cone"),
     (2, ["rod", "--inclination", "5"], "--inclination does not describe a rod"),
@@ -126,13 +136,22 @@ def test_a_figure_of_the_contacts_is_written(run: Run, folder: Path):
     assert Path("contacts.svg").read_bytes().startswith(b"<?xml")
 
 
-def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path):
-    sticking = ["--friction", "inf", "--load", 0.02, "--strain", "finite"]
-    done = run("reference", "rod", *sticking, "-o", "finite.h5").exits(0)
-    assert "sticking (fem, finite strain)" in done.out
+@pytest.mark.parametrize("law", [["--strain", "finite"], ["--film-law", "neo-hookean"]])
+def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path, law):
+    done = run("reference", "rod", "--load", 0.02, *law, "-o", "finite.h5").exits(0)
+    assert "sticking (fem, neo-hookean)" in done.out
     profile = memscal.read_reference("finite.h5")
     assert profile.solver == "memscal, fem backend, finite strain"
+    assert (profile.film.law, profile.friction_coefficient) == ("neo-hookean", np.inf)
     assert profile.force == pytest.approx(0.02, rel=1e-3)
+    assert "inf" in next(x for x in run("inspect", "finite.h5").out.splitlines() if "fricti" in x)
+
+
+def test_small_strain_is_linear_whatever_the_law(run: Run):
+    own = run("reference", "rod", "--json").json["solutions"]
+    law = ["--film-law", "neo-hookean", "--strain", "linear"]
+    assert run("reference", "rod", *law, "--json").json["solutions"] == own
+    assert (own[0]["strain"], own[0]["film_law"]) == ("linear", "linear")
 
 
 @pytest.mark.parametrize("way", [["--backend", "fem"], ["--strain", "finite"]])

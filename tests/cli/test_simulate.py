@@ -7,6 +7,8 @@ import pytest
 from helpers.console import Run, names
 
 import memscal
+from memscal.cli.options import FILM_LAWS
+from memscal.model.film import LAWS
 
 
 def test_the_defaults_are_those_of_the_library(run: Run, folder: Path):
@@ -14,7 +16,8 @@ def test_the_defaults_are_those_of_the_library(run: Run, folder: Path):
     assert names(folder) == ["synthetic_scan.h5"]
     found, own = memscal.read_scan("synthetic_scan.h5"), memscal.simulate()
     assert found.synthetic == own.synthetic
-    assert found.indenter == own.indenter
+    assert (found.indenter, found.rod_friction) == (own.indenter, own.rod_friction)
+    assert (found.film.law, found.rod_friction) == (own.film.law, np.inf)
     assert found.film.young_modulus_uncertainty == own.film.young_modulus_uncertainty
     assert found.film.poisson_ratio_uncertainty == own.film.poisson_ratio_uncertainty
     assert found.film.thickness_uncertainty == own.film.thickness_uncertainty
@@ -77,9 +80,21 @@ def test_a_disc_is_simulated_and_stored_as_truth(run: Run, folder: Path):
     np.testing.assert_allclose(scan.u_zz, own.u_zz, rtol=1e-12)
 
 
-def test_noise_may_be_left_unstated(run: Run, folder: Path):
-    assert run("simulate", "-o", "scan.h5", "--no-state-noise").code == 0
-    assert memscal.read_scan("scan.h5").u_zz_errors is None
+def test_noise_and_law_may_be_left_unstated(run: Run, folder: Path):
+    silent = ["--no-state-noise", "--no-state-law"]
+    assert "neo-hookean" in run("simulate", "-o", "scan.h5", *silent).exits(0).out
+    scan = memscal.read_scan("scan.h5")
+    assert (scan.u_zz_errors, scan.film.law, scan.rod_friction) == (None, "", None)
+
+
+def test_a_linear_film_and_its_rod_are_simulated_on_request(run: Run, folder: Path):
+    linear = ["--film-law", "linear", "--rod-friction", "0"]
+    shown = run("simulate", "-o", "scan.h5", "--points", 9, *linear, "--json").exits(0).json
+    scan = memscal.read_scan("scan.h5")
+    assert (scan.film.law, scan.rod_friction) == ("linear", 0.0)
+    assert (shown["truth_si"]["film_law"], shown["truth_si"]["rod_friction"]) == ("linear", 0.0)
+    assert "sliding freely" in run("calibrate", "scan.h5", "--dry-run").out
+    assert FILM_LAWS == LAWS
 
 
 @pytest.mark.parametrize(("arguments", "code"), [
@@ -87,7 +102,8 @@ def test_noise_may_be_left_unstated(run: Run, folder: Path):
     (["--disc-radius", 800, "--sigma", 300, "--sigma", 200], 2),
     (["--disc-radius", 800, "--sigma", 300, "--weight", 1], 2), (["--disc-radius", 0], 2),
     (["--raster", "--repeats", 2], 2), (["--points", 1], 2), (["--noise", -1], 2),
-    (["--sigma", 700, "--weight", 0.5], 3),
+    (["--sigma", 700, "--weight", 0.5], 3), (["--film-law", "mooney-rivlin"], 2),
+    (["--mooney-rivlin-ratio", 0.1], 2), (["--rod-friction", 0.3], 2),
 ])  # fmt: skip
 def test_what_makes_no_scan_is_refused(run: Run, folder: Path, arguments, code):
     run("simulate", "-o", "scan.h5", *arguments).exits(code)

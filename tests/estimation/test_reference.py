@@ -1,6 +1,8 @@
 """The reference: where it comes from, what it must cover, and what its inputs change."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from memscal.estimation.reference import (
     film_sensitivities,
     reference_profile,
     require_calibration_rod,
+    require_same_set_up,
     rod_sensitivities,
 )
 from memscal.mechanics.contact import Contact
@@ -71,6 +74,69 @@ def test_a_sphere_and_a_rod_wider_than_the_film_cannot_calibrate() -> None:
         require_calibration_rod(replace(SCAN, indenter=memscal.Sphere(radius=0.1)))
     with pytest.raises(InputError, match="times the film's thickness of 2 mm"):
         require_calibration_rod(replace(SCAN, indenter=memscal.Rod(radius=1.1e-3)))
+
+
+FILM, TABLE, RUBBER = SCAN.film, CONTACT.profile(), {"law": "neo-hookean"}
+EXACTLY = {"thickness_uncertainty": None}
+LOADS = replace(SCAN, normal_load=np.geomspace(0.998, 1.001, SCAN.u_zz.size))
+
+
+@pytest.mark.parametrize(("scan", "table", "words"), [
+    # Thicknesses of 0.02 mm each: twice the uncertainty of the difference is 0.057 mm.
+    ({"thickness": 2.056e-3}, {}, None),
+    ({"thickness": 2.058e-3}, {}, r"film thickness 2\.058 mm \(u 0\.02\) in the scan, 2 mm \(u 0"),
+    ({"thickness": 2.000001e-3, **EXACTLY}, EXACTLY, None),
+    ({"thickness": 2.00001e-3, **EXACTLY}, EXACTLY, r"2\.00001 mm \(u not stated\)"),
+    ({"poisson_ratio": 0.48}, {}, r"film Poisson's ratio 0\.48 \(u 0\.005\)"),
+    ({"young_modulus": 9e6}, {"law": "linear"}, None),
+    ({"young_modulus": 9e6}, RUBBER, r"film Young's modulus 9 MPa .*, 2\.2 MPa"),
+    ({}, RUBBER, None),
+    ({"law": "linear"}, RUBBER, 'film law "linear" in the scan, "neo-hookean" in the reference'),
+    ({"radius": 0.255e-3}, {}, None),
+    ({"radius": 0.26e-3}, {}, r"rod radius 0\.26 mm"),
+    ({"rod_friction": np.inf}, {"friction_coefficient": 0.0}, None),
+    ({"rod_friction": np.inf}, {"friction_coefficient": 0.0, **RUBBER}, "friction of the rod inf"),
+    ({"load": 0.5}, {"law": "linear"}, None),
+    ({"load": 0.5}, {"law": ""}, r"load 0\.5 N \(u not stated\) in .* law is not stated"),
+    ({"load": 0.5}, RUBBER, "whose law is neo-hookean"),
+    ({"load": 0.97, "load_uncertainty": 0.02}, RUBBER, None),
+    ({"normal_load": LOADS.normal_load}, {"law": "linear"}, None),
+    ({"normal_load": LOADS.normal_load}, RUBBER, r"load 0\.998 N"),
+    ({"normal_load": LOADS.normal_load, "load_uncertainty": 2e-3}, RUBBER, None),
+    ({}, {"film": None, "load": 1.01}, "load 1 N"),
+])  # fmt: skip
+def test_a_reference_agrees_with_its_scan_within_their_uncertainties(scan, table, words) -> None:
+    made = []
+    for whole, values in ((SCAN, dict(scan)), (TABLE, dict(table))):
+        film = {name: values.pop(name) for name in [*values] if hasattr(FILM, name)}
+        rod = {name: values.pop(name) for name in [*values] if hasattr(PAPER_ROD, name)}
+        parts = {"film": replace(FILM, **film), "indenter": replace(PAPER_ROD, **rod)}
+        made.append(replace(whole, **(parts | values)))
+    set_up = [made[0]], [made[1]]
+    if words is None:
+        assert require_same_set_up(*set_up, override=False) == []
+        return
+    with pytest.raises(InputError, match=words):
+        memscal.calibrate(made[0], reference=made[1])
+    (difference,) = require_same_set_up(*set_up, override=True)
+    assert re.search(words, difference)
+
+
+def test_an_alternative_may_have_another_law_and_no_other_thickness() -> None:
+    scan, film = replace(SCAN, film=replace(FILM, law="linear")), replace(FILM, **RUBBER)
+    other = replace(TABLE, film=film, friction_coefficient=np.inf)
+    assert require_same_set_up([scan], [None], [other], override=False) == []
+    with pytest.raises(InputError, match=r"film thickness .* in the alternative"):
+        memscal.calibrate(scan, alternative=replace(other, film=replace(film, thickness=3e-3)))
+
+
+def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path: Path) -> None:
+    scan = replace(SCAN, film=replace(FILM, **RUBBER), reference=replace(TABLE, film=None))
+    memscal.write_scan(scan, tmp_path / "scan.h5")
+    read = memscal.read_scan(tmp_path / "scan.h5")
+    assert require_same_set_up([read], [None], override=False) == []
+    with pytest.raises(InputError, match=r"load 0\.5 N"):
+        memscal.calibrate(replace(scan, load=0.5))
 
 
 def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertainty() -> None:

@@ -14,7 +14,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from helpers.meshes import section
+from helpers.meshes import section, write
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
 from memscal.formats.meshes import mesh_files
@@ -36,10 +36,7 @@ POINTS = (
 def small(path: Path, **options: Any) -> Path:
     """Save a small mesh with one stress."""
     mesh = meshio.Mesh(SMALL.points, SMALL.cells, point_data={"S9": SMALL.point_data["S9"]})
-    {".vtu": meshio.vtu, ".vtk": meshio.vtk, ".xdmf": meshio.xdmf}[path.suffix].write(
-        str(path), mesh, **options
-    )
-    return path
+    return write(mesh, path, **options)
 
 
 def edited(path: Path, old: str, new: str) -> Path:

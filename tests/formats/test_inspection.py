@@ -7,7 +7,6 @@ import h5py
 import pytest
 from helpers.builders import make_artifact, make_profile, make_scan
 
-from memscal.errors import InputError
 from memscal.formats.artifact import write_artifact
 from memscal.formats.inspection import check, describe
 from memscal.formats.reference import write_reference
@@ -40,18 +39,6 @@ def test_a_sound_file_is_found_in_order_and_described_in_standard_json(folder: P
 def test_an_artifact_is_titled_by_its_sensor_alone(tmp_path: Path, name, title):
     write_artifact(make_artifact(sensor=StressSensor(name=name)), tmp_path / "a.h5")
     assert describe(tmp_path / "a.h5")["title"] == title
-
-
-def test_an_uncertainty_is_told_in_the_unit_of_its_quantity(folder: Path):
-    with h5py.File(folder / "scan.h5", "r+") as file:
-        del file.attrs["memscal_content_sha256"]
-        spread = file["/entry/sample/film/thickness_errors"]  # 0.02 mm
-        spread[()] = 20.0
-        spread.attrs["units"] = "um"
-    quantities = {q["name"]: q for q in describe(folder / "scan.h5")["quantities"]}
-    thickness = quantities["thickness"]
-    assert (thickness["value"], thickness["unit"]) == (2.0, "mm")
-    assert thickness["standard_uncertainty"] == pytest.approx(0.02, rel=1e-12)
 
 
 @pytest.mark.parametrize(("name", "passed"), [("scan", True), ("artifact", False)])
@@ -91,8 +78,5 @@ def test_a_newer_version_fails_at_the_schema(folder: Path):
 def test_the_time_is_that_of_the_build_where_one_is_given(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     assert timestamp() == "2023-11-14T22:13:20+00:00"
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
-    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
-        timestamp()
     monkeypatch.delenv("SOURCE_DATE_EPOCH")
     assert timestamp().endswith("+00:00")

@@ -9,9 +9,9 @@ import meshio
 import numpy as np
 import pytest
 from helpers.builders import make_film
-from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor
+from helpers.meshes import HEIGHTS, RADII, block, pressure, section, tensor, write
 
-from memscal.errors import FormatError, InputError, MemscalError, UnitError
+from memscal.errors import FormatError, InputError, UnitError
 from memscal.formats.meshes.mesh_files import read_mesh, write_mesh
 from memscal.formats.meshes.reference_mesh import read_reference_mesh
 from memscal.formats.reference import read_reference, write_reference
@@ -50,10 +50,7 @@ def saved(mesh: meshio.Mesh, path: Path, **options: Any) -> Path:
         for fields in (mesh.point_data, mesh.cell_data):
             for name in ("S4", "C4"):
                 fields.pop(name, None)
-    {".vtu": meshio.vtu, ".vtk": meshio.vtk, ".xdmf": meshio.xdmf}[path.suffix].write(
-        str(path), mesh, **options
-    )
-    return path
+    return write(mesh, path, **options)
 
 
 def assert_is_the_section(found: ImportedProfile, *, turned: int = 1) -> None:
@@ -257,23 +254,6 @@ def test_our_own_field_comes_back_through_a_file(tmp_path: Path):
     np.testing.assert_allclose(again.point_data["displacement_mm"][:, :2], 1e-3 * points)
     np.testing.assert_array_equal(again.point_data["displacement_mm"][:, 2], 0.0)
     assert b"E = 2.2 MPa" in (tmp_path / "film.vtu").read_bytes()
-
-
-def test_a_mesh_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    mesh = FieldMesh(
-        points=[[0, 0], [1, 0], [0, 1]], triangles=[[0, 1, 2]], displacement=np.zeros((3, 2)),
-        stress=np.zeros((3, 4)),
-    )  # fmt: skip
-    path = tmp_path / "film.vtu"
-    path.write_text("mine")
-    with pytest.raises(MemscalError, match="exists already"):
-        write_mesh(mesh, path)
-    assert path.read_text() == "mine"
-    write_mesh(mesh, path, overwrite=True)
-    first = path.read_bytes()
-    write_mesh(mesh, path, overwrite=True)
-    assert path.read_bytes() == first
-    assert [each.name for each in tmp_path.iterdir()] == ["film.vtu"]
 
 
 def test_what_was_taken_for_what_stays_with_the_profile(tmp_path: Path):

@@ -10,18 +10,13 @@ import numpy as np
 import pytest
 import silx.io.nxdata
 import xarray
-from helpers.builders import make_artifact, make_profile, make_scan
+from helpers.builders import BARE, make_artifact, make_profile, make_scan
 from nexusformat.nexus.validate import validate_file
 
 from memscal.formats.artifact import write_artifact
 from memscal.formats.reference import write_reference
 from memscal.formats.scan import write_scan
 
-BARE: dict[str, Any] = {
-    **dict.fromkeys(("u_zz_errors", "normal_load", "reference", "synthetic")),
-    **dict.fromkeys(("title", "start_time", "end_time", "notes"), ""),
-    "channels": {},
-}
 WRITERS: dict[str, Callable[[Path], None]] = {
     "line": lambda path: write_scan(make_scan("line"), path),
     "repeats": lambda path: write_scan(make_scan("repeats"), path),

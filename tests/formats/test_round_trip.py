@@ -2,14 +2,14 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
-from helpers.builders import make_artifact, make_film, make_profile, make_scan
+from helpers.builders import BARE, make_artifact, make_film, make_profile, make_scan
+from helpers.records import EXACT, assert_same
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -17,79 +17,47 @@ from hypothesis.extra import numpy as hnp
 from memscal.apparatus import load_apparatus
 from memscal.errors import FormatError, InputError, OutputError, UnitError
 from memscal.formats.artifact import write_artifact
+from memscal.formats.meshes.mesh_files import write_mesh
 from memscal.formats.reference import read_reference, write_reference
 from memscal.formats.scan import read_scan, write_scan
 from memscal.model.apparatus import ParameterSet
 from memscal.model.checks import Message, QualityCheck, messages_from_json
+from memscal.model.field_mesh import FieldMesh
 from memscal.model.indenter import Sphere
 from memscal.model.provenance import SourceFile
-
-# Twice the rounding of one multiplication and one division by a power of ten.
-EXACT = 4.5e-16
-
-
-def assert_same(found: Any, expected: Any, *, but: tuple[str, ...] = (), where: str = "") -> None:
-    """Compare two values of the model field by field, numbers to the last bit but one."""
-    if dataclasses.is_dataclass(expected):
-        assert isinstance(found, type(expected)), where
-        for field in dataclasses.fields(expected):
-            if field.name not in but:
-                pair = getattr(found, field.name), getattr(expected, field.name)
-                assert_same(*pair, but=but, where=f"{where}.{field.name}")
-    elif isinstance(expected, Mapping):
-        assert set(found) == set(expected), where
-        for key, value in expected.items():
-            assert_same(found[key], value, but=but, where=f"{where}[{key}]")
-    elif isinstance(expected, tuple):
-        assert len(found) == len(expected), where
-        for i, (a, b) in enumerate(zip(found, expected, strict=True)):
-            assert_same(a, b, but=but, where=f"{where}[{i}]")
-    elif isinstance(expected, (np.ndarray, float)):
-        np.testing.assert_allclose(found, expected, rtol=EXACT, atol=0, err_msg=where)
-    else:
-        assert found == expected, where
-
-
-@pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
-def test_a_scan_comes_back_with_its_source_named(tmp_path: Path, kind):
-    path = tmp_path / "scan.h5"
-    write_scan(make_scan(kind), path)
-    found = read_scan(path)
-    assert_same(found, make_scan(kind), but=("source",))
-    assert found.kind == kind
-    assert found.source == SourceFile("scan.h5", hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 @pytest.mark.parametrize("kind", ["line", "repeats", "raster", "points"])
 @pytest.mark.parametrize("direction", ["x", "y"])
 def test_all_that_a_scan_may_state_comes_back(tmp_path: Path, kind, direction):
-    plain = make_scan(kind)
+    path, plain = tmp_path / "scan.h5", make_scan(kind)
+    film = dataclasses.replace(plain.film, name="film A")
     count = np.arange(plain.u_zz.size).reshape(plain.u_zz.shape)
     errors = np.where(count % 33 == 4, np.nan, 0.02 * plain.normal_load * (1 + count))
     order = np.arange(count.size if kind == "raster" else 33)
     scan = dataclasses.replace(
         plain, x_errors=np.linspace(1e-6, 2e-6, 33), position_scale_uncertainty=2e-3,
         u_zz_correlation=0.5 ** np.abs(np.subtract.outer(order, order)), branch=count % 3,
-        film=dataclasses.replace(plain.film, name="film A"), normal_load_errors=errors,
-        lubrication="lubricated", lubricant="glycerol, 99 %",
+        film=film, normal_load_errors=errors, lubrication="lubricated", lubricant="glycerol, 99 %",
         direction="x" if kind == "raster" else direction,
-        y=None if kind == "points" else plain.y,  # a line, the repeats of which are numbered
+        # Points of direction y are a line, the repeats of which are numbered.
+        y=None if (kind, direction) == ("points", "y") else plain.y,
+        # The reference's own film has no name of its own: it is the scan's.
+        reference=dataclasses.replace(plain.reference, film=film),
     )  # fmt: skip
-    write_scan(scan, tmp_path / "scan.h5")
-    # The reference's own film has no name of its own: it is the scan's.
-    assert_same(read_scan(tmp_path / "scan.h5"), scan, but=("source", "reference"))
-    with h5py.File(tmp_path / "scan.h5") as file:
+    write_scan(scan, path)
+    found = read_scan(path)
+    assert_same(found, scan, but=("source",))
+    assert found.kind == kind
+    assert found.source == SourceFile("scan.h5", hashlib.sha256(path.read_bytes()).hexdigest())
+    with h5py.File(path) as file:
         assert file["/entry/data/normal_load_errors"].attrs["units"] == "N"
         assert "1 approach, 2 retreat" in file["/entry/data/branch"].attrs["meaning"]
 
 
 def test_a_scan_with_nothing_optional_comes_back_so(tmp_path: Path):
-    bare: dict[str, Any] = dict.fromkeys(
-        ("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")
-    )
-    bare |= {"channels": {}, "title": "", "start_time": "", "end_time": "", "notes": ""}
-    write_scan(make_scan(**bare), tmp_path / "scan.h5")
-    assert_same(read_scan(tmp_path / "scan.h5"), make_scan(**bare), but=("source",))
+    write_scan(make_scan(**BARE), tmp_path / "scan.h5")
+    assert_same(read_scan(tmp_path / "scan.h5"), make_scan(**BARE), but=("source",))
 
 
 def test_a_reference_comes_back(tmp_path: Path):
@@ -183,8 +151,15 @@ def test_configurations_with_numpy_numbers_and_infinities_are_stored_as_json(tmp
     assert found == {"seed": 3, "mu": "inf", "loads": [1.0, 2.0]}
 
 
+MESH = FieldMesh(
+    points=[[0, 0], [1, 0], [0, 1]], triangles=[[0, 1, 2]], displacement=np.zeros((3, 2)),
+    stress=np.zeros((3, 4)),
+)  # fmt: skip
+
+
 @pytest.mark.parametrize(("write", "thing"), [
     (write_scan, make_scan()), (write_reference, make_profile()), (write_artifact, make_artifact()),
+    (write_mesh, MESH),
 ])  # fmt: skip
 def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path: Path, write, thing):
     path = tmp_path / "a.h5"
@@ -193,7 +168,8 @@ def test_a_file_is_replaced_only_where_that_is_asked_for(tmp_path: Path, write, 
         write(thing, path)
     assert path.read_bytes() == b"years of work"
     write(thing, path, overwrite=True)
-    assert h5py.is_hdf5(path)
+    assert b"years" not in path.read_bytes()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
 
 
 def test_a_large_field_is_compressed_and_comes_back(tmp_path: Path):
@@ -222,8 +198,8 @@ finite = st.floats(-1e6, 1e6, allow_subnormal=False)
 )
 def test_any_scan_comes_back(tmp_path: Path, x, missing, title, notes, load):
     u = np.where(np.arange(x.size) < missing * x.size, np.nan, x)
-    bare: dict[str, Any] = dict.fromkeys(["u_zz_errors", "normal_load", "reference"])
-    scan = make_scan(x=x, u_zz=u, channels={}, title=title, notes=notes, load=load, **bare)
+    stated = {"x": x, "u_zz": u, "title": title, "notes": notes, "load": load}
+    scan = make_scan(**(BARE | stated))
     write_scan(scan, tmp_path / "scan.h5", overwrite=True)
     found = read_scan(tmp_path / "scan.h5")
     assert_same(found, scan, but=("source", "title"))
@@ -291,6 +267,19 @@ def test_a_wrong_unit_is_named_with_its_path_and_the_right_one(tmp_path: Path, p
     with pytest.raises(UnitError, match=rf"scan\.h5: {path}(.|\n)*{wanted}") as caught:
         read_scan(tmp_path / "scan.h5")
     assert caught.value.cure
+
+
+@pytest.mark.parametrize(("path", "value", "cure"), [
+    ("/entry/sample/film/law", "rubber", "linear, neo-hookean, mooney-rivlin"),
+    ("/entry/indenter/friction_coefficient", 0.3, "Give 0 or inf"),
+])  # fmt: skip
+def test_an_unknown_law_or_friction_is_refused_by_its_place(tmp_path: Path, path, value, cure):
+    other_program(tmp_path / "scan.h5")
+    with h5py.File(tmp_path / "scan.h5", "r+") as file:
+        file[path] = value
+    place = path.removesuffix("/law")
+    with pytest.raises(InputError, match=rf"scan\.h5: {place}: .*{value}(.|\n)*{cure}"):
+        read_scan(tmp_path / "scan.h5")
 
 
 def edit(path: Path, name: str, value: Any, units: str) -> None:

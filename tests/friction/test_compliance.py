@@ -1,6 +1,7 @@
 """Laws of the interface weighed by what was calculated: each is found where it is the truth."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -149,8 +150,6 @@ def test_the_interval_is_as_wide_as_the_slope_of_the_likelihood_says() -> None:
 def test_an_uncertain_macroscopic_coefficient_makes_the_slip_length_as_uncertain() -> None:
     # Where nothing slips the law knows friction over slip length only: a change of one by a
     # tenth is undone by a change of the other.
-    from dataclasses import replace
-
     exact = slipping()
     t = exact.coordinates[:, None, None]
     change = -0.1 * t * (1 - t) * exact.by_coordinate

@@ -81,10 +81,6 @@ def test_all_loads_together_tell_more_than_each() -> None:
     assert joint.degrees == 2 * (33 - 3) - 1
 
 
-def test_lubricated_contacts_reach_no_friction() -> None:
-    assert sum(one.interval.low == 0 for one in found(0.0)) >= binom.ppf(CHANCE, SEEDS, 0.95)
-
-
 def test_the_other_loading_adds_a_rectangle() -> None:
     first, second = found(0.1)[0], found(0.2)[0]
     expected = abs(first.value - second.value) / np.sqrt(12)

@@ -15,7 +15,7 @@ from memscal.friction.marginal_likelihood import (
     log_uniform_prior,
     uniform_prior,
 )
-from memscal.friction.results import BayesFactor
+from memscal.model.bayes_factor import BayesFactor
 
 LOG_2PI = float(np.log(2 * np.pi))
 

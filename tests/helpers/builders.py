@@ -14,11 +14,20 @@ SIGMA = 561e-6
 CONVERSION = 3.0e-8
 
 
+BARE: dict[str, Any] = {
+    **dict.fromkeys(("u_zz_errors", "normal_load", "load_uncertainty", "reference", "synthetic")),
+    **dict.fromkeys(("title", "start_time", "end_time", "notes"), ""),
+    "channels": {},
+}
+"""Changes that leave a scan without all that is optional."""
+
+
 def make_film(**changes: Any) -> ElasticFilm:
     """The paper's film."""
     film = ElasticFilm(
         young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, roughness_rms=1.82e-6,
         young_modulus_uncertainty=0.1e6, thickness_uncertainty=20e-6,
+        law="mooney-rivlin", mooney_rivlin_ratio=0.2,
     )  # fmt: skip
     return replace(film, **changes)
 
@@ -56,7 +65,8 @@ def make_scan(kind: str = "line", **changes: Any) -> Scan:
         repeat=np.arange(33) % 3 + 1 if kind == "points" else None, u_zz=u,
         u_zz_errors=np.full(u.shape, 1e-5), normal_load=np.full(u.shape, 1.01),
         channels={"u_xz": 0.1 * u}, load=1.0, load_uncertainty=0.01,
-        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6), film=make_film(),
+        indenter=Rod(radius=0.25e-3, radius_uncertainty=1e-6), rod_friction=np.inf,
+        film=make_film(),
         sensor=StressSensor(name="S1", model="MEMS", channel="zz"), title="A scan",
         start_time="2024-01-02T03:04:05+00:00", end_time="2024-01-02T04:04:05+00:00",
         notes="Two lines\nof notes, with an é.", reference=make_profile(),

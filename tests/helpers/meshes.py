@@ -1,5 +1,6 @@
 """Meshes as finite-element programs leave them, with a stress in closed form."""
 
+from pathlib import Path
 from typing import Any
 
 import meshio
@@ -7,6 +8,13 @@ import numpy as np
 
 RADII = np.linspace(0.0, 8.0, 41)
 HEIGHTS = np.linspace(0.0, 2.0, 4)
+
+
+def write(mesh: meshio.Mesh, path: Path, **options: Any) -> Path:
+    """Write a mesh with meshio, in the format of the file's name."""
+    formats = {".vtu": meshio.vtu, ".vtk": meshio.vtk, ".xdmf": meshio.xdmf}
+    formats[path.suffix].write(str(path), mesh, **options)
+    return path
 
 
 def pressure(r: Any) -> Any:

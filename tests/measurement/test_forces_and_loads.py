@@ -59,17 +59,6 @@ def test_the_force_does_not_depend_on_the_thickness_of_the_film() -> None:
     np.testing.assert_allclose(ratios(found), right, atol=0.01)
 
 
-@pytest.mark.parametrize("gain", [1 / 1.05, 1.05])
-def test_a_gain_that_is_wrong_by_five_percent_is_seen(gain: float) -> None:
-    scan = contact_scan(2, **QUIET)
-    wrong = replace(scan, u_zz=gain * scan.u_zz, u_zz_errors=gain * scan.u_zz_errors)
-    found = memscal.measure_stress(wrong, SENSOR)
-    assert "applied_force_all" in failed(found)
-    np.testing.assert_allclose(
-        ratios(found), gain * ratios(memscal.measure_stress(scan, SENSOR)), rtol=2e-3
-    )
-
-
 def test_all_profiles_together_tell_more_than_one_until_a_is_all_that_is_left() -> None:
     found = measured(3, conversion_uncertainty=0.01)
     single = [p.force_budget["scan"] / p.load for p in found.profiles]

@@ -24,10 +24,10 @@ def test_the_moduli_are_those_of_isotropic_elasticity(nu: float, modulus: float)
 
 
 @pytest.mark.parametrize(("changes", "named"), [
-    ({"young_modulus": 0.0}, "young_modulus is 0 Pa"),
+    ({"young_modulus": 0.0}, "young_modulus is 0 Pa, but .* above zero"),
     ({"young_modulus": float("inf")}, "young_modulus is inf Pa"),
     ({"poisson_ratio": 0.5000001}, "poisson_ratio"),
-    ({"poisson_ratio": -0.1}, "poisson_ratio is -0.1"),
+    ({"poisson_ratio": -0.1}, r"poisson_ratio is -0\.1 .*from 0 to 0\.5"),
     ({"poisson_ratio": float("nan")}, "poisson_ratio is nan"),
     ({"thickness": -2e-3}, "thickness is -0.002 m"),
     ({"roughness_rms": -1e-6}, "roughness_rms"),

@@ -91,6 +91,8 @@ def test_scans_and_profiles_are_shown_in_one_short_line(thing) -> None:
     ({"sigma_rz": np.zeros(102)}, "sigma_rz of the stress profile has 102 values for 101"),
     ({"sigma_zz": np.full(101, np.nan)}, "sigma_zz of the stress profile holds"),
     ({"sigma_zz": np.zeros((101, 1))}, "sigma_zz of the stress profile has shape"),
+    ({"r": [], "sigma_zz": []}, r"r of the stress profile has shape \(0,\)"),
+    ({"r": 1.0}, r"r of the stress profile has shape \(\)"),
 ])  # fmt: skip
 def test_a_profile_that_contradicts_itself_is_refused(changes, problem) -> None:
     with pytest.raises(InputError, match=problem):

@@ -28,6 +28,7 @@ RARE = 1e-9
 
 STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 EXACT: dict[str, Any] = {**STILL, "load_scatter": 0.0, "position_error": 0.0}
+LINEAR = replace(PAPER_FILM, law="linear")
 CENTRED = {"centre": (0.0, 0.0)}
 
 
@@ -51,9 +52,8 @@ def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int) ->
     options: dict[str, Any] = {"load": [0.34, 1.37], "friction": 0.15, "points": 9, **STILL}
     options |= {"spacing": 1e-3, "position_error": 0.0, "load_reading": 0.0}
     scan = simulate_contacts(record_loads=True, load_scatter=0.02, seed=seed, **options)
-    contacts = memscal.indent(
-        PAPER_FILM, PAPER_SPHERE, load=np.sort(scan.normal_load, axis=None), friction=0.15
-    )
+    each = np.sort(scan.normal_load, axis=None)
+    contacts = memscal.indent(LINEAR, PAPER_SPHERE, load=each, friction=0.15)
     solved = {contact.load: contact for contact in contacts}
     away = np.abs(scan.x - 0.14e-3)
     expected = np.empty_like(scan.u_zz)
@@ -70,7 +70,7 @@ def test_contacts_that_scatter_are_those_solved_at_their_own_loads(seed: int) ->
 def test_a_scan_is_that_of_its_contacts_at_the_nominal_loads() -> None:
     law = memscal.Interface(slip_length=3e-6)
     scan = simulate_contacts(load=1.37, friction=0.8, interface=law, points=17, **EXACT)
-    contact = memscal.indent(PAPER_FILM, PAPER_SPHERE, load=1.37, friction=0.8, interface=law)
+    contact = memscal.indent(LINEAR, PAPER_SPHERE, load=1.37, friction=0.8, interface=law)
     r = np.linspace(0, 30e-3, 3001)
     profile = contact.base_stress(r)
     # The blurred stress at a place, as an integral over the plane around it.

@@ -1,5 +1,7 @@
 """Synthetic scans: conservation of force, and statistics; tests/accuracy convolves directly."""
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 RARE = 1e-9
 """Probability with which a correct program would fail one of the random tests here."""
 
+LINEAR = replace(PAPER_FILM, law="linear")
 STILL = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 RING = GaussianMixture((1.8, -0.8), (0.7e-3, 0.45e-3))
 DISC = SmoothedDisc(radius=0.8e-3, sigma=0.3e-3)
@@ -26,14 +29,13 @@ def test_the_voltage_over_the_plane_is_the_constant_times_the_load(kernel: Radia
     # The integral of a smooth field is the sum of a raster's pixels; this one, of an
     # incompressible film, is gone only at 20 thicknesses.
     options: dict[str, Any] = {"points": 161, "half_range": 40e-3, "centre": (0.2e-3, -0.3e-3)}
-    scan = simulate(
-        raster=True, load=2.0, kernel=kernel, conversion_constant=3e-8, **options, **STILL
-    )
+    options |= {"film": LINEAR, "load": 2.0, "kernel": kernel}
+    scan = simulate(raster=True, conversion_constant=3e-8, **options, **STILL)
     assert scan.u_zz.sum() * (scan.x[1] - scan.x[0]) ** 2 == pytest.approx(3e-8 * 2.0, rel=1e-6)
 
 
 def test_a_line_is_the_middle_row_of_a_raster() -> None:
-    options: dict[str, Any] = {"points": 33, "centre": (0.3e-3, 0.2e-3), **STILL}
+    options: dict[str, Any] = {"points": 33, "centre": (0.3e-3, 0.2e-3), "film": LINEAR, **STILL}
     raster, line = simulate(raster=True, **options), simulate(**options)
     assert (raster.kind, line.kind) == ("raster", "line")
     np.testing.assert_array_equal(raster.x, raster.y)
@@ -47,7 +49,7 @@ def test_the_largest_voltage_is_over_the_sensor() -> None:
 
 
 def test_offset_and_drift_are_shares_of_the_largest_signal() -> None:
-    options: dict[str, Any] = {"noise": 0.0, "half_range": 20e-3, "points": 41, "load": 3.0}
+    options: dict[str, Any] = {"noise": 0.0, "half_range": 20e-3, "points": 41, "film": LINEAR}
     largest = simulate(**{**options, **STILL}).u_zz.max()
     scan = simulate(baseline=0.02, drift=0.01, **options)
     added = scan.u_zz - simulate(**{**options, **STILL}).u_zz
@@ -60,7 +62,7 @@ def test_offset_and_drift_are_shares_of_the_largest_signal() -> None:
 
 @pytest.mark.parametrize("noise", [0.001, 0.05])
 def test_the_noise_has_the_standard_deviation_that_is_stated(noise: float, seed: int) -> None:
-    options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5]}
+    options: dict[str, Any] = {"points": 65, "repeats": 60, "load": [0.5, 1.5], "film": LINEAR}
     noisy, clean = (simulate(noise=s, seed=seed, **options) for s in (noise, 0.0))
     residual = noisy.u_zz - clean.u_zz
     stated = noisy.u_zz_errors
@@ -92,13 +94,36 @@ def test_a_seed_gives_the_same_scan_whatever_else_draws_numbers(seed: int) -> No
 
 
 def test_several_loads_give_a_repeat_each_in_proportion() -> None:
-    scan = simulate(load=[0.34, 0.69, 1.37], repeats=2, points=17, load_uncertainty=0.02, **STILL)
+    options: dict[str, Any] = {"repeats": 2, "points": 17, "film": LINEAR}
+    scan = simulate(load=[0.34, 0.69, 1.37], load_uncertainty=0.02, **options, **STILL)
     assert (scan.kind, scan.u_zz.shape) == ("repeats", (6, 17))
     loads = np.array([0.34, 0.34, 0.69, 0.69, 1.37, 1.37])
     np.testing.assert_array_equal(scan.normal_load, np.tile(loads[:, None], 17))
     np.testing.assert_allclose(scan.u_zz / loads[:, None], np.tile(scan.u_zz[0] / 0.34, (6, 1)))
     assert scan.load == pytest.approx(0.8)
     assert scan.load_uncertainty == pytest.approx(0.016)
+
+
+def test_the_rod_is_pressed_by_the_law_at_each_load() -> None:
+    options: dict[str, Any] = {"points": 17, "half_range": 4e-3, **STILL}
+    loads = [0.1, 1.0]
+    scan = simulate(load=loads, repeats=2, **options)
+    for rows, load in zip((scan.u_zz[:2], scan.u_zz[2:]), loads, strict=True):
+        np.testing.assert_allclose(rows, [simulate(load=load, **options).u_zz] * 2, rtol=1e-9)
+    light, heavy = scan.u_zz[0].max() / loads[0], scan.u_zz[2].max() / loads[1]
+    assert heavy / light > 1.1
+
+
+@pytest.mark.parametrize(("film", "law", "friction"), [
+    (PAPER_FILM, "neo-hookean", math.inf), (LINEAR, "linear", None),
+    (replace(PAPER_FILM, law=""), "linear", None),
+])  # fmt: skip
+def test_the_scan_states_its_law_if_it_has_one_and_it_is_wanted(film, law, friction) -> None:
+    scan, silent = simulate(film=film, points=9), simulate(film=film, points=9, state_law=False)
+    assert (scan.film, scan.rod_friction) == (film, friction)
+    assert (silent.film, silent.rod_friction) == (replace(film, law=""), None)
+    assert scan.synthetic == silent.synthetic
+    assert (scan.synthetic["film_law"], scan.synthetic.get("rod_friction")) == (law, friction)
 
 
 def test_repeats_at_one_load_share_their_signal_but_not_their_noise() -> None:

@@ -19,8 +19,11 @@ from memscal.model.arrays import FloatArray
 # Intervals between rings that one side of a triangle spans.  A quartic has four, but with two the
 # shear of a sticking contact needs a quarter of the rings, for 1.4 times the time.
 _INTERVALS = 2
-# ... and one only at the last rings, so many of them, where a rod's pressure is singular.
+# ... and one only at the last rings, so many of them, where a rod's pressure is singular, ...
 _AT_THE_EDGE = 4
+# ... and at an edge within the rings, where they are closer than this share of the outermost gap:
+# the shear of a contact that sticks at once is singular there.
+_NARROW = 0.25
 # ... where the widest of them is at most so many times the narrowest.
 _UNEVEN = 2.1
 # Widest side at distances from the contact, all in film thicknesses: the field decays ...
@@ -91,7 +94,8 @@ def _fitted(rings: FloatArray, sizes: _Sizes) -> FloatArray:
     corners = [rings[-1]]
     last = gaps.size
     while last > 0:
-        span = 1 if gaps.size - last < _AT_THE_EDGE else max(1, _INTERVALS // sizes.refinement)
+        single = gaps.size - last < _AT_THE_EDGE or gaps[last - 1] < _NARROW * gaps[-1]
+        span = 1 if single else max(1, _INTERVALS // sizes.refinement)
         first = last - 1
         longest = float(sizes.widest(rings[last]))
         while first > 0 and last - first < span:

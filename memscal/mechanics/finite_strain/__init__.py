@@ -1,1 +1,1 @@
-"""The neo-Hookean film at finite strain."""
+"""The film at finite strain, neo-Hookean or Mooney-Rivlin."""

@@ -1,10 +1,12 @@
 r"""Finite elements for the film at finite strain: energy, forces and their exact tangent.
 
-With the deformation gradient :math:`F` (components rr, rz, zr, zz, hoop) and :math:`J = \det F`
-the neo-Hookean energy per undeformed volume is
+With the deformation gradient :math:`F` (components rr, rz, zr, zz, hoop), :math:`J = \det F` and
+:math:`G = 2(C_1 + C_2)` the Mooney-Rivlin energy (neo-Hookean where :math:`C_2 = 0`) per
+undeformed volume is
 
-.. math:: W = G\left[\tfrac12(F:F - 3) - (J - 1)\right] + \tfrac{K}{2}(J - 1)^2,
-          \qquad K = \lambda + G,
+.. math:: W = C_1(I_1 - 3) + C_2(I_2 - 3) - (2C_1 + 4C_2)(J - 1) + \tfrac{K}{2}(J - 1)^2,
+          \qquad I_1 = F:F, \quad I_2 = \mathrm{cof} F:\mathrm{cof} F,
+          \quad K = \lambda + 2C_1,
 
 without a logarithm, so that Newton's method may pass through trial states that are turned inside
 out (Smith, de Goes and Kim, ACM Trans. Graphics 37 (2018) 12, eq. 13).  A share :math:`\kappa` of
@@ -25,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
+from memscal.model.film import MOONEY_RIVLIN, NEO_HOOKEAN, ElasticFilm
 
 _PASCAL_TO_MPA = 1e-6
 # Share of K that does not go through the pressure, in shear moduli: enough to keep elements from
@@ -44,67 +46,93 @@ def cofactor(F: FloatArray) -> FloatArray:
     return np.stack([zz * hoop, -zr * hoop, -rz * hoop, rr * hoop, rr * zz - rz * zr], axis=-1)
 
 
+# Pairs of components, the third that J has with them, and its sign.
+_TRIPLES = ((0, 3, 4, 1), (1, 2, 4, -1), (0, 4, 3, 1), (3, 4, 0, 1), (1, 4, 2, -1), (2, 4, 1, -1))
+
+
+def _curvature(F: FloatArray) -> FloatArray:
+    """Return the second derivative of J by the gradient, linear in it, shape (..., 5, 5)."""
+    second = np.zeros((*F.shape, 5))
+    for i, j, k, sign in _TRIPLES:
+        second[..., i, j] = second[..., j, i] = sign * F[..., k]
+    return second
+
+
 @dataclass(frozen=True)
-class NeoHookean:
+class Rubber:
     """The film's material, in MPa: with lengths in mm, the unknowns are then of like size."""
 
-    shear_modulus: float
+    c1: float
+    c2: float
     held: float  # kappa
     softness: float  # 1/(K - kappa), 0 where the film is incompressible
 
     @classmethod
-    def of(cls, film: ElasticFilm) -> NeoHookean:
-        r"""Return the material with the film's moduli at small strain: K = G / (1 - 2 nu)."""
-        G = film.shear_modulus * _PASCAL_TO_MPA
-        compliance = (1 - 2 * film.poisson_ratio) / G  # 1/K
+    def of(cls, film: ElasticFilm) -> Rubber:
+        r"""Return the material with the film's moduli at small strain."""
+        G, ratio = film.shear_modulus * _PASCAL_TO_MPA, film.mooney_rivlin_ratio or 0.0
+        c1, c2 = G / 2 / (1 + ratio), G / 2 * ratio / (1 + ratio)
+        compliance = (1 - 2 * film.poisson_ratio) / (G - 2 * c2 * (1 - 2 * film.poisson_ratio))
         held = _HELD * G / (1 + 2 * _HELD * G * compliance)
-        return cls(G, held, compliance / (1 - held * compliance))
+        return cls(c1, c2, held, compliance / (1 - held * compliance))
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus G at small strain."""
+        return 2 * (self.c1 + self.c2)
+
+    @property
+    def law(self) -> str:
+        """Name of the law."""
+        return MOONEY_RIVLIN if self.c2 else NEO_HOOKEAN
 
     def energy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the stored energy per undeformed volume, shape (...), where p has settled."""
-        strain = (np.sum(F**2, axis=-1) - 3) / 2 - (determinant(F) - 1)
-        swelling = self.held / 2 * (determinant(F) - 1) ** 2
-        return np.asarray(self.shear_modulus * strain + swelling + self.softness / 2 * p**2)
+        swelling = determinant(F) - 1
+        strain = self.c1 * (np.sum(F**2, axis=-1) - 3) - (2 * self.c1 + 4 * self.c2) * swelling
+        strain += self.c2 * (np.sum(cofactor(F) ** 2, axis=-1) - 3)
+        return np.asarray(strain + self.held / 2 * swelling**2 + self.softness / 2 * p**2)
 
     def _pressing(self, F: FloatArray, p: FloatArray) -> FloatArray:
-        """Return G + p - held (J - 1): minus the factor of the cofactor in the stress."""
-        return np.asarray(self.shear_modulus + p - self.held * (determinant(F) - 1))
+        """Return minus the factor of the cofactor in the stress."""
+        pressure = 2 * self.c1 + 4 * self.c2 + p - self.held * (determinant(F) - 1)
+        return np.asarray(pressure[..., None])
 
     def stress(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the nominal (first Piola-Kirchhoff) stress, shape (..., 5)."""
-        return np.asarray(self.shear_modulus * F - self._pressing(F, p)[..., None] * cofactor(F))
+        cof = cofactor(F)
+        stress = 2 * self.c1 * F - self._pressing(F, p) * cof
+        if self.c2:
+            stress += 2 * self.c2 * (_curvature(F) @ cof[..., None])[..., 0]
+        return np.asarray(stress)
 
     def tangent(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the derivative of the nominal stress by the gradient, shape (..., 5, 5)."""
-        rr, rz, zr, zz, hoop = np.moveaxis(F, -1, 0)
-        cof, pressing = cofactor(F), self._pressing(F, p)
+        cof, second = cofactor(F), _curvature(F)
         stiffness = self.held * cof[..., :, None] * cof[..., None, :]
-        pairs = ((0, 3, hoop), (1, 2, -hoop), (0, 4, zz), (3, 4, rr), (1, 4, -zr), (2, 4, -rz))
-        for i, j, second in pairs:  # second derivatives of J
-            stiffness[..., i, j] -= pressing * second
-            stiffness[..., j, i] -= pressing * second
-        stiffness[..., range(5), range(5)] += self.shear_modulus
+        stiffness -= self._pressing(F, p)[..., None] * second
+        if self.c2:
+            stiffness += 2 * self.c2 * (second @ second + _curvature(cof))
+        stiffness[..., range(5), range(5)] += 2 * self.c1
         return np.asarray(stiffness)
 
     def cauchy(self, F: FloatArray, p: FloatArray) -> FloatArray:
         """Return the Cauchy stress rr, zz, hoop and rz, tension positive, shape (..., 4)."""
-        rr, rz, zr, zz, hoop = np.moveaxis(F, -1, 0)
-        b = np.stack([rr**2 + rz**2, zr**2 + zz**2, hoop**2, rr * zr + rz * zz], axis=-1)
-        stress = (self.shear_modulus / determinant(F))[..., None] * b
-        stress[..., :3] -= self._pressing(F, p)[..., None]
-        return np.asarray(stress)
+        S, (rr, rz, zr, zz, hoop) = np.moveaxis(self.stress(F, p), -1, 0), np.moveaxis(F, -1, 0)
+        pulled = [S[0] * rr + S[1] * rz, S[2] * zr + S[3] * zz, S[4] * hoop, S[0] * zr + S[1] * zz]
+        return np.asarray(np.stack(pulled, axis=-1) / determinant(F)[..., None])
 
 
 # Sides below the contact, as a share of the rod's radius or of the contact's ...
-_SHARE_OF_ROD = 0.25
+_SHARE_OF_ROD = 0.5
 _SHARE_OF_CONTACT = 0.025
 # ... growing from one to the next away from it by this share, up to this many thicknesses near
-# the contact and far from it.
+# the contact and far from it, beyond so many thicknesses.
 _GROWTH = 0.3
-_WIDEST_BELOW_A_ROD = 0.06
-_WIDEST_BELOW_A_SPHERE = 0.08
+_WIDEST_NEAR = 0.08
 _WIDEST_FAR = 0.6
-_NEAR = 4.0
+_NEAR_A_ROD = 1.5
+_NEAR_A_SPHERE = 4.0
 # Growth of the sides with the distance from where the surface is folded around the rod's edge.
 _SLOPE = 0.7
 
@@ -117,9 +145,8 @@ def mesh_below_a_rod(
 ) -> Any:
     """Return a mesh (mm) that is finest where the rod's edge folds the surface."""
     thickness, _, refinement = size
-    near = _WIDEST_BELOW_A_ROD * thickness / refinement
-    side = min(_SHARE_OF_ROD * rod / refinement, near)
-    mesh = _tensor(np.linspace(0.0, rod, max(2, round(rod / side)) + 1), side, near, size)
+    side = min(_SHARE_OF_ROD * rod, _WIDEST_NEAR * thickness) / refinement
+    mesh = _tensor(np.linspace(0.0, rod, max(2, round(rod / side)) + 1), side, _NEAR_A_ROD, size)
     while True:
         r, z = mesh.p[:, mesh.t]
         longest = np.hypot(r - np.roll(r, 1, axis=0), z - np.roll(z, 1, axis=0)).max(axis=0)
@@ -135,20 +162,21 @@ def mesh_below_a_rod(
 def mesh_below_a_sphere(size: FilmSize, *, contact: float) -> Any:
     """Return a mesh (mm) that is fine up to a radius somewhat beyond the contact."""
     thickness, _, refinement = size
-    near = _WIDEST_BELOW_A_SPHERE * thickness / refinement
-    side = min(_SHARE_OF_CONTACT * contact / refinement, near)
-    return _tensor(np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1), side, near, size)
+    side = min(_SHARE_OF_CONTACT * contact, _WIDEST_NEAR * thickness) / refinement
+    even = np.linspace(0.0, contact, int(np.ceil(contact / side)) + 1)
+    return _tensor(even, side, _NEAR_A_SPHERE, size)
 
 
-def _tensor(even: FloatArray, side: float, near: float, size: FilmSize) -> Any:
+def _tensor(even: FloatArray, side: float, reach: float, size: FilmSize) -> Any:
     """Return triangles on a grid that grows away from the contact, outward and downward."""
     import skfem
 
     thickness, radius, refinement = size
-    contact, grow, far = even[-1], 1 + _GROWTH / refinement, _WIDEST_FAR * thickness / refinement
+    contact, grow = even[-1], 1 + _GROWTH / refinement
+    near, far = (widest * thickness / refinement for widest in (_WIDEST_NEAR, _WIDEST_FAR))
     r, step = [contact], side
     while r[-1] < radius:
-        step = min(step * grow, near if r[-1] < contact + _NEAR * thickness else far)
+        step = min(step * grow, near if r[-1] < contact + reach * thickness else far)
         r.append(radius if radius - r[-1] < 1.5 * step else r[-1] + step)
     depth, step = [0.0], side
     while depth[-1] < thickness:
@@ -162,7 +190,7 @@ def _tensor(even: FloatArray, side: float, near: float, size: FilmSize) -> Any:
 IntArray = NDArray[np.int64]
 
 # Exact for the square of a quadratic, times its radius and its Jacobian.
-_QUADRATURE = 6
+_QUADRATURE = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +198,7 @@ class FilmElements:
     """Forces for the unknowns (n radial and n upward displacements in mm, m pressures in MPa)."""
 
     mesh: Any
-    material: NeoHookean
+    material: Rubber
 
     @cached_property
     def bases(self) -> tuple[Any, Any]:
@@ -258,7 +286,7 @@ class FilmElements:
     def tangent(self, x: FloatArray) -> sparse.csr_array:
         """Return the derivative of the forces by the unknowns: symmetric, of shape (size, size)."""
         F, p = self._state(x)
-        gradients, pressures, volumes, moving, pressing = self._shape
+        gradients, pressures, volumes, *_ = self._shape
         cells = p.shape[0]
         stiffness = self.material.tangent(F, p) * volumes[..., None, None]
         flat = gradients.reshape(cells, -1, 12)
@@ -268,11 +296,19 @@ class FilmElements:
         weighted = pressures * (self.material.softness * volumes)[..., None]
         soft = -pressures.transpose(0, 2, 1) @ weighted
         whole = np.block([[stiff, couple.transpose(0, 2, 1)], [couple, soft]])
-        dofs = np.concatenate([moving, pressing], axis=1)
-        rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
-        columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-        shape = (self.size, self.size)
-        return sparse.coo_array((whole.ravel(), (rows, columns)), shape=shape).tocsr()
+        places, indices, starts = self._pattern
+        values = np.bincount(places, whole.ravel(), indices.size)
+        return sparse.csr_array((values, indices, starts), shape=(self.size, self.size))
+
+    @cached_property
+    def _pattern(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Return where an entry of the cells' matrices goes, and columns and row starts there."""
+        dofs = np.concatenate(self._shape[3:], axis=1).astype(np.int64)
+        entries = dofs[:, :, None] * self.size + dofs[:, None, :]
+        unique, places = np.unique(entries, return_inverse=True)
+        starts = np.searchsorted(unique, np.arange(self.size + 1) * self.size)
+        index = np.int32
+        return places.ravel(), (unique % self.size).astype(index), starts.astype(index)
 
     def is_inside_out(self, x: FloatArray) -> bool:
         """Whether a triangle, as a whole, is turned inside out: no state of a film."""

@@ -78,10 +78,8 @@ class SphereFace:
 # Newton's method has converged when the last step moved nothing by more than this share of the
 # film's thickness; its convergence is quadratic, so that what is left is the square of it.
 _SETTLED = 1e-7
-# The contact's edge is looked at again when the last step was shorter than this; a node that
-# sticks stays for good where it is then, and that must be where it touched.
-_LOOSE_SLIDING = 1e-3
-_LOOSE_STICKING = 1e-6
+# The contact's edge is looked at again when the last step was shorter than this.
+_LOOSE = 1e-3
 _MOST_ITERATIONS = 40
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
@@ -123,18 +121,21 @@ class Pressing:
     # Whether a node sticks at its undeformed radius, and not where it came to touch the face.
     upright: bool = False
 
-    def press(self, start: Pressed, goal: Goal) -> Pressed:
-        """Return the equilibrium at a goal, from a state near it, or raise :class:`NewtonError`."""
-        state = self.placed(start if goal.is_load else replace(start, depth=goal.value))
+    def press(self, start: Pressed, goal: Goal, before: Pressed) -> Pressed:
+        """Return the equilibrium at a goal from a state near it and the last one on the way.
+
+        It raises :class:`NewtonError` where it finds none.
+        """
+        state = start if goal.is_load else replace(start, depth=goal.value)
         seen: set[bytes] = set()
-        loose = _LOOSE_STICKING if self.sticking and not self.upright else _LOOSE_SLIDING
+        state = self.placed(self._touching(state, before, set(), guess=True) or state)
         for iteration in range(1, _MOST_ITERATIONS + 1):
             state, moved = self._step(state, goal)
             if not moved < _FARTHEST * self.elements.thickness:
                 break
-            if moved > loose * self.elements.thickness:
+            if moved > _LOOSE * self.elements.thickness:
                 continue
-            changed = self._touching(state, seen)
+            changed = self._touching(state, before, seen)
             if changed is not None:
                 state = self.placed(changed)
             elif moved < _SETTLED * self.elements.thickness:
@@ -154,19 +155,20 @@ class Pressing:
         x[self.elements.held] = 0.0
         return replace(state, x=x)
 
-    def _touching(self, state: Pressed, seen: set[bytes]) -> Pressed | None:
+    def _touching(
+        self, state: Pressed, before: Pressed, seen: set[bytes], *, guess: bool = False
+    ) -> Pressed | None:
         """Return the state with the nodes that should touch, or None if they do already."""
-        n, nodes = self.elements.n, self.elements.surface
-        u, w = state.x[nodes], state.x[nodes + n]
-        place, gap = self.face.nearest(self.elements.nodes[0][nodes] + u, w + state.depth)
-        if self.upright:
-            place = self.place_at(self.elements.nodes[0][nodes])
+        nodes = self.elements.surface
+        place, gap = self.nearest(state)
         touches = np.isin(nodes, state.touching)
         place[touches] = state.place
-        _, (along, up), _ = self.face.contour(place)
-        forces = self.elements.forces(state.x)
-        pushed = up * forces[nodes] - along * forces[nodes + n] > 0
-        chosen = np.where(touches, pushed, gap < -_INSIDE * self.elements.thickness)
+        chosen = np.where(touches, True, gap < -_INSIDE * self.elements.thickness)
+        if not guess:
+            _, (along, up), _ = self.face.contour(place)
+            forces = self.elements.forces(state.x)
+            pushed = up * forces[nodes] - along * forces[nodes + self.elements.n] > 0
+            chosen[touches] = pushed[touches]
         chosen[0] = True
         if np.array_equal(chosen, touches):
             return None
@@ -175,7 +177,25 @@ class Pressing:
             if np.array_equal(chosen, touches):
                 return None
         seen.add(key)
+        if self.sticking and not self.upright:
+            # A node that sticks stays where its way since the last state crossed the face.
+            _, first = self.nearest(before)
+            share = np.clip(first / np.maximum(first - gap, 1e-300), 0.0, 1.0)
+            crossing, _ = self.nearest(before, state, share)
+            place = np.where(touches, place, crossing)
         return replace(state, touching=nodes[chosen], place=place[chosen])
+
+    def nearest(
+        self, state: Pressed, to: Pressed | None = None, share: FloatArray | float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return arc length and distance of the surface's nodes, on the way to another state."""
+        n, nodes = self.elements.n, self.elements.surface
+        radius = self.elements.nodes[0][nodes]
+        to = to or state
+        u, w = ((1 - share) * state.x[dofs] + share * to.x[dofs] for dofs in (nodes, nodes + n))
+        depth = (1 - share) * state.depth + share * to.depth
+        place, gap = self.face.nearest(radius + u, w + depth)
+        return (self.place_at(radius) if self.upright else place), gap
 
     def place_at(self, r: FloatArray) -> FloatArray:
         """Return the arc length at which the face has the radius ``r``."""
@@ -191,37 +211,38 @@ class Pressing:
         n, size = elements.n, elements.size
         _, tangents, bends = self.face.contour(state.place)
         forces, tangent = elements.forces(state.x), elements.tangent(state.x)
-        # Columns: unknowns that are free; the places of sliding nodes, in the columns of their
-        # radial displacement; and the depth, which moves all touching nodes down.
+        # Columns: unknowns that are free, with the places of sliding nodes in the columns of their
+        # radial displacement.  The depth moves all touching nodes down.
         free = np.ones(size, dtype=bool)
         free[np.concatenate([elements.held, touching + n])] = False
-        outward = np.ones(size)
-        outward[touching] = tangents[0]
-        climbing = sparse.coo_array((tangents[1], (touching + n, touching)), shape=(size, size))
         if self.sticking:
             free[touching] = False
+            change = sparse.eye_array(size, format="csc")[:, np.flatnonzero(free)]
+            reduced = tangent[free][:, free]
         else:
-            curvature = np.zeros(size)
+            outward, curvature = np.ones(size), np.zeros(size)
+            outward[touching] = tangents[0]
+            climbing = sparse.coo_array((tangents[1], (touching + n, touching)), shape=(size, size))
+            change = (sparse.diags_array(outward) + climbing).tocsc()[:, np.flatnonzero(free)]
             curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
-        columns = [(sparse.diags_array(outward) + climbing).tocsc()[:, np.flatnonzero(free)]]
-        if goal.is_load:
-            sinking = np.zeros((size, 1))
-            sinking[touching + n] = -1.0
-            columns.append(sparse.csc_array(sinking))
-        change = sparse.hstack(columns, format="csc")
-        reduced = change.T @ tangent @ change
-        residual = np.asarray(change.T @ forces)
-        if not self.sticking:
-            last = [0.0] if goal.is_load else []
-            reduced = reduced + sparse.diags_array(np.concatenate([curvature[free], last]))
-        if goal.is_load:
-            residual[-1] -= goal.value
+            reduced = change.T @ tangent @ change + sparse.diags_array(curvature[free])
         # The matrix is symmetric, and needs pivots off the diagonal only for the pressures.
-        solution = splu(reduced.tocsc(), diag_pivot_thresh=1e-4).solve(-residual)
-        sunk = float(solution[-1]) if goal.is_load else 0.0
-        steps = np.zeros(size)
-        steps[free] = solution[: np.count_nonzero(free)]
-        place = state.place if self.sticking else state.place + steps[touching]
+        factors = splu(reduced.tocsc(), diag_pivot_thresh=1e-4)
+        solution, sunk = factors.solve(-np.asarray(change.T @ forces)), 0.0
+        if goal.is_load:
+            sinking = np.zeros(size)
+            sinking[touching + n] = -1.0
+            pushed = tangent @ sinking
+            along = factors.solve(-np.asarray(change.T @ pushed))
+            lacking = goal.value - sinking @ forces - pushed @ (change @ solution)
+            sunk = float(lacking / (sinking @ pushed + pushed @ (change @ along)))
+            solution += sunk * along
+        steps = np.asarray(change @ solution)
+        place = state.place
+        if not self.sticking:
+            steps = np.zeros(size)
+            steps[free] = solution
+            place = place + steps[touching]
         ahead = replace(state, x=state.x + steps, depth=state.depth + sunk, place=place)
         return self.placed(ahead), max(float(np.max(np.abs(steps[: 2 * n]))), abs(sunk))
 
@@ -231,8 +252,13 @@ class Pressing:
 _FIRST = 0.05
 _FIRST_STEPS = 5
 _GROWTH = 1.4
+# Under a rod no step is longer than this share of its radius: film that comes to stick on the way
+# is placed to the second order in it.
+_LONGEST = 0.2
 # A step that takes more iterations than this is not followed by a longer one.
 _EASY = 9
+# States through which the next is guessed.
+_THROUGH = 3
 # A step is halved at most so many times.
 _HALVINGS = 8
 
@@ -292,14 +318,15 @@ class _Path:
         """Go to a goal."""
         begin, halvings = _value(self.states[-1], goal) if self.states else 0.0, 0
         if not self.states:
-            self.length = self._first(goal)
+            self.length = min(_FIRST * self._radius(goal), goal.value / _FIRST_STEPS)
         while begin != goal.value:
             left = goal.value - begin
             pieces = max(1.0, np.ceil(abs(left) / self.length - 1e-9))
             ahead = goal.value if pieces == 1 else begin + left / pieces
             stage = Goal(ahead, goal.is_load)
             try:
-                state = self.pressing.press(self._guess(stage), stage)
+                before = self.states[-1] if self.states else self.start
+                state = self.pressing.press(self._guess(stage), stage, before)
             except NewtonError:
                 self.length = abs(ahead - begin) / 2
                 halvings += 1
@@ -309,32 +336,33 @@ class _Path:
             halvings = max(0, halvings - 1)
             if state.iterations <= _EASY:
                 self.length = max(abs(ahead - begin), self.length) * _GROWTH
+            self.length = min(self.length, _LONGEST * self._radius(goal))
             self.states.append(state)
             begin = ahead
 
-    def _first(self, goal: Goal) -> float:
-        """Return the length of the first step."""
+    def _radius(self, goal: Goal) -> float:
+        """Return a rod's radius as a depth, or the load that sinks it so far; inf for a sphere."""
         face = self.pressing.face
         if not isinstance(face, RodFace):
-            return goal.value / _FIRST_STEPS
+            return np.inf
         stiffness = 8 * self.pressing.elements.material.shear_modulus * face.radius
-        return _FIRST * face.radius * (stiffness if goal.is_load else 1.0)
+        return face.radius * (stiffness if goal.is_load else 1.0)
 
     def _guess(self, goal: Goal) -> Pressed:
-        """Return the last state, carried on as it came."""
-        if not self.states:
-            return self.start
-        if len(self.states) == 1:
-            return self.states[-1]
-        before, last = self.states[-2:]
-        old, new = _value(before, goal), _value(last, goal)
-        if new == old:
-            return last
-        ahead = (goal.value - new) / (new - old)
-        place = last.place.copy()
-        if not self.pressing.sticking:
-            was = np.isin(before.touching, last.touching)
-            now = np.isin(last.touching, before.touching)
-            place[now] += ahead * (place[now] - before.place[was])
-        depth = last.depth + ahead * (last.depth - before.depth)
-        return replace(last, x=last.x + ahead * (last.x - before.x), depth=depth, place=place)
+        """Return the last state, carried on as it came: by a parabola through three states."""
+        states = self.states[-_THROUGH:] or [self.start]
+        values = np.array([_value(state, goal) for state in states])
+        if np.any(np.diff(values) * np.sign(goal.value - values[-1]) <= 0):  # it turned back
+            return states[-1]
+        weights = [
+            np.prod((goal.value - np.delete(values, i)) / (values[i] - np.delete(values, i)))
+            for i in range(values.size)
+        ]
+        x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
+        depth = float(sum(w * s.depth for w, s in zip(weights, states, strict=True)))
+        ahead = replace(states[-1], x=x, depth=depth)
+        if self.pressing.sticking:
+            return ahead
+        place, _ = self.pressing.nearest(ahead)
+        touching = np.isin(self.pressing.elements.surface, ahead.touching)
+        return replace(ahead, place=place[touching])

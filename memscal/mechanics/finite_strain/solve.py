@@ -1,4 +1,4 @@
-"""Neo-Hookean film at finite strain under a rigid rod or sphere, by finite elements.
+"""Film at finite strain under a rigid rod or sphere, by finite elements.
 
 The linear model is formal where an indenter sinks by a good part of the film's thickness.
 """
@@ -15,7 +15,7 @@ from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.finite_strain.film_elements import (
     FilmElements,
-    NeoHookean,
+    Rubber,
     mesh_below_a_rod,
     mesh_below_a_sphere,
 )
@@ -45,7 +45,7 @@ _FREE_EDGE = 12.5
 _EDGE = 0.1
 # Sides of triangles at the edge, as a share of its rounding: a frictionless film is drawn around
 # the edge and stretched, and needs them finer.
-_FINEST_STICKING = 1 / 5
+_FINEST_STICKING = 2 / 5
 _FINEST_SLIDING = 1 / 8
 # Undeformed radii between which the surface folds around the edge, in radii of the rod.
 _FOLD_STICKING = (0.8, 1.9)
@@ -165,7 +165,7 @@ class _Request:
                     why="It must end well within both.",
                 )
             mesh = mesh_below_a_sphere(size, contact=widest)
-        elements = FilmElements(mesh, NeoHookean.of(self.film))
+        elements = FilmElements(mesh, Rubber.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
 

@@ -91,7 +91,7 @@ class FiniteStrainField:
             triangles=triangles,
             displacement=x[: 2 * elements.n].reshape(2, -1).T * _MM,
             stress=elements.nodal_stress(x) * _MPA,
-            notes=f"neo-Hookean film at finite strain under {self.pressed.load:.6g} N",
+            notes=f"{elements.material.law} film at finite strain under {self.pressed.load:.6g} N",
         )
 
 

@@ -24,6 +24,9 @@ from memscal.model.arrays import FloatArray
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
 _PULL = 1e-2
 _OVERLAP = 1e-3
+# Share of the load that may pull at the edge of a contact that sticks at once: in a compressible
+# film it does at any radius, whatever the rings.
+_TENSION = 2e-3
 
 
 def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
@@ -35,8 +38,13 @@ def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> Contact
 
 def _is_contact(problem: ContactProblem, state: ContactState) -> bool:
     """Whether a state fulfils Signorini's conditions, but for what an edge does not resolve."""
-    overlaps = np.any(problem.separations(state)[~state.touching] < -_OVERLAP * abs(state.depth))
-    return bool(state.pressure.min() >= -_PULL * state.pressure.max() and not overlaps)
+    pulls = state.pressure.min() < -_PULL * state.pressure.max()
+    return not pulls and not _overlaps(problem, state)
+
+
+def _overlaps(problem: ContactProblem, state: ContactState) -> bool:
+    gaps = problem.separations(state)[~state.touching]
+    return bool(np.any(gaps < -_OVERLAP * abs(state.depth)))
 
 
 def _mixture(lower: ContactState, upper: ContactState, target: Target) -> ContactState:
@@ -93,7 +101,8 @@ def _between_rings(
         rings, upper = rings - 1, lower
         lower = meeting_at(rings - 1)
     state = _mixture(lower, upper, target)
-    if not _is_contact(problem, state):
+    tension = -float(problem.compliance.areas @ np.minimum(state.pressure, 0.0))
+    if tension > _TENSION * state.load or _overlaps(problem, state):
         raise ConvergenceError(
             f"No contact that is loaded in one step was found at {target}.",
             why="At its edge the film would have to pull at the indenter, or pass through it.",

@@ -1,12 +1,14 @@
 """The film at finite strain: closed forms, balances, and the linear model where strain is small."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import skfem
 
 from memscal import Contact, ElasticFilm, Rod, Sphere, indent
 from memscal.errors import ConvergenceError
-from memscal.mechanics.finite_strain.film_elements import FilmElements, NeoHookean
+from memscal.mechanics.finite_strain.film_elements import FilmElements, Rubber
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.problem import Depth, Load
@@ -18,10 +20,14 @@ EDGE = 0.05e-3
 RADII = np.array([0.0, 0.5, 1.0, 2.0]) * 1e-3
 
 
-def cylinder(nu: float = 0.5) -> FilmElements:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
+def film_of(nu: float = 0.5, ratio: float | None = None) -> ElasticFilm:
+    law = "neo-hookean" if ratio is None else "mooney-rivlin"
+    return replace(FILM, poisson_ratio=nu, law=law, mooney_rivlin_ratio=ratio)
+
+
+def cylinder(nu: float = 0.5, ratio: float | None = None) -> FilmElements:
     mesh = skfem.MeshTri.init_tensor(np.linspace(0, 1.5, 5), np.linspace(0, 2, 4))
-    return FilmElements(mesh, NeoHookean.of(film))
+    return FilmElements(mesh, Rubber.of(film_of(nu, ratio)))
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["sliding", "sticking"])
@@ -51,23 +57,35 @@ def test_a_free_cylinder_is_compressed_as_the_closed_form_says(stretch: float) -
     assert np.max(np.abs(stress[..., [0, 2, 3]])) < 1e-12
 
 
-@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
-def test_the_tangent_is_the_derivative_of_the_forces(nu: float) -> None:
-    elements = cylinder(nu)
+@pytest.mark.parametrize(("nu", "ratio"), [(0.0, None), (0.3, 0.7), (0.5, None), (0.5, 0.3)])
+def test_the_tangent_is_the_derivative_of_the_forces(nu: float, ratio: float | None) -> None:
+    elements = cylinder(nu, ratio)
     wave = np.sin(np.arange(elements.size) * 1.7)
     x, direction, step = 0.03 * wave, np.cos(np.arange(elements.size) * 0.9), 1e-6
     change = (elements.forces(x + step * direction) - elements.forces(x - step * direction)) / 2
     assert elements.tangent(x) @ direction == pytest.approx(change / step, abs=1e-8)
 
 
-def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film() -> None:
-    elements = cylinder()
+@pytest.mark.parametrize("ratio", [None, 0.4])
+def test_the_forces_are_the_derivative_of_the_energy_of_an_incompressible_film(ratio) -> None:
+    elements = cylinder(ratio=ratio)
     x = 0.03 * np.sin(np.arange(elements.size) * 1.7)
     x[2 * elements.n :] = 0.0  # its multiplier does no work in the energy
     direction, step = np.cos(np.arange(elements.size) * 0.9), 1e-6
     direction[2 * elements.n :] = 0.0
     change = elements.energy(x + step * direction) - elements.energy(x - step * direction)
     assert elements.forces(x) @ direction == pytest.approx(change / (2 * step), rel=1e-7)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 2.0])
+def test_simple_shear_of_a_mooney_rivlin_film_is_the_closed_form(ratio: float) -> None:
+    rubber, gamma = Rubber.of(film_of(ratio=ratio)), 0.8
+    F = np.array([1.0, gamma, 0.0, 1.0, 1.0])
+    rr, zz, hoop, rz = rubber.cauchy(F, np.zeros(()))
+    assert rubber.shear_modulus == pytest.approx(FILM.shear_modulus * 1e-6, rel=1e-12)
+    assert rz == pytest.approx(rubber.shear_modulus * gamma, rel=1e-12)
+    assert rr - hoop == pytest.approx(2 * rubber.c1 * gamma**2, rel=1e-12)
+    assert zz - hoop == pytest.approx(-2 * rubber.c2 * gamma**2, abs=1e-12)
 
 
 @pytest.mark.parametrize("face", [RodFace(0.25, 0.05), SphereFace(0.3)])

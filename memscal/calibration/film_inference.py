@@ -1,0 +1,294 @@
+r"""Film's law and thickness, from scans at several loads or with several rods.
+
+The voltages of all scans, with one A and G, have a marginal likelihood :math:`p(u)` by the rods'
+base stress on films of each law (:func:`~memscal.estimation.profile.log_marginal_likelihood`).
+Weights and noise are common to all laws: a point is an outlier where it is one by every law, and
+the noise is that of the law that leaves least.  Stated uncertainties of film, rod, positions and,
+scan by scan, load are Gaussian nuisance parameters, integrated to first order; what is common to
+all loads is part of A.  A thickness has the posterior of the same likelihood with a Gaussian
+prior: its mode, and the curvature there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from memscal.calibration.stages import Solution, solve
+from memscal.calibration.uncertainty import input_effects
+from memscal.errors import InputError, MemscalError
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.points import loads_differ
+from memscal.estimation.profile import log_marginal_likelihood
+from memscal.estimation.reference import reference_spectra
+from memscal.mechanics.contact import Contact
+from memscal.mechanics.press_rod import is_tabulated, press_rod
+from memscal.model.arrays import FloatArray
+from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor
+from memscal.model.checks import Message
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
+from memscal.model.notation import format_measured
+from memscal.model.quantities import MM, MV
+from memscal.model.scan import Scan
+from memscal.model.stress import StressProfile
+
+#: Name of an input that scans may be asked to determine.
+THICKNESS = "thickness"
+
+
+@dataclass(frozen=True)
+class WeighedLaw:
+    """A law of the film: ln of its evidence up to a constant of the scans, and the result by it."""
+
+    law: str
+    log_evidence: float
+    conversion_constant: float  # by the method of the calibration, in V/Pa
+    gaussian_sigma: float  # in m
+
+
+@dataclass(frozen=True)
+class FilmLawComparison:
+    """Laws of the film, by falling evidence, and that of the reference (empty: not stated)."""
+
+    laws: tuple[WeighedLaw, ...]
+    reference: str
+    loads: tuple[float, ...]  # in N
+
+    def factor(self, law: WeighedLaw) -> BayesFactor:
+        """Return the Bayes factor of the best law against one."""
+        best = self.laws[0]
+        return BayesFactor(best.law, law.law, best.log_evidence - law.log_evidence)
+
+    @property
+    def record(self) -> list[dict[str, Any]]:
+        """What files and JSON hold: of each law its evidence below the best's, A and sigma."""
+        return [
+            {
+                "law": law.law,
+                "is_reference": law.law == self.reference,
+                "log_evidence_below_best": self.factor(law).log_factor,
+                "best_against_it": self.factor(law).words if law is not self.laws[0] else None,
+                "conversion_constant": {"value": law.conversion_constant / MV, "unit": "mV/Pa"},
+                "gaussian_sigma": {"value": law.gaussian_sigma / MM, "unit": "mm"},
+            }
+            for law in self.laws
+        ]
+
+    @property
+    def message(self) -> Message:
+        """The Bayes factor, and what to do where it favours another law than the reference's."""
+        best, factor = self.laws[0], self.factor(self.laws[1])
+        value = f"{factor.value:.3g}" if factor.value < 1e6 else f"{factor.value:.1e}"
+        text = (
+            f"Loads of {min(self.loads):.3g} to {max(self.loads):.3g} N favour a {factor.favoured} "
+            f"film over a {factor.against} one by a Bayes factor of {value} ({factor.words}). "
+            f"Weighed: {', '.join(law.law for law in self.laws)}."
+        )
+        against = best.law != self.reference
+        if against and 2 * factor.log_factor >= POSITIVE:
+            text += (
+                f" By the {best.law} film A = {best.conversion_constant / MV:.4g} mV/Pa and "
+                f"σ = {best.gaussian_sigma / MM:.4g} mm; --film-law {best.law} makes it the "
+                "reference."
+            )
+        strong = against and 2 * factor.log_factor >= STRONG
+        return Message("film_law", text, "warning" if strong else "note")
+
+
+def weigh_laws(solution: Solution) -> FilmLawComparison | None:
+    """Weigh the film's laws by scans at several loads; ``None`` where one load or law is left."""
+    loads = tuple(scan.load for scan in solution.scans)
+    if not loads_differ(loads):
+        return None
+    stated = {law for stress in solution.stresses for law in [_law_of(stress)]}
+    reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
+    solved: dict[str, Solution] = {}
+    for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
+        of_law = ratio if law == reference else None
+        films = [replace(s.film, law=law, mooney_rivlin_ratio=of_law) for s in solution.scans]
+        scans = [replace(s, film=f) for s, f in zip(solution.scans, films, strict=True)]
+        if law == reference:
+            solved[law] = replace(solution, scans=tuple(scans))
+            continue
+        keys = [(s.film, s.indenter, s.load, s.rod_friction) for s in scans]
+        # Finite elements take long: other laws are weighed where closed form or table has them.
+        if law == LINEAR or all(is_tabulated(*key) for key in keys):
+            stresses = [press_rod(*key) for key in keys]
+            with suppress(MemscalError):  # no apparatus function may explain the scans by it
+                channel = solution.estimate.points.channel
+                solved[law] = solve(scans, stresses, solution.method, channel, both=False)
+    if len(solved) < 2:
+        return None
+    estimates = [each.estimate for each in solved.values()]
+    outlier = np.max([estimate.outlier_weight for estimate in estimates], axis=0)
+    weights = solution.estimate.weights / solution.estimate.outlier_weight * outlier
+    noise = min(estimate.noise_scale for estimate in estimates)
+    laws = []
+    for law, by_law in solved.items():
+        estimate = replace(by_law.estimate, weights=weights, outlier_weight=outlier)
+        evidence = float(log_marginal_likelihood(estimate, _input_columns(by_law), noise)[0])
+        a, sigma = by_law.deconvolution.conversion_constant, estimate.gaussian.sigma
+        laws.append(WeighedLaw(law, evidence, a, sigma))
+    ranked = sorted(laws, key=lambda law: -law.log_evidence)
+    return FilmLawComparison(tuple(ranked), reference, loads)
+
+
+def _law_of(stress: StressProfile | Contact) -> tuple[str, float | None]:
+    """Law by which a reference was made, with its ratio; empty where it states none."""
+    film = stress.film_of_law if isinstance(stress, Contact) else stress.film
+    return ("", None) if film is None else (film.law, film.mooney_rivlin_ratio)
+
+
+def _input_columns(solution: Solution, without: str = "") -> FloatArray:
+    """Voltages by one standard uncertainty of each stated input, (n, q), in V."""
+    estimate = solution.estimate
+    effects = input_effects(solution.scans, solution.stresses, estimate)
+    names = [name for name in effects if name != "load" and name.rstrip("0123456789") != without]
+    columns = [effects[name].voltage for name in names]
+    # A balance's error may differ from load to load; repeats at one load share it.
+    signal, scan_of_points = estimate.predicted - estimate.background, estimate.points.scan
+    keys = [
+        (o, s.load, s.load_uncertainty)
+        for o, s in zip(solution.owners, solution.scans, strict=True)
+    ]
+    for key in dict.fromkeys(keys):
+        _, load, u = key
+        chosen = np.array([other == key for other in keys])[scan_of_points]
+        columns.append(np.where(chosen, signal * (u or 0.0) / load, 0.0))
+    return np.stack(columns, axis=1)
+
+
+@dataclass(frozen=True)
+class FreeThickness:
+    """Posterior of the thickness of films by scans: each film as stated, and as estimated."""
+
+    films: Mapping[ElasticFilm, ElasticFilm]
+
+    def of(self, scans: Sequence[Scan]) -> list[Scan]:
+        """Return the scans with the thickness and its uncertainty as estimated."""
+        return [replace(scan, film=self.films[scan.film]) for scan in scans]
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What files and JSON hold: prior and posterior of each film's thickness."""
+        rows = [
+            {"film": prior.name, "prior": _thickness(prior), "posterior": _thickness(posterior)}
+            for prior, posterior in self.films.items()
+        ]
+        return {THICKNESS: rows}
+
+    @property
+    def messages(self) -> list[Message]:
+        """Prior and posterior in words, and how much the data moved the one to the other."""
+        messages = []
+        for prior, posterior in self.films.items():
+            u, left = prior.thickness_uncertainty or 1.0, posterior.thickness_uncertainty or 0.0
+            moved = (posterior.thickness - prior.thickness) / u
+            text = (
+                f"The thickness of the film {prior.name}".rstrip() + f" is {_written(posterior)} "
+                f"by the scans, from {_written(prior)} as stated: moved by {moved:+.2g} of the "
+                f"stated standard uncertainty, of which {left / u:.0%} is left."
+            )
+            if left > _HARDLY * u:
+                text += " The scans hardly determine it: it is what was stated."
+            far = abs(moved) > _FAR_OFF
+            messages.append(Message("free", text, "warning" if far else "note"))
+        return messages
+
+
+def _thickness(film: ElasticFilm) -> dict[str, Any]:
+    u = None if film.thickness_uncertainty is None else film.thickness_uncertainty / MM
+    return {"value": film.thickness / MM, "standard_uncertainty": u, "unit": "mm"}
+
+
+def _written(film: ElasticFilm) -> str:
+    return format_measured(film.thickness / MM, (film.thickness_uncertainty or 0.0) / MM, "mm")
+
+
+#: A posterior this many standard uncertainties of its prior away contradicts it, and one that is
+#: as wide as this share of the prior is hardly of the scans.
+_FAR_OFF, _HARDLY = 2.0, 0.9
+#: Nodes along each thickness, of one film or two, and how far from the prior's middle they reach,
+#: in its standard uncertainties; when they are set finer, in the posterior's.
+_NODES, _REACH, _WIDTHS, _ROUNDS = (13, 9), 3.0, 4.0, 3
+
+
+def require_free(
+    free: str | Sequence[str], scans: Sequence[Scan], stated: Sequence[object]
+) -> None:
+    """Refuse to free what scans do not determine; ``stated``: references that were given."""
+    names = [free] if isinstance(free, str) else free
+    if unknown := [name for name in names if name != THICKNESS]:
+        raise InputError(f"There is no free input {unknown[0]!r}.", cure=f"Give {THICKNESS!r}.")
+    rods, laws = {scan.indenter for scan in scans}, {scan.film.law for scan in scans}
+    if len(rods) < 2 and not (
+        loads_differ([s.load for s in scans]) and laws.isdisjoint(("", LINEAR))
+    ):
+        raise InputError(
+            "The scans do not determine the film's thickness.",
+            why="With one rod, at one load or on a linear film, whose voltage is in proportion to "
+            "the load, a thicker film looks like a wider apparatus function.",
+            cure="Give scans with rods of several radii, or at several loads on a film of another "
+            "stated law.",
+        )
+    if (count := len({scan.film for scan in scans})) > len(_NODES):
+        raise InputError(
+            f"The scans have {count} films of unknown thickness.",
+            cure=f"Give scans on at most {len(_NODES)} films.",
+        )
+    if not all(scan.film.thickness_uncertainty for scan in scans):
+        raise InputError(
+            "A film states no uncertainty of its thickness.",
+            why="It is the standard deviation of the prior of a thickness that is estimated.",
+            cure="State it (memscal import --thickness-uncertainty, or "
+            "/entry/sample/film/thickness_uncertainty).",
+        )
+    if any(reference is not None for reference in [*stated, *(scan.reference for scan in scans)]):
+        raise InputError(
+            "A reference is given, of one thickness.",
+            why="To estimate the thickness the rod is solved on films of others.",
+            cure="Leave the reference out, of the scan's file as well.",
+        )
+
+
+def free_thickness(solution: Solution) -> FreeThickness:
+    """Estimate the thickness of each film, from its stated one as a Gaussian prior."""
+    scans, estimate = solution.scans, solution.estimate
+    films = list(dict.fromkeys(scan.film for scan in scans))
+    stated = np.array([film.thickness for film in films])
+    u = np.array([film.thickness_uncertainty or 0.0 for film in films])
+    points = [estimate.points.only(i) for i in range(len(scans))]
+    inputs, noise = _input_columns(solution, THICKNESS), estimate.noise_scale
+
+    def log_posterior(z: FloatArray) -> float:
+        pairs = zip(films, stated + z * u, strict=True)
+        at = {film: replace(film, thickness=float(h)) for film, h in pairs}
+        rods = [press_rod(at[s.film], s.indenter, s.load, s.rod_friction) for s in scans]
+        references = reference_spectra(rods, points, [s.film.thickness for s in scans])
+        model = ForwardModel(estimate.points, references)
+        # Hypotheses without a Gaussian: a shape that is assumed would determine the thickness.
+        both = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
+        return float(both[1] - z @ z / 2)
+
+    # Sums over a grid, made finer where the posterior is narrower than its step.
+    middle, reach = np.zeros(u.size), np.full(u.size, _REACH)
+    for _ in range(_ROUNDS):
+        lines = np.linspace(middle - reach, middle + reach, _NODES[u.size - 1], axis=1)
+        grid = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, u.size)
+        logs = np.array([log_posterior(z) for z in grid])
+        shares = np.exp(logs - logs.max())
+        shares /= shares.sum()
+        middle = shares @ grid
+        spread = np.sqrt(shares @ (grid - middle) ** 2)
+        if (spread > lines[:, 1] - lines[:, 0]).all():
+            break
+        reach = np.minimum(reach, _WIDTHS * np.maximum(spread, (lines[:, 1] - lines[:, 0]) / 2))
+    pairs = zip(films, stated + middle * u, spread * u, strict=True)
+    return FreeThickness({
+        film: replace(film, thickness=float(h), thickness_uncertainty=float(left))
+        for film, h, left in pairs
+    })  # fmt: skip

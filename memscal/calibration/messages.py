@@ -1,0 +1,228 @@
+"""Messages of a calibration: what a user has to know of its result beside the checks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from memscal.calibration.drawn_scatter import draw_count, is_linear
+from memscal.calibration.stages import Solution
+from memscal.calibration.uncertainty import Results, input_effects, propagate
+from memscal.estimation.bayesian import HYPOTHESES
+from memscal.estimation.points import loads_differ
+from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reference import RECTANGLE
+from memscal.mechanics.contact import Contact
+from memscal.model.apparatus import ParameterSet
+from memscal.model.arrays import FloatArray
+from memscal.model.checks import (
+    NOISE_UNSTATED,
+    OUTLIER_WEIGHT,
+    REPEAT_CENTRES,
+    Message,
+    QualityCheck,
+    failed_check_messages,
+)
+from memscal.model.film import LINEAR
+from memscal.model.scan import Scan
+
+#: Methods whose window is that of the stress's transform: nothing is left to say of them.
+_WINDOWS = ("white-noise", "tikhonov", "bayesian")
+#: Tails of less probability are not told.
+_LEAST_TOLD = 0.001
+
+
+def calibration_messages(
+    solution: Solution, results: Results, checks: tuple[QualityCheck, ...]
+) -> tuple[Message, ...]:
+    """Return the messages that accompany a result, warnings first."""
+    scan, channel = solution.scan, solution.estimate.points.channel
+    messages = failed_check_messages(checks)
+    if solution.estimate.model.order:
+        text = (
+            f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
+            "those of the shear at the base; the voltage is positive where the film pulls the "
+            f"sensor towards larger {channel[0]}."
+        )
+        messages.append(Message("experimental", text))
+    messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
+    messages += _method(solution) + _reference(solution) + _law(solution, results)
+    messages += _unstated(solution, results)
+    if scan.synthetic is not None:
+        messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
+    return tuple(messages)
+
+
+def _centres(solution: Solution) -> list[Message]:
+    """Return that repeats have centres of their own, and why."""
+    if not solution.per_repeat:
+        return []
+    owners, centres = np.array(solution.owners), solution.estimate.centres
+    apart = max(float(np.ptp(centres[owners == i], axis=0).max()) for i in set(owners))
+    test, way = solution.apart, "as asked for (--centre per-repeat)"
+    if loads_differ([scan.load for scan in solution.scans]):
+        way = "as their loads differ, and with them the shape of the stress"
+    elif test is not None:
+        way = f"as one centre has a p-value of {test.p_value:.1g} (--centre common takes one)"
+    text = (
+        f"Each of the {owners.size} repeats has its own centre, baseline and drift, {way}. The "
+        f"centres are up to {apart * 1e6:.3g} um apart."
+    )
+    return [Message(REPEAT_CENTRES, text)]
+
+
+def _points(estimate: ProfileEstimate) -> list[Message]:
+    points = estimate.points
+    messages: list[Message] = []
+    if points.missing:
+        text = f"{points.missing} points of the scan are missing and were left out."
+        messages.append(Message("missing_points", text))
+    for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]:
+        place = f"x = {points.x[i] * 1e3:.4g} mm"
+        if points.planar:
+            place += f", y = {points.y[i] * 1e3:.4g} mm"
+        if points.repeat.any():
+            place += f" of repeat {points.repeat[i]}"
+        voltages = f"{points.u[i] * 1e3:.4g} mV instead of {estimate.predicted[i] * 1e3:.4g} mV"
+        text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
+        messages.append(Message("outlier", text))
+    if points.u_errors is None:
+        text = (
+            f"u_{points.channel}_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV "
+            "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
+            "misfit of the same size, and has no p-value."
+        )
+        messages.append(Message(NOISE_UNSTATED, text))
+    return messages
+
+
+def _tails(estimate: ProfileEstimate) -> list[Message]:
+    """Return what a tail that the scan hardly tells from the baseline would change in A."""
+    probability, change = estimate.weighed.of_kind("wide tail")
+    if probability < _LEAST_TOLD:
+        return []
+    prior = sum(h.estimate for h in HYPOTHESES if h.kind == "wide tail")
+    a = estimate.conversion_constant
+    text = (
+        "Tails of G two to three times as wide as its core have a probability of "
+        f"{probability:.2g} (prior {prior:.2g}). With them A by method bayesian is "
+        f"{abs(change) / a:.2%} {'larger' if change > 0 else 'smaller'} than without; it is the "
+        "mean of both."
+    )
+    return [Message("wide_tails", text)]
+
+
+def _method(solution: Solution) -> list[Message]:
+    """Return where the uncertainty comes from if the method is no plain window."""
+    method = solution.method
+    if method.name in _WINDOWS:
+        return []
+    way = "uncertainties are first-order through its effective window"
+    if not is_linear(method):
+        way = "what noise adds to the uncertainties is the scatter of "
+        way += f"{draw_count(solution)} draws of the voltages"
+        way += " and of its own random numbers" if hasattr(method, "seed") else ""
+    return [Message("method", f"Method {method.name}: {way}. {method.fails}")]
+
+
+def _reference(solution: Solution) -> list[Message]:
+    stress = solution.stress
+    if isinstance(stress, Contact) or stress.convergence is not None:
+        return []
+    text = "The reference states no convergence: its own error is not counted."
+    return [Message("convergence_unstated", text)]
+
+
+def _law(solution: Solution, results: Results) -> list[Message]:
+    """Return which law the reference has, and what is not known of it."""
+    law, parameters = solution.scan.film.law, results.parameters
+    changes = results.changes
+    if law == LINEAR:
+        films = [replace(scan.film, law="") for scan in solution.scans]
+        pairs = zip(solution.scans, films, strict=True)
+        changes = _changes(solution, [replace(scan, film=film) for scan, film in pairs])
+    if law in ("", LINEAR):
+        rubber = (
+            "a neo-Hookean film under a rod that sticks would change "
+            f"{_change_of(parameters, changes['model_form'] / RECTANGLE)}"
+        )
+    if not law:
+        text = (
+            "The film's law is not stated (film/law, --film-law), and the reference is that of a "
+            f"linear film; {rubber}. Changes up to that, of either sign, are counted as equally "
+            "likely (model_form)."
+        )
+    elif law == LINEAR:
+        text = f"The film is taken as linear elastic, as stated; {rubber}: it is not counted."
+    else:
+        text = (
+            f"The film is taken as {law}, as stated; how far it departs from that law, by "
+            "viscosity, swelling or slip at the rod's side, is not part of the uncertainties."
+        )
+    if "rod_friction" in changes:
+        sliding = _change_of(parameters, -changes["rod_friction"] / RECTANGLE)
+        text += (
+            " Whether it sticks under the rod is not stated (indenter/friction_coefficient, "
+            f"--rod-friction): it is taken to stick; sliding would change {sliding}, which is "
+            "counted (rod_friction)."
+        )
+    return [Message("film_law", text)]
+
+
+def _changes(solution: Solution, scans: Sequence[Scan]) -> Mapping[str, FloatArray]:
+    """Changes of the parameters by one standard uncertainty of what these scans state."""
+    effects = input_effects(scans, solution.stresses, solution.estimate)
+    return propagate(solution, solution.deconvolution, np.zeros(0), effects, {}).changes
+
+
+def _change_of(parameters: ParameterSet, change: FloatArray) -> str:
+    """Return relative changes of A and of the fitted width in words."""
+    rows = _a_and_sigma(parameters)
+    return " and ".join(f"{symbol} by {change[i] / value:+.1%}" for symbol, i, value in rows)
+
+
+#: Film properties by their names in messages, with their symbols; the share by which one that
+#: states no uncertainty is varied.
+_OF_FILM = {
+    "film thickness": ("thickness", "h"),
+    "Young's modulus": ("young_modulus", "E"),
+    "Poisson's ratio": ("poisson_ratio", "nu"),
+}
+_VARIED = 0.01
+
+
+def _unstated(solution: Solution, results: Results) -> list[Message]:
+    """Return which inputs state no uncertainty, and how much hangs on those of the film."""
+    scan, film = solution.scan, solution.scan.film
+    missing = {name: getattr(film, f"{attribute}_uncertainty")
+               for name, (attribute, _) in _OF_FILM.items()}  # fmt: skip
+    if film.law in ("", LINEAR):
+        # At a given load the stress in a linear film does not depend on it.
+        del missing["Young's modulus"]
+    missing |= {"rod radius": scan.indenter.radius_uncertainty, "load": scan.load_uncertainty}
+    names = [name for name, value in missing.items() if value is None]
+    if not names:
+        return []
+    pronoun = "them" if len(names) > 1 else "it"
+    text = f"No uncertainty is stated for {', '.join(names)}: nothing is counted for {pronoun}."
+    varied = {name: _OF_FILM[name] for name in names if name in _OF_FILM}
+    if varied:
+        shares = {f"{a}_uncertainty": _VARIED * getattr(film, a) for a, _ in varied.values()}
+        films = [replace(s.film, **shares) for s in solution.scans]
+        pairs = zip(solution.scans, films, strict=True)
+        changes = _changes(solution, [replace(s, film=film) for s, film in pairs])
+        slopes = [
+            f"d ln {symbol}/d ln {of} = {float(changes[a][row] / value / _VARIED):+.2f}"
+            for a, of in varied.values()
+            for symbol, row, value in _a_and_sigma(results.parameters)
+        ]
+        text += f" {', '.join(slopes)}."
+    return [Message("uncertainty_unstated", text)]
+
+
+def _a_and_sigma(parameters: ParameterSet) -> list[tuple[str, int, float]]:
+    """Return symbol, place and value of A and of the fitted width."""
+    pairs = (("A", "conversion_constant"), ("sigma", "gaussian_sigma"))
+    return [(symbol, parameters.names.index(name), parameters[name]) for symbol, name in pairs]

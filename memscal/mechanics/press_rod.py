@@ -1,0 +1,44 @@
+"""Rod on a film by the film's law: closed form, table of rods, or finite elements."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+from memscal.mechanics.contact import Contact
+from memscal.mechanics.finite_strain.table import tabulated_rod
+from memscal.mechanics.indent import indent
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
+from memscal.model.indenter import Rod, RoundIndenter
+
+
+@lru_cache(maxsize=256)
+def press_rod(
+    film: ElasticFilm, rod: RoundIndenter, load: float, friction: float | None = None
+) -> Contact:
+    """Press a rod to a load (N) by the film's law, linear where it states none.
+
+    ``friction``: 0 or ``inf``; by default a linear film slides, which changes its base stress by
+    1e-3, and one of another law sticks, which is solved at any depth.
+    """
+    if film.law in ("", LINEAR):
+        return indent(film, rod, load=load, friction=friction or 0.0, strain="linear")
+    friction = math.inf if friction is None else friction
+    if isinstance(rod, Rod) and film.law == NEO_HOOKEAN:
+        tabulated = tabulated_rod(film, rod, load, sticking=friction > 0)
+        if tabulated is not None:
+            return tabulated
+    return indent(film, rod, load=load, friction=friction)
+
+
+def is_tabulated(
+    film: ElasticFilm, rod: RoundIndenter, load: float, friction: float | None = None
+) -> bool:
+    """Whether a neo-Hookean film is found in the table, in milliseconds; else it is solved."""
+    sticking = friction is None or friction > 0
+    return isinstance(rod, Rod) and tabulated_rod(film, rod, load, sticking=sticking) is not None
+
+
+def largest_tabulated_load(film: ElasticFilm, rod: RoundIndenter, *, sticking: bool) -> float:
+    """Return the load (N) at which the table ends for a film and a rod; 0 outside the table."""
+    return 0.44

@@ -1,0 +1,113 @@
+"""The film's law: counted where it is not stated, taken as known where it is."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.scans import EXACT_FILM, LINEAR_FILM, simulated
+
+import memscal
+from memscal import Calibration
+from memscal.errors import InputError
+from memscal.model.scan import Scan
+
+LAWLESS = replace(EXACT_FILM, law="")
+
+
+def message(calibration: Calibration, kind: str) -> str:
+    return next(m.text for m in calibration.apparatus.process.messages if m.kind == kind)
+
+
+def check(calibration: Calibration, name: str):
+    return next(c for c in calibration.apparatus.checks if c.name == name)
+
+
+@pytest.fixture(scope="module")
+def deep() -> Scan:
+    """The paper's load, under which the rod sinks by 29 % of the film; the law is not stated."""
+    return simulated(film=LAWLESS, seed=1)
+
+
+@pytest.mark.parametrize("method", ["white-noise", "bayesian"])
+def test_the_form_of_a_law_that_is_not_stated_is_a_rectangle(deep: Scan, method: str) -> None:
+    linear, rubber, counted = (
+        memscal.calibrate(deep, method=method, film_law=law).apparatus
+        for law in ("linear", "neo-hookean", None)
+    )
+    for name in ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved"):
+        assert counted.parameters[name] == linear.parameters[name]
+        share = counted.budget[name]["model_form"]
+        half_width = abs(rubber.parameters[name] - linear.parameters[name])
+        assert share == pytest.approx(half_width / math.sqrt(3), rel=1e-6)
+        square = linear.parameters.uncertainty(name) ** 2 + share**2
+        assert counted.parameters.uncertainty(name) == pytest.approx(math.sqrt(square))
+    # A G(r), too: its band holds the other law's G within the root of three.
+    r = np.linspace(0.0, 1.5e-3, 16)
+    apart = np.abs(rubber.radial(r) - linear.radial(r)) / math.sqrt(3)
+    assert np.all(counted.radial_uncertainty(r) >= 0.99 * apart)
+    assert "model_form" not in linear.budget["gaussian_sigma"]
+
+
+def test_it_dominates_at_the_papers_load_and_hardly_counts_at_a_light_one(deep: Scan) -> None:
+    usual = replace(LINEAR_FILM, law="")  # with the uncertainties of its thickness and others
+    light = memscal.calibrate(simulated(film=usual, load=0.05, seed=1))
+    heavy = memscal.calibrate(replace(deep, film=usual))
+    sigma = heavy.apparatus.parameters
+    assert sigma.uncertainty("gaussian_sigma") / sigma["gaussian_sigma"] > 0.08
+    assert heavy.summary().startswith("The film's law, which is not stated, dominates")
+    assert light.summary().startswith("Use A =")
+    u = light.apparatus.parameters.uncertainty("gaussian_sigma")
+    without = math.sqrt(u**2 - light.apparatus.budget["gaussian_sigma"]["model_form"] ** 2)
+    assert u / without == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("law", "passes"), [("", True), ("neo-hookean", True), ("linear", False)])
+def test_a_deep_rod_fails_only_under_a_film_that_is_stated_to_be_linear(
+    deep: Scan, law: str, passes: bool
+) -> None:
+    calibration = memscal.calibrate(replace(deep, film=replace(LAWLESS, law=law)))
+    indentation = check(calibration, "indentation")
+    assert indentation.passed is passes
+    assert indentation.value == pytest.approx(0.3, abs=0.02)
+    assert check(memscal.calibrate(simulated(load=0.3)), "indentation").passed
+    assert message(calibration, "film_law").startswith("The film's law is not") == (not law)
+
+
+def test_whether_the_film_sticks_is_counted_where_it_is_not_stated(deep: Scan) -> None:
+    film = replace(LAWLESS, law="neo-hookean")
+    light = replace(simulated(film=LAWLESS, load=0.3), film=film)
+    sticks, slides, either = (
+        memscal.calibrate(light, rod_friction=friction) for friction in (math.inf, 0.0, None)
+    )
+    half_width = abs(slides.apparatus.gaussian_sigma - sticks.apparatus.gaussian_sigma)
+    share = either.apparatus.budget["gaussian_sigma"]["rod_friction"]
+    assert share == pytest.approx(half_width / math.sqrt(3), rel=0.25)  # to first order
+    assert either.apparatus.gaussian_sigma == sticks.apparatus.gaussian_sigma
+    assert "rod_friction" not in sticks.apparatus.budget["gaussian_sigma"]
+    # Beyond where a sliding film can be solved the difference grows with the depth.
+    deeper = memscal.calibrate(replace(deep, film=film)).apparatus.budget["gaussian_sigma"]
+    assert deeper["rod_friction"] > share
+
+
+def test_the_law_of_a_reference_counts_as_stated(deep: Scan) -> None:
+    linear = memscal.indent(LINEAR_FILM, deep.indenter, load=1.0)
+    calibration = memscal.calibrate(deep, reference=linear.profile())
+    assert calibration.apparatus.film.law == "linear"
+    assert "model_form" not in calibration.apparatus.budget["gaussian_sigma"]
+    assert not check(calibration, "indentation").passed
+    with pytest.raises(InputError, match=r"law \(neo-hookean\) and a reference"):
+        memscal.calibrate(deep, reference=linear, film_law="neo-hookean")
+
+
+def test_what_hangs_on_a_film_that_states_no_uncertainty_is_told(deep: Scan) -> None:
+    calibration = memscal.calibrate(deep)
+    text = message(calibration, "uncertainty_unstated")
+    (slope,) = re.findall(r"d ln sigma/d ln h = ([+-][\d.]+)", text)
+    step = 0.02
+    pair = [replace(deep, film=replace(LAWLESS, thickness=2e-3 * (1 + s))) for s in (step, -step)]
+    more, less = (memscal.calibrate(scan).apparatus.gaussian_sigma for scan in pair)
+    assert float(slope) == pytest.approx(math.log(more / less) / (2 * step), abs=0.1)
+    assert "d ln A/d ln nu" in text
+    assert "Young's modulus" not in text  # of which a linear film's stress does not depend
