@@ -83,9 +83,9 @@ from .model.scan import Places as Places
 from .model.scan import Scan as Scan
 from .model.scan import StressSensor as StressSensor
 from .model.stress import StressProfile as StressProfile
+from .planning.design import Design as Design
+from .planning.design import Plan as Plan
 from .planning.design import design as design
-from .planning.expected import Design as Design
-from .planning.plan import Plan as Plan
 from .simulation.experiment import Experiment as Experiment
 from .simulation.experiment import simulate_experiment as simulate_experiment
 from .simulation.rod_scan import simulate as simulate

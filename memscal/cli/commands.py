@@ -93,13 +93,8 @@ def memscal() -> None:
     Lengths are in mm, depths in um, loads in N and moduli in MPa; each option states its unit.
     """
     if os.environ.get("SOURCE_DATE_EPOCH") is not None:
-        _check_clock()
+        from memscal.model.provenance import timestamp
 
-
-def _check_clock() -> None:
-    """Refuse a wrong SOURCE_DATE_EPOCH before numpy does; an empty one counts as none."""
-    from memscal.model.provenance import timestamp
-
-    timestamp()
-    if not os.environ["SOURCE_DATE_EPOCH"]:
-        del os.environ["SOURCE_DATE_EPOCH"]
+        timestamp()  # refuses a wrong one before numpy does
+        if not os.environ["SOURCE_DATE_EPOCH"]:  # which counts as none
+            del os.environ["SOURCE_DATE_EPOCH"]

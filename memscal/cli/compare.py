@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -27,57 +26,17 @@ def figure_stems(lubrications: Iterable[str], *, interface: bool = False) -> lis
     return [*stems, "interface"] if interface else stems
 
 
-@dataclass(frozen=True)
-class FigureFiles:
-    """Files of the figures: of the one that shows all, and of all others in a folder."""
-
-    single: tuple[Path, ...]
-    folder: Path | None
-    suffix: str
-    lubrications: tuple[str, ...]
-    interface: bool = False
-
-    @property
-    def in_folder(self) -> dict[str, Path]:
-        """Files in the folder by the stem of their names."""
-        if self.folder is None:
-            return {}
-        stems = figure_stems(self.lubrications, interface=self.interface)
-        return {stem: self.folder / f"{stem}.{self.suffix}" for stem in stems}
-
-    @property
-    def paths(self) -> list[Path]:
-        """All files."""
-        return [*self.single, *self.in_folder.values()]
-
-    def prove(self, *, force: bool, inputs: Sequence[Path]) -> None:
-        """Prove that all can be written; a folder that is not there yet is made at the end."""
-        if self.folder is not None and not self.folder.is_dir():
-            if self.folder.exists():
-                raise click.UsageError(f"--figures names a folder, but {self.folder} is a file.")
-            out.prove_writable([*self.single, self.folder], force=force, inputs=inputs)
-        else:
-            out.prove_writable(self.paths, force=force, inputs=inputs)
-
-    def rendered(self, comparison: FrictionComparison) -> dict[Path, bytes]:
-        """Return the content of each file."""
-        if not self.paths:
-            return {}
+def _rendered(
+    comparison: FrictionComparison, single: Sequence[Path], named: Mapping[str, Path]
+) -> dict[Path, bytes]:
+    """Return the content of the files of the one figure that shows all, and of all others."""
+    ready = out.rendered(comparison.plot, single)
+    if named:
         from memscal.figures.friction import comparison_figures
-        from memscal.figures.style import render_figure
 
-        ready = out.rendered(comparison.plot, self.single)
-        if self.folder is not None:
-            named = self.in_folder
-            for stem, draw in comparison_figures(comparison).items():
-                ready[named[stem]] = render_figure(draw(), self.suffix)
-        return ready
-
-    def write(self, ready: dict[Path, bytes], *, force: bool) -> None:
-        """Write what was rendered."""
-        if self.folder is not None:
-            self.folder.mkdir(exist_ok=True)
-        out.write_files(ready, force=force)
+        for stem, draw in comparison_figures(comparison).items():
+            ready |= out.rendered(draw, [named[stem]])
+    return ready
 
 
 def user_cache_folder() -> Path | None:
@@ -162,22 +121,7 @@ Examples:
 @option("--figure-format", click.Choice(_FORMATS), "png")("Format of --figures.")
 @output_options
 def command(
-    artifact: Path,
-    scans: tuple[Path, ...],
-    friction: tuple[float, ...],
-    loadings: tuple[str, ...],
-    references: tuple[Path, ...],
-    macroscopic: float | None,
-    macroscopic_uncertainty: float | None,
-    interface: bool,
-    override: bool,
-    cache: Path | None,
-    no_cache: bool,
-    single: tuple[Path, ...],
-    folder: Path | None,
-    figure_format: str,
-    as_json: bool,
-    force: bool,
+    artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
 ) -> int:
     """Compare the stress that contact SCANs measured with calculated contacts.
 
@@ -190,8 +134,8 @@ def command(
 
     A failed quality check is exit code 1: the results are printed all the same.
     """
-    _check_usage(friction, loadings, references, macroscopic, macroscopic_uncertainty, interface)
-    kept = cache_from(cache, no_cache)
+    _check_usage(options)
+    cache = cache_from(options["cache"], options["no_cache"])
 
     from memscal.apparatus import load_apparatus
     from memscal.cli.failures import exit_code_of
@@ -201,30 +145,42 @@ def command(
     from memscal.summaries.comparison import failures
 
     apparatus, data = load_apparatus(artifact), opened_contacts(scans)
-    profiles = [read_reference(path) for path in references]
-    lubrications = tuple(dict.fromkeys(scan.lubrication for scan in scans_of(data)))
-    files = FigureFiles(single, folder, figure_format, lubrications, interface)
-    files.prove(force=force, inputs=[artifact, *scans, *references])
+    references = [read_reference(path) for path in options["references"]]
+    single, folder, interface = options["single"], options["folder"], options["interface"]
+    named = {}
+    if folder is not None:
+        stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
+        named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
+    inputs, friction = [artifact, *scans, *options["references"]], options["friction"]
+    outputs = [*single, *named.values()]
+    if folder is not None and not folder.is_dir():
+        if folder.exists():
+            raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
+        outputs = [*single, folder]  # which is made at the end
+    out.prove_writable(outputs, force=force, inputs=inputs)
 
     with out.working("Comparing with calculated contacts"):
         comparison = compare(
             data,
             apparatus,
-            friction=tuple(sorted({0.0, *friction, math.inf})) if friction else None,
-            loading=loadings or ("incremental", "total"),
-            references=profiles or None,
-            macroscopic=macroscopic,
-            macroscopic_uncertainty=macroscopic_uncertainty,
+            friction=sorted({0.0, *friction, math.inf}) if friction else None,
+            loading=options["loadings"] or ("incremental", "total"),
+            references=references or None,
+            macroscopic=options["macroscopic"],
+            macroscopic_uncertainty=options["macroscopic_uncertainty"],
             interface=interface,
-            override=override,
-            cache=kept,
+            override=options["override"],
+            cache=cache,
             workers=min(2, os.cpu_count() or 1),
         )
     with out.working("Drawing"):
-        ready = files.rendered(comparison)
-    files.write(ready, force=force)
-    _show(comparison, artifact, profiles, files.paths, as_json)
-    for path in files.paths:
+        ready = _rendered(comparison, single, named)
+    if folder is not None:
+        folder.mkdir(exist_ok=True)
+    out.write_files(ready, force=force)
+    figures = [*single, *named.values()]
+    _show(comparison, artifact, references, figures, as_json)
+    for path in figures:
         out.message(f"Written: {path}")
     failed = [
         f"{kind} {' '.join(check.profile for check in checks)}".strip()
@@ -233,27 +189,23 @@ def command(
     return exit_code_of(comparison.checks, failed)
 
 
-def _check_usage(
-    friction: tuple[float, ...],
-    loadings: tuple[str, ...],
-    references: tuple[Path, ...],
-    macroscopic: float | None,
-    uncertainty: float | None,
-    interface: bool,
-) -> None:
+def _check_usage(options: Mapping[str, Any]) -> None:
     """Refuse options that do not go together, before anything is read."""
+    friction, loadings, macroscopic = (
+        options[name] for name in ("friction", "loadings", "macroscopic")
+    )
     for name, values in (("friction", friction), ("loading", loadings)):
         twice = [value for value in values if values.count(value) > 1]
         if twice:
             raise click.UsageError(f"--{name} {twice[0]} is given twice.")
-    if references and (friction or loadings):
+    if options["references"] and (friction or loadings):
         raise click.UsageError(
             "--reference brings its own friction coefficients and loading: leave out --friction "
             "and --loading."
         )
-    if uncertainty is not None and macroscopic is None:
+    if options["macroscopic_uncertainty"] is not None and macroscopic is None:
         raise click.UsageError("--macroscopic-uncertainty needs --macroscopic.")
-    if interface and macroscopic is None:
+    if options["interface"] and macroscopic is None:
         raise click.UsageError(
             "--interface needs --macroscopic: the friction coefficient at which an interface that "
             "yields begins to slip."
@@ -272,7 +224,7 @@ def _show(
 
     from memscal.formats.files import read_bytes
     from memscal.model.provenance import SourceFile
-    from memscal.summaries.comparison import file_json, notes, tables
+    from memscal.summaries.comparison import file_json, notes
 
     if as_json:
         source = SourceFile(artifact.name, hashlib.sha256(read_bytes(artifact)).hexdigest())
@@ -283,5 +235,5 @@ def _show(
         }
         out.emit_json(comparison.to_dict() | files)
     else:
-        out.emit_tables(*tables(comparison))
+        out.emit_tables(*comparison.tables())
     out.show_messages(notes(comparison))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,7 @@ from memscal.cli.failures import DONE
 from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from memscal.planning.expected import Design
+    from memscal.planning.design import Design
 
     _TargetType = click.ParamType[tuple[str, float]]
 else:  # generic since click 8.2 only
@@ -124,14 +123,13 @@ def command(
     out.prove_writable(figures, force=force)
     vary = None if vary is None else vary.replace("-", "_")
     planned = _designed(options, dict(targets), vary)
-    out.write_files(out.rendered(lambda: _figure(planned, vary), figures), force=force)
+    drawn = out.rendered(partial(planned.plot, vary=vary or "step"), figures)
+    out.write_files(drawn, force=force)
 
     if as_json:
         out.emit_json({"schema_version": "1", **planned.to_dict()})
     else:
-        from memscal.summaries.design import tables
-
-        out.emit_tables(*tables(planned))
+        out.emit_tables(*planned.tables())
     out.note(_HIDDEN.format(what=_BY_PRIOR if planned.method == "bayesian" else _BY_WINDOW))
     for path in figures:
         out.message(f"Written: {path}")
@@ -145,9 +143,3 @@ def _designed(options: dict[str, Any], targets: dict[str, float], vary: str | No
     settings |= {name: options[name] for name in ("load", "repeats", "method")}
     settings |= {"rod": common.indenter_from("rod", options), "film": common.film_from(options)}
     return design(kernel=common.kernel_from(options), want=targets, vary=vary, **settings)
-
-
-def _figure(planned: Design, vary: str | None) -> Figure:
-    from memscal.figures.design import design_figure
-
-    return design_figure(planned, vary="step" if vary is None else vary)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,25 +63,14 @@ reference_options = options_of(
 """The options that describe a table or a mesh of stress at the base."""
 
 
-def _needed_by_reference(path: Path) -> tuple[str, ...]:
-    """Return the options without which a reference cannot be read."""
-    return (*(() if _is_mesh(path) else _OF_TABLES), "r_unit", "sigma", "sigma_unit", "load")
-
-
-def _unused_options(path: Path, options: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
-    """Return mesh or table, and the options given that such a file has no use for."""
-    kind, names = ("mesh", (*_OF_TABLES, *_READING)) if _is_mesh(path) else ("table", _OF_MESHES)
-    return kind, tuple(name for name in names if options[name] is not None)
-
-
-def _read_reference(path: Path, options: dict[str, Any]) -> ImportedProfile:
+def _read_reference(path: Path, mesh: bool, options: dict[str, Any]) -> ImportedProfile:
     """Read the reference with the options given; for the others the library's defaults hold."""
     setting = _stated(options, (*_SHARED, "load"))
     if any(options[name] is not None for name in (*common.FILM, *common.LAW)):
         setting["film"] = common.film_from(options)
     if options["radius"] is not None:
         setting["indenter"] = common.indenter_from(options["indenter"], options)
-    if not _is_mesh(path):
+    if not mesh:
         from memscal.formats.tables.reference import read_reference_table
 
         return read_reference_table(path, **_stated(options, (*_OF_TABLES, *_READING)), **setting)
@@ -93,13 +82,6 @@ def _read_reference(path: Path, options: dict[str, Any]) -> ImportedProfile:
     if "centre" in setting:
         setting["centre"] = tuple(si(position, -3) for position in setting["centre"])
     return read_reference_mesh(path, **setting)
-
-
-def _is_mesh(path: Path) -> bool:
-    """Return whether a file's name says that it is a mesh."""
-    from memscal.formats.meshes.mesh_files import is_mesh
-
-    return is_mesh(path)
 
 
 EXAMPLES = """\b
@@ -135,7 +117,10 @@ _ONLY = {
     "scan": [*_SCAN_NAMES, "load_scatter", "position_error", *_SENSOR_NAMES.values()],
     "reference": _REFERENCE_NAMES,
 }
-_NEEDED = ("x", "x_unit", "u", "u_unit")
+_NEEDED = {
+    "scan": ("x", "x_unit", "u", "u_unit"),
+    "reference": ("r_unit", "sigma", "sigma_unit", "load"),
+}
 
 
 @click.command("import", epilog=EXAMPLES)
@@ -203,29 +188,42 @@ def command(
     kept as they are. The numbers of readings, repeats, places and missing values are printed, and
     kept in the notes of the file.
     """
+    from memscal.formats.meshes.mesh_files import is_mesh
+
+    mesh = is_mesh(table)
     options["repeat"] = options["repeat"] or None
-    _check_usage(table, kind, options)
+    _check_usage(table, kind, mesh, options)
     options |= {name: int(options[name]) for name in _SIGNS if options[name] is not None}
     prove_writable([output], force=force, inputs=[table])
-    imported = _scan(table, options) if kind == "scan" else _read_reference(table, options)
-    _write(imported, output, force)
-    warnings = [note for note in imported.notes if note.severity == "warning"]
+    if kind == "scan":
+        from memscal.formats.scan import write_scan
+
+        scan = _read_scan(table, options)
+        notes = scan.notes
+        write_scan(scan.scan, output, overwrite=force)
+    else:
+        from memscal.formats.reference import write_reference
+
+        reference = _read_reference(table, mesh, options)
+        notes = reference.notes
+        write_reference(reference.profile, output, overwrite=force)
+    warnings = [note for note in notes if note.severity == "warning"]
     if as_json:
         head = {"schema_version": "1", "output": str(output), "format": kind}
-        emit_json({**head, "notes": marked_texts(imported.notes)})
+        emit_json({**head, "notes": marked_texts(notes)})
     else:
-        emit(readable("\n".join(note.text for note in imported.notes if note not in warnings)))
+        emit(readable("\n".join(note.text for note in notes if note not in warnings)))
     show_messages(warnings)
     message(f"Written: {output}")
     return DONE
 
 
-def _check_usage(path: Path, kind: str, options: dict[str, Any]) -> None:
+def _check_usage(path: Path, kind: str, mesh: bool, options: dict[str, Any]) -> None:
     """Name every option that is missing, or that belongs to something else, at once."""
-    if kind == "scan" and _is_mesh(path):
+    if kind == "scan" and mesh:
         raise click.UsageError(f"{path.name} is a mesh, and no scan: add --format reference.")
-    names = _NEEDED if kind == "scan" else _needed_by_reference(path)
-    missing = [name for name in names if options[name] is None]
+    of_table = () if mesh or kind == "scan" else _OF_TABLES
+    missing = [name for name in (*of_table, *_NEEDED[kind]) if options[name] is None]
     if missing:
         raise click.UsageError(
             f"A {kind} needs more: add {_named(missing)}. See the examples of "
@@ -234,18 +232,16 @@ def _check_usage(path: Path, kind: str, options: dict[str, Any]) -> None:
     if kind == "scan" and options["load"] is None and options["load_column"] is None:
         raise click.UsageError("The load is not given: add --load (in N) or --load-column.")
     other = "reference" if kind == "scan" else "scan"
-    misplaced = [name for name in _ONLY[other] if options[name] is not None]
-    if misplaced:
+    if misplaced := _stated(options, _ONLY[other]):
         raise click.UsageError(f"{_named(misplaced)} belong to --format {other}.")
     if options["rod_friction"] is not None and options["indenter"] != "rod":
         raise click.UsageError("--rod-friction belongs to --indenter rod.")
-    if kind == "reference":
-        file_kind, unused = _unused_options(path, options)
-        if unused:
-            raise click.UsageError(f"A {file_kind} has no use for {_named(unused)}.")
+    unused = _stated(options, (*_OF_TABLES, *_READING) if mesh else _OF_MESHES)
+    if unused and kind == "reference":
+        raise click.UsageError(f"A {'mesh' if mesh else 'table'} has no use for {_named(unused)}.")
 
 
-def _named(names: Sequence[str]) -> str:
+def _named(names: Iterable[str]) -> str:
     return ", ".join("--" + name.replace("_", "-") for name in names)
 
 
@@ -254,7 +250,7 @@ def _stated(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
     return {name: values[name] for name in names if values[name] is not None}
 
 
-def _scan(path: Path, options: dict[str, Any]) -> ImportedScan:
+def _read_scan(path: Path, options: dict[str, Any]) -> ImportedScan:
     film, indenter = common.film_from(options), common.indenter_from(options["indenter"], options)
     from memscal.formats.tables.scan import read_scan_table
     from memscal.model.scan import StressSensor
@@ -269,16 +265,3 @@ def _scan(path: Path, options: dict[str, Any]) -> ImportedScan:
         indenter=indenter,
         sensor=StressSensor(**labels),
     )
-
-
-def _write(imported: ImportedScan | ImportedProfile, output: Path, force: bool) -> None:
-    from memscal.formats.tables.scan import ImportedScan
-
-    if isinstance(imported, ImportedScan):
-        from memscal.formats.scan import write_scan
-
-        write_scan(imported.scan, output, overwrite=force)
-    else:
-        from memscal.formats.reference import write_reference
-
-        write_reference(imported.profile, output, overwrite=force)

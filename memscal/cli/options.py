@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
@@ -106,8 +106,10 @@ output_options = options_of(json_option, force_option, debug_option)
 
 #: Those of memscal.model.film, which takes longer to import than help may; a test compares them.
 FILM_LAWS = ("linear", "neo-hookean", "mooney-rivlin")
-FILM, LAW = ("young_modulus", "poisson_ratio", "thickness"), ("film_law", "mooney_rivlin_ratio")
-"""What describes a film, and its law, by the names of its options."""
+FILM = {"young_modulus": 6, "poisson_ratio": 0, "thickness": -3}
+"""What describes a film, by the names of its options, with the powers of ten of their units."""
+LAW = ("film_law", "mooney_rivlin_ratio")
+"""What describes its law."""
 
 #: The paper's film, in the units of the command line.
 PAPER_FILM: Mapping[str, float | str | None] = {
@@ -127,25 +129,22 @@ def film_options(
     *, defaults: Mapping[str, float | str | None] | None = None, uncertainties: bool = True
 ) -> _Adder:
     """Return the film's options, with or without those of the uncertainties."""
-    values = {} if defaults is None else defaults
     ratio = Quantity("ratio", high=0.5, open_low=False)
-    entries: list[tuple[str, click.ParamType[Any], str]] = [
-        ("young-modulus", Quantity("MPa"), "Young's modulus of the film, in MPa."),
-        ("poisson-ratio", ratio, "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."),
-        ("thickness", Quantity("mm"), "Thickness of the film, in mm."),
-    ]
-    if uncertainties:
-        words = ("Young's modulus, in MPa.", "Poisson's ratio.", "the thickness, in mm.")
-        entries += [
-            (f"{name}-uncertainty", Quantity(kind.name, open_low=False), _UNCERTAINTY + about)
-            for (name, kind, _), about in zip(entries, words, strict=True)
-        ]
-    ratio = Quantity("ratio", open_low=False)
-    entries += [
-        ("film-law", click.Choice(FILM_LAWS), "Law of the film's stress: small strain, or rubber."),
-        ("mooney-rivlin-ratio", ratio, "C2/C1 of a film of --film-law mooney-rivlin."),
-    ]
-    return _all_of(entries, values)
+    modulus_text = "Young's modulus of the film, in MPa."
+    ratio_text = "Poisson's ratio of the film, from 0 to 0.5 (incompressible)."
+    entries = (
+        ("young-modulus", Quantity("MPa"), modulus_text, "Young's modulus, in MPa."),
+        ("poisson-ratio", ratio, ratio_text, "Poisson's ratio."),
+        ("thickness", Quantity("mm"), "Thickness of the film, in mm.", "the thickness, in mm."),
+    )
+    values = defaults or {}
+    law = option("--film-law", click.Choice(FILM_LAWS), values.get("film-law"))
+    constants = option("--mooney-rivlin-ratio", Quantity("ratio", open_low=False))
+    return options_of(
+        _measured(entries, values, uncertainties),
+        law("Law of the film's stress: small strain, or rubber."),
+        constants("C2/C1 of a film of --film-law mooney-rivlin."),
+    )
 
 
 rod_friction_option = option(
@@ -163,21 +162,26 @@ def radius_options(
     uncertainties: bool = True,
 ) -> _Adder:
     """Return the option of the indenter's radius, with or without its uncertainty."""
-    entries: list[tuple[str, click.ParamType[Any], str]] = [
-        ("radius", Quantity("mm"), f"Radius of {of} (not the diameter), in mm.")
-    ]
-    if uncertainties:
-        spread = Quantity("mm", open_low=False)
-        entries.append(("radius-uncertainty", spread, _UNCERTAINTY + "the radius, in mm."))
+    about = f"Radius of {of} (not the diameter), in mm."
     values = {"radius": default, "radius-uncertainty": uncertainty}
-    return _all_of(entries, {name: v for name, v in values.items() if v is not None})
+    radius = ("radius", Quantity("mm"), about, "the radius, in mm.")
+    return _measured([radius], values, uncertainties)
 
 
-def _all_of(
-    entries: list[tuple[str, click.ParamType[Any], str]], defaults: Mapping[str, float | str | None]
+def _measured(
+    entries: Sequence[tuple[str, Quantity, str, str]],
+    defaults: Mapping[str, float | str | None],
+    uncertainties: bool,
 ) -> _Adder:
+    """Return the options of quantities, then those of their uncertainties (the last texts)."""
+    options = [(name, kind, about) for name, kind, about, _ in entries]
+    if uncertainties:
+        options += [
+            (f"{name}-uncertainty", Quantity(kind.unit, open_low=False), _UNCERTAINTY + of)
+            for name, kind, _, of in entries
+        ]
     return options_of(
-        *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in entries)
+        *(option(f"--{name}", kind, defaults.get(name))(about) for name, kind, about in options)
     )
 
 
@@ -204,16 +208,12 @@ def film_from(options: Mapping[str, Any]) -> ElasticFilm:
         )
     from memscal.model.film import ElasticFilm
 
-    return ElasticFilm(
-        young_modulus=si(options["young_modulus"], 6),
-        poisson_ratio=options["poisson_ratio"],
-        thickness=si(options["thickness"], -3),
-        young_modulus_uncertainty=si(options.get("young_modulus_uncertainty"), 6),
-        poisson_ratio_uncertainty=options.get("poisson_ratio_uncertainty"),
-        thickness_uncertainty=si(options.get("thickness_uncertainty"), -3),
-        law=law,
-        mooney_rivlin_ratio=ratio,
-    )
+    numbers: dict[str, Any] = {
+        name: si(options.get(name), power)
+        for quantity, power in FILM.items()
+        for name in (quantity, f"{quantity}_uncertainty")
+    }
+    return ElasticFilm(law=law, mooney_rivlin_ratio=ratio, **numbers)
 
 
 def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
@@ -226,7 +226,7 @@ def indenter_from(shape: str, options: Mapping[str, Any]) -> RoundIndenter:
     return kind(radius=si(options["radius"], -3), radius_uncertainty=spread)
 
 
-def _require(subject: str, options: Mapping[str, Any], names: tuple[str, ...]) -> None:
+def _require(subject: str, options: Mapping[str, Any], names: Iterable[str]) -> None:
     missing = ["--" + name.replace("_", "-") for name in names if options[name] is None]
     if missing:
         raise click.UsageError(f"{subject} is not fully given: add {', '.join(missing)}.")

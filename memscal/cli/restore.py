@@ -69,7 +69,6 @@ def command(
     out.prove_writable(files, force=force, inputs=[p for p in (artifact, scan, expected) if p])
 
     from memscal.measurement.restore import restore
-    from memscal.summaries.restoration import tables
 
     with out.working("Restoring"):
         restored = restore(data, apparatus, expected=stress, override=override)
@@ -86,7 +85,7 @@ def command(
         written = None if output is None else str(output)
         out.emit_json({"schema_version": "1", "output": written, **restored.to_dict()})
     else:
-        out.emit_tables(*tables(restored))
+        out.emit_tables(*restored.tables())
     out.show_messages(restored.messages)
     for path in files:
         out.message(f"Written: {path}")

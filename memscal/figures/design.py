@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from memscal.errors import InputError
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
+from memscal.figures.style import COLOURS, legend_above, panels_of
 from memscal.model.quantities import MM, PER_MM, PER_MM2
-from memscal.planning.design import varied_designs
-from memscal.planning.expected import Design
+from memscal.planning.design import Design, varied_designs
 
 #: G is drawn to this many Gaussian widths, its transform to this many resolved bands.
 _WIDTHS, _BANDS = 4.0, 2.0
@@ -43,13 +42,10 @@ def design_figure(planned: Design, vary: str = "step") -> Figure:
             f"The figure is to vary {vary!r}, which cannot be varied.",
             cure=f"Choose from {', '.join(_AXES)}.",
         )
-    with house_style():
-        figure = new_figure(2.9)
-        panels = figure.subplots(1, 3)
+    with panels_of(2.9, 1, 3) as (figure, panels):
         _draw_radial(panels[0], planned)
         _draw_transfer(panels[1], planned)
         _draw_varied(panels[2], planned, vary)
-        panel_letters(panels)
     return figure
 
 

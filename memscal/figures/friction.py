@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,23 +14,12 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.figures import friction_scale as scale
-from memscal.figures.friction_profiles import (
-    draw_profiles,
-    draw_residuals,
-    friction_set_figure,
-    profile_figure,
-)
-from memscal.figures.friction_readings import (
-    draw_effective,
-    draw_levels,
-    effective_friction_figure,
-    likelihood_figure,
-)
-from memscal.figures.friction_scale import LUBRICATIONS, friction_name, friction_position
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
-from memscal.friction.family import FRICTION_SCALE
+from memscal.figures import friction_profiles as profiles
+from memscal.figures.friction_profiles import friction_name, friction_position, lubricated_words
+from memscal.figures.style import COLOURS, legend_above, panels_of
+from memscal.friction.family import bounded
 from memscal.friction.results import (
+    BoundedEstimate,
     FrictionComparison,
     ImpliedFriction,
     InterfaceComparison,
@@ -58,29 +50,26 @@ def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Fi
             "There is no law of the interface to draw.",
             cure="Compare with interface=True and a macroscopic friction coefficient.",
         )
-    with house_style():
-        figure = new_figure(3.0)
-        slip = laws.tangential
-        implied = None if slip is None else slip.implied
-        panels = figure.subplots(1, 2 if implied is None else 3)
+    slip = laws.tangential
+    implied = None if slip is None else slip.implied
+    with panels_of(3.0, 1, 2 if implied is None else 3) as (figure, panels):
         _draw_lengths(panels[0], laws.by_direction)
         _draw_marginal_likelihoods(panels[1], laws.by_direction)
         if slip is not None and implied is not None:
             measured = [load for load in loads if load.lubrication == slip.lubrication]
             _draw_implied(panels[2], implied, measured)
-        panel_letters(panels)
     return figure
 
 
 def length_position(length: ArrayLike) -> FloatArray:
     """Return where a length (m) stands on an axis from 0 to infinity: 3 um in its middle."""
-    return friction_position(FRICTION_SCALE * np.asarray(length, dtype=np.float64) / _MIDDLE)
+    return bounded(length, _MIDDLE)
 
 
 def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     for direction, compared in by_direction.items():
         rise = np.asarray(compared.length.chi_square) - float(np.min(compared.length.chi_square))
-        label = f"{direction}, {scale.lubricated_words(compared.lubrication)}"
+        label = f"{direction}, {profiles.lubricated_words(compared.lubrication)}"
         colour = COLOURS[_COLOURS[direction]]
         axes.plot(length_position(compared.length.values), rise, color=colour, label=label)
     draw_levels(axes)
@@ -115,14 +104,13 @@ def _draw_implied(axes: Axes, implied: ImpliedFriction, measured: Sequence[LoadC
     axes.plot(implied.loads, best, color=blue, label="what the slip length means")
     for i, at_load in enumerate(measured):
         reading = at_load.by_profile
-        top = np.inf if reading.interval.high is None else reading.interval.high
-        ends = friction_position([reading.interval.low, top])
+        ends = _ends(reading)
         label = "found at each load" if i == 0 else "_found"
         axes.plot([at_load.load] * 2, ends, color=COLOURS["measured"], lw=1.0, label=label)
         if reading.value is not None:
             place = friction_position([reading.value])
             axes.plot([at_load.load], place, "o", color=COLOURS["measured"], ms=4)
-    scale.friction_axis(axes, "y", r"effective friction coefficient $\mu_e$")
+    profiles.friction_axis(axes, "y")
     axes.set_xlabel("load (N)")
     axes.set_xlim(left=0)
     legend_above(axes, columns=1)
@@ -136,33 +124,31 @@ _ROOM = 0.22
 
 def maxima_figure(comparison: FrictionComparison) -> Figure:
     """Draw measured and calculated S_max/p0_max against the load, a panel for each loading."""
-    with house_style():
-        figure = new_figure(3.4)
-        count = len(comparison.loadings)
-        panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
-        for axes, loading in zip(panels, comparison.loadings, strict=True):
-            draw_maxima(axes, comparison, loading)
-        panel_letters(panels)
-        for axes in panels[1:]:
+    count = len(comparison.loadings)
+    with panels_of(3.4, 1, count, sharey=True, squeeze=False) as (figure, panels):
+        for axes, loading in zip(panels.flat, comparison.loadings, strict=True):
+            _draw_maxima(axes, comparison, loading)
+        for axes in panels.flat[1:]:
             axes.set_ylabel("")
     return figure
 
 
-def draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str | None = None) -> None:
+def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> None:
     """Draw the ratios of one definition of the loading, and the calculated curves."""
-    loading = scale.main_loading(comparison, loading)
-    loads, curves = _curves(comparison, loading)
+    by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
+    loads = sorted(by_load)
+    curves = np.array([by_load[load] for load in loads])
     ends = []
     ends_of_all = (float(comparison.friction[0]), float(comparison.friction[-1]))
     usual = {float(mu) for mu in comparison.friction if mu in _SHOWN}
     for mu in sorted(usual.union(ends_of_all)):
         curve = curves[:, int(np.flatnonzero(comparison.friction == mu)[0])]
-        (line,) = axes.plot(loads, curve, color=scale.friction_colours(mu)[0], lw=0.9)
+        (line,) = axes.plot(loads, curve, color=profiles.friction_colours(mu)[0], lw=0.9)
         line.set_gid(f"mu={mu:g}")
         ends.append((float(curve[-1]), mu))
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
         _draw_ratios(axes, comparison.loads[loading], lubrication)
-    first, last = float(loads[0]), float(loads[-1])
+    first, last = loads[0], loads[-1]
     # Room at the right for the curves' names.
     axes.set_xlim(min(0.0, first), last + _ROOM * max(last - first, 0.2 * last))
     _name_ends(axes, last, ends)
@@ -173,24 +159,13 @@ def draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str | None 
     legend_above(axes, columns=3)
 
 
-def _curves(comparison: FrictionComparison, loading: str) -> tuple[FloatArray, FloatArray]:
-    """Return loads, increasing, and the calculated maxima over the frictionless ones there."""
-    by_load = {load.load: load.p_max / load.p0_max for load in comparison.loads[loading]}
-    loads = sorted(by_load)
-    return np.array(loads), np.array([by_load[load] for load in loads])
-
-
 def _draw_ratios(axes: Axes, loads: Sequence[LoadComparison], lubrication: str) -> None:
     measured = [load for load in loads if load.lubrication == lubrication]
-    marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
-    black = COLOURS["measured"]
-    axes.errorbar(
-        [load.load for load in measured],
-        [load.ratio for load in measured],
-        [load.ratio_uncertainty for load in measured],
-        fmt=marker, color=black, mfc=black if filled else "white", ms=4, mew=0.8,
-        elinewidth=0.8, capsize=2, label=scale.lubricated_words(lubrication), zorder=3,
-    )  # fmt: skip
+    values = [(load.load, load.ratio, load.ratio_uncertainty) for load in measured]
+    x, ratio, u = zip(*values, strict=True)
+    look = profiles.mark(lubrication, COLOURS["measured"]) | {"ms": 4, "mew": 0.8, "ls": "none"}
+    look |= {"elinewidth": 0.8, "capsize": 2, "label": profiles.lubricated_words(lubrication)}
+    axes.errorbar(x, ratio, u, zorder=3, **look)
 
 
 def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
@@ -208,7 +183,7 @@ def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
         axes.annotate(
             text if group is not groups[-1] else rf"$\mu$ {text if '≥' in text else '= ' + text}",
             (x, height), (7, 0), textcoords="offset points", va="center", fontsize=6.5,
-            color=scale.friction_colours(max(mu for _, mu in group))[0],
+            color=profiles.friction_colours(max(mu for _, mu in group))[0],
         )  # fmt: skip
 
 
@@ -228,18 +203,14 @@ def comparison_figure(
     Panel a, profiles between no friction and full stick; b, maxima over frictionless ones; c,
     residuals against the frictionless profiles; d, the effective friction coefficient.
     """
-    loading = scale.main_loading(comparison, loading)
-    loads = scale.chosen(comparison, loading, lubrication)
-    with house_style():
-        figure = new_figure(5.6)
-        panels = figure.subplots(2, 2)
-        draw_profiles(panels[0, 0], comparison, loads)
-        draw_maxima(panels[0, 1], comparison, loading)
-        draw_residuals(panels[1, 0], comparison, loads, 0)
+    loads = profiles.chosen(comparison, loading, lubrication)
+    with panels_of(5.6, 2, 2) as (figure, panels):
+        profiles.draw_profiles(panels[0, 0], comparison, loads)
+        _draw_maxima(panels[0, 1], comparison, loads[0].loading)
+        profiles.draw_residuals(panels[1, 0], comparison, loads, 0)
         panels[1, 0].set_xlim(panels[0, 0].get_xlim())
-        draw_effective(panels[1, 1], comparison, loads[0].lubrication, loading)
+        draw_effective(panels[1, 1], comparison, loads)
         legend_above(panels[1, 1], columns=2)
-        panel_letters(panels.flat)
     return figure
 
 
@@ -249,17 +220,168 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     measured = (profile.lubrication for profile in comparison.measured.profiles)
     for lubrication in dict.fromkeys(measured):
         tail = f"-{lubrication}" if lubrication else ""
-        figures[f"profiles{tail}"] = _of(profile_figure, comparison, lubrication)
-        figures[f"friction-set{tail}"] = _of(friction_set_figure, comparison, lubrication)
-    figures["maxima"] = lambda: maxima_figure(comparison)
-    figures["effective-friction"] = lambda: effective_friction_figure(comparison)
-    figures["likelihood"] = lambda: likelihood_figure(comparison)
+        of_state = {"lubrication": lubrication}
+        figures[f"profiles{tail}"] = partial(profiles.profile_figure, comparison, **of_state)
+        figures[f"friction-set{tail}"] = partial(
+            profiles.friction_set_figure, comparison, **of_state
+        )
+    figures["maxima"] = partial(maxima_figure, comparison)
+    figures["effective-friction"] = partial(effective_friction_figure, comparison)
+    figures["likelihood"] = partial(likelihood_figure, comparison)
     if comparison.interface is not None:
-        figures["interface"] = lambda: interface_figure(comparison)
+        figures["interface"] = partial(interface_figure, comparison)
     return figures
 
 
-def _of(
-    draw: Callable[..., Figure], comparison: FrictionComparison, lubrication: str
-) -> Callable[[], Figure]:
-    return lambda: draw(comparison, lubrication=lubrication)
+_READINGS = {
+    "by_maximum": ("by the maximum", "gaussian", -1),
+    "by_profile": ("by the profile", "deconvolved", 1),
+}
+#: Both readings of one load stand this share of the loads' span to its left and right.
+_ASIDE = 0.008
+#: Differences of chi-square that bound 68.3 % and 95 % of one parameter.
+_LEVELS = ((1.0, "68 %"), (3.84, "95 %"))
+_HIGHEST = 12.0
+#: Entries in one line of a legend.
+_ENTRIES = 7
+
+
+def effective_friction_figure(comparison: FrictionComparison) -> Figure:
+    """Draw the effective friction coefficient against the load, with intervals.
+
+    A row for each lubrication, a panel for each loading.  Open intervals end in arrows; a band is
+    the interval of all loads together.
+    """
+    return _panels(comparison, draw_effective, 2.7)
+
+
+def draw_effective(
+    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
+) -> None:
+    """Draw both readings of each load, the joint interval, and the macroscopic coefficient."""
+    span = loads[-1].load - loads[0].load or loads[0].load
+    for name, (words, colour, side) in _READINGS.items():
+        for i, at_load in enumerate(loads):
+            reading, x = getattr(at_load, name), at_load.load + side * _ASIDE * span
+            look = profiles.mark(at_load.lubrication, COLOURS[colour])
+            _draw_reading(axes, reading, x, words if i == 0 else "", look)
+    _draw_joint(axes, comparison.joint[loads[0].lubrication][loads[0].loading])
+    _draw_macroscopic(axes, comparison.macroscopic)
+    profiles.friction_axis(axes, "y")
+    axes.set_xlim(0, loads[-1].load + 0.08 * span)
+    axes.set_xlabel("load (N)")
+
+
+def _draw_reading(
+    axes: Axes, reading: BoundedEstimate, x: float, label: str, look: dict[str, Any]
+) -> None:
+    """Draw a value with its interval; where there is none, the open interval as an arrow."""
+    colour = look["color"]
+    low, high, ends = reading.interval.low, reading.interval.high, _ends(reading)
+    (bar,) = axes.plot([x, x], ends, color=colour, lw=1.0, solid_capstyle="butt")
+    bar.set_gid("interval")
+    axes.plot([x], ends[:1], "_" if low > 0 else "", color=colour, ms=5, mew=1.0)
+    if high is None:
+        axes.plot([x], [1.0], "^", color=colour, ms=4, clip_on=False, label="_open")
+    else:
+        axes.plot([x], ends[1:], "_", color=colour, ms=5, mew=1.0)
+    if reading.value is not None:
+        (value,) = axes.plot([x], friction_position([reading.value]), ms=4, mew=0.8, **look)
+        value.set(ls="none", zorder=3, label="_value")
+    if label:
+        axes.plot([], [], look["marker"], color=colour, ms=4, ls="-", lw=1.0, label=label)
+
+
+def _ends(reading: BoundedEstimate) -> FloatArray:
+    """Return where the ends of an interval stand on the axis."""
+    low, high = reading.interval.low, reading.interval.high
+    return friction_position([low, math.inf if high is None else high])
+
+
+def _draw_joint(axes: Axes, joint: BoundedEstimate) -> None:
+    low, top = _ends(joint)
+    axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
+    if joint.value is not None:
+        axes.axhline(float(friction_position(joint.value)), color=COLOURS["reference"], lw=0.8)
+
+
+def _draw_macroscopic(axes: Axes, macroscopic: tuple[float, float | None] | None) -> None:
+    if macroscopic is None:
+        return
+    value, u = macroscopic
+    place = float(friction_position(value))
+    axes.axhline(place, color=COLOURS["muted"], lw=0.8, ls="--", label="macroscopic")
+    if u:
+        low, high = friction_position([max(value - 1.96 * u, 0.0), value + 1.96 * u])
+        axes.axhspan(low, high, color=COLOURS["muted"], alpha=0.15, lw=0)
+
+
+def _panels(
+    comparison: FrictionComparison,
+    draw: Callable[[Axes, FrictionComparison, Sequence[LoadComparison]], None],
+    height: float,
+) -> Figure:
+    """Draw a row of ``height`` inches for each lubrication, a panel for each loading."""
+    lubrications = list(comparison.joint)
+    rows, columns = len(lubrications), len(comparison.loadings)
+    shared = {"sharex": True, "sharey": True, "squeeze": False}
+    with panels_of(0.6 + height * rows, rows, columns, **shared) as (figure, panels):
+        for row, lubrication in zip(panels, lubrications, strict=True):
+            for axes, loading in zip(row, comparison.loadings, strict=True):
+                draw(axes, comparison, profiles.chosen(comparison, loading, lubrication))
+                words = lubricated_words(lubrication) + (f", {loading} loading" if loading else "")
+                axes.set_title(words, fontsize=8, loc="left")
+        for axes in panels.flat:
+            axes.label_outer()
+        _one_legend(figure, panels.flat)
+    return figure
+
+
+def _one_legend(figure: Figure, panels: Iterable[Axes]) -> None:
+    """Put the entries of all panels above them, each label once."""
+    shown: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            shown.setdefault(label, handle)
+    of_loads = (label for label in shown if label.endswith(" N"))
+    loads = sorted(of_loads, key=lambda label: float(label.removesuffix(" N")))
+    order = [*loads, *(label for label in shown if label not in loads)]
+    handles = [shown[label] for label in order]
+    figure.legend(handles, order, loc="outside upper center", ncols=min(len(order), _ENTRIES))
+
+
+def likelihood_figure(comparison: FrictionComparison) -> Figure:
+    """Draw chi-square above its least value against the coefficient: the profile likelihoods."""
+    return _panels(comparison, _draw_likelihood, 2.4)
+
+
+def _draw_likelihood(
+    axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison]
+) -> None:
+    """Draw chi-square above its least value of each load and of all loads together."""
+    looks = profiles.load_looks(comparison)
+    for at_load in loads:
+        _draw_curve(axes, at_load.by_profile, *looks[at_load.load], 1.0)
+    joint = comparison.joint[loads[0].lubrication][loads[0].loading]
+    _draw_curve(axes, joint, COLOURS["measured"], "all loads", 1.8)
+    draw_levels(axes)
+    profiles.friction_axis(axes, "x")
+    axes.set_ylabel(r"$\chi^2 - \chi^2_{min}$")
+
+
+def draw_levels(axes: Axes) -> None:
+    """Draw the levels that bound 68.3 % and 95 %, and end the axis not far above."""
+    for level, words in _LEVELS:
+        axes.axhline(level, color="0.6", lw=0.6, ls=":")
+        axes.annotate(
+            words, (0.995, level), (0, 1), xycoords=("axes fraction", "data"),
+            textcoords="offset points", ha="right", fontsize=6, color="0.4",
+        )  # fmt: skip
+    axes.set_ylim(0, _HIGHEST)
+
+
+def _draw_curve(
+    axes: Axes, reading: BoundedEstimate, colour: str, label: str, width: float
+) -> None:
+    rise = np.asarray(reading.chi_square) - float(np.min(reading.chi_square))
+    axes.plot(friction_position(reading.values), rise, color=colour, lw=width, label=label)

@@ -1,18 +1,176 @@
-"""Measured stress profiles beside calculated ones: the limits of friction, and a set of it."""
+"""Measured stress profiles beside calculated ones, and what all figures of friction share."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
-from memscal.figures import friction_scale as scale
-from memscal.figures.friction_scale import LUBRICATIONS, friction_colours, friction_name, on_axis
-from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panel_letters
+from memscal.errors import InputError
+from memscal.figures.style import COLOURS, house_style, legend_above, new_figure, panels_of, shades
+from memscal.friction.family import FRICTION_SCALE, bounded
 from memscal.friction.results import FrictionComparison, LoadComparison
+from memscal.model.arrays import FloatArray
 from memscal.model.quantities import KPA, MM
+
+#: Loads up to this multiple of another one look alike.
+_ALIKE = 1.05
+#: Radii closer than this, in m, count as one.
+_CLOSE = 1e-6
+_TICKS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, np.inf)
+#: Marker and filling of a lubrication.
+_LUBRICATIONS = {"dry": ("o", True), "lubricated": ("s", False), "": ("D", True)}
+
+
+def friction_position(friction: ArrayLike) -> FloatArray:
+    """Return where a friction coefficient stands on an axis from 0 to infinity: mu/(mu + 0.3)."""
+    return bounded(friction, FRICTION_SCALE)
+
+
+def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Give an axis the ticks of effective friction coefficients from 0 to infinity."""
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_ticks(list(friction_position(_TICKS)), [friction_name(mu) for mu in _TICKS])
+    margin = 0.02
+    (axes.set_xlim if which == "x" else axes.set_ylim)(-margin, 1 + margin)
+    axis.set_label_text(r"effective friction coefficient $\mu_e$")
+
+
+def friction_name(friction: float) -> str:
+    """Return a coefficient as a label: ``0.15``, or the sign of infinity."""
+    return "∞" if np.isinf(friction) else f"{friction:.3g}"
+
+
+def friction_colours(friction: ArrayLike) -> list[str]:
+    """Return colours of friction coefficients, by their place between 0 and infinity."""
+    import matplotlib as mpl
+
+    shades = mpl.colormaps["plasma"](0.92 * (1.0 - friction_position(friction)))
+    return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
+
+
+def load_looks(comparison: FrictionComparison) -> dict[float, tuple[str, str]]:
+    """Return colour and name of each load: darker as it grows; within 5 % loads look alike."""
+    groups: list[list[float]] = []
+    for load in sorted({profile.load for profile in comparison.measured.profiles}):
+        if groups and load <= _ALIKE * groups[-1][0]:
+            groups[-1].append(load)
+        else:
+            groups.append([load])
+    colours = shades(len(groups), 0.2)
+    names = [f"{np.mean(group):.3g} N" for group in groups]
+    return {
+        load: (colour, name)
+        for group, colour, name in zip(groups, colours, names, strict=True)
+        for load in group
+    }
+
+
+def mark(lubrication: str, colour: str) -> dict[str, Any]:
+    """Return marker and colours of points by their lubrication, distinct in grey print."""
+    marker, filled = _LUBRICATIONS.get(lubrication, _LUBRICATIONS[""])
+    return {"marker": marker, "color": colour, "mfc": colour if filled else "white"}
+
+
+def lubricated_words(lubrication: str) -> str:
+    """Return a lubrication in words."""
+    return lubrication or "lubrication not stated"
+
+
+def chosen(
+    comparison: FrictionComparison, loading: str | None, lubrication: str | None
+) -> list[LoadComparison]:
+    """Return the loads of one loading and lubrication, increasing; of the first by default."""
+    loading = comparison.loadings[0] if loading is None else loading
+    if loading not in comparison.loads:
+        raise InputError(
+            f"The loading {loading!r} was not compared.",
+            cure=f"There is {', '.join(repr(name) for name in comparison.loadings)}.",
+        )
+    measured = [at_load.lubrication for at_load in comparison.loads[loading]]
+    state = measured[0] if lubrication is None else lubrication
+    if state not in measured:
+        raise InputError(
+            f"No profile is {lubricated_words(state)!r}.",
+            cure=f"There is {', '.join(sorted({lubricated_words(name) for name in measured}))}.",
+        )
+    loads = [at_load for at_load in comparison.loads[loading] if at_load.lubrication == state]
+    return sorted(loads, key=lambda at_load: at_load.load)
+
+
+def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
+    """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones.
+
+    Radii closer than a micrometre count as one.
+    """
+    from scipy.interpolate import CubicSpline
+
+    kept = _apart(r)
+    inner, samples = r[kept], values[:, kept]
+    start = 1 if inner[0] < _CLOSE else 0
+    mirrored = np.concatenate([-inner[start:][::-1], inner])
+    both = np.concatenate([samples[:, start:][:, ::-1], samples], axis=1)
+    return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
+
+
+def _apart(r: FloatArray) -> Sequence[int]:
+    kept, last = [], -np.inf
+    for i, radius in enumerate(r):
+        if radius - last > _CLOSE:
+            kept.append(i)
+            last = radius
+    return kept
+
+
+#: Coverage factor of the grey band, and of points distinct from zero.
+EXPANDED = 2.0
+#: How strongly points are drawn that are not distinct from zero.
+_PALE = 0.25
+_LEAST_LIMIT = 3.5
+
+
+def _draw_points(
+    axes: Axes, at_load: LoadComparison, colour: str, label: str, logarithmic: bool
+) -> None:
+    """Draw the measured points; on a logarithmic scale those below 2u are pale or left out."""
+    profile = at_load.profile
+    r, s, u = profile.r / MM, profile.s_zz / KPA, profile.s_zz_errors / KPA
+    clear = s > EXPANDED * u if logarithmic else np.ones(s.size, dtype=bool)
+    for shown, alpha in ((clear, None), (~clear & (s > 0), _PALE)):
+        if shown.any():
+            points = (r[shown], s[shown], u[shown])
+            _draw_errorbar(axes, at_load, colour, points, label=label or "_points", alpha=alpha)
+
+
+def _draw_errorbar(
+    axes: Axes,
+    at_load: LoadComparison,
+    colour: str,
+    points: tuple[FloatArray, FloatArray, FloatArray],
+    **style: Any,
+) -> None:
+    """Draw x, y and the standard uncertainty of y, in the marker of the lubrication."""
+    look = {"ls": "none", "ms": 3.0, "mew": 0.6, "elinewidth": 0.7, **style}
+    x, y, u = points
+    axes.errorbar(x, y, u, **mark(at_load.lubrication, colour), **look)
+
+
+def share_limits(panels: Sequence[Axes]) -> None:
+    """Give residual panels one scale that shows every point, and at least the band."""
+    sizes = [
+        np.abs(np.asarray(line.get_ydata()))
+        for axes in panels
+        for line in axes.lines
+        if line.get_marker() not in ("None", "", None)
+    ]
+    limit = max(_LEAST_LIMIT, 1.1 * float(np.max(np.concatenate(sizes))))
+    for axes in panels:
+        axes.set_ylim(-limit, limit)
+
 
 _FINE = 241
 _DECADES = 3.3
@@ -29,17 +187,13 @@ def profile_figure(
     Panels a and b, stress on a linear and a logarithmic scale; c and d, residuals over standard
     uncertainties against the frictionless profile and that of the largest coefficient.
     """
-    loading = scale.main_loading(comparison, loading)
-    loads = scale.chosen(comparison, loading, lubrication)
-    with house_style():
-        figure = new_figure(4.6)
-        panels = figure.subplots(2, 2, height_ratios=(2.2, 1), sharex=True)
+    loads = chosen(comparison, loading, lubrication)
+    with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
         draw_profiles(panels[0, 1], comparison, loads, logarithmic=True)
         for axes, index in zip(panels[1], (0, -1), strict=True):
             draw_residuals(axes, comparison, loads, index)
-        scale.share_limits(panels[1])
-        panel_letters(panels.flat)
+        share_limits(panels[1])
     return figure
 
 
@@ -51,14 +205,14 @@ def draw_profiles(
     logarithmic: bool = False,
 ) -> None:
     """Draw measured points with their uncertainties, and the calculated limits through them."""
-    looks = scale.load_looks(comparison)
+    looks = load_looks(comparison)
     for at_load in loads:
         colour, name = looks[at_load.load]
         r = np.linspace(0.0, at_load.profile.r[-1], _FINE)
         limits = on_axis(at_load.profile.r, at_load.calculated[[0, -1]], r) / KPA
         axes.plot(r / MM, limits[0], color=colour, lw=1.0)
         axes.plot(r / MM, limits[1], color=colour, lw=1.0, ls="--")
-        scale.draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
+        _draw_points(axes, at_load, colour, "" if logarithmic else name, logarithmic)
     if logarithmic:
         top = max(float(at_load.profile.s_zz.max()) for at_load in loads) / KPA
         axes.set_yscale("log")
@@ -77,7 +231,7 @@ def draw_profiles(
 def _annotate_curves(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     """Name the scan and the curves inside the frame, where no data are."""
     ends = [friction_name(comparison.friction[i]) for i in (0, -1)]
-    lines = [scale.lubricated_words(at_load.lubrication)]
+    lines = [lubricated_words(at_load.lubrication)]
     lines += [f"{at_load.loading} loading"] if at_load.loading else []
     lines += [rf"solid: $\mu$ = {ends[0]}", rf"dashed: $\mu$ = {ends[1]}"]
     axes.annotate(
@@ -89,17 +243,22 @@ def draw_residuals(
     axes: Axes, comparison: FrictionComparison, loads: Sequence[LoadComparison], index: int
 ) -> None:
     """Draw measured minus calculated stress at one coefficient, over its uncertainty."""
-    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
-    axes.axhline(0.0, color="0.4", lw=0.6)
-    looks = scale.load_looks(comparison)
-    for at_load in loads:
-        colour, _ = looks[at_load.load]
-        z = (at_load.profile.s_zz - at_load.calculated[index]) / at_load.profile.s_zz_errors
-        marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
-        (points,) = axes.plot(at_load.profile.r / MM, z, marker, color=colour, ms=2.5, mew=0.6)
-        points.set_markerfacecolor(colour if filled else "white")
+    looks = load_looks(comparison)
+    colours = [looks[at_load.load][0] for at_load in loads]
+    _plot_residuals(axes, loads, index, colours)
     axes.set_xlabel("distance from the centre (mm)")
     axes.set_ylabel(rf"$(S_{{zz}} - S^{{\mu={friction_name(comparison.friction[index])}}})/u$")
+
+
+def _plot_residuals(
+    axes: Axes, loads: Sequence[LoadComparison], index: int, colours: Sequence[str]
+) -> None:
+    axes.axhspan(-EXPANDED, EXPANDED, color="0.92", lw=0)
+    axes.axhline(0.0, color="0.4", lw=0.6)
+    for at_load, colour in zip(loads, colours, strict=True):
+        profile, look = at_load.profile, mark(at_load.lubrication, colour)
+        z = (profile.s_zz - at_load.calculated[index]) / profile.s_zz_errors
+        axes.plot(profile.r / MM, z, ls="none", ms=2.5, mew=0.6, **look)
 
 
 def friction_set_figure(
@@ -110,8 +269,7 @@ def friction_set_figure(
     A column for each of at most four loads: stress near the centre, the same less the frictionless
     profile (percent of its maximum), residuals against the coefficient of least chi-square.
     """
-    loading = scale.main_loading(comparison, loading)
-    loads = scale.chosen(comparison, loading, lubrication)
+    loads = chosen(comparison, loading, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
     with house_style():
@@ -119,10 +277,13 @@ def friction_set_figure(
         rows = (1.5, 1.5, 1.0)
         panels = figure.subplots(3, len(loads), height_ratios=rows, sharex="col", squeeze=False)
         for column, at_load in zip(panels.T, loads, strict=True):
-            _draw_set(column[0], comparison, at_load)
-            _draw_differences(column[1], comparison, at_load)
+            frictionless = at_load.calculated[0]
+            column[0].set_title(f"{at_load.load:.3g} N", fontsize=8)
+            _draw_set(column[0], comparison, at_load, 0.0 * frictionless, KPA)
+            column[0].set_ylim(bottom=0)
+            _draw_set(column[1], comparison, at_load, frictionless, at_load.p0_max / 100)
             _draw_best(column[2], comparison, at_load)
-        scale.share_limits(panels[2])
+        share_limits(panels[2])
         low, high = zip(*(axes.get_ylim() for axes in panels[1]), strict=True)
         for axes in panels[1]:
             axes.set_ylim(min(low), max(high))
@@ -131,7 +292,7 @@ def friction_set_figure(
             axes.set_ylabel(label)
         figure.align_ylabels(panels[:, 0])
         figure.supxlabel("distance from the centre (mm)", fontsize=8)
-        _legend_of_friction(figure, comparison, loads[0].lubrication, loading)
+        _legend_of_friction(figure, comparison, loads[0])
     return figure
 
 
@@ -141,51 +302,35 @@ def _shown_indices(comparison: FrictionComparison) -> list[int]:
     return sorted(names | {0, comparison.friction.size - 1})
 
 
-def _core(at_load: LoadComparison) -> float:
-    """Return the radius within which the frictionless profile exceeds a twentieth of its top."""
+def _draw_set(
+    axes: Axes,
+    comparison: FrictionComparison,
+    at_load: LoadComparison,
+    less: FloatArray,
+    unit: float,
+) -> None:
+    """Draw stress less that of some profile at its radii, in a unit (Pa)."""
+    profile, black = at_load.profile, COLOURS["measured"]
+    # As far as the frictionless profile exceeds a twentieth of its top.
     strong = at_load.calculated[0] > 0.05 * at_load.calculated[0].max()
-    return float(at_load.profile.r[np.flatnonzero(strong)[-1]])
-
-
-def _draw_set(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    axes.set_title(f"{at_load.load:.3g} N", fontsize=8)
-    r = np.linspace(0.0, _core(at_load), _FINE)
+    r = np.linspace(0.0, profile.r[np.flatnonzero(strong)[-1]], _FINE)
     for i in _shown_indices(comparison):
-        curve = on_axis(at_load.profile.r, at_load.calculated[[i]], r)[0]
-        axes.plot(r / MM, curve / KPA, color=friction_colours(comparison.friction[i])[0], lw=0.9)
-    scale.draw_points(axes, at_load, COLOURS["measured"], "", False)
+        curve = on_axis(profile.r, (at_load.calculated[i] - less)[None, :], r)[0]
+        axes.plot(r / MM, curve / unit, color=friction_colours(comparison.friction[i])[0], lw=0.9)
+    points = (profile.r / MM, (profile.s_zz - less) / unit, profile.s_zz_errors / unit)
+    _draw_errorbar(axes, at_load, black, points, label="_points")
     axes.set_xlim(0, 1.03 * r[-1] / MM)
-    axes.set_ylim(bottom=0)
-
-
-def _draw_differences(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
-    """Draw what friction adds to the frictionless stress, in percent of its maximum."""
-    unit = at_load.p0_max / 100
-    r = np.linspace(0.0, _core(at_load), _FINE)
-    for i in _shown_indices(comparison):
-        change = (at_load.calculated[i] - at_load.calculated[0])[None, :]
-        colour = friction_colours(comparison.friction[i])[0]
-        axes.plot(r / MM, on_axis(at_load.profile.r, change, r)[0] / unit, color=colour, lw=0.9)
-    profile = at_load.profile
-    beyond, u = (profile.s_zz - at_load.calculated[0]) / unit, profile.s_zz_errors / unit
-    scale.draw_errorbar(axes, profile.r / MM, beyond, u, at_load, colour=COLOURS["measured"])
 
 
 def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparison) -> None:
     best = int(np.argmin(at_load.chi_square))
-    z = (at_load.profile.s_zz - at_load.calculated[best]) / at_load.profile.s_zz_errors
-    axes.axhspan(-scale.EXPANDED, scale.EXPANDED, color="0.92", lw=0)
-    axes.axhline(0.0, color="0.4", lw=0.6)
-    marker, filled = LUBRICATIONS.get(at_load.lubrication, LUBRICATIONS[""])
-    black = COLOURS["measured"]
-    face = black if filled else "white"
-    axes.plot(at_load.profile.r / MM, z, marker, color=black, ms=2.5, mew=0.6, mfc=face)
+    _plot_residuals(axes, [at_load], best, [COLOURS["measured"]])
     label = rf"least $\chi^2$: $\mu$ = {friction_name(comparison.friction[best])}"
     axes.annotate(label, (0.96, 0.9), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 def _legend_of_friction(
-    figure: Figure, comparison: FrictionComparison, lubrication: str, loading: str
+    figure: Figure, comparison: FrictionComparison, at_load: LoadComparison
 ) -> None:
     from matplotlib.lines import Line2D
 
@@ -194,12 +339,9 @@ def _legend_of_friction(
                label=rf"$\mu$ = {friction_name(comparison.friction[i])}")
         for i in _shown_indices(comparison)
     ]  # fmt: skip
-    marker, filled = LUBRICATIONS.get(lubrication, LUBRICATIONS[""])
-    point = Line2D(
-        [], [], color="k", marker=marker, ms=3, mfc="k" if filled else "white", ls="none"
-    )
-    point.set_label(f"measured, {scale.lubricated_words(lubrication)}")
-    title = f"{loading} loading" if loading else "profiles as given"
+    point = Line2D([], [], ms=3, ls="none", **mark(at_load.lubrication, "k"))
+    point.set_label(f"measured, {lubricated_words(at_load.lubrication)}")
+    title = f"{at_load.loading} loading" if at_load.loading else "profiles as given"
     figure.legend(
         handles=[point, *handles], loc="outside upper center", ncols=len(handles) + 1, title=title,
         title_fontsize=8,

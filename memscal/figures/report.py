@@ -14,7 +14,6 @@ from memscal.figures.style import render_figure
 from memscal.model import records
 from memscal.model.apparatus import ApparatusData, ParameterSet
 from memscal.model.notation import format_measured
-from memscal.model.provenance import SourceFile
 from memscal.model.quantities import PER_MM, Record, estimated_quantity
 from memscal.summaries.calibration import sensor_title, tables
 from memscal.summaries.table import Table, checks_table, stated_text
@@ -169,9 +168,11 @@ def _provenance(data: ApparatusData) -> str:
     rows = [
         ("program", f"{process.program} {process.version}"),
         ("date", process.date),
-        *_source_rows("scan", process.input_scan),
-        *_source_rows("reference", process.input_reference),
     ]
+    for name, source in (("scan", process.input_scan), ("reference", process.input_reference)):
+        if source is not None:
+            rows.append((f"input {name}", source.file_name))
+            rows.append((f"its SHA-256 ({name})", source.sha256))
     blocks = [Table("What was run on what", ("item", "value"), rows).html()]
     for caption, mapping in (("Options", process.configuration), ("Versions", process.environment)):
         if mapping:
@@ -180,12 +181,6 @@ def _provenance(data: ApparatusData) -> str:
     items = "\n".join(f"<li>{escape(message.text)}</li>" for message in process.messages)
     messages = f"<ul>\n{items}\n</ul>" if items else "<p>None.</p>"
     return "\n".join([*blocks, "<h3>Messages</h3>", messages])
-
-
-def _source_rows(name: str, source: SourceFile | None) -> list[tuple[str, str]]:
-    if source is None:
-        return []
-    return [(f"input {name}", source.file_name), (f"its SHA-256 ({name})", source.sha256)]
 
 
 def _figure(data: ApparatusData) -> str:

@@ -33,9 +33,7 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
     bars.  Bars are 95 %; lines are the restored stress, blurred by G; ticks at the top mark the
     radius of the frictionless contact.
     """
-    with style.house_style():
-        figure = style.new_figure(3.6)
-        panels = figure.subplots(1, 2)
+    with style.panels_of(3.6, 1, 2) as (figure, panels):
         scales = ("linear scale", "logarithmic scale, three decades")
         for axes, scale in zip(panels, scales, strict=True):
             axes.set_title(scale, fontsize=8, loc="left")
@@ -44,7 +42,6 @@ def measured_stress_figure(measured: MeasuredStress) -> Figure:
             axes.set_xlabel("distance from the centre (mm)")
             axes.set_ylabel(r"measured stress $S_{zz}$ (kPa)")
             axes.set_xlim(left=0.0)
-        style.panel_letters(panels)
         panels[0].axhline(0.0, color="0.8", lw=0.5, zorder=0)
         top = max(profile.s_zz.max() for profile in measured.profiles) / KPA
         panels[1].set_yscale("log")
@@ -111,12 +108,9 @@ def restoration_figure(restored: Restoration, compared: StressComparison | None 
     Panel a, stress against the distance from the centre; b, residuals against position.
     """
     compared = restored.comparison if compared is None else compared
-    with style.house_style():
-        figure = style.new_figure(3.3)
-        left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))
-        _draw_stress(left, restored, compared)
-        _draw_residuals(right, restored)
-        style.panel_letters((left, right))
+    with style.panels_of(3.3, 1, 2, width_ratios=(1.6, 1)) as (figure, panels):
+        _draw_stress(panels[0], restored, compared)
+        _draw_residuals(panels[1], restored)
     return figure
 
 
@@ -185,26 +179,13 @@ def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
     if not contacts:
         raise InputError("There is no contact to draw.")
     several = len(contacts) > 1
-    with style.house_style():
-        figure = style.new_figure(2.9)
-        panels = figure.subplots(1, 3 if several else 2)
-        colours = _shades(len(contacts))
+    with style.panels_of(2.9, 1, 3 if several else 2) as (figure, panels):
+        colours = style.shades(len(contacts), 0.15)
         _draw_interface(panels[0], contacts, colours)
         _draw_base(panels[1], contacts, colours)
         if several:
             _draw_loading(panels[2], contacts, colours)
-        style.panel_letters(panels)
     return figure
-
-
-def _shades(count: int) -> list[str]:
-    """Return colours that get darker along the path, also in grey."""
-    import matplotlib as mpl
-
-    if count == 1:
-        return [COLOURS["deconvolved"]]
-    shades = mpl.colormaps["viridis_r"](np.linspace(0.15, 1.0, count))
-    return [mpl.colors.to_hex(shade) for shade in shades]
 
 
 def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) -> None:

@@ -8,11 +8,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import NDArray
 
 from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL
@@ -98,6 +100,18 @@ def new_figure(height: float) -> Figure:
     return figure
 
 
+@contextmanager
+def panels_of(
+    height: float, rows: int = 1, columns: int = 1, **layout: Any
+) -> Iterator[tuple[Figure, NDArray[Any]]]:
+    """Yield a figure of a height in inches and its panels, in the house's style, with letters."""
+    with house_style():
+        figure = new_figure(height)
+        panels = np.asarray(figure.subplots(rows, columns, **layout))
+        yield figure, panels
+        panel_letters(panels.flat)
+
+
 def panel_letters(panels: Iterable[Axes]) -> None:
     """Put each panel's letter at the upper left, outside the frame and clear of all data."""
     place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
@@ -120,6 +134,14 @@ def legend_above(axes: Axes, *, columns: int = 2, points: int = 0) -> None:
         borderpad=0.2,
         markerscale=3.0 if points > SCATTER_THRESHOLD else 1.0,
     )
+
+
+def shades(count: int, first: float) -> list[str]:
+    """Return colours that get darker along a path, also in grey; the first from 0 to 1."""
+    if count == 1:
+        return [COLOURS["deconvolved"]]
+    colours = mpl.colormaps["viridis_r"](np.linspace(first, 1.0, count))
+    return [mpl.colors.to_hex(colour) for colour in colours]
 
 
 def marker_size(points: int) -> float:

@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from memscal.calibration.sweep import Sweep
-from memscal.figures.style import COLOURS, house_style, new_figure, panel_letters
+from memscal.figures.style import COLOURS, panels_of
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import MM, MV
+from memscal.summaries.declared import power_of_ten
 
 _INNER = (0.16, 0.84)  # of the draws: what one standard deviation holds of a normal law
 _SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge
@@ -23,20 +24,18 @@ def sweep_figure(sweep: Sweep) -> Figure:
     """
     constants = sweep.conversion_constant, sweep.seed_conversion_constant
     widths = sweep.gaussian_sigma_deconvolved, sweep.seed_gaussian_sigma
-    power = _power_of_ten(sweep.conversion_constant / MV)
+    power = power_of_ten(sweep.conversion_constant / MV)
+    power = 0 if -2 <= power <= 3 else power
     unit = f"$10^{{{power}}}$ mV/Pa" if power else "mV/Pa"
     rows = (
         (f"$A$ ({unit})", *constants, MV * 10.0**power),
         (r"$\sigma$ of deconvolved $G$ (mm)", *widths, MM),
         ("reconvolution, rms misfit (%)", sweep.relative_rms, sweep.seed_relative_rms, 0.01),
     )
-    with house_style():
-        figure = new_figure(6.6)
-        panels = figure.subplots(3, 1, sharex=True)
+    with panels_of(6.6, 3, sharex=True) as (figure, panels):
         for axes, (label, exact, draws, scale) in zip(panels, rows, strict=True):
             _draw_row(axes, sweep.amplitude, exact / scale, draws / scale)
             axes.set_ylabel(label)
-        panel_letters(panels)
         for axes in panels[:2]:
             _relative_axis(axes, sweep.amplitude)
         axes = panels[2]
@@ -48,13 +47,6 @@ def sweep_figure(sweep: Sweep) -> Figure:
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     return figure
-
-
-def _power_of_ten(values: FloatArray) -> int:
-    """Return the power of ten to name in a label in place of a row of zeros."""
-    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
-    power = int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
-    return 0 if -2 <= power <= 3 else power
 
 
 def _draw_row(axes: Axes, amplitude: FloatArray, exact: FloatArray, draws: FloatArray) -> None:

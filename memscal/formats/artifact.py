@@ -8,7 +8,7 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats import groups
-from memscal.formats.codec import read_record, write_record
+from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5.reader import SafeFile
 from memscal.formats.hdf5.writer import ARTIFACT_SCHEMA, Group, Node, file_tree, write_tree
 from memscal.formats.values import altered, require_scalar, require_schema

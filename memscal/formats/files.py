@@ -7,7 +7,7 @@ import errno
 import os
 import secrets
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from memscal.errors import InputError, OutputError, UnsafeFileError
@@ -35,14 +35,8 @@ def ensure_writable(
     inputs: Iterable[str | os.PathLike[str]] = (),
 ) -> None:
     """Prove that an output can be written, by writing beside it: permissions show no full disk."""
-    target = _checked_target(path, overwrite=overwrite, inputs=inputs)
-    temporary = _temporary_name(target)
-    try:
+    with _beside(_checked_target(path, overwrite=overwrite, inputs=inputs)) as temporary:
         _write_durably(temporary, b"\0")
-    except OSError as error:
-        raise _output_error(target, error) from error
-    finally:
-        _remove(temporary)
 
 
 def atomic_write_bytes(
@@ -54,18 +48,13 @@ def atomic_write_bytes(
 ) -> None:
     """Write a file whole or not at all: beside the target, flushed, then renamed in one step."""
     target = _checked_target(path, overwrite=overwrite, inputs=inputs)
-    temporary = _temporary_name(target)
-    try:
+    with _beside(target) as temporary:
         _write_durably(temporary, data)
         if overwrite:
             os.replace(temporary, target)
         else:
             _place_new(temporary, target)
         _sync_folder(target.parent)
-    except OSError as error:
-        raise _output_error(target, error) from error
-    finally:
-        _remove(temporary)
 
 
 def _checked_target(
@@ -106,8 +95,17 @@ def _checked_target(
     return target
 
 
-def _temporary_name(target: Path) -> Path:
-    return target.parent / f".memscal-{secrets.token_hex(8)}.tmp"
+@contextlib.contextmanager
+def _beside(target: Path) -> Iterator[Path]:
+    """Yield the name of a temporary file beside a target, and remove the file at the end."""
+    temporary = target.parent / f".memscal-{secrets.token_hex(8)}.tmp"
+    try:
+        yield temporary
+    except OSError as error:
+        raise _output_error(target, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
 
 
 def _write_durably(temporary: Path, data: bytes | memoryview) -> None:
@@ -143,11 +141,6 @@ def _sync_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-def _remove(temporary: Path) -> None:
-    with contextlib.suppress(OSError):
-        os.unlink(temporary)
 
 
 def _output_error(target: Path, error: OSError) -> OutputError:

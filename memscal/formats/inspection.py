@@ -11,8 +11,7 @@ import numpy as np
 
 from memscal.errors import FormatError, MemscalError
 from memscal.formats.artifact import artifact_from
-from memscal.formats.codec import listed, origins
-from memscal.formats.groups import estimated_record, read_quality
+from memscal.formats.groups import estimated_record, listed, origins, read_quality
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.reference import profile_from

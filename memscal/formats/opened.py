@@ -24,9 +24,7 @@ Contacts: TypeAlias = Scan | MeasuredStress | Path | Sequence[Scan | MeasuredStr
 
 def opened_scan(scan: Scan | Path) -> Scan:
     """Return a scan that is given itself or as a path."""
-    if isinstance(scan, str | PathLike):
-        return read_scan(scan)
-    return _required(scan)
+    return read_scan(scan) if isinstance(scan, str | PathLike) else _required(scan)
 
 
 def opened_scans(scans: Scans) -> tuple[Scan, ...]:

@@ -12,12 +12,12 @@ from typing import Any
 
 from memscal.errors import FormatError, OutputError
 from memscal.formats import groups, values
-from memscal.formats.codec import read_record, write_record
 from memscal.formats.files import ensure_writable
+from memscal.formats.groups import read_record, write_record
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si
-from memscal.formats.values import any_scalar, json_value, optional_text
+from memscal.formats.values import any_scalar, optional_text, text_list
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import by_name
@@ -121,11 +121,9 @@ def scan_from(file: SafeFile) -> Scan:
 def _read_arrays(file: SafeFile, along: str) -> dict[str, Any]:
     """Read the positions and the readings; :class:`Scan` compares their shapes."""
     unused = {"repeat", *(("y_errors",) if along == "x" else ("x", "x_errors"))}
-    arrays: dict[str, Any] = {
-        "position_scale_uncertainty": values.optional_scalar(
-            file, f"{_DATA}/position_scale_errors", "dimensionless"
-        )
-    }
+    arrays: dict[str, Any] = {}
+    if file.has(scale := f"{_DATA}/position_scale_errors"):
+        arrays["position_scale_uncertainty"] = values.require_scalar(file, scale, "dimensionless")
     for name, quantity in _DECLARED.items():
         path = f"{_DATA}/{name}"
         if name not in unused and (file.has(path) or name in (along, "u_zz")):
@@ -249,11 +247,11 @@ def _read_synthetic(file: SafeFile) -> dict[str, Any] | None:
     path = "/entry/synthetic"
     if not file.is_group(path):
         return None
-    truth: dict[str, Any] = {}
-    for name in json_value(file, f"{path}/names", list, []):
-        item = f"{path}/{name}"
-        truth[str(name)] = file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
-    return truth
+    items = {name: f"{path}/{name}" for name in text_list(file, f"{path}/names")}
+    return {
+        name: file.text(item) if file.is_text(item) else any_scalar(file, item)[0]
+        for name, item in items.items()
+    }
 
 
 def ensure_folder_writable(

@@ -11,13 +11,12 @@ import numpy as np
 
 from memscal.errors import FormatError
 from memscal.formats import groups, values
-from memscal.formats.codec import read_record, read_source, write_record, write_source
+from memscal.formats.groups import read_record, read_source, write_record, write_source
 from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile, open_hdf5
 from memscal.formats.hdf5.writer import Group, Node, si, to_json
-from memscal.formats.values import json_value, optional_text
+from memscal.formats.values import json_value, optional_text, text_list
 from memscal.model import records
-from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import (
     MeasuredPoints,
     MeasuredProfile,
@@ -48,26 +47,40 @@ def _scans_group(scans: Sequence[MeasuredScan]) -> Group:
 
 
 def _read_scans(
-    file: SafeFile, paths: Sequence[str], numbers: Sequence[int], sources: Mapping[str, SourceFile]
+    file: SafeFile, paths: Sequence[str], of: Sequence[int], sources: Mapping[str, SourceFile]
 ) -> tuple[MeasuredScan, ...]:
-    """Read the scans; ``numbers`` say which, from 1, the profile at each of the paths is of."""
+    """Read the scans; ``of`` says which, from 1, the profile at each of the paths is of."""
     stored = json_value(file, "/entry/scans/names", list, None)
-    size = max(numbers) if stored is None else len(stored)
-    if max(numbers) > size:
+    size = max(of) if stored is None else len(stored)
+    if max(of) > size:
         raise FormatError(
-            f"{file.where('/entry')}: a profile comes from scan {max(numbers)} of {size}.",
+            f"{file.where('/entry')}: a profile comes from scan {max(of)} of {size}.",
             cure="Run memscal apply again.",
         )
-    if stored is None:
-        # A file of version 1.0 states film, indenter and sensor once, for all scans.
-        path_of = dict(zip(reversed(numbers), reversed(paths), strict=True))
-        return tuple(
-            _old_scan(file, path_of.get(i, paths[0]), sources.get(f"scan_{i}"))
-            for i in range(1, size + 1)
+    scans = []
+    for i, name in enumerate(stored or [f"scan_{i}" for i in range(1, size + 1)], start=1):
+        path, source = f"/entry/scans/{name}", sources.get(str(name))
+        if stored is not None:
+            lubrication = optional_text(file, f"{path}/sample/lubrication")
+            numbers = read_record(records.MEASURED_SCAN, file, path)
+        else:
+            # A file of version 1.0 states film, indenter and sensor once, for all scans.
+            path = "/entry"
+            profile = paths[of.index(i) if i in of else 0]
+            lubrication = optional_text(file, f"{profile}/lubrication")
+            x, y = (values.require_array(file, f"{profile}/{axis}", "length") for axis in "xy")
+            numbers = {"width": float(np.hypot(np.ptp(x), np.ptp(y)))}
+        scans.append(
+            MeasuredScan(
+                film=groups.read_film(file, f"{path}/sample/film"),
+                indenter=groups.read_round_indenter(file, f"{path}/indenter"),
+                sensor=groups.read_sensor(file, f"{path}/instrument/stress_sensor"),
+                lubrication=lubrication,
+                source=source,
+                **numbers,
+            )
         )
-    return tuple(
-        _read_scan(file, f"/entry/scans/{name}", sources.get(str(name))) for name in stored
-    )
+    return tuple(scans)
 
 
 def _scan_group(scan: MeasuredScan) -> Group:
@@ -78,29 +91,6 @@ def _scan_group(scan: MeasuredScan) -> Group:
         **write_record(records.MEASURED_SCAN, scan).children,
     }
     return Group("NXcollection", children)
-
-
-def _read_scan(file: SafeFile, path: str, source: SourceFile | None) -> MeasuredScan:
-    return MeasuredScan(
-        film=groups.read_film(file, f"{path}/sample/film"),
-        indenter=groups.read_round_indenter(file, f"{path}/indenter"),
-        sensor=groups.read_sensor(file, f"{path}/instrument/stress_sensor"),
-        lubrication=optional_text(file, f"{path}/sample/lubrication"),
-        **read_record(records.MEASURED_SCAN, file, path),
-        source=source,
-    )
-
-
-def _old_scan(file: SafeFile, profile: str, source: SourceFile | None) -> MeasuredScan:
-    x, y = (values.require_array(file, f"{profile}/{name}", "length") for name in ("x", "y"))
-    return MeasuredScan(
-        film=groups.read_film(file, "/entry/sample/film"),
-        indenter=groups.read_round_indenter(file, "/entry/indenter"),
-        sensor=groups.read_sensor(file, "/entry/instrument/stress_sensor"),
-        width=float(np.hypot(np.ptp(x), np.ptp(y))),
-        lubrication=optional_text(file, f"{profile}/lubrication"),
-        source=source,
-    )
 
 
 _BUDGET = {"force": "force", "maximum": "stress"}
@@ -148,8 +138,8 @@ def stress_from(file: SafeFile) -> MeasuredStress:
             f"{file.where('/entry/profiles')} names no profile.",
             why="It lists the groups that hold one.",
         )
-    inputs = json_value(file, "/entry/inputs/names", list, [])
-    sources = {str(name): read_source(file, f"/entry/inputs/{name}") for name in inputs}
+    inputs = text_list(file, "/entry/inputs/names")
+    sources = {name: read_source(file, f"/entry/inputs/{name}") for name in inputs}
     numbers = [_scan_number(file, path) for path in paths]
     scans = _read_scans(file, paths, numbers, sources)
     return MeasuredStress(
@@ -160,7 +150,7 @@ def stress_from(file: SafeFile) -> MeasuredStress:
         scans=scans,
         **read_record(records.CONVERSION, file, "/entry/sensor"),
         checks=groups.read_quality(file, "/entry/quality"),
-        overridden=tuple(str(text) for text in json_value(file, "/entry/overridden", list, [])),
+        overridden=tuple(text_list(file, "/entry/overridden")),
         process=groups.read_process(file, "/entry/process"),
         artifact=sources.get("artifact"),
         artifact_digest=optional_text(file, "/entry/sensor/content_sha256"),
@@ -178,7 +168,7 @@ def write_stress(
 
 def profile_paths(file: SafeFile) -> list[str]:
     """Return the paths of the groups that hold a profile each; none in another schema's file."""
-    return [f"/entry/{name}" for name in json_value(file, "/entry/profiles", list, [])]
+    return [f"/entry/{name}" for name in text_list(file, "/entry/profiles")]
 
 
 def _entry(measured: MeasuredStress) -> Group:
@@ -272,7 +262,7 @@ def _numbers(profile: MeasuredProfile) -> dict[str, Any]:
 def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProfile:
     arrays = read_record(records.STRESS_PROFILE, file, path)
     n = arrays["r"].size
-    sources = [str(source) for source in json_value(file, f"{path}/sources", list, [])]
+    sources = text_list(file, f"{path}/sources")
     kind = "stress squared"
     declared = (Quantity(_PREFIX + name, kind, axes=_AXES, required=True) for name in sources)
     stored = read_record(record("NXdata", *declared), file, path, sizes={"r": n})
@@ -282,32 +272,20 @@ def _read_profile(file: SafeFile, path: str, scan: MeasuredScan) -> MeasuredProf
             f"{file.where(path)} states no covariance of its stress, or no budget.",
             why="Measured stress without uncertainty means little.",
         )
-    curve: dict[str, FloatArray] = {"curve_r": np.zeros(0), "curve_s_zz": np.zeros(0)}
+    profile = {"y": np.zeros(n), "load_uncertainty": None} | arrays
+    profile |= read_record(records.STRESS_NUMBERS, file, path)
     if file.has(f"{path}/curve"):
-        curve = read_record(records.STRESS_CURVE, file, f"{path}/curve")
-    numbers = read_record(records.STRESS_NUMBERS, file, path)
-    centre, uncertainty = (
-        np.array([numbers[f"centre{end}"], numbers.get(f"centre_y{end}", 0.0)])
-        for end in ("", "_uncertainty")
-    )
+        profile |= read_record(records.STRESS_CURVE, file, f"{path}/curve")
+    for end in ("", "_uncertainty"):
+        across = profile.get(f"centre_y{end}", 0.0)
+        profile[f"centre{end}"] = np.array([profile[f"centre{end}"], across])
+    # What follows from the others is stored for other programs.
+    fields = MeasuredProfile.__dataclass_fields__
     return MeasuredProfile(
         scan=scan,
-        load=numbers["load"],
-        load_uncertainty=numbers.get("load_uncertainty"),
-        r=arrays["r"],
-        x=arrays["x"],
-        y=arrays.get("y", np.zeros(n)),
-        s_zz=arrays["s_zz"],
+        **{name: value for name, value in profile.items() if name in fields},
         covariances={source: stored[f"{_PREFIX}{source}"] for source in sources},
-        force=numbers["force"],
         force_budget=budget["force"],
-        maximum=numbers["maximum"],
         maximum_budget=budget["maximum"],
-        centre=centre,
-        centre_uncertainty=uncertainty,
-        baseline=numbers["baseline"],
-        baseline_uncertainty=numbers["baseline_uncertainty"],
-        contact_radius=numbers["contact_radius"],
-        **curve,
         points=_read_points(file, path),
     )

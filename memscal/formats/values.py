@@ -84,11 +84,6 @@ def require_scalar(file: SafeFile, path: str, dimension: str) -> float:
     return float(values.reshape(()))
 
 
-def optional_scalar(file: SafeFile, path: str, dimension: str) -> float | None:
-    """Return the one number at a path in SI units, or ``None`` where there is none."""
-    return require_scalar(file, path, dimension) if file.has(path) else None
-
-
 def any_scalar(file: SafeFile, path: str) -> tuple[float, str]:
     """Return a number of any dimension in SI units, with its SI unit."""
     dimension = dimension_of(units_of(file, path) or "1", file.where(path))
@@ -102,9 +97,9 @@ def require_text(file: SafeFile, path: str) -> str:
     return file.text(path)
 
 
-def optional_text(file: SafeFile, path: str, default: str = "") -> str:
-    """Return the text at a path, or the default where there is none."""
-    return file.text(path) if file.has(path) else default
+def optional_text(file: SafeFile, path: str) -> str:
+    """Return the text at a path, empty where there is none."""
+    return file.text(path) if file.has(path) else ""
 
 
 def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
@@ -122,6 +117,11 @@ def json_value(file: SafeFile, path: str, kind: type, default: Any) -> Any:
     if isinstance(value, (list, dict)) and len(value) > _MAX_ITEMS:
         raise FormatError(f"{file.where(path)} lists {len(value):,} items.")
     return value
+
+
+def text_list(file: SafeFile, path: str) -> list[str]:
+    """Return the texts of a JSON list, such as names; none where there is no list."""
+    return [str(text) for text in json_value(file, path, list, [])]
 
 
 _PATH = re.compile(r"/|(?:/[a-z][a-z0-9_]*)+")

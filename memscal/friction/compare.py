@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
+from typing import Any
 
 import numpy as np
 
@@ -14,17 +15,9 @@ from memscal.errors import InputError
 from memscal.estimation.points import TANGENTIAL, accepted_differences
 from memscal.formats.cache import CacheFolder
 from memscal.formats.opened import Contacts, opened_contacts, opened_stress
-from memscal.friction.calculated import FRICTIONS, amontons_family
+from memscal.friction import effective
+from memscal.friction.calculated import FRICTIONS, amontons_family, external_family
 from memscal.friction.checks import comparison_checks, comparison_messages, synthetic_messages
-from memscal.friction.effective import (
-    Confrontation,
-    confront,
-    dry_against_lubricated,
-    load_comparison,
-    lubricated_pairs,
-    with_loading,
-)
-from memscal.friction.external import external_family
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import load_points, sensor_of
 from memscal.friction.model_comparison import compare_interface
@@ -194,19 +187,11 @@ def compare(
     opened, sensor = opened_contacts(contacts), opened_apparatus(apparatus)
     require_macroscopic(macroscopic, macroscopic_uncertainty, interface=interface)
     measured = _measured(opened, sensor, override)
+    setting = _setting(measured, cache, workers)
     if references is None:
-        families = _families(measured, friction, loading, cache, workers)
+        families = _families(setting, friction, loading)
     else:
-        scan = measured.scans[0]
-        family = external_family(
-            references,
-            np.unique(measured.loads),
-            reach=_reach(measured),
-            film=scan.film,
-            indenter=scan.indenter,
-            cache=cache,
-            workers=workers,
-        )
+        family = external_family(references, **setting)
         families = {family.loading: family}
     sliding = None if macroscopic is None else (macroscopic, macroscopic_uncertainty)
     comparison = compare_measured(measured, sensor, families, macroscopic=sliding)
@@ -254,7 +239,9 @@ def compare_measured(
     """Compare measured stress with families by loading, which hold every measured load."""
     confronted = _confronted(measured, apparatus, families)
     loads = {
-        name: tuple(load_comparison(p, of_family, i) for i, p in enumerate(measured.profiles))
+        name: tuple(
+            effective.load_comparison(p, of_family, i) for i, p in enumerate(measured.profiles)
+        )
         for name, of_family in confronted.items()
     }
     loads, joint = _loading_counted(loads, _joint(measured, confronted))
@@ -271,21 +258,21 @@ def compare_measured(
     )
 
 
-def _reach(measured: MeasuredStress) -> float:
-    """Return how far from the axis stresses are calculated, in m: whole millimetres."""
-    return math.ceil(_REACH * max(scan.width for scan in measured.scans) / _MM) * _MM
+def _setting(measured: MeasuredStress, cache: CacheFolder, workers: int) -> dict[str, Any]:
+    """Return film, sphere, loads and reach (whole millimetres) of the contacts to calculate."""
+    scan = measured.scans[0]
+    reach = math.ceil(_REACH * max(scan.width for scan in measured.scans) / _MM) * _MM
+    contacts = {"film": scan.film, "indenter": scan.indenter, "loads": np.unique(measured.loads)}
+    return {**contacts, "reach": reach, "cache": cache, "workers": workers}
 
 
 def _families(
-    measured: MeasuredStress,
+    setting: Mapping[str, Any],
     friction: Sequence[float] | None,
     loading: str | Sequence[str],
-    cache: CacheFolder,
-    workers: int,
     order: int = 0,
 ) -> dict[str, ProfileFamily]:
     """Return the calculated profiles at every load that was measured, by loading."""
-    scan = measured.scans[0]
     values = FRICTIONS if friction is None else tuple(float(mu) for mu in friction)
     if len(values) < 2:
         raise InputError(
@@ -296,17 +283,7 @@ def _families(
     if not loadings:
         raise InputError('No loading was given: "incremental", "total", or both.')
     return {
-        name: amontons_family(
-            scan.film,
-            scan.indenter,
-            np.unique(measured.loads),
-            friction=values,
-            loading=name,
-            reach=_reach(measured),
-            cache=cache,
-            workers=workers,
-            order=order,
-        )
+        name: amontons_family(friction=values, loading=name, order=order, **setting)
         for name in loadings
     }
 
@@ -316,12 +293,12 @@ def _confronted(
     apparatus: ApparatusFunction,
     families: Mapping[str, ProfileFamily],
     channel: str = "zz",
-) -> dict[str, Confrontation]:
+) -> dict[str, effective.Confrontation]:
     """Hold the points of every profile against each family."""
     points = [load_points(profile, channel) for profile in measured.profiles]
     reach = float(max(of_load.radius.max() for of_load in points))
     return {
-        name: confront(
+        name: effective.confront(
             family,
             sensor_of(apparatus, family, reach),
             points,
@@ -332,7 +309,7 @@ def _confronted(
 
 
 def _joint(
-    measured: MeasuredStress, confronted: Mapping[str, Confrontation]
+    measured: MeasuredStress, confronted: Mapping[str, effective.Confrontation]
 ) -> dict[str, dict[str, BoundedEstimate]]:
     """Return the coefficient of all loads together, for each state of lubrication."""
     by_lubrication: dict[str, list[int]] = {}
@@ -357,24 +334,26 @@ def _loading_counted(
         name: tuple(
             replace(
                 mine,
-                by_maximum=with_loading(mine.by_maximum, theirs.by_maximum),
-                by_profile=with_loading(mine.by_profile, theirs.by_profile),
+                by_maximum=effective.with_loading(mine.by_maximum, theirs.by_maximum),
+                by_profile=effective.with_loading(mine.by_profile, theirs.by_profile),
             )
             for mine, theirs in zip(loads[name], loads[other[name]], strict=True)
         )
         for name in names
     }
     together = {
-        kind: {name: with_loading(by[name], by[other[name]]) for name in names}
+        kind: {name: effective.with_loading(by[name], by[other[name]]) for name in names}
         for kind, by in joint.items()
     }
     return counted, together
 
 
-def _pairs(measured: MeasuredStress, confronted: Confrontation) -> tuple[DryAgainstLubricated, ...]:
+def _pairs(
+    measured: MeasuredStress, confronted: effective.Confrontation
+) -> tuple[DryAgainstLubricated, ...]:
     frictionless = confronted.family.at(confronted.family.values[:1])
     pairs = (
-        dry_against_lubricated(
+        effective.dry_against_lubricated(
             (measured.profiles[i], measured.profiles[j]),
             (confronted.points[i], confronted.points[j]),
             confronted.sensor,
@@ -382,7 +361,7 @@ def _pairs(measured: MeasuredStress, confronted: Confrontation) -> tuple[DryAgai
             (confronted.loads[i], confronted.loads[j]),
             measured.conversion_constant_uncertainty / measured.conversion_constant,
         )
-        for i, j in lubricated_pairs(measured.profiles)
+        for i, j in effective.lubricated_pairs(measured.profiles)
     )
     return tuple(pair for pair in pairs if pair is not None)
 
@@ -454,7 +433,7 @@ def compare_shear(
     _require_tangential(sensor)
     overridden = accept_other_sensor(measured.scans[0], sensor, ("name",), override=override)
     channel = sensor.sensor.channel
-    families = _families(measured, friction, loading, cache, workers, order=1)
+    families = _families(_setting(measured, cache, workers), friction, loading, order=1)
     confronted = _confronted(measured, sensor, families, channel)
     note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
     return ShearComparison(

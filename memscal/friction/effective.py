@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,8 @@ from memscal.friction.likelihood import (
 )
 from memscal.friction.results import BoundedEstimate, DryAgainstLubricated, Interval, LoadComparison
 from memscal.model.arrays import FloatArray
+from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_bound
-
-if TYPE_CHECKING:
-    from memscal.model.measured_stress import MeasuredProfile
 
 #: Coverage factor of 95 %.
 _EXPANDED = 1.96

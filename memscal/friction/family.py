@@ -30,7 +30,13 @@ from memscal.formats.cache import CacheFolder, find_contact_table, keep_contact_
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.indent import indent
 from memscal.mechanics.interface import Interface
-from memscal.model.arrays import FloatArray, finite_vector, freeze_arrays, require_positive
+from memscal.model.arrays import (
+    FloatArray,
+    finite_vector,
+    freeze_arrays,
+    frozen_array,
+    require_positive,
+)
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Sphere
 from memscal.parallel import require_workers, worker_pool
@@ -43,9 +49,15 @@ FRICTION_SCALE = 0.3
 _ROUNDING = 1e-9
 
 
-def bounded(value: float, scale: float) -> float:
-    """Return the bounded coordinate of a value: 1 where it is infinite."""
-    return 1.0 if math.isinf(value) else value / (value + scale)
+def bounded(values: ArrayLike, scale: float) -> FloatArray:
+    """Return the bounded coordinate of values: 1 where they are infinite."""
+    theta = np.asarray(values, dtype=np.float64)
+    finite = np.where(np.isfinite(theta), theta, 0.0)
+    return np.where(np.isfinite(theta), finite / (finite + scale), 1.0)
+
+
+#: Arrays of a family that hold one number for each value and load.
+_NUMBERS = ("depths", "contact_radii", "convergence")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +85,8 @@ class ProfileFamily:
     slopes: FloatArray | None = None  # of a selection by at(), whose values have any order
 
     def __post_init__(self) -> None:
-        arrays = ("loads", "values", "spectra", "by_load")
-        freeze_arrays(self, *arrays, "depths", "contact_radii", "convergence")
-        changes = {source: np.array(change) for source, change in self.changes.items()}
-        for change in changes.values():
-            change.setflags(write=False)
+        freeze_arrays(self, "loads", "values", "spectra", "by_load", *_NUMBERS)
+        changes = {source: frozen_array(change) for source, change in self.changes.items()}
         object.__setattr__(self, "changes", MappingProxyType(changes))
         require_positive("scale of a profile family", self.scale)
         self._require_shapes()
@@ -92,15 +101,10 @@ class ProfileFamily:
     def _require_shapes(self) -> None:
         table = (self.values.size, self.loads.size)
         whole = (*table, self.wavenumbers.k.size)
-        shapes: dict[str, tuple[FloatArray, tuple[int, ...]]] = {
-            "spectra": (self.spectra, whole),
-            "by_load": (self.by_load, whole),
-            **{f"changes[{name!r}]": (c, whole) for name, c in self.changes.items()},
-            "depths": (self.depths, table),
-            "contact_radii": (self.contact_radii, table),
-            "convergence": (self.convergence, table),
-        }
-        for name, (array, shape) in shapes.items():
+        arrays = {name: getattr(self, name) for name in ("spectra", "by_load", *_NUMBERS)}
+        arrays |= {f"changes[{name!r}]": change for name, change in self.changes.items()}
+        for name, array in arrays.items():
+            shape = table if name in _NUMBERS else whole
             if array.shape != shape:
                 raise InputError(
                     f"{name} of a profile family has shape {array.shape}, not {shape}."
@@ -114,7 +118,7 @@ class ProfileFamily:
     @cached_property
     def coordinates(self) -> FloatArray:
         """Bounded coordinates of the values, shape (M,)."""
-        return np.array([self.coordinate(float(value)) for value in self.values])
+        return bounded(self.values, self.scale)
 
     @cached_property
     def by_coordinate(self) -> FloatArray:
@@ -125,7 +129,7 @@ class ProfileFamily:
         r"""Return the bounded coordinate :math:`t = \theta/(\theta + \theta_0)` of a value."""
         if math.isnan(value) or value < 0:
             raise InputError(f"A {self.name} family has no value {value:g}: it is not negative.")
-        return bounded(value, self.scale)
+        return float(bounded(value, self.scale))
 
     def value_at(self, coordinate: float) -> float:
         """Return the value at a bounded coordinate: the inverse of :meth:`coordinate`."""
@@ -156,32 +160,24 @@ class ProfileFamily:
         def linear(table: FloatArray) -> FloatArray:
             return np.stack([np.interp(t, nodes, column) for column in table.T], axis=1)
 
+        numbers: dict[str, Any] = {name: linear(getattr(self, name)) for name in _NUMBERS}
         return replace(
             self,
             values=chosen,
             spectra=arrays[:, 0],
             by_load=arrays[:, 1],
             changes={source: arrays[:, 2 + i] for i, source in enumerate(self.changes)},
-            depths=linear(self.depths),
-            contact_radii=linear(self.contact_radii),
-            convergence=linear(self.convergence),
             slopes=self._interpolated(t, 1)[:, 0],
+            **numbers,
         )
 
     def only(self, loads_index: int | Sequence[int]) -> ProfileFamily:
         """Return the family at one or several of its loads, by index, in the order given."""
         chosen = np.atleast_1d(np.asarray(loads_index, dtype=np.intp))
-        return replace(
-            self,
-            loads=self.loads[chosen],
-            spectra=self.spectra[:, chosen],
-            by_load=self.by_load[:, chosen],
-            changes={name: change[:, chosen] for name, change in self.changes.items()},
-            depths=self.depths[:, chosen],
-            contact_radii=self.contact_radii[:, chosen],
-            convergence=self.convergence[:, chosen],
-            slopes=None if self.slopes is None else self.slopes[:, chosen],
-        )
+        names = ["spectra", "by_load", *_NUMBERS, *(() if self.slopes is None else ("slopes",))]
+        arrays: dict[str, Any] = {name: getattr(self, name)[:, chosen] for name in names}
+        changes = {name: change[:, chosen] for name, change in self.changes.items()}
+        return replace(self, loads=self.loads[chosen], changes=changes, **arrays)
 
     @cached_property
     def _pieces(self) -> Any:
@@ -330,8 +326,7 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
     """Solve the contacts; an error names the loads and the interface that it was about."""
     rigid = path.interface.rigid
     usual = _RINGS_OF_A_RIGID_CONTACT if rigid else _RINGS_OF_A_COMPLIANT_CONTACT
-    counts = (usual, *_OTHER_RINGS)
-    for rings in counts:
+    for rings in (usual, *_OTHER_RINGS):
         try:
             return indent(
                 path.film,
@@ -345,11 +340,10 @@ def _contacts(path: LoadingPath, loads: FloatArray) -> list[Contact]:
                 rings=rings,
             )
         except ConvergenceError as error:
-            if rings == counts[-1]:
-                raise _named(path, error) from error
+            failure = error
         except DomainError as error:
             raise _named(path, error) from error
-    raise AssertionError("one of the attempts returns or raises")
+    raise _named(path, failure) from failure
 
 
 def _named(path: LoadingPath, error: DomainError | ConvergenceError) -> MemscalError:
@@ -421,19 +415,10 @@ class FamilySetup:
         nodes = base_wavenumbers(film.thickness, reach)
         return cls(film, indenter, require_loads(loads), nodes, cache, workers, order)
 
-    def path(
-        self, *, friction: float, loading: str = "incremental", interface: Interface | None = None
-    ) -> LoadingPath:
-        """Return the loading path of one member."""
-        return LoadingPath(
-            film=self.film,
-            indenter=self.indenter,
-            loads=tuple(float(load) for load in self.loads),
-            friction=friction,
-            loading=loading,
-            interface=interface or Interface(),
-            order=self.order,
-        )
+    def path(self, **law: Any) -> LoadingPath:
+        """Return the loading path of one member; ``law``: its friction, loading and interface."""
+        law |= {"loads": tuple(float(load) for load in self.loads), "order": self.order}
+        return LoadingPath(film=self.film, indenter=self.indenter, **law)
 
     def family(
         self,
@@ -456,7 +441,6 @@ class FamilySetup:
             arrays = self._calculated(paths, stronger, (values, scale) if a_length else None)
             axes = {"value": values, "load": self.loads, "k": k}
             keep_contact_table(self.cache, key, axes | arrays)
-        fixed = ("spectra", "by_load", "depths", "contact_radii", "convergence")
         changes = [name for name in arrays if name.startswith(_CHANGE)]
         return ProfileFamily(
             name=name,
@@ -468,7 +452,7 @@ class FamilySetup:
             changes={source.removeprefix(_CHANGE): arrays[source] for source in changes},
             notes=notes,
             order=self.order,
-            **{name: arrays[name] for name in fixed},
+            **{name: arrays[name] for name in ("spectra", "by_load", *_NUMBERS)},
         )
 
     def _calculated(
@@ -553,5 +537,5 @@ def _by_log_value(spectra: FloatArray, values: FloatArray, scale: float) -> Floa
         return np.zeros_like(spectra)
     from scipy.interpolate import PchipInterpolator
 
-    t = np.array([bounded(float(value), scale) for value in values])
+    t = bounded(values, scale)
     return np.asarray((t * (1 - t))[:, None, None] * PchipInterpolator(t, spectra, axis=0)(t, 1))

@@ -218,9 +218,7 @@ def sensor_of(apparatus: ApparatusFunction, family: ProfileFamily, reach: float)
 
 def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: int) -> Predicted:
     """Return what the sensor reads of members at the points of one load, by the load's index."""
-    bessel = _Bessel(points.radius, sensor.wavenumbers)
-    if sensor.order:
-        bessel = _VectorBessel(points.radius, sensor.wavenumbers, np.sign(points.offset))
+    bessel = _Bessel.of(points, sensor)
     spectra, transfer = members.spectra[:, load], sensor.transfer
     by_load = bessel.values(transfer * members.by_load[:, load])
     slope = bessel.slopes(transfer * spectra)
@@ -241,48 +239,32 @@ def predict(points: LoadPoints, sensor: Sensor, members: ProfileFamily, load: in
 
 @dataclass(frozen=True, eq=False)
 class _Bessel:
-    """Inverse transforms at distances (n,) in m, and their slopes; repeats share theirs."""
+    """Inverse transforms at the distances of n points, and their slopes; repeats share theirs."""
 
-    radius: FloatArray
-    wavenumbers: Wavenumbers
-    sign: FloatArray | float = 1.0  # factor (n,) of both: of a vector, the side of the centre
+    even: FloatArray  # (m, K): of a transform's value at the m different distances
+    odd: FloatArray  # (m, K): of its derivative by the distance
+    back: NDArray[np.intp]  # (n,): which of the distances is that of a point
+    sign: FloatArray | float  # factor (n,) of both: of a vector, the side of the centre
+
+    @classmethod
+    def of(cls, points: LoadPoints, sensor: Sensor) -> _Bessel:
+        """Return those of a scalar, or of a vector's component where the order is one."""
+        radius, back = np.unique(points.radius, return_inverse=True)
+        k, weights = sensor.wavenumbers.k, sensor.wavenumbers.weights
+        phase = np.multiply.outer(radius, k)
+        if not sensor.order:
+            return cls(j0(phase) * weights, -j1(phase) * weights * k, back, 1.0)
+        turn = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
+        odd = (j0(phase) - turn) * weights * k
+        return cls(j1(phase) * weights, odd, back, np.sign(points.offset))
 
     def values(self, spectra: FloatArray) -> FloatArray:
-        """Values of transforms (V, K) at the distances, shape (V, n)."""
-        return np.asarray(self.sign * (spectra @ self._even.T)[:, self._unique[1]])
+        """Values of transforms (V, K) at the points, shape (V, n)."""
+        return np.asarray(self.sign * (spectra @ self.even.T)[:, self.back])
 
     def slopes(self, spectra: FloatArray) -> FloatArray:
         """Their derivatives by the distance, shape (V, n)."""
-        return np.asarray(self.sign * (spectra @ self._odd.T)[:, self._unique[1]])
-
-    @cached_property
-    def _unique(self) -> tuple[FloatArray, NDArray[np.intp]]:
-        return np.unique(self.radius, return_inverse=True)
-
-    @cached_property
-    def _even(self) -> FloatArray:
-        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
-        return np.asarray(j0(phase) * self.wavenumbers.weights)
-
-    @cached_property
-    def _odd(self) -> FloatArray:
-        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
-        return np.asarray(-j1(phase) * self.wavenumbers.weights * self.wavenumbers.k)
-
-
-class _VectorBessel(_Bessel):
-    """The same of a vector's component, of order one."""
-
-    @cached_property
-    def _even(self) -> FloatArray:
-        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
-        return np.asarray(j1(phase) * self.wavenumbers.weights)
-
-    @cached_property
-    def _odd(self) -> FloatArray:
-        phase = np.multiply.outer(self._unique[0], self.wavenumbers.k)
-        turn = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
-        return np.asarray((j0(phase) - turn) * self.wavenumbers.weights * self.wavenumbers.k)
+        return np.asarray(self.sign * (spectra @ self.odd.T)[:, self.back])
 
 
 @dataclass(frozen=True, eq=False)

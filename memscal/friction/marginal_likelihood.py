@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
+from memscal.friction.family import bounded
 from memscal.model.arrays import FloatArray
 
 #: Paths through the loads along which a parameter of each load is drawn: a power of two.
@@ -62,14 +63,6 @@ class Tables:
         return self.squares, self.pulls, self.grips, self.volumes
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """An integral of the likelihood over a prior, by its logarithm, and its numerical error."""
-
-    log: float
-    error: float = 0.0
-
-
 def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
     """Return the logarithm of the likelihood, and chi-square, of each entry of tables.
 
@@ -93,14 +86,16 @@ def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
     return -(chi_square + volume) / 2, chi_square
 
 
-def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> Evidence:
-    """Return the evidence of a law with one parameter; ``weights`` (M,): the prior of each node."""
+def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> float:
+    """Return the logarithm of the evidence of a law with one parameter; ``weights`` (M,): prior."""
     with np.errstate(divide="ignore"):
-        return Evidence(float(_log_sum(log_likelihoods + np.log(weights))))
+        return float(_log_sum(log_likelihoods + np.log(weights)))
 
 
-def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) -> Evidence:
-    """Return the evidence of a law with one parameter of each load, on its nodes and their weights.
+def evidence_of_each(
+    tables: Sequence[Tables], weights: Sequence[FloatArray]
+) -> tuple[float, float]:
+    """Return the logarithm of the evidence of a law with one parameter of each load, and its error.
 
     The parameter of each load is drawn (by a Sobol sequence) given those before; the evidence is
     the mean over the draws of the product of what each load was expected to be.
@@ -137,7 +132,7 @@ def evidence_of_each(tables: Sequence[Tables], weights: Sequence[FloatArray]) ->
         before = log_likelihood(taken)[0]
     mean = float(_log_sum(logs) - np.log(paths))
     spread = np.std(np.exp(logs - mean)) / np.sqrt(paths)
-    return Evidence(mean, float(spread))
+    return mean, float(spread)
 
 
 def _log_sum(logs: FloatArray) -> FloatArray:
@@ -176,12 +171,7 @@ class Prior:
 
 def bounded_prior(scale: float, words: str) -> Prior:
     """Return the prior that is uniform in the bounded coordinate about a ``scale``."""
-
-    def below(values: FloatArray) -> FloatArray:
-        finite = np.where(np.isfinite(values), values, 0.0)
-        return np.where(np.isfinite(values), finite / (finite + scale), 1.0)
-
-    return Prior(words, below)
+    return Prior(words, lambda values: bounded(values, scale))
 
 
 def log_uniform_prior(low: float, high: float, words: str) -> Prior:

@@ -16,46 +16,42 @@ which bear no shear, follows likewise whether the interface yields normally.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from memscal.apparatus import ApparatusFunction
 from memscal.errors import InputError
 from memscal.formats.cache import CacheFolder
 from memscal.friction.calculated import LawFamilies
+from memscal.friction.effective import profile_estimate
 from memscal.friction.family import ProfileFamily
-from memscal.friction.interface_laws import (
-    LawCurve,
-    Measured,
-    curve,
-    implied_friction,
-    interface_length,
-    of_one_value,
-    one_of_all,
-    one_of_each,
-)
-from memscal.friction.likelihood import load_points, sensor_of
+from memscal.friction.likelihood import LoadPoints, Sensor, likelihood, load_points, sensor_of
 from memscal.friction.marginal_likelihood import (
     Prior,
+    Tables,
     bounded_prior,
+    evidence_of_each,
+    evidence_of_one,
+    log_likelihood,
     log_uniform_prior,
     uniform_prior,
 )
 from memscal.friction.results import (
+    BoundedEstimate,
+    ImpliedFriction,
     InterfaceComparison,
     InterfaceLaw,
+    Interval,
     LawComparison,
     PriorChoice,
 )
-from memscal.model.arrays import require_positive
+from memscal.model.arrays import FloatArray, require_positive
 from memscal.model.bayes_factor import BayesFactor
 from memscal.model.checks import Message
-
-if TYPE_CHECKING:
-    from memscal.model.measured_stress import MeasuredProfile
+from memscal.model.measured_stress import MeasuredProfile
 
 #: Slip lengths that are thought possible: of the order of the roughness of surfaces that touch.
 _SLIP_LENGTHS = (1e-7, 1e-4)
@@ -97,9 +93,7 @@ def weigh_slip_length(
     )
 
 
-def weigh_normal_compliance(
-    measured: Measured, *, lubrication: str = "lubricated"
-) -> LawComparison:
+def weigh_normal_compliance(measured: Measured) -> LawComparison:
     """Weigh a normal compliance against a rigid interface, both without friction."""
     largest = float(measured.family.values[-1])
     low, high = (share * largest for share in _NORMAL_SHARES)
@@ -112,7 +106,7 @@ def weigh_normal_compliance(
     rigid = of_one_value("rigid, frictionless", along, 0, measured.degrees)
     yielding = one_of_all("normal compliance, length", along, prior, measured.degrees)
     return LawComparison(
-        lubrication=lubrication,
+        lubrication="lubricated",
         loads=measured.family.loads,
         laws=(rigid, yielding),
         factors=_factors([rigid, yielding]),
@@ -243,3 +237,228 @@ def _messages(
                 f"best one's chi-square, {best.least:.0f} of {best.degrees} degrees of freedom, "
                 f"has p = {best.p_value:.1g}. Their Bayes factors compare laws that are all wrong.",
             )
+
+
+#: Nodes over all values, and over those that the data do not exclude.
+_COARSE, _FINE = 81, 161
+#: Of one load: with others its parameter is known better than alone.
+_FINER = 321
+#: Values are excluded where twice the log-likelihood falls short of the best by this.
+_EXCLUDED = 25.0
+#: Sweeps over the loads that look for the best parameter of each.
+_SWEEPS = 200
+_SETTLED = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Measured points, the sensor, and the contacts calculated at their loads, in their order."""
+
+    points: Sequence[LoadPoints]
+    sensor: Sensor
+    family: ProfileFamily
+
+    @property
+    def degrees(self) -> int:
+        """Points less flat nuisances, of all loads."""
+        return sum(points.degrees for points in self.points)
+
+    def tables(self, values: FloatArray) -> Tables:
+        """Return the statistics of the loads at values of the family's parameter."""
+        loads = range(len(self.points))
+        return likelihood(self.points, self.sensor, self.family.at(values), loads).tables()
+
+
+@dataclass(frozen=True, eq=False)
+class LawCurve:
+    """The likelihood of a law along its parameter, at M values."""
+
+    values: FloatArray
+    coordinates: FloatArray
+    edges: FloatArray  # (M + 1,): between them each value stands for all others
+    tables: Tables  # of shape (M, 1)
+    log_likelihood: FloatArray
+    chi_square: FloatArray
+
+    @property
+    def best(self) -> int:
+        """Index of the largest likelihood."""
+        return int(np.argmax(self.log_likelihood))
+
+    @property
+    def deviance(self) -> FloatArray:
+        """Chi-square at the largest likelihood, and above it elsewhere by twice its loss."""
+        loss = self.log_likelihood[self.best] - self.log_likelihood
+        return np.asarray(self.chi_square[self.best] + 2 * loss)
+
+    def log_evidence(self, prior: Prior) -> float:
+        """Return the logarithm of the likelihood averaged over a prior."""
+        return evidence_of_one(self.log_likelihood, prior.weights(self.edges))
+
+
+def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] = ()) -> LawCurve:
+    """Return the likelihood along a family's parameter, of all loads or of one by its index."""
+    family = measured.family
+    first, last = family.coordinates[0], family.coordinates[-1]
+    # Nodes are even in the bounded coordinate, closer where it matters.
+    extra = [family.coordinate(value) for value in also]
+    coarse = np.unique(np.concatenate([np.linspace(first, last, _COARSE), extra]))
+
+    def tables_at(coordinates: FloatArray) -> Tables:
+        tables = measured.tables(family.values_at(coordinates))
+        return tables.together() if load is None else tables.group(load)
+
+    rough = tables_at(coarse)
+    rough_log = log_likelihood(rough)[0][:, 0]
+    near = np.flatnonzero(2 * (rough_log.max() - rough_log) < _EXCLUDED)
+    low, high = coarse[max(near[0] - 1, 0)], coarse[min(near[-1] + 1, coarse.size - 1)]
+    fine = np.setdiff1d(np.linspace(low, high, _FINE if load is None else _FINER), coarse)
+    close = tables_at(fine)
+    both = np.concatenate([coarse, fine])
+    order = np.argsort(both)
+    tables = Tables(
+        *(np.concatenate(pair)[order] for pair in zip(rough.arrays, close.arrays, strict=True))
+    )
+    t = both[order]
+    logs, chi_square = log_likelihood(tables)
+    middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
+    values, edges = family.values_at(t), family.values_at(middles)
+    return LawCurve(values, t, edges, tables, logs[:, 0], chi_square[:, 0])
+
+
+def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> InterfaceLaw:
+    """Return the law with one parameter for all loads; degrees are points less nuisances."""
+    best, log_evidence = float(along.values[along.best]), along.log_evidence(prior)
+    top, least = float(along.log_likelihood[along.best]), float(along.chi_square[along.best])
+    return _law(name, (best,), log_evidence, 0.0, top, least, degrees - 1)
+
+
+def of_one_value(name: str, along: LawCurve, index: int, degrees: int) -> InterfaceLaw:
+    """Return the law that leaves nothing free, by the index of its parameter in a curve."""
+    top, least = float(along.log_likelihood[index]), float(along.chi_square[index])
+    return _law(name, (), top, 0.0, top, least, degrees)
+
+
+def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
+    """Return the law with one parameter of each load; arguments as for :func:`one_of_all`."""
+    tables, near = zip(*(_where_it_matters(along) for along in curves), strict=True)
+    weights = [prior.weights(along.edges)[nodes] for along, nodes in zip(curves, near, strict=True)]
+    log_evidence, error = evidence_of_each(tables, weights)
+    start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
+    chosen, top, chi_square = _best_of_each(tables, start)
+    triples = zip(curves, near, chosen, strict=True)
+    best = tuple(float(along.values[nodes][place]) for along, nodes, place in triples)
+    return _law(name, best, log_evidence, error, top, chi_square, degrees - len(curves))
+
+
+def _law(
+    name: str,
+    best: tuple[float, ...],
+    log_evidence: float,
+    error: float,
+    top: float,
+    least: float,
+    degrees: int,
+) -> InterfaceLaw:
+    p_value = float(chdtrc(degrees, least)) if degrees > 0 else 1.0
+    return InterfaceLaw(name, best, log_evidence, top, error, least, degrees, p_value)
+
+
+def _where_it_matters(along: LawCurve) -> tuple[Tables, FloatArray]:
+    """Leave out the nodes that one load alone excludes."""
+    near = 2 * (along.log_likelihood.max() - along.log_likelihood) < _EXCLUDED
+    return Tables(*(array[near] for array in along.tables.arrays)), near
+
+
+def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int], float, float]:
+    """Climb the likelihood, one load after the other, from node to node."""
+    chosen, top, chi_square = list(start), -np.inf, 0.0
+    for _ in range(_SWEEPS):
+        before = top
+        for j, table in enumerate(tables):
+            at = [[a[chosen[i]] for a in other.arrays] for i, other in enumerate(tables) if i != j]
+            sums = [np.sum(arrays, axis=0) for arrays in zip(*at, strict=True)] or [0.0] * 4
+            both = Tables(*(a + s for a, s in zip(table.arrays, sums, strict=True)))
+            logs, squares = log_likelihood(both)
+            chosen[j] = int(np.argmax(logs[:, 0]))
+            top, chi_square = float(logs[chosen[j], 0]), float(squares[chosen[j], 0])
+        if top - before < _SETTLED:
+            break
+    return chosen, top, chi_square
+
+
+_NODES = 401
+#: A maximum this near to the largest one, relatively, is full stick: profiles are that accurate.
+_STICK = 2e-4
+
+
+def implied_friction(
+    rigid: Measured, slipping: Measured, length: BoundedEstimate, friction: float
+) -> ImpliedFriction:
+    """Return what a slip length and its interval mean at each load, read from the maximum."""
+    order = np.argsort(rigid.family.loads, kind="stable")
+    high = math.inf if length.interval.high is None else length.interval.high
+    lengths = np.array([length.interval.low, length.best, high])
+    t = np.linspace(rigid.family.coordinates[0], rigid.family.coordinates[-1], _NODES)
+    values = rigid.family.values_at(t)
+    curves, maxima = _maxima(rigid, values), _maxima(slipping, lengths)
+    implied = [[_read(values, curves[:, load], top) for top in maxima[:, load]] for load in order]
+    family = slipping.family
+    pressures = (family.loads / (np.pi * family.at(length.best).contact_radii[0] ** 2))[order]
+    with np.errstate(divide="ignore"):
+        stiffnesses = friction * pressures[:, None] / lengths
+    return ImpliedFriction(family.loads[order], np.array(implied), pressures, stiffnesses)
+
+
+def _maxima(measured: Measured, values: FloatArray) -> FloatArray:
+    """Return stresses on the axis behind G, times A, shape (V, L)."""
+    sensor, spectra = measured.sensor, measured.family.at(values).spectra
+    return np.asarray(spectra @ (sensor.transfer * sensor.wavenumbers.weights))
+
+
+def _read(values: FloatArray, curve: FloatArray, top: float) -> float:
+    """Return the first coefficient at which the maximum is as large."""
+    if top >= curve.max() * (1 - _STICK):
+        return math.inf
+    above = int(np.argmax(curve >= top))
+    if above == 0:
+        return float(values[0])
+    low, high = curve[above - 1], curve[above]
+    last = values[above] if np.isfinite(values[above]) else values[above - 1]
+    share = (top - low) / (high - low)
+    return float(values[above - 1] + share * (last - values[above - 1]))
+
+
+def interface_length(along: LawCurve, family: ProfileFamily, what: str) -> BoundedEstimate:
+    """Return a length by profile likelihood, one-sided where the data give only a bound."""
+    return profile_estimate(
+        along.values,
+        along.coordinates,
+        along.deviance,
+        family.value_at,
+        reason=lambda interval: _length_reason(what, interval, float(family.values[-1])),
+        two_sided=True,
+        unit="m",
+    )
+
+
+def _length_reason(what: str, interval: Interval, last: float) -> str:
+    low, high = interval.low, interval.high
+    if low > 0 and high is not None:
+        return ""
+    largest = f"the largest that was calculated, {last / _UM:.3g} um,"
+    end = "one that bears no shear" if math.isinf(last) else largest
+    if low > 0:
+        return (
+            f"The {what} is not identifiable above {low / _UM:.3g} um: larger ones, {end} "
+            "included, agree with the data as well. This is a lower bound."
+        )
+    if high is not None:
+        return (
+            f"The {what} is not identifiable below {high / _UM:.3g} um: a rigid interface agrees "
+            "with the data as well. This is an upper bound."
+        )
+    return (
+        f"The {what} is not identifiable: a rigid interface and {end} agree with the data "
+        "equally well."
+    )

@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from memscal.apparatus import ApparatusFunction
 from memscal.model.arrays import FloatArray
 from memscal.model.bayes_factor import POSITIVE, BayesFactor
-from memscal.model.checks import Message, QualityCheck
+from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
+from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
 from memscal.model.result import Result
-
-if TYPE_CHECKING:
-    from memscal.apparatus import ApparatusFunction
-    from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 
 _UM = 1e-6
 
@@ -202,7 +200,7 @@ def _joint_text(joint: Mapping[str, Mapping[str, BoundedEstimate]]) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrictionComparison(Result):
+class FrictionComparison(Result, Checked):
     """Measured stress against calculated contacts, with the friction that explains it.
 
     Printed, it is the tables of ``memscal compare``.
@@ -223,14 +221,7 @@ class FrictionComparison(Result):
 
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
-        failed = [check.name for check in self.checks if not check.passed]
-        state = f"failed: {', '.join(failed)}" if failed else "all checks passed"
-        return f"<FrictionComparison: {_joint_text(self.joint)}; {state}>"
-
-    @property
-    def passed(self) -> bool:
-        """Whether every quality check passed."""
-        return all(check.passed for check in self.checks)
+        return f"<FrictionComparison: {_joint_text(self.joint)}; {state_of_checks(self.checks)}>"
 
     @property
     def loadings(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import math
 import platform
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 
 import numpy as np
@@ -16,27 +16,9 @@ from scipy.special import erfc
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.errors import FitError, InputError
 from memscal.formats.opened import Scans, opened_scans
-from memscal.measurement.measured_profile import (
-    ContactSignal,
-    PreparedScan,
-    SingleLoad,
-    contact_signal,
-    measured_profile,
-    measured_scan,
-    place_of,
-    prepared_scan,
-    require_ends,
-    require_points,
-    single_loads,
-)
+from memscal.measurement import measured_profile as one_load
+from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
-from memscal.measurement.restore import (
-    accept_mismatches,
-    failed_calibration_messages,
-    noise_unstated_message,
-    require_covariance,
-    restore_known,
-)
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
     FAILED_CALIBRATION,
@@ -110,12 +92,6 @@ def _relative(profile: MeasuredProfile) -> dict[str, float]:
     """Standard uncertainties of force over load, by source."""
     budget = {source: u / profile.load for source, u in profile.force_budget.items()}
     return {**budget, "load": (profile.load_uncertainty or 0.0) / profile.load}
-
-
-def checks_of_restoration(restoration: Restoration, *, stated: bool) -> tuple[QualityCheck, ...]:
-    """Return the checks of a restoration that hold for its profile; ``stated``: the noise is."""
-    left_out = {_REPLACED} if stated else {_REPLACED, *_OF_STATED_NOISE}
-    return tuple(check for check in restoration.checks if check.name not in left_out)
 
 
 def _force(profile: MeasuredProfile) -> QualityCheck:
@@ -204,17 +180,17 @@ def measure_stress(
     True
     """
     sensor, scans = opened_apparatus(apparatus), opened_scans(scan)
-    require_covariance(sensor)
-    mismatches = (accept_mismatches(data, sensor, override=override) for data in scans)
+    restore.require_covariance(sensor)
+    mismatches = (restore.accept_mismatches(data, sensor, override=override) for data in scans)
     overridden = tuple(text for of_scan in mismatches for text in of_scan)
-    origins = tuple(measured_scan(data) for data in scans)
+    origins = tuple(one_load.measured_scan(data) for data in scans)
     loads = [
         _measure(origin, single, sensor)
         for origin, data in zip(origins, scans, strict=True)
-        for single in single_loads(data)
+        for single in one_load.single_loads(data)
     ]
-    profiles = tuple(load.profile for load in loads)
-    checks = stress_checks(profiles, [load.checks for load in loads])
+    profiles, restored, notes = zip(*loads, strict=True)
+    checks = stress_checks(profiles, restored)
     return MeasuredStress(
         profiles=profiles,
         scans=origins,
@@ -232,7 +208,7 @@ def measure_stress(
                 "numpy": np.__version__,
                 "scipy": scipy.__version__,
             },
-            messages=tuple(_messages(loads, sensor, checks, overridden)),
+            messages=tuple(_messages(notes, sensor, checks, overridden)),
         ),
         artifact=sensor.source,
         artifact_digest=sensor.content_digest,
@@ -259,12 +235,12 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
         if (numbered := _NUMBERED.fullmatch(check.name))
     ]
     # The checks, under their new numbers, state what failed.
-    messages = [
-        replace(message, text=f"{_files_of(stress)}: {message.text}")
-        for stress in stresses
-        for message in stress.messages
-        if message.kind != FAILED_CHECK
-    ]
+    messages = []
+    for stress in stresses:
+        names = ", ".join(scan.source.file_name for scan in stress.scans if scan.source)
+        place = names or f"{stress.profiles[0].label} and on"
+        others = (message for message in stress.messages if message.kind != FAILED_CHECK)
+        messages += [replace(message, text=f"{place}: {message.text}") for message in others]
     return replace(
         first,
         profiles=profiles,
@@ -275,60 +251,47 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
     )
 
 
-def _files_of(measured: MeasuredStress) -> str:
-    names = [scan.source.file_name for scan in measured.scans if scan.source]
-    return ", ".join(names) or f"{measured.profiles[0].label} and on"
-
-
-@dataclass(frozen=True, eq=False)
-class _MeasuredLoad:
-    """The profile of one load, with checks and messages of its restoration."""
-
-    profile: MeasuredProfile
-    checks: tuple[QualityCheck, ...]
-    messages: tuple[Message, ...]
-
-
-def _measure(origin: MeasuredScan, single: SingleLoad, sensor: ApparatusFunction) -> _MeasuredLoad:
-    signal = contact_signal(single, sensor)
-    require_points(single, signal)
-    prepared = _prepared(single, sensor, signal)
+def _measure(
+    origin: MeasuredScan, scan: Scan, sensor: ApparatusFunction
+) -> tuple[MeasuredProfile, Sequence[QualityCheck], list[Message]]:
+    """Return the profile of a scan of one load, with checks and messages of its restoration."""
+    signal = one_load.contact_signal(scan, sensor)
+    one_load.require_points(scan, signal)
+    prepared = _prepared(scan, sensor, signal)
     try:
-        restored = restore_known(prepared.scan, sensor)
+        restored = restore.restore_known(prepared.scan, sensor)
     except (FitError, InputError) as failure:
-        raise _placed(failure, single) from failure
-    require_ends(single, signal, restored.centre)
-    profile = measured_profile(origin, single, prepared, restored, signal)
+        raise _placed(failure, scan) from failure
+    one_load.require_ends(scan, signal, restored.centre)
+    profile = one_load.measured_profile(origin, scan, prepared, restored, signal)
     estimated = prepared.noise_estimated or restored.points.u_errors is None
     noise = profile.points["zz"].noise if estimated else None
-    return _MeasuredLoad(
-        profile=profile,
-        checks=checks_of_restoration(restored, stated=not estimated),
-        messages=tuple(_of_profile(single.scan, restored, noise)),
-    )
+    left_out = {_REPLACED, *_OF_STATED_NOISE} if estimated else {_REPLACED}
+    checks = [check for check in restored.checks if check.name not in left_out]
+    return profile, checks, list(_of_profile(scan, restored, noise))
 
 
-def _prepared(single: SingleLoad, sensor: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
+def _prepared(
+    scan: Scan, sensor: ApparatusFunction, signal: one_load.ContactSignal
+) -> one_load.PreparedScan:
     try:
-        return prepared_scan(single, sensor, signal)
+        return one_load.prepared_scan(scan, sensor, signal)
     except (FitError, InputError) as failure:
         # A scan that is too short fails here already, and in less plain words.
-        scan = single.scan
         if scan.y is None:
             top = np.nanargmax(np.nanmedian(scan.u_zz.reshape(-1, scan.x.size), axis=0))
-            require_ends(single, signal, np.full(2, scan.x[top]))
-        raise _placed(failure, single) from failure
+            one_load.require_ends(scan, signal, np.full(2, scan.x[top]))
+        raise _placed(failure, scan) from failure
 
 
-def _placed(failure: FitError | InputError, single: SingleLoad) -> FitError | InputError:
+def _placed(failure: FitError | InputError, scan: Scan) -> FitError | InputError:
     """Return the error with its file and load in front."""
-    return type(failure)(
-        f"{place_of(single.scan, single)}: {failure.problem}", why=failure.why, cure=failure.cure
-    )
+    problem = f"{one_load.load_of(scan)}: {failure.problem}"
+    return type(failure)(problem, why=failure.why, cure=failure.cure)
 
 
 def _messages(
-    loads: Sequence[_MeasuredLoad],
+    notes: Sequence[Sequence[Message]],
     sensor: ApparatusFunction,
     checks: Sequence[QualityCheck],
     overridden: Sequence[str],
@@ -336,21 +299,21 @@ def _messages(
     """Yield the messages of a measured stress, warnings first."""
     yield from failed_check_messages(checks)
     yield from override_messages(overridden)
-    yield from failed_calibration_messages(sensor)
+    yield from restore.failed_calibration_messages(sensor)
     # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}
-    for i, load in enumerate(loads):
-        for message in load.messages:
-            numbers.setdefault(message, []).append(str(i + 1))
+    for i, of_load in enumerate(notes, start=1):
+        for message in of_load:
+            numbers.setdefault(message, []).append(str(i))
     for message, of_profiles in numbers.items():
-        place = "" if len(of_profiles) == len(loads) else f"Profile {', '.join(of_profiles)}: "
+        place = "" if len(of_profiles) == len(notes) else f"Profile {', '.join(of_profiles)}: "
         yield replace(message, text=f"{place}{message.text}")
 
 
 def _of_profile(scan: Scan, restored: Restoration, noise: FloatArray | None) -> Iterator[Message]:
     """Yield the messages of one load; ``noise``: where it was estimated, in V."""
     if noise is not None:
-        yield noise_unstated_message(float(noise.min()))
+        yield restore.noise_unstated_message(float(noise.min()))
     if scan.normal_load is not None and scan.normal_load_errors is None:
         yield Message(
             "load_errors_unstated",

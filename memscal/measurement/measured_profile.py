@@ -38,30 +38,15 @@ _SAME_LOAD = 0.05
 _SCATTER = 0.15
 
 
-@dataclass(frozen=True, eq=False)
-class SingleLoad:
-    """The lines of a scan that were made at one nominal load, in N."""
-
-    scan: Scan
-    load: float
-    lubrication: str
-
-    @property
-    def label(self) -> str:
-        """Load and lubrication in words, as in ``"0.34 N, dry"``."""
-        return ", ".join(words for words in (f"{self.load:.4g} N", self.lubrication) if words)
-
-
-def single_loads(scan: Scan) -> tuple[SingleLoad, ...]:
+def single_loads(scan: Scan) -> tuple[Scan, ...]:
     """Split a scan by load, the smallest first; one that records no loads stays whole."""
     # Lines whose median loads lie within 5 % of each other are repeats of one load, the median of
     # all recorded ones.  A line at several loads, or without any, raises an InputError.
     if scan.normal_load is None:
-        return (SingleLoad(scan, scan.load, scan.lubrication),)
+        return (scan,)
     passes = scan.passes
     if scan.kind != "repeats" and not passes.any():
-        load = _line_load(scan, scan.normal_load, "")
-        return (SingleLoad(replace(scan, load=load), load, scan.lubrication),)
+        return (replace(scan, load=_line_load(scan, scan.normal_load, "")),)
     rows = [scan.normal_load[passes == i] for i in range(int(passes.max()) + 1)]
     loads = np.array([_line_load(scan, row, f", line {i + 1}") for i, row in enumerate(rows)])
     order = np.argsort(loads, kind="stable")
@@ -69,10 +54,15 @@ def single_loads(scan: Scan) -> tuple[SingleLoad, ...]:
     return tuple(_lines_of(scan, np.sort(group)) for group in np.split(order, starts))
 
 
-def place_of(scan: Scan, single: SingleLoad | None = None) -> str:
-    """Name a scan's file and a load in it, for messages."""
-    name = "The scan" if scan.source is None else scan.source.file_name
-    return name if single is None else f"{name}, {single.label}"
+def place_of(scan: Scan) -> str:
+    """Name a scan's file, for messages."""
+    return "The scan" if scan.source is None else scan.source.file_name
+
+
+def load_of(scan: Scan) -> str:
+    """Name a scan's file, load and lubrication, for messages."""
+    words = (place_of(scan), f"{scan.load:.4g} N", scan.lubrication)
+    return ", ".join(word for word in words if word)
 
 
 def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
@@ -95,14 +85,13 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
     return load
 
 
-def _lines_of(scan: Scan, rows: NDArray[np.intp]) -> SingleLoad:
+def _lines_of(scan: Scan, rows: NDArray[np.intp]) -> Scan:
     only = scan.only_passes(rows)
     assert only.normal_load is not None
     load = float(np.nanmedian(only.normal_load))
     common = scan.load_uncertainty
     uncertainty = None if common is None else common * load / scan.load
-    only = replace(only, load=load, load_uncertainty=uncertainty)
-    return SingleLoad(only, load, scan.lubrication)
+    return replace(only, load=load, load_uncertainty=uncertainty)
 
 
 _LARGEST_KH = 20.0
@@ -140,13 +129,12 @@ class ContactSignal:
         return float(np.interp(distance, self.r, free) / free.max())
 
 
-def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactSignal:
-    """Calculate the contacts of one nominal load and near it, or raise a DomainError."""
+def contact_signal(scan: Scan, apparatus: ApparatusFunction) -> ContactSignal:
+    """Calculate the contacts of a scan's nominal load and near it, or raise a DomainError."""
     # Contacts at P and P(1 +- 2 %) give dU/d ln P.  One that sticks is stiffer, its derivative
     # larger by up to 40 % on the axis.  A lubricated contact, and a rod's, is frictionless.
-    scan, load = single.scan, single.load
-    loads = load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
-    slides = single.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
+    loads = scan.load * np.array([1 - _LOAD_STEP, 1.0, 1 + _LOAD_STEP])
+    slides = scan.lubrication == "lubricated" or isinstance(scan.indenter, Rod)
     try:
         settings: dict[str, Any] = {"load": loads, "strain": "linear", "rings": _RINGS}
         contacts = [
@@ -155,7 +143,7 @@ def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactS
         ]
     except DomainError as failure:
         raise DomainError(
-            f"{place_of(scan, single)}: {failure.problem}",
+            f"{load_of(scan)}: {failure.problem}",
             why="The measured stress is compared with a contact that the model cannot hold for.",
             cure="Leave that load out; check its unit.",
         ) from failure
@@ -170,15 +158,14 @@ def contact_signal(single: SingleLoad, apparatus: ApparatusFunction) -> ContactS
     return ContactSignal(r, at, (above - below) / (2 * _LOAD_STEP), contacts[0][1].contact_radius)
 
 
-def require_points(single: SingleLoad, signal: ContactSignal) -> None:
+def require_points(scan: Scan, signal: ContactSignal) -> None:
     """Refuse a load whose points are all missing (NaN), or over more than a contact's radius."""
-    scan = single.scan
     complete = np.isfinite(scan.u_zz)
     if scan.normal_load is not None:
         complete &= np.isfinite(scan.normal_load)
     if not complete.any():
         raise InputError(
-            f"{place_of(scan, single)}: all {complete.size} points are missing (NaN).",
+            f"{load_of(scan)}: all {complete.size} points are missing (NaN).",
             why="A load without voltages has no profile.",
             cure="Check the import, or leave the lines of that load out.",
         )
@@ -192,7 +179,7 @@ def require_points(single: SingleLoad, signal: ContactSignal) -> None:
     if gaps.size and gaps.max() > signal.contact_radius:
         i = int(np.argmax(gaps))
         raise InputError(
-            f"{place_of(scan, single)}: {missing[i]} neighbouring points are missing (NaN), from "
+            f"{load_of(scan)}: {missing[i]} neighbouring points are missing (NaN), from "
             f"{x[places[i] + 1] * 1e3:.4g} to {x[places[i + 1] - 1] * 1e3:.4g} mm.",
             why=f"The gap is wider than the contact's radius, {signal.contact_radius * 1e3:.3g} "
             "mm: the profile within it would be the model's, not measured.",
@@ -200,21 +187,19 @@ def require_points(single: SingleLoad, signal: ContactSignal) -> None:
         )
 
 
-def require_ends(single: SingleLoad, signal: ContactSignal, centre: FloatArray) -> None:
+def require_ends(scan: Scan, signal: ContactSignal, centre: FloatArray) -> None:
     """Refuse a scan whose profile exceeds 5 % at its ends: its baseline is undetermined."""
-    scan = single.scan
     measured = np.isfinite(scan.u_zz)
     if scan.y is None:
         x = scan.x[measured.reshape(-1, scan.x.size).any(axis=0)]
-        along = centre[0 if scan.direction == "x" else 1]
-        ends = [abs(float(x.min() - along)), abs(float(x.max() - along))]
+        axes = [(x, centre[0 if scan.direction == "x" else 1])]
     else:
-        axes = (scan.x, centre[0]), (scan.y, centre[1])
-        ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
+        axes = [(scan.x, centre[0]), (scan.y, centre[1])]
+    ends = [abs(float(end - c)) for a, c in axes for end in (a.min(), a.max())]
     left = max(signal.share(end) for end in ends)
     if left > _LARGEST_END:
         raise FitError(
-            f"{place_of(scan, single)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "
+            f"{load_of(scan)}: the scan ends {min(ends) * 1e3:.3g} mm from its centre, "
             f"where the calculated profile still has {left:.0%} of its maximum.",
             why="The voltage never comes down to the baseline, so that it cannot be told from the "
             "stress.",
@@ -237,17 +222,14 @@ class PreparedScan:
     noise_estimated: bool  # whether it was estimated here
 
 
-def prepared_scan(
-    single: SingleLoad, apparatus: ApparatusFunction, signal: ContactSignal
-) -> PreparedScan:
+def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSignal) -> PreparedScan:
     """Bring every point to its nominal load, and state its noise; there has to be a centre."""
     # From P_i to P by -dU/d ln P ln(P_i/P); the variance is n_i^2 + (dU/d ln P u(P_i)/P)^2.
-    scan = single.scan
-    prepared = PreparedScan(_at_nominal(single, np.zeros_like(scan.u_zz)), _stated(scan), False)
+    prepared = PreparedScan(_at_nominal(scan, np.zeros_like(scan.u_zz)), _stated(scan), False)
     if scan.normal_load is None:
         return prepared
     errors = scan.normal_load_errors
-    load_share = 0.0 if errors is None else np.nan_to_num(errors) / single.load
+    load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.load
     for _ in range(_ROUNDS):
         estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
         slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
@@ -256,7 +238,7 @@ def prepared_scan(
         if scan.u_zz_errors is None and of_load.any():
             noise = _noise_of_load(estimate, of_load[np.isfinite(prepared.scan.u_zz)])
             electronic, estimated = np.full_like(slope, noise), True
-        level = _at_nominal(single, slope)
+        level = _at_nominal(scan, slope)
         prepared = PreparedScan(_with_noise(level, electronic, of_load), electronic, estimated)
     return prepared
 
@@ -272,12 +254,11 @@ def _stated(scan: Scan) -> FloatArray:
     return np.zeros_like(scan.u_zz) if scan.u_zz_errors is None else scan.u_zz_errors
 
 
-def _at_nominal(single: SingleLoad, slope: FloatArray) -> Scan:
+def _at_nominal(scan: Scan, slope: FloatArray) -> Scan:
     """Return the scan at its nominal load; points without a load are missing."""
-    scan = single.scan
     if scan.normal_load is None:
         return scan
-    shift = slope * np.log(scan.normal_load / single.load)
+    shift = slope * np.log(scan.normal_load / scan.load)
     return replace(scan, u_zz=scan.u_zz - shift, normal_load=None, normal_load_errors=None)
 
 
@@ -335,8 +316,8 @@ def measured_scan(scan: Scan) -> MeasuredScan:
 
 
 def measured_profile(
-    scan: MeasuredScan,
-    single: SingleLoad,
+    origin: MeasuredScan,
+    scan: Scan,
     prepared: PreparedScan,
     restored: Restoration,
     signal: ContactSignal,
@@ -359,9 +340,9 @@ def measured_profile(
     maximum, budget = _on_axis(restored)
     curve_r = np.linspace(0.0, float(r[order][-1]), _CURVE)
     return MeasuredProfile(
-        scan=scan,
-        load=single.load,
-        load_uncertainty=single.scan.load_uncertainty,
+        scan=origin,
+        load=scan.load,
+        load_uncertainty=scan.load_uncertainty,
         x=x[order],
         y=y[order],
         r=r[order],
@@ -378,7 +359,7 @@ def measured_profile(
         contact_radius=signal.contact_radius,
         curve_r=curve_r,
         curve_s_zz=restored.blurred_stress(curve_r),
-        points=_points(single.scan, prepared, restored),
+        points=_points(scan, prepared, restored),
     )
 
 

@@ -18,7 +18,14 @@ from memscal.estimation.points import ScanPoints
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import OVERRIDE, Message, QualityCheck, chi_square_limit
+from memscal.model.checks import (
+    OVERRIDE,
+    Checked,
+    Message,
+    QualityCheck,
+    chi_square_limit,
+    state_of_checks,
+)
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.result import Result
@@ -129,7 +136,7 @@ def read_expected(expected: Expected) -> StressProfile | Contact:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Restoration(Result):
+class Restoration(Result, Checked):
     r"""The stress at the film's base that explains a scan, with its uncertainty.
 
     Parameters
@@ -168,14 +175,8 @@ class Restoration(Result):
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
         force = format_measured(self.force, self.force_uncertainty, "N")
-        failed = [check.name for check in self.checks if not check.passed]
-        state = f"failed: {', '.join(failed)}" if failed else "all checks passed"
+        state = state_of_checks(self.checks)
         return f"<Restoration: force {force}, {self.r.size} radii, {state}>"
-
-    @property
-    def passed(self) -> bool:
-        """Whether every quality check passed."""
-        return all(check.passed for check in self.checks)
 
     @property
     def points(self) -> ScanPoints:

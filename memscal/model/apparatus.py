@@ -9,7 +9,7 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, freeze_arrays
-from memscal.model.checks import QualityCheck, state_of_checks
+from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
@@ -176,7 +176,7 @@ class OtherEstimate:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ApparatusData:
+class ApparatusData(Checked):
     """Everything that an apparatus-function artifact stores, in SI units.
 
     ``reference`` is the base stress that was divided by; ``budget`` has the standard uncertainty
@@ -224,8 +224,3 @@ class ApparatusData:
     def resolved_wavenumber(self) -> float:
         """Wavenumber up to which the scan determines G, in rad/m."""
         return self.transfer.resolved_wavenumber
-
-    @property
-    def passed(self) -> bool:
-        """Whether every quality check passed."""
-        return all(check.passed for check in self.checks)

@@ -80,6 +80,17 @@ class QualityCheck:
         return self.name.removeprefix(self.kind).lstrip("_")
 
 
+class Checked:
+    """A result with quality checks."""
+
+    checks: tuple[QualityCheck, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every quality check passed."""
+        return all(check.passed for check in self.checks)
+
+
 def check(
     name: str, value: float, limit: float, meaning: str, p_value: float | None = None
 ) -> QualityCheck:

@@ -22,7 +22,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from memscal.model.arrays import FloatArray, frozen_array, same_content
-from memscal.model.checks import Message, QualityCheck, state_of_checks
+from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.notation import format_measured
@@ -208,7 +208,7 @@ class MeasuredProfile:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class MeasuredStress(Result):
+class MeasuredStress(Result, Checked):
     """The measured stress of all loads of one or several scans, live or read from its file.
 
     Made by :func:`memscal.measure_stress` or :func:`memscal.read_stress`; the two are equal if one
@@ -269,11 +269,6 @@ class MeasuredStress(Result):
     def messages(self) -> tuple[Message, ...]:
         """Notes and warnings of the measurement, the most serious first."""
         return self.process.messages
-
-    @property
-    def passed(self) -> bool:
-        """Whether every quality check passed."""
-        return all(check.passed for check in self.checks)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the measured stress to a file (memscal-stress).

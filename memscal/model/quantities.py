@@ -52,7 +52,7 @@ class Quantity:
     """A quantity of a record."""
 
     name: str  # of its attribute
-    dimension: str  # a key of DIMENSIONS, or of memscal.formats.codec.KINDS, such as "text"
+    dimension: str  # a key of DIMENSIONS, or of memscal.formats.groups.KINDS, such as "text"
     words: str = ""
     symbol: str = ""
     axes: tuple[str, ...] = ()  # the quantities along which an array runs

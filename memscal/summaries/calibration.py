@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from memscal.calibration.calibrate import Calibration
 from memscal.calibration.stages import Misfit
@@ -17,11 +17,14 @@ from memscal.model.checks import REPEAT_CENTRES, Message
 from memscal.model.quantities import MM, PER_MM, measured_text, parameter_quantity
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
-from memscal.summaries.declared import correlated_parameters, members, parameter_json, record_arrays
+from memscal.summaries.declared import (
+    Dataset,
+    correlated_parameters,
+    members,
+    parameter_json,
+    record_arrays,
+)
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
-
-if TYPE_CHECKING:
-    import xarray
 
 Calibrated: TypeAlias = Calibration | ApparatusData
 
@@ -136,7 +139,7 @@ def mapping(result: Calibrated) -> dict[str, Any]:
     }
 
 
-def dataset(result: Calibrated) -> xarray.Dataset:
+def dataset(result: Calibrated) -> Dataset:
     """Return G(r), the transfer function, the reconvolution and the field, in SI units."""
     import xarray
 

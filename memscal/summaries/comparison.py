@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,18 +22,14 @@ from memscal.friction.results import (
 from memscal.model import records
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FAILED_CHECK, Message, QualityCheck, failed_check_messages
+from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_measured
 from memscal.model.provenance import SourceFile
 from memscal.model.quantities import MM, measured
 from memscal.summaries import interface_laws
-from memscal.summaries.declared import cell, columns, correlated_numbers, members
+from memscal.summaries.declared import DataFrame, cell, columns, correlated_numbers, members
 from memscal.summaries.interface_laws import friction_name
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from memscal.model.measured_stress import MeasuredProfile
 
 
 def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
@@ -78,7 +74,7 @@ def mapping(comparison: FrictionComparison | ShearComparison) -> dict[str, Any]:
     }
 
 
-def frame(comparison: FrictionComparison | ShearComparison) -> pd.DataFrame:
+def frame(comparison: FrictionComparison | ShearComparison) -> DataFrame:
     """Return one row for each load and definition of the loading; open ends are infinite."""
     import pandas as pd
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +18,15 @@ from memscal.model.film import NEO_HOOKEAN
 from memscal.model.indenter import Cone, Rod, RoundIndenter
 from memscal.model.quantities import KPA, MM, Quantity, by_name
 from memscal.model.records import PROFILE, SOLUTION
-from memscal.summaries.declared import correlated_numbers, data_frame, labelled_dataset, members
+from memscal.summaries.declared import (
+    DataFrame,
+    Dataset,
+    correlated_numbers,
+    data_frame,
+    labelled_dataset,
+    members,
+)
 from memscal.summaries.table import Table
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray
 
 #: Share of the film's thickness up to which linear elasticity is taken as valid.
 _SHALLOW = 0.1
@@ -147,12 +150,12 @@ def _arrays(contact: Contact) -> dict[str, FloatArray]:
     }
 
 
-def dataset(contact: Contact) -> xarray.Dataset:
+def dataset(contact: Contact) -> Dataset:
     """Return normal stress and shear at the base and at the interface along r."""
     return labelled_dataset(_PROFILE, _arrays(contact))
 
 
-def frame(contact: Contact) -> pd.DataFrame:
+def frame(contact: Contact) -> DataFrame:
     """Return one row for each radius of the default profile."""
     return data_frame(_PROFILE, _arrays(contact))
 

@@ -15,8 +15,10 @@ from memscal.model.quantities import DIMENSIONS, Quantity, Record, by_name, para
 from memscal.summaries.table import finite
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray
+    from pandas import DataFrame as DataFrame
+    from xarray import Dataset as Dataset
+else:  # their libraries are imported when they are needed
+    DataFrame = Dataset = Any
 
 _UNCERTAINTY = "_uncertainty"
 
@@ -60,6 +62,12 @@ def plain(value: Any, scale: float = 1.0) -> Any:
     return value if isinstance(value, int) and scale == 1 else finite(float(value) / scale)
 
 
+def power_of_ten(values: FloatArray) -> int:
+    """Return the power of ten to name in a head or label in place of a row of zeros."""
+    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+    return int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
+
+
 def parameter_json(parameters: ParameterSet, name: str) -> dict[str, Any]:
     """Return a parameter's value and standard uncertainty in the unit in which it is shown."""
     quantity = parameter_quantity(parameters, name)
@@ -77,36 +85,28 @@ def cell(quantity: Quantity, holder: object, /, *, unit: str | None = None, **va
     return format_measured(value / quantity.scale, spread, shown)
 
 
-def columns(quantities: Iterable[Quantity], holder: object, /) -> dict[str, Any]:
-    """Return the quantities of an object as one row of a data frame, by column."""
+def columns(quantities: Iterable[Quantity], holder: object, /, **values: Any) -> dict[str, Any]:
+    """Return the quantities of an object by the names of their columns in a data frame."""
+    held = {quantity: _value(quantity.name, holder, values) for quantity in quantities}
     return {
-        quantity.column: getattr(holder, quantity.name) / quantity.scale
-        if quantity.dimension in DIMENSIONS
-        else getattr(holder, quantity.name)
-        for quantity in quantities
+        quantity.column: value / quantity.scale if quantity.dimension in DIMENSIONS else value
+        for quantity, value in held.items()
     }
 
 
-def data_frame(quantities: Iterable[Quantity], values: Mapping[str, ArrayLike]) -> pd.DataFrame:
+def data_frame(quantities: Iterable[Quantity], values: Mapping[str, FloatArray]) -> DataFrame:
     """Return columns of the values (SI) in the units in which they are shown."""
     import pandas as pd
 
-    return pd.DataFrame(
-        {
-            quantity.column: np.asarray(values[quantity.name]) / quantity.scale
-            if quantity.dimension in DIMENSIONS
-            else values[quantity.name]
-            for quantity in quantities
-            if quantity.name in values
-        }
-    )
+    stated = [quantity for quantity in quantities if quantity.name in values]
+    return pd.DataFrame(columns(stated, None, **values))
 
 
 def labelled_dataset(
     quantities: Iterable[Quantity],
     values: Mapping[str, ArrayLike],
     axes: Mapping[str, tuple[str, ...]] | None = None,
-) -> xarray.Dataset:
+) -> Dataset:
     """Return values in SI units by the names of their quantities, which give axes and words.
 
     ``axes``: those of quantities that here run along others than declared.

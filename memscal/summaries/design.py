@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from memscal.model.quantities import ESTIMATED, MM, MV, PER_MM, PER_MM2, Quantity
 from memscal.model.records import EXPECTED, PLAN, RADIAL, TRANSFER
-from memscal.planning.expected import Design
+from memscal.planning.design import Design
 from memscal.summaries import declared
 from memscal.summaries.table import Table
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray
 
 #: Words and symbol of the parameters that are shown.
 _SHOWN = {
@@ -105,26 +101,25 @@ def mapping(planned: Design) -> dict[str, Any]:
         "method": planned.method,
         "plan": declared.members(PLAN, planned.plan),
         "wanted_si": dict(planned.want),
-        "expected": {name: _expected_json(planned, name) for name in _SHOWN},
+        "expected": {
+            name: {
+                **declared.parameter_json(planned.parameters, name),
+                "relative_uncertainty": planned.relative_uncertainty(name),
+                "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
+            }
+            for name in _SHOWN
+        },
         **declared.members(EXPECTED, planned, **axis),
     }
 
 
-def _expected_json(planned: Design, name: str) -> dict[str, Any]:
-    return {
-        **declared.parameter_json(planned.parameters, name),
-        "relative_uncertainty": planned.relative_uncertainty(name),
-        "budget": declared.plain(planned.budget[name], ESTIMATED[name].scale),
-    }
-
-
-def dataset(planned: Design) -> xarray.Dataset:
+def dataset(planned: Design) -> declared.Dataset:
     """Return G along r and its transfer function along k, with standard uncertainties."""
     values = {quantity.name: getattr(planned, quantity.name) for quantity in _QUANTITIES}
     return declared.labelled_dataset(_QUANTITIES, values)
 
 
-def frame(planned: Design) -> pd.DataFrame:
+def frame(planned: Design) -> declared.DataFrame:
     """Return one row for each radius at which G is expected."""
     names = ("r", "g", "g_errors")
     return declared.data_frame(_QUANTITIES[:3], {name: getattr(planned, name) for name in names})

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from memscal.calibration.many import FleetCalibration
 from memscal.errors import InputError
 from memscal.model.quantities import parameter_quantity
 from memscal.model.records import TRANSFER
 from memscal.summaries.calibration import estimate_rows
-from memscal.summaries.declared import correlated_parameters, members, parameter_json
+from memscal.summaries.declared import DataFrame, correlated_parameters, members, parameter_json
 from memscal.summaries.table import Table, checks_json, checks_table, texts_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def tables(result: FleetCalibration) -> list[Table]:
@@ -36,7 +33,7 @@ def mapping(result: FleetCalibration) -> dict[str, Any]:
     return values | estimates | resolved | {"checks": checks, "warnings": warnings}
 
 
-def frame(result: FleetCalibration) -> pd.DataFrame:
+def frame(result: FleetCalibration) -> DataFrame:
     """Return one row, which ``pandas.concat`` joins with those of the other scans."""
     import pandas as pd
 

@@ -107,14 +107,13 @@ def mapping(comparison: results.InterfaceComparison) -> dict[str, Any]:
 
 
 def _laws_json(compared: results.LawComparison) -> dict[str, Any]:
-    implied = compared.implied
     return {
         **members(COMPARED_LAWS, compared),
         "laws": [members(LAW, law) for law in compared.laws],
         "bayes_factors": [members(BAYES_FACTOR, factor) for factor in compared.factors],
         "length": bounded_json(SLIP_LENGTH, compared.length),
         "other_priors": [members(PRIOR, prior) for prior in compared.priors],
-        "implied": None if implied is None else _implied_json(implied),
+        "implied": None if compared.implied is None else _implied_json(compared.implied),
     }
 
 

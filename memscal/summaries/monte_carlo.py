@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from memscal.calibration.monte_carlo import BudgetComparison, MonteCarlo
 from memscal.model.quantities import estimated_quantity
 from memscal.model.records import DRAWN
-from memscal.summaries.declared import plain
+from memscal.summaries.declared import DataFrame, plain
 from memscal.summaries.table import Table, texts_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def tables(result: MonteCarlo) -> list[Table]:
@@ -55,7 +52,7 @@ def _comparison_json(comparison: BudgetComparison) -> dict[str, Any]:
     }
 
 
-def frame(result: MonteCarlo) -> pd.DataFrame:
+def frame(result: MonteCarlo) -> DataFrame:
     """Return the drawn parameters, one row for each draw that could be calibrated."""
     import pandas as pd
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,8 @@ from memscal.model.notation import format_measured
 from memscal.model.quantities import KPA, MM, PER_MM, Quantity, by_name
 from memscal.model.records import PROFILE, RESTORED, RESTORED_AGAINST
 from memscal.summaries import declared
-from memscal.summaries.declared import members
+from memscal.summaries.declared import DataFrame, Dataset, members
 from memscal.summaries.table import Table, checks_json, checks_table, finite, texts_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray
 
 _SHOWN_RADII = 9
 #: The table of the stress ends where it has fallen to this share of its maximum.
@@ -141,12 +137,12 @@ def _arrays(restored: Restoration) -> dict[str, FloatArray]:
     return values
 
 
-def dataset(restored: Restoration) -> xarray.Dataset:
+def dataset(restored: Restoration) -> Dataset:
     """Return the stress with its covariance along r, and the calculated one where there is one."""
     return declared.labelled_dataset(_QUANTITIES, _arrays(restored))
 
 
-def frame(restored: Restoration) -> pd.DataFrame:
+def frame(restored: Restoration) -> DataFrame:
     """Return one row for each radius."""
     columns = {name: values for name, values in _arrays(restored).items() if values.ndim == 1}
     return declared.data_frame(_QUANTITIES, columns)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,6 @@ from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.quantities import MM, Quantity, by_name
 from memscal.summaries import declared
 from memscal.summaries.table import Table, checks_json, checks_table, texts_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray
 
 _NUMBERS = by_name(records.STRESS_NUMBERS.quantities)
 _QUANTITIES = by_name(records.STRESS_PROFILE.quantities) | _NUMBERS
@@ -92,7 +88,7 @@ def _common_rows(stress: MeasuredStress) -> list[tuple[str, str]]:
     return [*numbers, ("points", f"{points}, from the axis to {farthest / MM:.3g} mm")]
 
 
-def dataset(stress: MeasuredStress) -> xarray.Dataset:
+def dataset(stress: MeasuredStress) -> declared.Dataset:
     """Return the points as (profile, point), NaN beyond the last of a profile, and its numbers."""
     profiles = stress.profiles
     shape = (len(profiles), max(profile.r.size for profile in profiles))
@@ -108,7 +104,7 @@ def dataset(stress: MeasuredStress) -> xarray.Dataset:
     return declared.labelled_dataset(_QUANTITIES.values(), values, axes)
 
 
-def frame(stress: MeasuredStress) -> pd.DataFrame:
+def frame(stress: MeasuredStress) -> declared.DataFrame:
     """Return one row for each point, with the number, load and lubrication of its profile."""
     sizes = [profile.r.size for profile in stress.profiles]
     values: dict[str, Any] = {

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from memscal.calibration.sweep import Sweep
 from memscal.model.arrays import FloatArray
 from memscal.model.quantities import ESTIMATED, MM, MV, Quantity
-from memscal.summaries.declared import plain
+from memscal.summaries.declared import Dataset, plain, power_of_ten
 from memscal.summaries.table import Table
-
-if TYPE_CHECKING:
-    import xarray
 
 #: Results of a sweep, with the attribute of their draws.
 _RESULTS = (
@@ -25,10 +22,7 @@ _RESULTS = (
 
 def tables(result: Sweep) -> list[Table]:
     """Return every second amplitude: the exact expectation, and the median of the draws."""
-    # The power of ten stands in the head in place of a row of zeros.
-    values = result.conversion_constant / MV
-    sizes = np.abs(values[np.isfinite(values) & (values != 0)])
-    power = int(np.floor(np.log10(np.median(sizes)))) if sizes.size else 0
+    power = power_of_ten(result.conversion_constant / MV)
     scales, forms = (MV * 10.0**power, MM, 0.01), (".4f", ".4f", ".3g")
     columns = [[f"{amplitude:.3g}" for amplitude in result.amplitude]]
     for (quantity, _), scale, form in zip(_RESULTS, scales, forms, strict=True):
@@ -57,7 +51,7 @@ def mapping(result: Sweep) -> dict[str, Any]:
     }
 
 
-def dataset(result: Sweep) -> xarray.Dataset:
+def dataset(result: Sweep) -> Dataset:
     """Return the results over amplitude, and those of the draws over amplitude and draw."""
     import xarray
 

@@ -20,7 +20,7 @@ from memscal.friction.calculated import amontons_family
 from memscal.friction.compare import compare_measured
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import FrictionComparison, Interval
-from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
+from memscal.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
 from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy

@@ -21,7 +21,7 @@ from memscal import ElasticFilm, Interface, LawComparison
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
 from memscal.friction.model_comparison import compare_interface
-from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE
+from memscal.simulation.experiment import PAPER_LOADS, PAPER_SPHERE
 from memscal.simulation.rod_scan import PAPER_FILM
 
 pytestmark = pytest.mark.accuracy

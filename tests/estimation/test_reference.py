@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.scans import reference_spectrum, simulated
+from helpers.scans import LINEAR_FILM, reference_spectrum, simulated
 
 import memscal
 from memscal.errors import InputError
@@ -19,9 +19,9 @@ from memscal.estimation.reference import (
     rod_sensitivities,
 )
 from memscal.mechanics.contact import Contact
-from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+from memscal.simulation.rod_scan import PAPER_ROD
 
-SCAN = simulated(film=PAPER_FILM, rod=PAPER_ROD)
+SCAN = simulated(film=LINEAR_FILM, rod=PAPER_ROD)
 POINTS = measured_points(SCAN)
 CONTACT = memscal.indent(SCAN.film, SCAN.indenter, load=1.0)
 

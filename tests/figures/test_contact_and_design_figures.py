@@ -14,7 +14,7 @@ from memscal.figures.style import render_figure
 from memscal.mechanics.indent import indent
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
-from memscal.planning.expected import Design
+from memscal.planning.design import Design
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 SPHERE = Sphere(radius=128.8e-3)

@@ -11,9 +11,14 @@ from matplotlib.axes import Axes
 from memscal.cli.compare import figure_stems
 from memscal.errors import InputError
 from memscal.figures import friction as of_friction
-from memscal.figures.friction_profiles import friction_set_figure, profile_figure
-from memscal.figures.friction_readings import effective_friction_figure, likelihood_figure
-from memscal.figures.friction_scale import friction_position, load_looks, on_axis
+from memscal.figures.friction import effective_friction_figure, likelihood_figure
+from memscal.figures.friction_profiles import (
+    friction_position,
+    friction_set_figure,
+    load_looks,
+    on_axis,
+    profile_figure,
+)
 from memscal.figures.style import render_figure
 from memscal.friction.results import FrictionComparison
 

@@ -17,7 +17,7 @@ import pytest
 from helpers.meshes import section, write
 
 from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
-from memscal.formats.meshes import child
+from memscal.formats.meshes import mesh_files
 from memscal.formats.meshes.mesh_files import Mesh, read_mesh
 
 SMALL = section(radii=np.linspace(0.0, 8.0, 5), heights=np.array([0.0, 1.0]))
@@ -346,7 +346,7 @@ def test_whatever_ends_the_reader_is_an_error_of_ours(hostile: Callable[[str], P
 
 
 def test_an_endless_reader_ends(hostile: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(child, "_SECONDS", 0.5)
+    monkeypatch.setattr(mesh_files, "_SECONDS", 0.5)
     refused(hostile("while True:\n    pass"), "takes longer than 0.5", UnsafeFileError)
 
 

@@ -106,15 +106,15 @@ def test_a_parameter_of_each_load_is_integrated_as_the_closed_form_does(seed, lo
         nodes = np.linspace(best[load] - 6 * errors[load], best[load] + 6 * errors[load], 241)
         along.append(model.along(load, nodes))
         weights.append(np.gradient(nodes))
-    found = evidence_of_each(along, weights)
-    assert found.log == pytest.approx(exact, abs=0.02)
-    assert found.error < 0.2
-    assert evidence_of_each(along, weights) == found
+    log, error = evidence_of_each(along, weights)
+    assert log == pytest.approx(exact, abs=0.02)
+    assert error < 0.2
+    assert evidence_of_each(along, weights) == (log, error)
 
 
 def test_one_parameter_is_integrated_over_its_prior() -> None:
     found = evidence_of_one(-(np.linspace(-8, 8, 161) ** 2) / 2, np.full(161, 0.1 / 16))
-    assert found.log == pytest.approx(LOG_2PI / 2 - np.log(16))
+    assert found == pytest.approx(LOG_2PI / 2 - np.log(16))
 
 
 def test_every_load_needs_its_prior() -> None:
@@ -128,7 +128,7 @@ def test_a_decade_more_that_the_data_exclude_costs_its_share_of_the_evidence() -
     edges = np.concatenate([values[:1], np.sqrt(values[1:] * values[:-1]), values[-1:]])
     log = -((np.log(values) / 0.05) ** 2) / 2
     two, three = (
-        evidence_of_one(log, log_uniform_prior(0.1, high, "").weights(edges)).log
+        evidence_of_one(log, log_uniform_prior(0.1, high, "").weights(edges))
         for high in (10.0, 100.0)
     )
     assert two - three == pytest.approx(np.log(3 / 2), abs=1e-6)

@@ -10,8 +10,7 @@ from helpers.machine import assert_same_to_rounding
 
 from memscal import StressProfile, indent
 from memscal.errors import InputError
-from memscal.friction.calculated import amontons_family
-from memscal.friction.external import external_family
+from memscal.friction.calculated import amontons_family, external_family
 
 FRICTIONS = (0.0, 0.3, math.inf)
 

@@ -10,8 +10,8 @@ import numpy as np
 from memscal import ElasticFilm, Sphere
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
-from memscal.friction.interface_laws import Measured
 from memscal.friction.likelihood import LoadPoints, Sensor
+from memscal.friction.model_comparison import Measured
 
 LOADS = (0.34, 0.69, 1.37, 2.75)
 MACROSCOPIC = 1.6

@@ -15,7 +15,7 @@ from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.profile import ProfileEstimate, estimate_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.model.apparatus import ApparatusRadial, ParameterSet, TransferFunction
-from memscal.simulation.contact_scan import simulate_contacts
+from memscal.simulation.experiment import simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 
 CONVERSION = 1e-7

@@ -17,8 +17,7 @@ from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import find_band, smooth_profile
-from memscal.planning.design import varied_designs
-from memscal.planning.expected import Design, expected_calibration
+from memscal.planning.design import Design, expected_calibration, varied_designs
 
 EXACT = {"film": EXACT_FILM, "rod": EXACT_ROD, "load_uncertainty": None}
 
@@ -76,15 +75,15 @@ def test_without_uncertain_inputs_only_noise_and_the_prior_are_left() -> None:
 
 
 def test_the_expected_noise_is_the_one_that_was_planned() -> None:
-    expected = expected_calibration(Plan(repeats=3), create_regulariser("evidence"))
-    assert expected.solution.estimate.weighed.noise == pytest.approx(1.0, abs=0.02)
+    solution, _ = expected_calibration(Plan(repeats=3), create_regulariser("evidence"))
+    assert solution.estimate.weighed.noise == pytest.approx(1.0, abs=0.02)
 
 
 def test_expectations_are_the_means_over_draws_of_the_noise() -> None:
     """Weights of the hypotheses, and the resolved band: expected at once, or one scan at a time."""
-    expected = expected_calibration(
+    expected, _ = expected_calibration(
         Plan(film=EXACT_FILM, rod=EXACT_ROD, load_uncertainty=None), create_regulariser("evidence")
-    ).solution
+    )
     drawn = [estimated(simulated(seed=seed)) for seed in range(30)]
     weights = np.array([estimate.weighed.probability for estimate in drawn])
     # A posterior weight is no linear function of the squares: 0.03 is allowed beside the sampling.

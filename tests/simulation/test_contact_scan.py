@@ -13,8 +13,13 @@ import memscal
 from memscal.errors import DomainError, InputError
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
-from memscal.simulation.contact_scan import PAPER_LOADS, PAPER_SPHERE, simulate_contacts
-from memscal.simulation.experiment import Reality, drawn
+from memscal.simulation.experiment import (
+    PAPER_LOADS,
+    PAPER_SPHERE,
+    Reality,
+    drawn,
+    simulate_contacts,
+)
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
 from memscal.simulation.sensor import blurred_stress
 

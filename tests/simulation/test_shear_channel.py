@@ -10,7 +10,7 @@ from helpers.machine import assert_same_to_rounding
 import memscal
 from memscal import GaussianMixture, simulate_experiment
 from memscal.errors import InputError
-from memscal.simulation.contact_scan import simulate_contacts
+from memscal.simulation.experiment import simulate_contacts
 from memscal.simulation.rod_scan import PAPER_FILM
 
 KERNEL = GaussianMixture(sigmas=(400e-6,))

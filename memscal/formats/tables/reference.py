@@ -10,7 +10,6 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.formats.tables.text_table import read_table
-from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.film import ElasticFilm
@@ -213,12 +212,11 @@ def read_reference_table(
     require_sign("shear sign", shear_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     columns = {
-        "r": to_si(table.column(r), r_unit, "length", table.where(r)),
-        "sigma_zz": sign * to_si(table.column(sigma), sigma_unit, "stress", table.where(sigma)),
+        "r": table.quantity(r, r_unit, "length"),
+        "sigma_zz": sign * table.quantity(sigma, sigma_unit, "stress"),
     }
     if shear is not None:
-        values = to_si(table.column(shear), sigma_unit, "stress", table.where(shear))
-        columns["sigma_rz"] = shear_sign * values
+        columns["sigma_rz"] = shear_sign * table.quantity(shear, sigma_unit, "stress")
     source = table.source
     origin = f"Imported from {source.file_name} (sha256 {source.sha256})."
     samples = Samples(

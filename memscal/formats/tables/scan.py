@@ -10,7 +10,6 @@ import numpy as np
 
 from memscal.errors import InputError, UnitError
 from memscal.formats.tables.text_table import Table, read_table
-from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
 from memscal.model.film import ElasticFilm
@@ -84,14 +83,13 @@ def read_scan_table(
     columns["u_zz"] = u_sign * columns["u_zz"]
     notes += _about_voltages(u_sign, u_unit, u_scale)
     if load_column is not None:
-        where = table.where(load_column)
-        columns["normal_load"] = to_si(table.column(load_column), load_unit, "force", where)
+        columns["normal_load"] = table.quantity(load_column, load_unit, "force")
     load = _nominal_load(load, columns, notes)
     if load_scatter is not None and "normal_load" not in columns:
         columns["normal_load"] = np.full(columns["u_zz"].shape, load)
-    columns["x"] = to_si(table.column(x), x_unit, "length", table.where(x))
+    columns["x"] = table.quantity(x, x_unit, "length")
     if y is not None:
-        columns["y"] = to_si(table.column(y), x_unit, "length", table.where(y))
+        columns["y"] = table.quantity(y, x_unit, "length")
     if repeat is not None:
         columns["repeat"] = _lines(table, repeat, notes)
     if branch is not None:
@@ -255,13 +253,12 @@ def _nominal_load(load: float | None, columns: Mapping[str, FloatArray], notes: 
 
 
 def _voltage(table: Table, column: Column, unit: str, scale: float | None) -> FloatArray:
-    values = table.column(column)
     if scale is not None:
         if not (np.isfinite(scale) and scale != 0):
             raise InputError(f"The scale of the readings is {scale:g} V per {unit}.")
-        return values * scale
+        return table.column(column) * scale
     try:
-        return to_si(values, unit, "voltage", table.where(column))
+        return table.quantity(column, unit, "voltage")
     except UnitError as error:
         raise UnitError(
             error.problem,

@@ -50,6 +50,10 @@ class Table:
             values[k] = self._number(row[i] if i < len(row) else "", k, column_name, words or {})
         return values
 
+    def quantity(self, column_name: str | int, unit: str, dimension: str) -> FloatArray:
+        """Return a column of numbers in a unit, in SI units."""
+        return to_si(self.column(column_name), unit, dimension, self.where(column_name))
+
     def where(self, column_name: str | int) -> str:
         """Return file and column as messages name them."""
         return f"{self.source.file_name}: column {column_name!r}"
@@ -187,18 +191,10 @@ def _find_decimal(rows: tuple[tuple[str, ...], ...], delimiter: str) -> str:
     return "," if any("," in c for c in cells) and not any("." in c for c in cells) else "."
 
 
-def read_indenter_table(
-    path: str | os.PathLike[str],
-    *,
-    r: str | int = 1,
-    z: str | int = 2,
-    r_unit: str = "mm",
-    z_unit: str = "um",
-) -> Profile:
-    r"""Read an indenter's profile from a table with one row per radius."""
+def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: str) -> Profile:
+    """Read an indenter's profile from a table with one row per radius: radius and height."""
     table = read_table(path)
-    radii = to_si(table.column(r), r_unit, "length", table.where(r))
-    heights = to_si(table.column(z), z_unit, "length", table.where(z))
+    radii, heights = table.quantity(1, r_unit, "length"), table.quantity(2, z_unit, "length")
     try:
         # What a microscope calls zero is anywhere.
         return Profile(r=radii, z=heights - heights.min())
