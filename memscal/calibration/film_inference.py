@@ -5,8 +5,8 @@ base stress on films of each law (:func:`~memscal.estimation.profile.log_margina
 Weights and noise are common to all laws: a point is an outlier where it is one by every law, and
 the noise is that of the law that leaves least.  Stated uncertainties of film, rod, positions and,
 scan by scan, load are Gaussian nuisance parameters, integrated to first order; what is common to
-all loads is part of A.  A thickness has the posterior of the same likelihood with a Gaussian
-prior: its mode, and the curvature there.
+all loads is part of A.  A thickness has the posterior mean by the same likelihood and a Gaussian
+prior, and the expected squared error of it by the priors of G's uncertainty.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ def _written(film: ElasticFilm) -> str:
 _FAR_OFF, _HARDLY = 2.0, 0.9
 #: Nodes along each thickness, of one film or two, and how far from the prior's middle they reach,
 #: in its standard uncertainties; when they are set finer, in the posterior's.
-_NODES, _REACH, _WIDTHS, _ROUNDS = (13, 9), 3.0, 4.0, 3
+_NODES, _REACH, _WIDTHS, _ROUNDS = (9, 7), 3.0, 4.0, 3
 
 
 def require_free(
@@ -264,30 +264,31 @@ def free_thickness(solution: Solution) -> FreeThickness:
     points = [estimate.points.only(i) for i in range(len(scans))]
     inputs, noise = _input_columns(solution, THICKNESS), estimate.noise_scale
 
-    def log_posterior(z: FloatArray) -> float:
+    def log_posterior(z: FloatArray) -> FloatArray:
         pairs = zip(films, stated + z * u, strict=True)
         at = {film: replace(film, thickness=float(h)) for film, h in pairs}
         rods = [press_rod(at[s.film], s.indenter, s.load, s.rod_friction) for s in scans]
         references = reference_spectra(rods, points, [s.film.thickness for s in scans])
         model = ForwardModel(estimate.points, references)
-        # Hypotheses without a Gaussian: a shape that is assumed would determine the thickness.
         both = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
-        return float(both[1] - z @ z / 2)
+        return np.asarray(both - z @ z / 2)
 
-    # Sums over a grid, made finer where the posterior is narrower than its step.
+    # Sums over a grid, which are good to 1e-2 while its step is at most twice the width of a normal
+    # density; where the posterior is narrower it is made finer.
     middle, reach = np.zeros(u.size), np.full(u.size, _REACH)
     for _ in range(_ROUNDS):
         lines = np.linspace(middle - reach, middle + reach, _NODES[u.size - 1], axis=1)
         grid = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, u.size)
         logs = np.array([log_posterior(z) for z in grid])
-        shares = np.exp(logs - logs.max())
-        shares /= shares.sum()
-        middle = shares @ grid
-        spread = np.sqrt(shares @ (grid - middle) ** 2)
-        if (spread > lines[:, 1] - lines[:, 0]).all():
+        shares, others = np.exp(logs - logs.max(axis=0)).T
+        middle = shares @ grid / shares.sum()
+        # As of G: the squared error is expected by priors that allow no Gaussian.
+        spread = np.sqrt(others @ (grid - middle) ** 2 / others.sum())
+        half_step = (lines[:, 1] - lines[:, 0]) / 2
+        if (spread > half_step).all():
             break
-        reach = np.minimum(reach, _WIDTHS * np.maximum(spread, (lines[:, 1] - lines[:, 0]) / 2))
-    pairs = zip(films, stated + middle * u, spread * u, strict=True)
+        reach = np.minimum(reach, _WIDTHS * np.maximum(spread, half_step))
+    pairs = zip(films, stated + middle * u, np.minimum(spread, 1.0) * u, strict=True)
     return FreeThickness({
         film: replace(film, thickness=float(h), thickness_uncertainty=float(left))
         for film, h, left in pairs

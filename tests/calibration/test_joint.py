@@ -241,3 +241,45 @@ def test_another_model_of_the_film_is_counted_as_a_rectangle_of_their_difference
     difference = abs(moved.gaussian_sigma - usual.gaussian_sigma)
     counted = usual.budget["gaussian_sigma"]["model_form"]
     assert counted == pytest.approx(difference / np.sqrt(3), rel=0.15)
+
+
+def test_several_loads_weigh_the_laws_of_the_film_and_one_does_not() -> None:
+    scans = [simulated(load=load, noise=0.005, seed=i) for i, load in enumerate((0.2, 0.6))]
+    made = memscal.calibrate(scans, method="bayesian")
+    best, other = made.to_dict()["film_laws"]
+    assert (best["law"], best["is_reference"]) == ("linear", True)
+    assert best["conversion_constant"]["value"] == pytest.approx(
+        1e3 * made.apparatus.conversion_constant
+    )
+    assert (other["law"], other["best_against_it"]) == ("neo-hookean", "very strong")
+    [message] = [m for m in made.apparatus.process.messages if m.kind == "film_law"]
+    assert message.severity == "note"
+    assert "film_laws" not in memscal.calibrate(scans[:1]).to_dict()
+
+
+UNSURE = replace(EXACT_FILM, thickness_uncertainty=0.1e-3)
+
+
+@pytest.mark.parametrize(("film", "loads", "radii", "words"), [
+    (UNSURE, (1.0, 0.5), (0.25e-3, 0.25e-3), "proportion to the load"),
+    (EXACT_FILM, (1.0, 1.0), (0.15e-3, 0.35e-3), "no uncertainty of its thickness"),
+])  # fmt: skip
+def test_a_thickness_that_the_scans_do_not_determine_is_not_freed(film, loads, radii, words):
+    rods = (replace(EXACT_ROD, radius=radius) for radius in radii)
+    scans = [simulated(film=film, rod=rod, load=p) for rod, p in zip(rods, loads, strict=True)]
+    with pytest.raises(InputError, match=words):
+        memscal.calibrate(scans, free="thickness")
+
+
+def test_a_thickness_that_rods_determine_is_the_posterior_of_what_is_stated() -> None:
+    film = replace(UNSURE, thickness=2.05e-3)
+    rods = [replace(EXACT_ROD, radius=radius) for radius in (0.15e-3, 0.4e-3)]
+    scans = [replace(simulated(rod=rod, noise=0.002, seed=3), film=film) for rod in rods]
+    made = memscal.calibrate(scans, free="thickness", method="bayesian")
+    [row] = made.to_dict()["free"]["thickness"]
+    assert row["prior"] == {"value": pytest.approx(2.05), "standard_uncertainty": 0.1, "unit": "mm"}
+    u = row["posterior"]["standard_uncertainty"]
+    assert abs(row["posterior"]["value"] - 2.0) < 4 * u
+    assert u < 0.1
+    assert made.apparatus.film.thickness * 1e3 == pytest.approx(row["posterior"]["value"])
+    assert made.apparatus.budget["gaussian_sigma"]["thickness"] > 0

@@ -7,7 +7,7 @@ import pytest
 from helpers.scans import simulated
 
 from memscal.errors import FitError, InputError
-from memscal.estimation.points import joined_points, measured_points
+from memscal.estimation.points import joined_points, measured_points, scans_by_load
 
 
 def test_missing_voltages_and_loads_are_left_out_and_counted() -> None:
@@ -34,6 +34,18 @@ def test_repeats_share_positions_and_know_their_row() -> None:
     assert np.array_equal(points.x[:11], points.x[11:22])
     assert np.array_equal(np.unique(points.repeat), [0, 1, 2])
     assert np.array_equal(joined_points([points, points]).branch, np.tile([1, 2, 0], 2).repeat(11))
+
+
+def test_repeats_at_loads_of_their_own_become_scans_and_keep_their_readings() -> None:
+    one = simulated(load=1.0, repeats=2, points=11)
+    several = replace(simulated(load=[1.0, 0.3, 1.01], points=11), load_uncertainty=0.01)
+    split, owners = scans_by_load([one, several])
+    assert owners == (0, 1, 1)
+    assert split[0] is one
+    assert [scan.load for scan in split[1:]] == pytest.approx([0.3, 1.005])
+    assert np.array_equal(split[2].u_zz, several.u_zz[[0, 2]])
+    assert np.array_equal(split[1].u_zz, several.u_zz[1:2])
+    assert split[1].load_uncertainty == pytest.approx(0.01 * 0.3 / several.load)
 
 
 @pytest.mark.parametrize(("change", "error", "words"), [

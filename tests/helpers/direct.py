@@ -1,6 +1,7 @@
 r"""Scans whose voltages share nothing with the analysis but the film: direct convolution.
 
-The base stress is that of the finite elements.  Convolved with a radial G it is at distance R
+The base stress, by a film of either law, is that of the finite elements.  Convolved with a radial
+G it is at distance R
 
 .. math::
 
@@ -9,8 +10,9 @@ The base stress is that of the finite elements.  Convolved with a radial G it is
 the inner integral is the same for all G, the outer one has panels narrower than any blur.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from helpers.scans import CENTRE, CONVERSION, EXACT_FILM, EXACT_ROD, SENSOR
@@ -23,6 +25,9 @@ HALF_RANGE = 8e-3
 PANEL, NODES, OUTERMOST = 0.05e-3, 8, 10e-3
 """Panels of the radius of G and where it ends, in m; Gauss nodes of each."""
 ANGLES = 96
+LOADS = (0.1, 0.3, 1.0)
+"""Loads at which base stresses are solved, in N."""
+TABLE = np.arange(0.0, 20e-3, 25e-6)
 
 
 @dataclass(frozen=True)
@@ -51,10 +56,20 @@ def quadrature() -> tuple[FloatArray, FloatArray]:
 
 
 @lru_cache
-def mean_stress(points: int, centre: float) -> FloatArray:
-    """Base stress of 1 N, averaged over circles about each position of the scan, in Pa."""
-    table = np.arange(0.0, 20e-3, 25e-6)
-    stress = memscal.indent(EXACT_FILM, EXACT_ROD, load=1.0, backend="fem").base_stress(table)
+def base_stresses(radius: float, law: str) -> dict[float, FloatArray]:
+    """Base stress (Pa) along TABLE at each of LOADS, on a film whose mesh is of its own radius."""
+    rod, film = memscal.Rod(radius=radius), replace(EXACT_FILM, law=law)
+    if law == "linear":
+        stress = memscal.indent(film, rod, load=1.0, backend="fem").base_stress(TABLE)
+        return {load: load * stress for load in LOADS}
+    contacts = memscal.indent(film, rod, load=LOADS, friction=np.inf, film_radius=21e-3)
+    return {load: c.base_stress(TABLE) for load, c in zip(LOADS, contacts, strict=True)}
+
+
+@lru_cache
+def mean_stress(points: int, centre: float, load: float, radius: float, law: str) -> FloatArray:
+    """Base stress, averaged over circles about each position of the scan, in Pa."""
+    table, stress = TABLE, base_stresses(radius, law)[load]
     even = np.append(-table[:0:-1], table), np.append(stress[:0:-1], stress)
     at = make_interp_spline(*even, k=5)
     q, cosine = quadrature()[0][:, None], np.cos((np.arange(ANGLES) + 0.5) * np.pi / ANGLES)
@@ -64,13 +79,13 @@ def mean_stress(points: int, centre: float) -> FloatArray:
 
 
 @lru_cache
-def voltages(kernel: Kernel, points: int, centre: float) -> FloatArray:
-    """Voltages without noise, baseline and drift at 1 N, in V."""
+def voltages(kernel: Kernel, points: int, centre: float, *pressed: Any) -> FloatArray:
+    """Voltages without noise, baseline and drift, in V; load, rod and law as of mean_stress."""
     q, weights = quadrature()
     share = weights * kernel.radial(q)
     # The quadrature resolves G: nothing of it is lost.
     assert abs(share.sum() - 1) < 1e-9
-    return np.asarray(CONVERSION * (mean_stress(points, centre) @ share))
+    return np.asarray(CONVERSION * (mean_stress(points, centre, *pressed) @ share))
 
 
 def direct_scan(
@@ -84,12 +99,16 @@ def direct_scan(
     baseline: float = 0.01,
     drift: float = 0.005,
     state_noise: bool = True,
+    load: float = 1.0,
+    radius: float = EXACT_ROD.radius,
+    law: str = "linear",
 ) -> memscal.Scan:
     """Scan as ``memscal.simulate`` does, with the same noise for a seed, by direct convolution.
 
     ``noise``, ``baseline`` and ``drift`` are shares of the largest signal.
     """
-    x, signal = np.linspace(-HALF_RANGE, HALF_RANGE, points), voltages(kernel, points, centre)
+    x = np.linspace(-HALF_RANGE, HALF_RANGE, points)
+    signal = voltages(kernel, points, centre, load, radius, law)
     top = float(signal.max())
     clean = signal + top * (baseline + 0.5 * drift * x / HALF_RANGE)
     shape = (repeats, points) if repeats > 1 else (points,)
@@ -98,7 +117,7 @@ def direct_scan(
     return memscal.Scan(
         x=x, u_zz=u.reshape(shape),
         u_zz_errors=np.full(shape, noise * top) if state_noise and noise > 0 else None,
-        load=1.0, indenter=EXACT_ROD, film=EXACT_FILM, sensor=SENSOR,
+        load=load, indenter=replace(EXACT_ROD, radius=radius), film=EXACT_FILM, sensor=SENSOR,
         synthetic={"centre": centre, "conversion_constant": CONVERSION, "seed": float(seed)}
         | {name: share * top for name, share in shares.items()},
     )  # fmt: skip
