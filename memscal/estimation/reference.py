@@ -21,7 +21,8 @@ from memscal.estimation.points import (
     stated_differences,
 )
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.press_rod import is_tabulated, largest_tabulated_load, press_rod
+from memscal.mechanics.finite_strain.table import largest_tabulated_load
+from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter

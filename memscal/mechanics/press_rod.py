@@ -37,8 +37,3 @@ def is_tabulated(
     """Whether a neo-Hookean film is found in the table, in milliseconds; else it is solved."""
     sticking = friction is None or friction > 0
     return isinstance(rod, Rod) and tabulated_rod(film, rod, load, sticking=sticking) is not None
-
-
-def largest_tabulated_load(film: ElasticFilm, rod: RoundIndenter, *, sticking: bool) -> float:
-    """Return the load (N) at which the table ends for a film and a rod; 0 outside the table."""
-    return 0.44

@@ -80,7 +80,7 @@ class SphereFace:
 _SETTLED = 1e-7
 # The contact's edge is looked at again when the last step was shorter than this.
 _LOOSE = 1e-3
-_MOST_ITERATIONS = 40
+_MOST_ITERATIONS = 20
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
 # A node must lie this deep inside the indenter, in film thicknesses, to be taken in.

@@ -1,94 +1,200 @@
-"""Table of rods at finite strain (a stub, until the table is made)."""
+"""Table of neo-Hookean rods: base stress and depth against load, made by docs/rod_table.py.
+
+Columns of growing depth stand at values of Poisson's ratio and of the rod's radius over the film's
+thickness h; each holds the load over G h d, with the depth d, and the transforms of the base's
+normal stress and shear over the load.  A rod between the columns is found by polynomials through
+the four nearest, one between depths by cubic splines.
+"""
 
 from __future__ import annotations
 
-import pickle
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 
 from memscal.axisymmetry.hankel import Wavenumbers
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.film_response import RingTraction
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 
+FILE = Path(__file__).with_name("rods.npz")
+#: Columns that a polynomial goes through; relative error of the base stress and of the depth.
+_STENCIL = 4
+_ACCURACY = 2e-3
+#: Shares of the depth at which the load is integrated to the work.
+_STEPS = np.linspace(0.0, 1.0, 65)
+
 
 @dataclass(frozen=True, eq=False)
 class TabulatedField:
-    """Base stress of a rod by its transforms (N) at wavenumbers."""
+    """Base stress of a rod by its transforms (N) at wavenumbers (rad/m), and nothing else."""
 
     k: FloatArray
-    normal: FloatArray
-    shear: FloatArray
+    transforms: tuple[FloatArray, FloatArray]  # of the normal stress, and of order one of the shear
+    radius: float
 
     def base_spectrum(self, k: FloatArray) -> FloatArray:
-        from scipy.interpolate import CubicSpline
-
-        return np.where(
-            np.abs(k) <= self.k[-1],
-            CubicSpline(self.k, self.normal)(np.minimum(k, self.k[-1])),
-            0.0,
-        )
+        """Return the transform of the normal stress at ``k`` (rad/m), in N."""
+        return self._transform(0, k)
 
     def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
-        from scipy.interpolate import CubicSpline
-
-        return np.where(
-            np.abs(k) <= self.k[-1], CubicSpline(self.k, self.shear)(np.minimum(k, self.k[-1])), 0.0
-        )
+        """Return the transform of order one of the shear at ``k`` (rad/m), in N."""
+        return self._transform(1, k)
 
     def base_normal(self, r: FloatArray) -> FloatArray:
-        nodes = Wavenumbers.covering(self.k[-1], max(float(np.max(r)), 1e-3))
-        return nodes.synthesise(self.base_spectrum(nodes.k), r)
+        """Return the normal stress at the base in Pa, compression positive."""
+        return self._stress(0, r)
 
     def base_shear(self, r: FloatArray) -> FloatArray:
-        nodes = Wavenumbers.covering(self.k[-1], max(float(np.max(r)), 1e-3))
-        return nodes.synthesise(self.base_shear_spectrum(nodes.k), r, order=1)
+        """Return the radial traction of the base on the film in Pa, positive outward."""
+        return self._stress(1, r)
 
-    def depression(self, r: FloatArray) -> FloatArray:
-        raise InputError("x")
+    def _transform(self, order: int, k: FloatArray) -> FloatArray:
+        from scipy.interpolate import CubicSpline
 
-    outward = depression
+        # Even in k, or odd.
+        ends = ((2, 0.0) if order else (1, 0.0), "not-a-knot")
+        spline = CubicSpline(self.k, self.transforms[order], bc_type=ends)
+        return np.where(k <= self.k[-1], spline(np.minimum(k, self.k[-1])), 0.0)
+
+    def _stress(self, order: int, r: FloatArray) -> FloatArray:
+        nodes = Wavenumbers.covering(float(self.k[-1]), float(np.max(r, initial=self.radius)))
+        values = self._transform(order, nodes.k)
+        return nodes.synthesise(values, np.ravel(r), order=order).reshape(np.shape(r))
+
+    def _absent(self, *_: Any) -> NoReturn:
+        raise InputError(
+            "The table of rods holds the stress at the base alone.",
+            cure="Press the rod by memscal.indent, which solves the whole film.",
+        )
+
+    depression = outward = pressure = shear = _absent
+    pressure_transform = shear_transform = half_space_integrals = _absent
 
 
 def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -> Contact | None:
-    with open(f"/tmp/stub_{'stick' if sticking else 'slide'}.pkl", "rb") as f:
-        rows = pickle.load(f)
-    p = load / (film.shear_modulus * film.thickness**2) * (2.2e6 / 3 * 4e-6)
-    loads = np.array([row[0] for row in rows])
-    if not p <= loads[-1]:
+    """Return a rod on a neo-Hookean film under a load (N); ``None`` outside the table."""
+    column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
+    scale = film.shear_modulus * film.thickness**2
+    if column is None or load > column.largest_load * scale:
         return None
-    from scipy.interpolate import PchipInterpolator as S
-
-    depth = (
-        float(S(np.append(0, loads), np.append(0, [row[1] for row in rows]))(p))
-        * film.thickness
-        / 2e-3
-    )
-    normal = S(loads, np.array([row[3] for row in rows]))(max(p, loads[0])) * load
-    shear = S(loads, np.array([row[4] for row in rows]))(max(p, loads[0])) * load
-    k = rows[0][2] * 2e-3 / film.thickness
-    a = rod.radius
+    depth = column.depth(load / scale)
+    normal, shear = column.spectra(depth) * load
+    inside: Any = TabulatedField(_table()["kh"] / film.thickness, (normal, shear), rod.radius)
+    loads = column.load(_STEPS * depth) * scale
+    work = float(np.trapezoid(loads, _STEPS * depth * film.thickness))
     return Contact(
         film=film,
         indenter=rod,
         load=load,
-        depth=depth,
-        contact_radius=a,
-        stick_radius=a if sticking else 0.0,
-        friction=np.inf if sticking else 0.0,
+        depth=depth * film.thickness,
+        contact_radius=rod.radius,
+        stick_radius=rod.radius if sticking else 0.0,
+        friction=math.inf if sticking else 0.0,
         loading="",
         backend="fem",
-        convergence=2e-3,
+        convergence=_ACCURACY,
         steps=1,
-        discretisation="table",
-        traction=RingTraction(np.array([0, a]), np.zeros(2), np.zeros(2)),
-        inside=TabulatedField(k, normal, shear),
-        elastic_energy=0.0,
-        work=None,
-        dissipated_energy=None,
+        discretisation="table of rods, interpolated",
+        traction=inside,
+        inside=inside,
+        elastic_energy=work,
+        work=work,
+        dissipated_energy=0.0,
         strain="finite",
     )
+
+
+def largest_tabulated_load(film: ElasticFilm, rod: Rod, *, sticking: bool) -> float:
+    """Return the load (N) at which the table ends for a rod; 0 outside the table."""
+    column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
+    return 0.0 if column is None else column.largest_load * film.shear_modulus * film.thickness**2
+
+
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """A rod by its depth over the thickness; loads in units of G h^2."""
+
+    stiffness: Callable[[Any], Any]  # load over depth
+    both: Callable[[float], FloatArray]  # spectra over the load
+    deepest: float
+
+    def load(self, depth: Any) -> Any:
+        """Load at depths."""
+        return self.stiffness(depth) * depth
+
+    @property
+    def largest_load(self) -> float:
+        """Load at which the column ends."""
+        return float(self.load(self.deepest))
+
+    def depth(self, load: float) -> float:
+        """Depth at a load."""
+        from scipy.optimize import brentq
+
+        return float(brentq(lambda d: float(self.load(d)) - load, 0.0, self.deepest, xtol=1e-12))
+
+    def spectra(self, depth: float) -> FloatArray:
+        """Spectra of normal stress and shear over the load, (2, k)."""
+        return np.asarray(self.both(depth)).reshape(2, -1)
+
+
+@lru_cache(maxsize=1)
+def _table() -> dict[str, FloatArray]:
+    with np.load(FILE) as file:
+        return {name: file[name].astype(np.float64) for name in file.files}
+
+
+@lru_cache(maxsize=256)
+def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
+    """Interpolate between the columns; ``None`` outside the table."""
+    from scipy.interpolate import CubicSpline
+
+    table = _table()
+    ratios, radii, depths = (table[name] for name in ("poisson_ratio", "radius", "depth"))
+    if not (ratios[0] <= poisson <= ratios[-1] and radii[0] <= radius <= radii[-1]):
+        return None
+    columns = table["table"][0 if sticking else 1]
+    # How many depths each column has; it ends where the first of its neighbours does.
+    reached = np.isfinite(columns[..., 0]).sum(axis=-1)
+    i, j = (int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
+            for axis, value in ((ratios, poisson), (radii, radius)))  # fmt: skip
+    count = int(reached[i : i + 2, j : j + 2].min())
+    rows = np.empty((count, columns.shape[-1]))
+    for n in range(count):
+        of_ratios = np.empty((ratios.size, columns.shape[-1]))
+        usable = []
+        for m in range(ratios.size):
+            nodes = _nearest(np.flatnonzero(reached[m] > n), j)
+            if {j, j + 1} <= set(nodes):
+                usable.append(m)
+                of_ratios[m] = (
+                    _polynomial(np.log(radii[nodes]), np.log(radius)) @ columns[m, nodes, n]
+                )
+        chosen = _nearest(np.array(usable), i)
+        rows[n] = _polynomial(ratios[chosen], poisson) @ of_ratios[chosen]
+    stiffness, spectra = (CubicSpline(depths[:count], rows[:, part])
+                          for part in (0, slice(1, None)))  # fmt: skip
+    return _Column(stiffness, spectra, float(depths[count - 1]))
+
+
+def _nearest(nodes: Any, place: int) -> list[int]:
+    """Return up to four of the nodes around the interval after a place."""
+    order = sorted(nodes.tolist(), key=lambda node: abs(node - place - 0.5))
+    return sorted(order[:_STENCIL])
+
+
+def _polynomial(nodes: FloatArray, x: float) -> FloatArray:
+    """Weights of values at nodes in the polynomial through them, at ``x``."""
+    weights = np.ones(nodes.size)
+    for i, node in enumerate(nodes):
+        others = np.delete(nodes, i)
+        weights[i] = np.prod((x - others) / (node - others))
+    return weights
