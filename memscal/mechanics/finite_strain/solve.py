@@ -47,9 +47,11 @@ _EDGE = 0.1
 # the edge and stretched, and needs them finer.
 _FINEST_STICKING = 2 / 5
 _FINEST_SLIDING = 1 / 8
-# Undeformed radii between which the surface folds around the edge, in radii of the rod.
-_FOLD_STICKING = (0.8, 1.9)
+# Undeformed radii between which the surface folds around the edge, in radii of the rod; film that
+# sticks is drawn in by so much more for each radius of depth.
+_FOLD_STICKING = (0.8, 1.2)
 _FOLD_SLIDING = (0.2, 1.1)
+_DRAWN_IN = 0.16
 # Radii at which the base stress of two meshes is compared, in film thicknesses.
 _SAMPLES = np.linspace(0.0, 4.0, 41)
 
@@ -149,10 +151,13 @@ class _Request:
         if isinstance(self.indenter, Rod):
             rod = self.indenter.radius * _MM
             face = RodFace(rod, _EDGE * rod if self.edge is None else self.edge * _MM)
-            fold = _FOLD_STICKING if self.sticking else _FOLD_SLIDING
-            finest = face.edge * (_FINEST_STICKING if self.sticking else _FINEST_SLIDING)
-            fold = (fold[0] * rod, fold[1] * rod)
-            mesh = mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest)
+            if self.sticking:
+                finest, (inner, outer) = _FINEST_STICKING, _FOLD_STICKING
+                outer += _DRAWN_IN * max(map(self._depth, self.goals)) / rod
+            else:
+                finest, (inner, outer) = _FINEST_SLIDING, _FOLD_SLIDING
+            fold = (inner * rod, outer * rod)
+            mesh = mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest * face.edge)
         else:
             face = SphereFace(self.indenter.radius * _MM)
             widest = max(map(self._hertz_radius, self.goals))
@@ -168,6 +173,13 @@ class _Request:
         elements = FilmElements(mesh, Rubber.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
+
+    def _depth(self, goal: Goal) -> float:
+        """Return a rod's depth at a goal, that on a half-space at a load, in mm."""
+        if not goal.is_load:
+            return goal.value
+        stiffness = 2 * self.film.contact_modulus / 1e6 * self.indenter.extent * _MM
+        return min(goal.value / stiffness, self.film.thickness * _MM)
 
     def _hertz_radius(self, goal: Goal) -> float:
         """Return a contact radius of a sphere that is not exceeded, in mm."""
