@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -80,6 +81,8 @@ class SphereFace:
 _SETTLED = 1e-7
 # The contact's edge is looked at again when the last step was shorter than this.
 _LOOSE = 1e-3
+# Near the end the factors are kept while each step is this much shorter than the one before.
+_KEPT = 0.1
 _MOST_ITERATIONS = 20
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
@@ -112,6 +115,16 @@ class Pressed:
 
 
 @dataclass(frozen=True, eq=False)
+class _Tangent:
+    """The forces' change with what is free and with the depth, at a state."""
+
+    factors: Any
+    pushed: FloatArray  # forces on what is free, per depth
+    along: FloatArray  # change of what is free, per depth
+    stiffness: float  # load per depth
+
+
+@dataclass(frozen=True, eq=False)
 class Pressing:
     """A film, an indenter, and whether the surface sticks to it."""
 
@@ -129,21 +142,26 @@ class Pressing:
         state = start if goal.is_load else replace(start, depth=goal.value)
         seen: set[bytes] = set()
         state = self.placed(self._touching(state, before, set(), guess=True) or state)
+        tangent, last = None, np.inf
         for iteration in range(1, _MOST_ITERATIONS + 1):
-            state, moved = self._step(state, goal)
+            state, moved, tangent = self._step(state, goal, tangent)
             if not moved < _FARTHEST * self.elements.thickness:
                 break
+            near, last = moved < _KEPT * last, moved
             if moved > _LOOSE * self.elements.thickness:
+                tangent = None
                 continue
             changed = self._touching(state, before, seen)
             if changed is not None:
-                state = self.placed(changed)
+                state, tangent = self.placed(changed), None
             elif moved < _SETTLED * self.elements.thickness:
                 if self.elements.is_inside_out(state.x):
                     break
                 forces = self.elements.forces(state.x)
                 load = -float(np.sum(forces[state.touching + self.elements.n]))
                 return replace(state, load=load, iterations=iteration)
+            elif not near:
+                tangent = None
         raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")
 
     def placed(self, state: Pressed) -> Pressed:
@@ -205,46 +223,65 @@ class Pressing:
             s -= (points[0] - r) / np.maximum(tangents[0], 0.1)
         return s
 
-    def _step(self, state: Pressed, goal: Goal) -> tuple[Pressed, float]:
+    def _step(
+        self, state: Pressed, goal: Goal, tangent: _Tangent | None
+    ) -> tuple[Pressed, float, _Tangent]:
         """Take Newton's step; return the state after it and how far it moved something, in mm."""
-        elements, touching = self.elements, state.touching
-        n, size = elements.n, elements.size
-        _, tangents, bends = self.face.contour(state.place)
-        forces, tangent = elements.forces(state.x), elements.tangent(state.x)
-        # Columns: unknowns that are free, with the places of sliding nodes in the columns of their
-        # radial displacement.  The depth moves all touching nodes down.
-        free = np.ones(size, dtype=bool)
-        free[np.concatenate([elements.held, touching + n])] = False
+        touching, n = state.touching, self.elements.n
+        forces, change = self.elements.forces(state.x), self._change(state)
+        tangent = tangent or self._tangent(state, forces, change)
+        solution, sunk = tangent.factors.solve(-np.asarray(change.T @ forces)), 0.0
+        if goal.is_load:
+            load = -float(np.sum(forces[touching + n]))
+            sunk = (goal.value - load - tangent.pushed @ solution) / tangent.stiffness
+            solution = solution + sunk * tangent.along
+        free = np.zeros(self.elements.size)
+        free[self._free(state)] = solution
+        place = state.place if self.sticking else state.place + free[touching]
+        ahead = replace(state, x=state.x + free, depth=state.depth + sunk, place=place)
+        return self.placed(ahead), max(float(np.max(np.abs(free[: 2 * n]))), abs(sunk)), tangent
+
+    def _free(self, state: Pressed) -> IntArray:
+        """Return the unknowns that are free; those of sliding nodes are radial."""
+        free = np.ones(self.elements.size, dtype=bool)
+        free[np.append(self.elements.held, state.touching + self.elements.n)] = False
         if self.sticking:
-            free[touching] = False
-            change = sparse.eye_array(size, format="csc")[:, np.flatnonzero(free)]
-            reduced = tangent[free][:, free]
+            free[state.touching] = False
+        return np.flatnonzero(free)
+
+    def _change(self, state: Pressed) -> Any:
+        """Return the change of all unknowns with those that are free, sparse."""
+        # The places of sliding nodes are in the columns of their radial displacement.
+        size, touching = self.elements.size, state.touching
+        change = sparse.eye_array(size, format="csc")
+        if not self.sticking:
+            _, tangents, _ = self.face.contour(state.place)
+            rows = np.append(touching, touching + self.elements.n)
+            values = np.append(tangents[0] - 1, tangents[1])
+            sliding = (values, (rows, np.append(touching, touching)))
+            change = change + sparse.coo_array(sliding, shape=(size, size)).tocsc()
+        return change[:, self._free(state)]
+
+    def _tangent(self, state: Pressed, forces: FloatArray, change: Any) -> _Tangent:
+        """Return what the forces change by, at a state."""
+        touching, n = state.touching, self.elements.n
+        stiffness, free = self.elements.tangent(state.x), self._free(state)
+        if self.sticking:
+            reduced = stiffness[free][:, free]
         else:
-            outward, curvature = np.ones(size), np.zeros(size)
-            outward[touching] = tangents[0]
-            climbing = sparse.coo_array((tangents[1], (touching + n, touching)), shape=(size, size))
-            change = (sparse.diags_array(outward) + climbing).tocsc()[:, np.flatnonzero(free)]
+            _, _, bends = self.face.contour(state.place)
+            curvature = np.zeros(forces.size)
             curvature[touching] = forces[touching] * bends[0] + forces[touching + n] * bends[1]
-            reduced = change.T @ tangent @ change + sparse.diags_array(curvature[free])
+            reduced = change.T @ stiffness @ change + sparse.diags_array(curvature[free])
         # The matrix is symmetric, and needs pivots off the diagonal only for the pressures.
         factors = splu(reduced.tocsc(), diag_pivot_thresh=1e-4)
-        solution, sunk = factors.solve(-np.asarray(change.T @ forces)), 0.0
-        if goal.is_load:
-            sinking = np.zeros(size)
-            sinking[touching + n] = -1.0
-            pushed = tangent @ sinking
-            along = factors.solve(-np.asarray(change.T @ pushed))
-            lacking = goal.value - sinking @ forces - pushed @ (change @ solution)
-            sunk = float(lacking / (sinking @ pushed + pushed @ (change @ along)))
-            solution += sunk * along
-        steps = np.asarray(change @ solution)
-        place = state.place
-        if not self.sticking:
-            steps = np.zeros(size)
-            steps[free] = solution
-            place = place + steps[touching]
-        ahead = replace(state, x=state.x + steps, depth=state.depth + sunk, place=place)
-        return self.placed(ahead), max(float(np.max(np.abs(steps[: 2 * n]))), abs(sunk))
+        # The depth moves all touching nodes down.
+        sinking = np.zeros(forces.size)
+        sinking[touching + n] = -1.0
+        sunk = stiffness @ sinking
+        pushed = np.asarray(change.T @ sunk)
+        along = -factors.solve(pushed)
+        return _Tangent(factors, pushed, along, float(sinking @ sunk + pushed @ along))
 
 
 # The first step of a rod, as a share of its radius in depth; those of a sphere to the first goal,
