@@ -287,7 +287,7 @@ def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, 
         *_agreements(solution, results),
         *_shape(solution, results.parameters),
         *_set_up(solution),
-        _indentation(solution),
+        _indentation(solution, results),
         *_noise(estimate),
         *(_size(estimate, residuals) + _order(residuals) if enough else []),
         _bayes_factor(estimate),
@@ -446,7 +446,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     return [check(name, *values[name], meanings[name]) for name in values]
 
 
-def _indentation(solution: Solution) -> QualityCheck:
+def _indentation(solution: Solution, results: Results) -> QualityCheck:
     """Compare the depth with the thickness: beyond the limit a linear film is formal."""
     film, depths = solution.scan.film, []
     for scan, stress in zip(solution.scans, solution.stresses, strict=True):
@@ -456,11 +456,12 @@ def _indentation(solution: Solution) -> QualityCheck:
             depth = press_rod(linear, scan.indenter, scan.load).depth
         depths.append(depth / scan.film.thickness)
     meaning = "Largest depth of the rod over the film's thickness. "
-    if film.law == LINEAR:
+    formal = film.law == LINEAR or not (film.law or "model_form" in results.changes)
+    if formal:
         meaning += (
-            "A failure means that a film that is taken as linear elastic is strained too far for "
-            "that: give its law (film/law, --film-law), or leave it out to have the law's form "
-            "counted, or calibrate at a lighter load."
+            "A failure means that a film that is taken as linear elastic, of which nothing is "
+            "counted, is strained too far for that: give its law (film/law, --film-law), or leave "
+            "it out to have the law's form counted, or calibrate at a lighter load."
         )
     elif not film.law:
         meaning += (
@@ -472,7 +473,7 @@ def _indentation(solution: Solution) -> QualityCheck:
             f"It passes at any depth, for the reference is that of a {film.law} film; a failure "
             "means that a film was stated to be linear."
         )
-    passed = film.law != LINEAR or max(depths) <= INDENTATION_LIMIT
+    passed = not formal or max(depths) <= INDENTATION_LIMIT
     return QualityCheck("indentation", max(depths), INDENTATION_LIMIT, passed, meaning)
 
 

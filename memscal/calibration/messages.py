@@ -144,11 +144,17 @@ def _law(solution: Solution, results: Results) -> list[Message]:
         pairs = zip(solution.scans, films, strict=True)
         changes = _changes(solution, [replace(scan, film=film) for scan, film in pairs])
     if law in ("", LINEAR):
-        rubber = (
-            "a neo-Hookean film under a rod that sticks would change "
-            f"{_change_of(parameters, changes['model_form'] / RECTANGLE)}"
+        rubber = "a neo-Hookean film under a rod that sticks would change "
+        if (form := changes.get("model_form")) is not None:
+            rubber += _change_of(parameters, form / RECTANGLE)
+        else:
+            rubber = "no neo-Hookean film could be solved at this depth"
+    if not law and form is None:
+        text = (
+            "The film's law is not stated (film/law, --film-law), and the reference is that of a "
+            f"linear film; {rubber}: nothing is counted for the form of the law."
         )
-    if not law:
+    elif not law:
         text = (
             "The film's law is not stated (film/law, --film-law), and the reference is that of a "
             f"linear film; {rubber}. Changes up to that, of either sign, are counted as equally "
@@ -161,6 +167,12 @@ def _law(solution: Solution, results: Results) -> list[Message]:
             f"The film is taken as {law}, as stated; how far it departs from that law, by "
             "viscosity, swelling or slip at the rod's side, is not part of the uncertainties."
         )
+    if (
+        law not in ("", LINEAR)
+        and solution.scan.rod_friction is None
+        and "rod_friction" not in changes
+    ):
+        text += " What sliding under the rod would change could not be solved: it is not counted."
     if "rod_friction" in changes:
         sliding = _change_of(parameters, -changes["rod_friction"] / RECTANGLE)
         text += (

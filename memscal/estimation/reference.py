@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
-from memscal.errors import InputError
+from memscal.errors import ConvergenceError, DomainError, InputError
 from memscal.estimation.points import (
     COVERAGE,
     ScanPoints,
@@ -316,19 +316,23 @@ def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     Rectangles, of which the standard uncertainty is the half width over the root of three: where
     no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
     at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
-    sliding.
+    sliding.  Nothing where the rod goes deeper than can be solved.
     """
     film, rod, load = scan.film, scan.indenter, scan.load
     if film.law == LINEAR or (film.law and scan.rod_friction is not None):
         return {}
     k, order = reference.wavenumbers.k.tobytes(), reference.order
-    if not film.law:
-        pair = press_neo_hookean(scan), press_rod(film, rod, load)
-    else:
-        rubber = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None)
+    rubber, end = replace(film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None), load
+    if film.law and isinstance(rod, Rod):
         # A film that slides is drawn out from under the rod, and is not solved to any depth.
-        end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False))
-        pair = press_rod(rubber, rod, end, math.inf), press_rod(rubber, rod, end, 0.0)
+        end = min(load, 0.999 * largest_tabulated_load(rubber, rod, sticking=False)) or load
+    try:
+        if not film.law:
+            pair = press_neo_hookean(scan), press_rod(film, rod, load)
+        else:
+            pair = press_rod(rubber, rod, end, math.inf), press_rod(rubber, rod, end, 0.0)
+    except (ConvergenceError, DomainError):
+        return {}
     change = np.subtract(*(_base_spectrum(c, k, order) / c.load for c in pair))
     name = "rod_friction" if film.law else "model_form"
     return {name: RECTANGLE * change * load / pair[0].load}

@@ -167,6 +167,8 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
     i, j = (int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
             for axis, value in ((ratios, poisson), (radii, radius)))  # fmt: skip
     count = int(reached[i : i + 2, j : j + 2].min())
+    if count < _STENCIL:
+        return None
     rows = np.empty((count, columns.shape[-1]))
     for n in range(count):
         of_ratios = np.empty((ratios.size, columns.shape[-1]))
