@@ -137,49 +137,41 @@ def _reference(solution: Solution) -> list[Message]:
 
 def _law(solution: Solution, results: Results) -> list[Message]:
     """Return which law the reference has, and what is not known of it."""
-    law, parameters = solution.scan.film.law, results.parameters
-    changes = results.changes
+    law, changes = solution.scan.film.law, results.changes
     if law == LINEAR:
         films = [replace(scan.film, law="") for scan in solution.scans]
         pairs = zip(solution.scans, films, strict=True)
         changes = _changes(solution, [replace(scan, film=film) for scan, film in pairs])
+
+    def changed(by: str, sign: int) -> str:
+        if by not in changes:
+            return "cannot be solved at this depth, and nothing is counted for it"
+        return f"would change {_change_of(results.parameters, sign * changes[by] / RECTANGLE)}"
+
     if law in ("", LINEAR):
-        rubber = "a neo-Hookean film under a rod that sticks would change "
-        if (form := changes.get("model_form")) is not None:
-            rubber += _change_of(parameters, form / RECTANGLE)
-        else:
-            rubber = "no neo-Hookean film could be solved at this depth"
-    if not law and form is None:
-        text = (
-            "The film's law is not stated (film/law, --film-law), and the reference is that of a "
-            f"linear film; {rubber}: nothing is counted for the form of the law."
-        )
+        rubber = f"a neo-Hookean film under a rod that sticks {changed('model_form', 1)}"
+    if law == LINEAR:
+        text = f"The film is taken as linear elastic, as stated; {rubber}: it is not counted."
     elif not law:
         text = (
             "The film's law is not stated (film/law, --film-law), and the reference is that of a "
-            f"linear film; {rubber}. Changes up to that, of either sign, are counted as equally "
-            "likely (model_form)."
+            f"linear film; {rubber}."
         )
-    elif law == LINEAR:
-        text = f"The film is taken as linear elastic, as stated; {rubber}: it is not counted."
+        if "model_form" in changes:
+            text += (
+                " Changes up to that, of either sign, are counted as equally likely (model_form)."
+            )
     else:
         text = (
             f"The film is taken as {law}, as stated; how far it departs from that law, by "
             "viscosity, swelling or slip at the rod's side, is not part of the uncertainties."
         )
-    if (
-        law not in ("", LINEAR)
-        and solution.scan.rod_friction is None
-        and "rod_friction" not in changes
-    ):
-        text += " What sliding under the rod would change could not be solved: it is not counted."
-    if "rod_friction" in changes:
-        sliding = _change_of(parameters, -changes["rod_friction"] / RECTANGLE)
-        text += (
-            " Whether it sticks under the rod is not stated (indenter/friction_coefficient, "
-            f"--rod-friction): it is taken to stick; sliding would change {sliding}, which is "
-            "counted (rod_friction)."
-        )
+        if solution.scan.rod_friction is None:
+            text += (
+                " Whether it sticks under the rod is not stated (indenter/friction_coefficient, "
+                f"--rod-friction): it is taken to stick, and sliding {changed('rod_friction', -1)}."
+            )
+            text += " The difference is counted (rod_friction)." * ("rod_friction" in changes)
     return [Message("film_law", text)]
 
 

@@ -60,7 +60,7 @@ class TabulatedField:
         from scipy.interpolate import CubicSpline
 
         # Even in k, or odd.
-        ends = ((2, 0.0) if order else (1, 0.0), "not-a-knot")
+        ends: Any = ((2, 0.0) if order else (1, 0.0), "not-a-knot")
         spline = CubicSpline(self.k, self.transforms[order], bc_type=ends)
         return np.where(k <= self.k[-1], spline(np.minimum(k, self.k[-1])), 0.0)
 
