@@ -291,7 +291,7 @@ _FIRST_STEPS = 5
 _GROWTH = 1.4
 # Under a rod no step is longer than this share of its radius: film that comes to stick on the way
 # is placed to the second order in it.
-_LONGEST = 0.2
+_LONGEST = 0.1
 # A step that takes more iterations than this is not followed by a longer one.
 _EASY = 9
 # States through which the next is guessed.
