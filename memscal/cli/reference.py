@@ -229,6 +229,7 @@ def _pressed(
     names = ("loading", "backend", "rings")
     settings: dict[str, Any] = {"friction": friction} | {name: options[name] for name in names}
     settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
+    settings["strain"] = "linear" if film.law == "linear" else "finite"
     with out.working("Pressing") as show:
         settings["progress"] = lambda share: show(f"Pressing: {share:.0%}")
         if depths:
