@@ -229,9 +229,12 @@ def _pressed(
     names = ("loading", "backend", "rings")
     settings: dict[str, Any] = {"friction": friction} | {name: options[name] for name in names}
     settings |= {"interface": interface, "film_radius": si(options["film_radius"], -3)}
-    if depths:
-        return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
-    return indent(film, body, load=list(loads or (1.0,)), **settings)
+    settings["strain"] = "linear" if film.law == "linear" else "finite"
+    with out.working("Pressing") as show:
+        settings["progress"] = lambda share: show(f"Pressing: {share:.0%}")
+        if depths:
+            return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
+        return indent(film, body, load=list(loads or (1.0,)), **settings)
 
 
 def _write(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, overload
 
@@ -37,6 +37,7 @@ def indent(
     friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
     interface: Interface | None = None, strain: str | None = None,
     film_radius: float | None = None, rings: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Contact: ...  # fmt: skip
 @overload
 def indent(
@@ -45,6 +46,7 @@ def indent(
     friction: float = 0.0, loading: str = "incremental", backend: str = "hankel",
     interface: Interface | None = None, strain: str | None = None,
     film_radius: float | None = None, rings: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Contact]: ...  # fmt: skip
 @single_threaded()
 def indent(
@@ -60,6 +62,7 @@ def indent(
     strain: str | None = None,
     film_radius: float | None = None,
     rings: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Contact | list[Contact]:
     r"""Press a rigid indenter on a bonded film, to a load or to a depth.
 
@@ -94,6 +97,8 @@ def indent(
     rings : int, optional
         Rings from the axis to the largest contact, at least 16.  By default they are doubled
         until base stress, load and depth change by less than 1e-4.
+    progress : callable, optional
+        At finite strain it is called with the share of the work that is done, from 0 to 1.
 
     Returns
     -------
@@ -150,7 +155,7 @@ def indent(
         film, indenter, interface, targets, friction, loading, backend, film_radius, rings
     )
     if strain == "finite":
-        contacts = press_at_finite_strain(request)
+        contacts = press_at_finite_strain(request, progress)
     elif _is_plain_rod(indenter, friction, backend, interface):
         contacts = tuple(_rod_contact(film, indenter, target, friction) for target in targets)
     else:

@@ -10,7 +10,7 @@ active set: a node that is pulled leaves, and one that lies inside the indenter 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -77,8 +77,8 @@ class SphereFace:
 
 
 # Newton's method has converged when the last step moved nothing by more than this share of the
-# film's thickness; its convergence is quadratic, so that what is left is the square of it.
-_SETTLED = 1e-7
+# film's thickness; what is left is less by a tenth or, with new factors, the square of it.
+_SETTLED = 1e-10
 # The contact's edge is looked at again when the last step was shorter than this.
 _LOOSE = 1e-3
 # Near the end the factors are kept while each step is this much shorter than the one before.
@@ -291,13 +291,17 @@ _FIRST_STEPS = 5
 _GROWTH = 1.4
 # Under a rod no step is longer than this share of its radius: film that comes to stick on the way
 # is placed to the second order in it.
-_LONGEST = 0.2
+_LONGEST = 0.1
 # A step that takes more iterations than this is not followed by a longer one.
 _EASY = 9
 # States through which the next is guessed.
 _THROUGH = 3
 # A step is halved at most so many times.
 _HALVINGS = 8
+
+
+# What is told the share of the work that is done.
+Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,12 +317,19 @@ def _value(state: Pressed, goal: Goal) -> float:
     return state.load if goal.is_load else state.depth
 
 
-def follow(pressing: Pressing, start: Pressed, goals: list[Goal]) -> Iterator[Step]:
-    """Yield the states at the goals, in order; the ``last`` of a NewtonError is the last step."""
+def follow(
+    pressing: Pressing, start: Pressed, goals: list[Goal], progress: Progress | None = None
+) -> Iterator[Step]:
+    """Yield the states at the goals, in order; the ``last`` of a NewtonError is the last step.
+
+    ``progress`` is told the share of the way after each step.
+    """
     path = _Path(pressing, start)
-    for goal in goals:
+    for number, goal in enumerate(goals):
         try:
-            path.reach(goal)
+            for share in path.reach(goal):
+                if progress is not None:
+                    progress((number + share) / len(goals))
         except NewtonError as problem:
             problem.last = path.step if path.states else None
             raise
@@ -351,9 +362,10 @@ class _Path:
         places = (number[:-1, None] + (t + 1) / 2).ravel()
         return float(np.tile(weights / 2, number.size - 1) @ (load(places) * depth(places, 1)))
 
-    def reach(self, goal: Goal) -> None:
-        """Go to a goal."""
+    def reach(self, goal: Goal) -> Iterator[float]:
+        """Go to a goal; yield the share of the way after each step."""
         begin, halvings = _value(self.states[-1], goal) if self.states else 0.0, 0
+        way = goal.value - begin
         if not self.states:
             self.length = min(_FIRST * self._radius(goal), goal.value / _FIRST_STEPS)
         while begin != goal.value:
@@ -376,6 +388,7 @@ class _Path:
             self.length = min(self.length, _LONGEST * self._radius(goal))
             self.states.append(state)
             begin = ahead
+            yield 1 - (goal.value - begin) / way
 
     def _radius(self, goal: Goal) -> float:
         """Return a rod's radius as a depth, or the load that sinks it so far; inf for a sphere."""

@@ -26,6 +26,7 @@ from memscal.mechanics.finite_strain.pressing import (
     NewtonError,
     Pressed,
     Pressing,
+    Progress,
     RodFace,
     SphereFace,
     Step,
@@ -40,6 +41,8 @@ from memscal.model.indenter import Rod, Sphere
 _MM = 1e3
 # The mesh that tells the convergence has sides longer by this factor.
 _COARSER = 1.5
+# Share of the work that it takes.
+_COARSE_WORK = 0.3
 # Distance of the film's free edge from the axis, in thicknesses, where none is given.
 _FREE_EDGE = 12.5
 # Radius of the rounding of a rod's edge, as a share of the rod's radius, where none is given: a
@@ -58,7 +61,9 @@ _DRAWN_IN = 0.16
 _SAMPLES = np.linspace(0.0, 4.0, 41)
 
 
-def press_at_finite_strain(request: RingRequest) -> tuple[Contact, ...]:
+def press_at_finite_strain(
+    request: RingRequest, progress: Progress | None = None
+) -> tuple[Contact, ...]:
     """Return the contacts at the targets, visited in their order."""
     film, indenter, targets = request.film, request.indenter, request.targets
     friction = request.friction
@@ -89,7 +94,9 @@ def press_at_finite_strain(request: RingRequest) -> tuple[Contact, ...]:
             cure="Check the depth and its unit.",
         )
     radius = request.film_radius or _FREE_EDGE * film.thickness
-    return solve_finite_strain(film, indenter, targets, sticking=friction > 0, radius=radius)
+    return solve_finite_strain(
+        film, indenter, targets, sticking=friction > 0, radius=radius, progress=progress
+    )
 
 
 @lru_cache(maxsize=32)
@@ -102,6 +109,7 @@ def solve_finite_strain(
     radius: float = 25e-3,
     refinement: float = 1.0,
     edge: float | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Contact, ...]:
     """Press a rod (edge rounded to ``edge``, m) or a sphere on a film of ``radius`` (m)."""
     # Under a rod that sticks a point stays where it first touched, also at the rounded edge and at
@@ -109,8 +117,13 @@ def solve_finite_strain(
     by_load = isinstance(targets[0], Load)
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    coarse = request.solve(refinement / _COARSER, coarse=None)
-    return tuple(request.solve(refinement, coarse=coarse))
+    tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
+    coarse = request.solve(
+        refinement / _COARSER, coarse=None, progress=lambda x: tell(_COARSE_WORK * x)
+    )
+    return tuple(
+        request.solve(refinement, coarse=coarse, progress=lambda x: tell(1 - rest + rest * x))
+    )
 
 
 def follow_depths(
@@ -136,12 +149,14 @@ class _Request:
     radius: float
     edge: float | None
 
-    def solve(self, refinement: float, *, coarse: list[Contact] | None) -> list[Contact]:
+    def solve(
+        self, refinement: float, *, coarse: list[Contact] | None, progress: Progress
+    ) -> list[Contact]:
         """Return the contacts on one mesh; convergence against a coarser one."""
         pressing = self._pressing(refinement, coarse)
         contacts: list[Contact] = []
         try:
-            for step in follow(pressing, self._start(pressing), self.goals):
+            for step in follow(pressing, self._start(pressing), self.goals, progress):
                 contact = self._contact(pressing, step)
                 if coarse is not None:
                     r, other = _SAMPLES * self.film.thickness, coarse[len(contacts)]

@@ -1,0 +1,30 @@
+"""Rods of the table beside the same rods solved directly, off the table's nodes."""
+
+import numpy as np
+import pytest
+
+from memscal import ElasticFilm, Rod
+from memscal.mechanics.finite_strain.solve import solve_finite_strain
+from memscal.mechanics.finite_strain.table import tabulated_rod
+from memscal.mechanics.solver.problem import Depth
+
+H = 2e-3
+
+
+def compare_with_the_table(nu: float, radius: float, depths: list[float], sticking: bool) -> None:
+    """Assert that spectra, stress and depth agree; radius and depths in thicknesses."""
+    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=H, law="neo-hookean")
+    rod, k, r = Rod(radius=radius * H), np.linspace(0.0, 12.0, 61) / H, np.linspace(0.1, 4, 40) * H
+    for state in solve_finite_strain(
+        film, rod, tuple(Depth(d * H) for d in depths), sticking=sticking
+    ):
+        tabulated = tabulated_rod(film, rod, state.load, sticking=sticking)
+        assert tabulated is not None
+        largest = float(state.base_stress(0.0))
+        for name, at, bound in (
+            ("base_spectrum", k, 1e-3 * state.load), ("base_shear_spectrum", k, 1e-3 * state.load),
+            ("base_stress", r, 2e-3 * largest), ("base_shear", r, 2e-3 * largest),
+        ):  # fmt: skip
+            expected = getattr(state, name)(at)
+            assert getattr(tabulated, name)(at) == pytest.approx(expected, abs=bound), name
+        assert tabulated.depth == pytest.approx(state.depth, rel=5e-3)
