@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.scans import CENTRE, shear_scan
+from helpers.scans import CENTRE, LINEAR_FILM, shear_scan
 
 import memscal
 from memscal import GaussianMixture, StressProfile
@@ -13,6 +13,7 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.points import ScanPoints, measured_points
 from memscal.estimation.reference import carried_force, reference_spectra
 from memscal.model.arrays import FloatArray
+from memscal.simulation.rod_scan import PAPER_ROD
 
 KERNEL = GaussianMixture((1.4, -0.4), (450e-6, 250e-6))
 
@@ -29,7 +30,7 @@ def planar_points(x: FloatArray, y: FloatArray, channel: str) -> ScanPoints:
 
 def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
     scan = memscal.simulate()
-    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0, strain="linear")
     points = planar_points(x, y, channel)
     return ForwardModel(points, reference_spectra([contact], [points], [2e-3]))
 
@@ -38,7 +39,7 @@ def model_at(x: FloatArray, y: FloatArray, channel: str = "xz") -> ForwardModel:
 def test_the_signal_is_the_plain_sum_of_traction_times_sensitivity_over_the_sensor(channel) -> None:
     # The film's traction on every element of the base, weighed by G: in Cartesian coordinates,
     # with the indenter at (x, y) and the sensor at the centre.
-    contact = memscal.indent(memscal.simulate().film, memscal.simulate().indenter, load=2.0)
+    contact = memscal.indent(LINEAR_FILM, PAPER_ROD, load=2.0)
     rng = np.random.default_rng()
     x, y = rng.uniform(-4e-3, 4e-3, (2, 6))
     x0, y0 = rng.uniform(-0.5e-3, 0.5e-3, 2)
@@ -104,7 +105,7 @@ def test_derivatives_by_centre_and_distance_are_those_of_the_signal() -> None:
 
 def test_a_tabulated_shear_has_the_transform_of_the_contact_it_is_of() -> None:
     scan = shear_scan(seed=1)
-    contact = memscal.indent(scan.film, scan.indenter, load=1.0)
+    contact = memscal.indent(scan.film, scan.indenter, load=1.0, strain="linear")
     points = [measured_points(scan, "xz")]
     solved, tabulated = (
         reference_spectra([reference], points, [2e-3])[0]
@@ -118,7 +119,7 @@ def test_a_tabulated_shear_has_the_transform_of_the_contact_it_is_of() -> None:
 
 def test_a_reference_without_shear_or_with_the_other_sign_is_refused() -> None:
     scan = shear_scan(seed=1)
-    profile = memscal.indent(scan.film, scan.indenter, load=1.0).profile()
+    profile = memscal.indent(scan.film, scan.indenter, load=1.0, strain="linear").profile()
     assert profile.sigma_rz is not None
     points = [measured_points(scan, "xz")]
 
