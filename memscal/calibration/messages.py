@@ -15,6 +15,7 @@ from memscal.estimation.points import loads_differ
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import RECTANGLE
 from memscal.mechanics.contact import Contact
+from memscal.mechanics.press_rod import is_tabulated
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import (
@@ -25,7 +26,7 @@ from memscal.model.checks import (
     QualityCheck,
     failed_check_messages,
 )
-from memscal.model.film import LINEAR
+from memscal.model.film import LINEAR, NEO_HOOKEAN
 from memscal.model.scan import Scan
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
@@ -139,9 +140,13 @@ def _law(solution: Solution, results: Results) -> list[Message]:
     """Return which law the reference has, and what is not known of it."""
     law, changes = solution.scan.film.law, results.changes
     if law == LINEAR:
-        films = [replace(scan.film, law="") for scan in solution.scans]
-        pairs = zip(solution.scans, films, strict=True)
-        changes = _changes(solution, [replace(scan, film=film) for scan, film in pairs])
+        rubber_films = [replace(scan.film, law=NEO_HOOKEAN) for scan in solution.scans]
+        pairs = list(zip(solution.scans, rubber_films, strict=True))
+        if not all(is_tabulated(film, s.indenter, s.load, s.rod_friction) for s, film in pairs):
+            text = "The film is taken as linear elastic, as stated; no other law is counted."
+            return [Message("film_law", text)]
+        unstated = [replace(scan, film=replace(film, law="")) for scan, film in pairs]
+        changes = _changes(solution, unstated)
 
     def changed(by: str, sign: int) -> str:
         if by not in changes:

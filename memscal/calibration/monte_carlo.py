@@ -30,7 +30,7 @@ from memscal.calibration.uncertainty import (
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
-from memscal.estimation.reference import law_at_once, rod_spectrum
+from memscal.estimation.reference import law_at_once, relative, rod_spectrum
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.result import Result
@@ -178,7 +178,9 @@ class DrawnScans:
         rods = zip(true, self.solution.estimate.model.references, self._nominal, strict=True)
         laws = [law_at_once(scan) for scan in self.solution.scans]
         return tuple(
-            replace(ref, values=ref.values * (rod_spectrum(scan, ref, law) / nominal - 1))
+            replace(
+                ref, values=(rod_spectrum(scan, ref, law) - nominal) * relative(ref.values, nominal)
+            )
             for (scan, ref, nominal), law in zip(rods, laws, strict=True)
         )
 

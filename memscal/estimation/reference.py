@@ -350,7 +350,13 @@ def _difference(
         rod_spectrum(replace(scan, film=film, indenter=rod), reference, law)
         for film, rod in zip(films, rods, strict=True)
     )
-    return np.asarray((upper - lower) * (reference.values / rod_spectrum(scan, reference, law)))
+    own = rod_spectrum(scan, reference, law)
+    return (upper - lower) * relative(reference.values, own)
+
+
+def relative(values: FloatArray, own: FloatArray) -> FloatArray:
+    """Ratio of two transforms, 0 where the second ends."""
+    return np.divide(values, own, out=np.zeros_like(own), where=own != 0)
 
 
 def law_at_once(scan: Scan) -> str:
