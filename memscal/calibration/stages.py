@@ -77,6 +77,19 @@ def solve(
             # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
             if centre == PER_REPEAT:
                 raise
+    solution = solved(scans, stresses, estimate, method, both=both)
+    return replace(solution, owners=owners, apart=apart)
+
+
+def solved(
+    scans: Sequence[Scan],
+    stresses: Sequence[StressProfile | Contact],
+    estimate: ProfileEstimate,
+    method: Method,
+    *,
+    both: bool,
+) -> Solution:
+    """Find A and G from the estimate of the profile; see :func:`solve`."""
     smoothed = None if estimate.model.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
@@ -87,7 +100,7 @@ def solve(
     result = deconvolve(estimate, band, fields, method)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
     steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
-    return Solution(*steps, result, beside, gaussian, owners, apart)
+    return Solution(*steps, result, beside, gaussian)
 
 
 def require_profile(

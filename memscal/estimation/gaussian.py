@@ -25,6 +25,7 @@ _LONGEST_STEP = 1.0
 _ROUNDING = 1e-10
 
 Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+Shape = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
 
 
 def gauss_newton(
@@ -307,9 +308,17 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift, ellipse])
 
 
-def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
-    """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
-    free, elliptic = model.points.free, model.points.ellipse
+def _gaussian_shape(k: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+    kernel = gaussian_transfer(k, sigma)
+    return kernel, -sigma * k**2 * kernel
+
+
+def linearise(model: ForwardModel, theta: FloatArray, shape: Shape | None = None) -> GaussianFit:
+    """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity.
+
+    ``shape``: transform of a round kernel in the place of the Gaussian, and its slope by the width.
+    """
+    free, elliptic = model.points.free, 0 if shape else model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)
     centre[free] = theta[2 : 2 + free.sum()]
@@ -317,16 +326,15 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     ellipticity = np.zeros(2)
     ellipticity[:elliptic] = theta[theta.size - elliptic :]
     geometry = model.geometry(centre)
-    kernel = gaussian_transfer(model.k, sigma)
-    columns = np.stack([kernel, -sigma * model.k**2 * kernel], axis=1)
+    kernel, slope = (shape or _gaussian_shape)(model.k, sigma)
     if elliptic:
-        shape, widening, *ovals = elliptic_columns(model, geometry, sigma, ellipticity).T
+        signal, widening, *ovals = elliptic_columns(model, geometry, sigma, ellipticity).T
     else:
-        shape, widening, *ovals = model.signal(geometry, columns).T
+        signal, widening, *ovals = model.signal(geometry, np.stack([kernel, slope], axis=1)).T
     shift, baseline = model.centre_derivative(geometry, amplitude * kernel), model.drift_columns
     oval = [amplitude * column for column in ovals[:elliptic]]
-    jacobian = np.column_stack([shape, amplitude * widening, shift, baseline, *oval])
-    predicted = amplitude * shape + baseline @ drift
+    jacobian = np.column_stack([signal, amplitude * widening, shift, baseline, *oval])
+    predicted = amplitude * signal + baseline @ drift
     return GaussianFit(
         amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
     )

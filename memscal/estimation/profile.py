@@ -68,7 +68,11 @@ class ProfileEstimate:
     @property
     def noise_scale(self) -> float:
         """Noise of a point (V); with stated uncertainties, the factor they must grow by (Birge)."""
-        scatter = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
+        return self.adopted_noise(self.weighed.noise)
+
+    def adopted_noise(self, scatter: float) -> float:
+        """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
+        scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
     @property

@@ -24,8 +24,8 @@ from memscal.mechanics.contact import Contact
 from memscal.mechanics.finite_strain.table import largest_tabulated_load
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
-from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
-from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
+from memscal.model.indenter import Rod
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -277,20 +277,15 @@ def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Fl
     # for a reference from elsewhere.
     film = scan.film
     changes: dict[str, FloatArray] = {}
-    if (u := film.young_modulus_uncertainty) is not None:
-        # At a given load it does not change the stress in a linear film.
+    if film.young_modulus_uncertainty is not None:
         changes["young_modulus"] = np.zeros_like(reference.values)
-        if u and film.law not in ("", LINEAR):
-            films = [replace(film, young_modulus=film.young_modulus + step) for step in (u, -u)]
-            changes["young_modulus"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
-    if u := film.thickness_uncertainty:
-        films = [replace(film, thickness=film.thickness + step) for step in (u, -u)]
-        changes["thickness"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
-    if u := film.poisson_ratio_uncertainty:
-        above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
-        films = [replace(film, poisson_ratio=ratio) for ratio in (above, below)]
-        difference = _difference(scan, reference, films, [scan.indenter] * 2)
-        changes["poisson_ratio"] = difference * u / (above - below)
+    # At a given load the modulus does not change the stress in a linear film.
+    names = ["thickness", "poisson_ratio"]
+    for name in names if film.law in ("", LINEAR) else ["young_modulus", *names]:
+        if ends := more_and_less(film, name):
+            *films, share = ends
+            varied = [replace(scan, film=film) for film in films]
+            changes[name] = share * _difference(scan, reference, varied)
     return changes
 
 
@@ -300,8 +295,8 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     if not (u := rod.radius_uncertainty):
         return {}
     radii = (rod.radius + u, max(rod.radius - u, rod.radius / 2))
-    rods = [replace(rod, radius=radius) for radius in radii]
-    return {"rod_radius": _difference(scan, reference, [scan.film] * 2, rods) / 2}
+    varied = [replace(scan, indenter=replace(rod, radius=radius)) for radius in radii]
+    return {"rod_radius": _difference(scan, reference, varied) / 2}
 
 
 def press_neo_hookean(scan: Scan) -> Contact:
@@ -334,19 +329,11 @@ def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     return {name: RECTANGLE * change * load / pair[0].load}
 
 
-def _difference(
-    scan: Scan,
-    reference: RadialSpectrum,
-    films: Sequence[ElasticFilm],
-    rods: Sequence[RoundIndenter],
-) -> FloatArray:
-    """Difference of two rods' solutions, scaled from the rod's own to the reference."""
+def _difference(scan: Scan, reference: RadialSpectrum, varied: Sequence[Scan]) -> FloatArray:
+    """Difference of the rods of two scans, scaled from the scan's own rod to the reference."""
     law = law_at_once(scan)
-    upper, lower = (
-        rod_spectrum(replace(scan, film=film, indenter=rod), reference, law)
-        for film, rod in zip(films, rods, strict=True)
-    )
-    return np.asarray((upper - lower) * (reference.values / rod_spectrum(scan, reference, law)))
+    upper, lower, own = (rod_spectrum(rod, reference, law) for rod in (*varied, scan))
+    return np.asarray((upper - lower) * (reference.values / own))
 
 
 def law_at_once(scan: Scan) -> str:

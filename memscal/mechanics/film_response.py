@@ -43,7 +43,7 @@ from numpy.typing import ArrayLike
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import gauss_between, gauss_panels
-from memscal.mechanics.half_space import coupling_integrals, on_hats, singular_integrals
+from memscal.mechanics.surface import coupling_integrals, on_hats, singular_integrals
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 

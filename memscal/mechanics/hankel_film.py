@@ -1,6 +1,6 @@
 r"""Bonded film by Hankel transforms: compliance of its surface, and the field below it.
 
-The half-space's share of the compliance is in closed form (:mod:`memscal.mechanics.half_space`).
+The half-space's share of the compliance is in closed form (:mod:`memscal.mechanics.surface`).
 What the rigid base adds falls off as :math:`(kh)^2 e^{-2kh}` and is summed by Gauss quadrature
 over :math:`k`, in panels that resolve the oscillation of the Bessel functions.
 """
@@ -15,16 +15,8 @@ from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.mechanics import film_response
-from memscal.mechanics.film_response import (
-    HalfSpaceIntegrals,
-    InterfaceTraction,
-    RingTraction,
-    base_spectrum,
-    base_stress,
-    hat_transforms,
-)
-from memscal.mechanics.half_space import coupling_integrals, singular_integrals
-from memscal.mechanics.surface import SurfaceCompliance
+from memscal.mechanics.film_response import HalfSpaceIntegrals, InterfaceTraction, RingTraction
+from memscal.mechanics.surface import SurfaceCompliance, coupling_integrals, singular_integrals
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
@@ -47,7 +39,8 @@ class HankelFilm:
         film, r = self.film, self.r
         (w_by_p, u_by_q), (w_by_q, u_by_p) = singular_integrals(r, r), coupling_integrals(r, r)
         k, weights = _wavenumbers(film, 2 * r[-1])
-        layer = _layer_integrals(film, r, (k, weights), hat_transforms(r, k))
+        hats = film_response.hat_transforms(r, k)
+        layer = _layer_integrals(film, r, (k, weights), hats)
         return SurfaceCompliance(r, *_displacements(film, (w_by_p, w_by_q, u_by_p, u_by_q), layer))
 
     @property
@@ -69,19 +62,19 @@ class HankelField:
 
     def base_normal(self, r: FloatArray) -> FloatArray:
         """Return the normal stress at the base in Pa; zero where it is below 1e-13 of its peak."""
-        return base_stress(self.film, self.traction, r)
+        return film_response.base_stress(self.film, self.traction, r)
 
     def base_shear(self, r: FloatArray) -> FloatArray:
         """Return the radial traction of the base on the film in Pa."""
-        return base_stress(self.film, self.traction, r, order=1)
+        return film_response.base_stress(self.film, self.traction, r, order=1)
 
     def base_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
-        return 2 * np.pi * base_spectrum(self.film, self.traction, k)
+        return 2 * np.pi * film_response.base_spectrum(self.film, self.traction, k)
 
     def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
         r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
-        return 2 * np.pi * base_spectrum(self.film, self.traction, k, order=1)
+        return 2 * np.pi * film_response.base_spectrum(self.film, self.traction, k, order=1)
 
     def depression(self, r: FloatArray) -> FloatArray:
         """Return the normal displacement of the surface in m, positive into the film."""

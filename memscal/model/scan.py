@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -196,33 +196,14 @@ _LEAST_EIGENVALUE = 1e-8
 _LINE = 0.01
 
 
-class _Contacts(Protocol):
-    """What of a scan describes its contacts."""
-
-    @property
-    def normal_load(self) -> FloatArray | None: ...
-    @property
-    def normal_load_errors(self) -> FloatArray | None: ...
-    @property
-    def lubrication(self) -> str: ...
-    @property
-    def lubricant(self) -> str: ...
-
-
-def require_contacts(scan: _Contacts) -> None:
+def require_contacts(scan: Scan) -> None:
     """Refuse uncertainties of loads that are none, and an unknown state of lubrication."""
-    errors = scan.normal_load_errors
-    if errors is not None:
-        if scan.normal_load is None:
-            raise InputError(
-                "normal_load_errors is given without normal_load.",
-                why="It is the standard uncertainty of the load at each point.",
-                cure="Give normal_load too, the load that was set at each point.",
-            )
-        if np.any((errors < 0) | np.isinf(errors)):
-            raise InputError(
-                "normal_load_errors holds a standard uncertainty that is negative or infinite."
-            )
+    if scan.normal_load_errors is not None and scan.normal_load is None:
+        raise InputError(
+            "normal_load_errors is given without normal_load.",
+            why="It is the standard uncertainty of the load at each point.",
+            cure="Give normal_load too, the load that was set at each point.",
+        )
     if scan.lubrication not in LUBRICATIONS:
         raise InputError(
             f"The lubrication of the scan is {scan.lubrication!r}.",
@@ -547,11 +528,12 @@ class Scan:
         if self.load_uncertainty is not None:
             require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         require_rod_friction(self.rod_friction)
-        errors, loads = self.u_zz_errors, self.normal_load
-        if errors is not None and np.any((errors < 0) | np.isinf(errors)):
-            raise InputError(
-                "u_zz_errors holds a standard uncertainty that is negative or infinite."
-            )
+        loads, errors_of_loads = self.normal_load, self.normal_load_errors
+        stated = {"u_zz_errors": self.u_zz_errors, "normal_load_errors": errors_of_loads}
+        for name, errors in stated.items():
+            if errors is not None and np.any((errors < 0) | np.isinf(errors)):
+                problem = "holds a standard uncertainty that is negative or infinite."
+                raise InputError(f"{name} {problem}")
         if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
             raise InputError(
                 "normal_load holds a load that is infinite or not above zero.",

@@ -18,10 +18,9 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
-from memscal.calibration.drawn_scatter import drawn_scatter
-from memscal.calibration.fields import choose_grid
-from memscal.calibration.stages import Solution, deconvolve, prepare_fields
-from memscal.calibration.uncertainty import Results, input_effects, propagate
+from memscal.calibration.calibrate import uncertainties
+from memscal.calibration.stages import Solution, solved
+from memscal.calibration.uncertainty import Results, input_effects
 from memscal.deconvolution.division import Method, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation import reference
@@ -30,7 +29,6 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
-from memscal.estimation.smoothing import find_band, smooth_profile
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray, freeze_arrays, require_non_negative, require_positive
@@ -153,28 +151,9 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     points = measured_points(scan)
     references = reference.reference_spectra([stress], [points], [plan.film.thickness])
     estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)
-    smoothed = smooth_profile(estimate)
-    band = find_band(estimate, smoothed)
-    choice = choose_grid(estimate, band)
-    fields = prepare_fields(estimate, smoothed, choice)
-    deconvolution = deconvolve(estimate, band, fields, method)
-    solution = Solution(
-        scans=(scan,),
-        stresses=(stress,),
-        estimate=estimate,
-        smoothed=smoothed,
-        band=band,
-        choice=choice,
-        fields=fields,
-        method=method,
-        deconvolution=deconvolution,
-        other=None,
-        gaussian_misfit=deconvolution.misfit,
-    )
-    effects = input_effects(solution.scans, solution.stresses, estimate)
-    wavenumbers = fields.along_axis(deconvolution.quotient.window)[0]
-    results = propagate(solution, deconvolution, wavenumbers, effects, {}, drawn_scatter(solution))
-    return solution, results
+    solution = solved([scan], [stress], estimate, method, both=False)
+    effects = input_effects([scan], [stress], estimate)
+    return solution, uncertainties(solution, solution.deconvolution, effects, {})
 
 
 def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:

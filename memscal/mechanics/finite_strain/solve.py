@@ -15,12 +15,7 @@ import numpy as np
 
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.finite_strain.film_elements import (
-    FilmElements,
-    Rubber,
-    mesh_below_a_rod,
-    mesh_below_a_sphere,
-)
+from memscal.mechanics.finite_strain import film_elements
 from memscal.mechanics.finite_strain.pressing import (
     Goal,
     NewtonError,
@@ -109,8 +104,8 @@ def solve_finite_strain(
     by_load = isinstance(targets[0], Load)
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    coarse = request.solve(refinement / _COARSER, coarse=None)
-    return tuple(request.solve(refinement, coarse=coarse))
+    coarse = tuple(request.solve(refinement / _COARSER))
+    return tuple(request.solve(refinement, coarse))
 
 
 def follow_depths(
@@ -119,10 +114,8 @@ def follow_depths(
     """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
     goals = [Goal(depth * _MM, False) for depth in depths]
     request = _Request(film, rod, goals, sticking, _FREE_EDGE * film.thickness * _MM, None)
-    pressing = request._pressing(1.0, None)
-    with suppress(NewtonError):
-        for step in follow(pressing, request._start(pressing), goals):
-            yield request._contact(pressing, step)
+    with suppress(ConvergenceError):
+        yield from request.solve(1.0)
 
 
 @dataclass(frozen=True)
@@ -136,17 +129,16 @@ class _Request:
     radius: float
     edge: float | None
 
-    def solve(self, refinement: float, *, coarse: list[Contact] | None) -> list[Contact]:
-        """Return the contacts on one mesh; convergence against a coarser one."""
+    def solve(self, refinement: float, coarse: Sequence[Contact] = ()) -> Iterator[Contact]:
+        """Yield the contacts on one mesh; their convergence against those on a coarser one."""
         pressing = self._pressing(refinement, coarse)
-        contacts: list[Contact] = []
         try:
-            for step in follow(pressing, self._start(pressing), self.goals):
+            for i, step in enumerate(follow(pressing, self._start(pressing), self.goals)):
                 contact = self._contact(pressing, step)
-                if coarse is not None:
-                    r, other = _SAMPLES * self.film.thickness, coarse[len(contacts)]
-                    contact = replace(contact, convergence=relative_change(contact, other, r))
-                contacts.append(contact)
+                if coarse:
+                    change = relative_change(contact, coarse[i], _SAMPLES * self.film.thickness)
+                    contact = replace(contact, convergence=change)
+                yield contact
         except NewtonError as problem:
             error = ConvergenceError(
                 problem.problem,
@@ -156,9 +148,8 @@ class _Request:
             if isinstance(problem.last, Step):
                 error.last = self._contact(pressing, problem.last)
             raise error from problem
-        return contacts
 
-    def _pressing(self, refinement: float, coarse: list[Contact] | None) -> Pressing:
+    def _pressing(self, refinement: float, coarse: Sequence[Contact]) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
         size = (self.film.thickness * _MM, self.radius, refinement)
         face: RodFace | SphereFace
@@ -171,11 +162,12 @@ class _Request:
             else:
                 finest, (inner, outer) = _FINEST_SLIDING, _FOLD_SLIDING
             fold = (inner * rod, outer * rod)
-            mesh = mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest * face.edge)
+            finest *= face.edge
+            mesh = film_elements.mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest)
         else:
             face = SphereFace(self.indenter.radius * _MM)
             widest = max(map(self._hertz_radius, self.goals))
-            if coarse is not None:  # now it is known
+            if coarse:  # now it is known
                 widest = 1.1 * max(contact.contact_radius for contact in coarse) * _MM
             if widest > min(self.radius / 2, 0.9 * face.radius):
                 raise DomainError(
@@ -183,8 +175,8 @@ class _Request:
                     f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
                     why="It must end well within both.",
                 )
-            mesh = mesh_below_a_sphere(size, contact=widest)
-        elements = FilmElements(mesh, Rubber.of(self.film))
+            mesh = film_elements.mesh_below_a_sphere(size, contact=widest)
+        elements = film_elements.FilmElements(mesh, film_elements.Rubber.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
 

@@ -33,13 +33,9 @@ def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> Contact
     """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``."""
     # The rings in contact stay in contact, unless one pulls by more than a little at the edge.
     state = take_step(problem, start, Touch(ring), same_contact=True)
-    return state if _is_contact(problem, state) else take_step(problem, start, Touch(ring))
-
-
-def _is_contact(problem: ContactProblem, state: ContactState) -> bool:
-    """Whether a state fulfils Signorini's conditions, but for what an edge does not resolve."""
     pulls = state.pressure.min() < -_PULL * state.pressure.max()
-    return not pulls and not _overlaps(problem, state)
+    wrong = pulls or _overlaps(problem, state)
+    return take_step(problem, start, Touch(ring)) if wrong else state
 
 
 def _overlaps(problem: ContactProblem, state: ContactState) -> bool:
@@ -130,18 +126,13 @@ def follow(
     problem: ContactProblem, targets: Sequence[Target], loading: str, increments: int
 ) -> list[PathPoint]:
     """Return the states at ``targets``; the ``last`` of a ConvergenceError is a PathPoint."""
-    at_once = problem.friction > 0 and loading == "total"
-    return list((_in_one_step if at_once else _step_by_step)(problem, targets, increments))
-
-
-def _in_one_step(
-    problem: ContactProblem, targets: Sequence[Target], increments: int
-) -> Iterator[PathPoint]:
-    """Solve each target from the untouched film; the frictionless contact is where to begin."""
-    smooth = replace(problem, friction=0.0)
-    for target, point in zip(targets, _step_by_step(smooth, targets, increments), strict=True):
-        state = _step_at_once(problem, point.state, target)
-        yield PathPoint(state, 1, _elastic_energy(problem, state), None, None)
+    if problem.friction == 0 or loading != "total":
+        return list(_step_by_step(problem, targets, increments))
+    # Each from the untouched film; the frictionless contact is where to begin.
+    begin = _step_by_step(replace(problem, friction=0.0), targets, increments)
+    pairs = zip(begin, targets, strict=True)
+    states = [_step_at_once(problem, point.state, target) for point, target in pairs]
+    return [PathPoint(s, 1, _elastic_energy(problem, s), None, None) for s in states]
 
 
 @dataclass(eq=False)

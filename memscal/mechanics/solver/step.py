@@ -149,8 +149,13 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    status = _first_status(problem, start, goal)
+    law, separation = problem.normal_law, problem.separations(start)
+    pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
     held = goal.ring if isinstance(goal, Touch) else None
+    if held is not None:
+        pressing[held] = False
+    stretch = start.outward - start.anchor
+    status = _Status(pressing, start.slip, start.anchor, separation, start.pressure, stretch)
     for iteration in range(1, _MOST_ITERATIONS + 1):
         tractions = _solve_system(problem, status, goal)
         revised, settled = _revise(problem, status, tractions, held, iteration > _CAREFUL_AFTER)
@@ -165,16 +170,6 @@ def take_step(
         why=f"Before it, {start.load:.6g} N were borne at a depth of {start.depth * 1e6:.6g} um.",
         cure="Try another number of rings, or a friction coefficient nearby.",
     )
-
-
-def _first_status(problem: ContactProblem, start: ContactState, goal: Goal) -> _Status:
-    """Begin with the status of the state before."""
-    law, separation = problem.normal_law, problem.separations(start)
-    pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
-    if isinstance(goal, Touch):
-        pressing[goal.ring] = False
-    stretch = start.outward - start.anchor
-    return _Status(pressing, start.slip, start.anchor, separation, start.pressure, stretch)
 
 
 def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) -> NDArray[np.bool_]:
