@@ -13,15 +13,9 @@ import numpy as np
 from scipy.special import j1
 
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
+from memscal.deconvolution import fourier_ratio
 from memscal.deconvolution.division import Method, WhiteNoise
-from memscal.deconvolution.fourier_ratio import (
-    Field,
-    Quotient,
-    divide,
-    fit_gaussian,
-    normalise,
-    reconvolve,
-)
+from memscal.deconvolution.fourier_ratio import Field, Quotient
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.assumptions import CentresApart, repeat_centres_test
 from memscal.estimation.bayesian import Bayesian
@@ -135,11 +129,11 @@ def deconvolve(
         return _of_posterior(estimate, fields, method)
     # Eq. 2: A G.
     weakest = (band.weakest_reference, band.weakest_voltage)
-    quotient = divide(fields.voltage, fields.stress, weakest=weakest, method=method)
+    quotient = fourier_ratio.divide(fields.voltage, fields.stress, weakest=weakest, method=method)
     quotient = replace(quotient, values=quotient.values * fields.confinement)
     # Eq. 3: A, and G of unit integral.
-    a, g = normalise(fields.on_support(quotient.values, None))
-    sigma = fit_gaussian(g, estimate.gaussian.sigma)
+    a, g = fourier_ratio.normalise(fields.on_support(quotient.values, None))
+    sigma = fourier_ratio.fit_gaussian(g, estimate.gaussian.sigma)
     # Eq. 1: the voltage that A and G predict.
     predicted = _reconvolved(estimate, fields, quotient) + estimate.background
     return Deconvolution(quotient, a, g, sigma, predicted, _misfit(estimate, predicted))
@@ -152,8 +146,8 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
     )
     values = fields.kernel(profile.radial) * fields.confinement
     quotient = Quotient(fields.grid, values, np.ones(fields.grid.transfer(values).shape))
-    a, g = normalise(fields.on_support(values, profile))
-    sigma = fit_gaussian(g, estimate.gaussian.sigma)
+    a, g = fourier_ratio.normalise(fields.on_support(values, profile))
+    sigma = fourier_ratio.fit_gaussian(g, estimate.gaussian.sigma)
     model = estimate.model
     signal = model.signal(model.geometry(estimate.centres), profile.transform(model.k))
     predicted = signal + estimate.oval + estimate.background
@@ -258,7 +252,7 @@ class Solution:
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
     """Signal of the quotient at the points, in V: each scan through its own reference."""
     if estimate.points.scans == 1:
-        back = reconvolve(1.0, quotient, fields.stress)
+        back = fourier_ratio.reconvolve(1.0, quotient, fields.stress)
         return fields.at_points(back.values) * estimate.points.load
     k, kernel = fields.along_axis(fields.grid.transfer(quotient.values).real)
     spectrum = np.interp(estimate.model.k, k, kernel, right=0.0)

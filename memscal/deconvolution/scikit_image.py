@@ -7,14 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from memscal.deconvolution.division import (
-    NOISE_RATIO,
-    Division,
-    DivisionProblem,
-    image_division,
-    require_amplitude,
-    require_count,
-)
+from memscal.deconvolution import division
+from memscal.deconvolution.division import Division, DivisionProblem
 from memscal.model.arrays import FloatArray
 
 #: Pixels below this share of the brightest are left out of a Richardson-Lucy step.
@@ -50,7 +44,7 @@ class Wiener:
     )
 
     def __post_init__(self) -> None:
-        require_amplitude(self.name, self.amplitude)
+        division.require_amplitude(self.name, self.amplitude)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's Wiener-Hunt filter."""
@@ -65,9 +59,9 @@ class Wiener:
         )
         # Along one axis: the first component weaker than the weakest relevant one, or the last.
         index = int(np.argmax(spectrum[0] < weakest)) or spectrum.shape[1] - 1
-        balance = (self.amplitude * NOISE_RATIO * weakest / penalty[0, index]) ** 2
+        balance = (self.amplitude * division.NOISE_RATIO * weakest / penalty[0, index]) ** 2
         restored = wiener(images.image, images.point_spread, balance, clip=False)
-        return image_division(problem, restored * images.scale)
+        return division.image_division(problem, restored * images.scale)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +76,7 @@ class UnsupervisedWiener:
     )
 
     def __post_init__(self) -> None:
-        require_count(self.name, "seed", self.seed, 0)
+        division.require_count(self.name, "seed", self.seed, 0)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by scikit-image's unsupervised Wiener-Hunt restoration."""
@@ -91,7 +85,7 @@ class UnsupervisedWiener:
         images = _Images.of(problem)
         blurred, spread = images.image, images.point_spread
         restored, _ = unsupervised_wiener(blurred, spread, clip=False, rng=self.seed)
-        return image_division(problem, restored * images.scale)
+        return division.image_division(problem, restored * images.scale)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +100,7 @@ class RichardsonLucy:
     )
 
     def __post_init__(self) -> None:
-        require_count(self.name, "iterations", self.iterations, 1)
+        division.require_count(self.name, "iterations", self.iterations, 1)
 
     def divide(self, problem: DivisionProblem) -> Division:
         """Divide by steps on the grid's own transforms: 20 times faster than scikit-image's."""
@@ -120,4 +114,4 @@ class RichardsonLucy:
             positive = predicted > _DARK * voltage.max()
             ratio = np.divide(voltage, predicted, out=np.zeros_like(voltage), where=positive)
             field = field * grid.inverse(backward * grid.forward(ratio))
-        return image_division(problem, grid.to_image(field))
+        return division.image_division(problem, grid.to_image(field))

@@ -11,13 +11,8 @@ from numpy.typing import NDArray
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
-from memscal.estimation.bayesian import (
-    DepartureBasis,
-    WeighedFit,
-    departure_basis,
-    supported,
-    weigh_departures,
-)
+from memscal.estimation import bayesian
+from memscal.estimation.bayesian import DepartureBasis, WeighedFit
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.points import ScanPoints
@@ -177,13 +172,14 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     for _ in range(_WEIGHING_ROUNDS):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
-        basis = departure_basis(model, fit, weights)
-        weighed = weigh_departures(model, fit, basis, weights, count, least_noise=least)
+        basis = bayesian.departure_basis(model, fit, weights)
+        weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=least)
         updated = outlier_weights(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
         outlier = updated
-    estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, outlier, basis)
+    within = bayesian.supported(basis, weighed)
+    estimate = ProfileEstimate(model, fit, *within, weights, outlier, basis)
     _require_determined(estimate)
     return estimate
 
@@ -212,8 +208,9 @@ def log_marginal_likelihood(
     if not fit.has_width(weights, noise):
         # The flat prior of ln(width) has no end there, where the width changes no voltage.
         return np.full(2, -np.inf)
-    basis, count = departure_basis(model, fit, weights), float(estimate.outlier_weight.sum())
-    weighed = weigh_departures(model, fit, basis, weights, count, least_noise=_least_noise(fit))
+    basis, least = bayesian.departure_basis(model, fit, weights), _least_noise(fit)
+    count = float(estimate.outlier_weight.sum())
+    weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=least)
     both = weighed.log_marginal_likelihood, weighed.log_marginal_of_uncertainty
     return np.asarray(both) - volume / 2
 

@@ -292,9 +292,7 @@ def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
 def _distance(scan: Scan, centre: FloatArray) -> FloatArray:
     """Distance of every point of a scan from a centre, shape of ``u_zz``, in m."""
     x, y = scan.positions
-    if scan.planar:
-        return np.asarray(np.hypot(x - centre[0], y - centre[1]))
-    return np.asarray(np.abs(y - centre[1] if scan.direction == "y" else x - centre[0]))
+    return np.asarray(np.hypot(x - centre[0], y - centre[1]))
 
 
 #: Radii of the smooth curve.

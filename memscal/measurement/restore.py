@@ -30,21 +30,9 @@ from memscal.measurement.posterior import (
     sensor_transfer,
 )
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
+from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import (
-    FAILED_CALIBRATION,
-    NOISE_LIMIT,
-    NOISE_UNSTATED,
-    OUTLIER_LIMIT,
-    OUTLIER_WEIGHT,
-    Message,
-    QualityCheck,
-    check,
-    chi_square_limit,
-    failed_check_messages,
-    override_messages,
-    state_of_checks,
-)
+from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.records import FILM, SENSOR
@@ -169,7 +157,7 @@ def _noise(restored: Restoration) -> list[QualityCheck]:
         check(
             "noise_as_stated",
             restored.posterior.found_noise,
-            NOISE_LIMIT,
+            quality.NOISE_LIMIT,
             "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
             "something besides electronic noise scatters the scan, such as position or load; the "
             "uncertainties have been raised accordingly.",
@@ -207,8 +195,8 @@ def _symmetry(restored: Restoration) -> QualityCheck:
 def _outliers(restored: Restoration) -> QualityCheck:
     return check(
         "outliers",
-        float(np.mean(restored.posterior.estimate.outlier_weight < OUTLIER_WEIGHT)),
-        OUTLIER_LIMIT,
+        float(np.mean(restored.posterior.estimate.outlier_weight < quality.OUTLIER_WEIGHT)),
+        quality.OUTLIER_LIMIT,
         "Share of points whose weight was more than halved. A failure means that the noise is not "
         "what the uncertainties take it for: look at the residuals.",
     )
@@ -233,7 +221,7 @@ def restoration_messages(
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, warnings first."""
     estimate, points = restored.posterior.estimate, restored.points
-    messages = failed_check_messages(checks)
+    messages = quality.failed_check_messages(checks)
     messages += failed_calibration_messages(restored.apparatus)
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
@@ -244,7 +232,7 @@ def restoration_messages(
             f"Outlier {restored.distance[i] * 1e3:.4g} mm from the centre: "
             f"{points.u[i] * 1e3:.4g} mV instead of {restored.predicted[i] * 1e3:.4g} mV.",
         )
-        for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]
+        for i in (estimate.outlier_weight < quality.OUTLIER_WEIGHT).nonzero()[0]
     ]
     if points.u_errors is None:
         messages.append(noise_unstated_message(float(restored.noise.min())))
@@ -269,14 +257,14 @@ def restoration_messages(
 
 def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
     """Return one message if a check of the calibration had failed, else none."""
-    text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
-    return [] if apparatus.passed else [Message(FAILED_CALIBRATION, text)]
+    text = f"Quality checks of the calibration itself {quality.state_of_checks(apparatus.checks)}."
+    return [] if apparatus.passed else [Message(quality.FAILED_CALIBRATION, text)]
 
 
 def noise_unstated_message(noise: float) -> Message:
     """Return the message for a scan without u_zz_errors, with the estimated noise in V."""
     text = f"u_zz_errors is absent: a noise of {noise * 1e3:.3g} mV was estimated from the scatter."
-    return Message(NOISE_UNSTATED, text)
+    return Message(quality.NOISE_UNSTATED, text)
 
 
 #: A film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
@@ -332,7 +320,7 @@ def restore(
     """
     sensor, measured = opened_apparatus(apparatus), opened_scan(scan)
     require_measurement(measured, sensor)
-    overridden = override_messages(accept_mismatches(measured, sensor, override=override))
+    overridden = quality.override_messages(accept_mismatches(measured, sensor, override=override))
     restored = restore_known(measured, sensor, expected)
     return replace(restored, messages=(*overridden, *restored.messages))
 

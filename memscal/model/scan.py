@@ -12,13 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
-from memscal.model.arrays import (
-    FloatArray,
-    finite_vector,
-    frozen_array,
-    require_non_negative,
-    whole_numbers,
-)
+from memscal.model import arrays
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import SourceFile
@@ -246,7 +241,7 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
 
 def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
     """Return a read-only copy of a correlation of ``size`` points, which must be one of noise."""
-    correlation = frozen_array(stated)
+    correlation = arrays.frozen_array(stated)
     if correlation.shape != (size, size) or not np.isfinite(correlation).all():
         raise InputError(
             f"u_zz_correlation has shape {correlation.shape}, but it should be ({size}, {size}) "
@@ -401,16 +396,18 @@ class Scan:
     source: SourceFile | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "x", finite_vector("x of the scan", self.x))
-        if self.y is not None:
-            object.__setattr__(self, "y", finite_vector("y of the scan", self.y))
-        object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
+        for name in ("x", "y"):
+            if (values := getattr(self, name)) is not None:
+                vector = arrays.finite_vector(f"{name} of the scan", values)
+                object.__setattr__(self, name, vector)
+        object.__setattr__(self, "u_zz", arrays.frozen_array(self.u_zz))
         if self.repeat is not None:
-            object.__setattr__(self, "repeat", whole_numbers("repeat of the scan", self.repeat))
+            repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
+            object.__setattr__(self, "repeat", repeat)
         self._check_signal_shape()
         for name in ("u_zz_errors", "normal_load", "normal_load_errors"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, self._like_signal(name, getattr(self, name)))
+            if (values := getattr(self, name)) is not None:
+                object.__setattr__(self, name, self._like_signal(name, values))
         if self.branch is not None:
             branch = branch_numbers("branch of the scan", self.branch)
             if branch.shape == self.u_zz.shape[:-1] != ():
@@ -509,7 +506,7 @@ class Scan:
             require_plane(self.x, self.y)
 
     def _like_signal(self, name: str, values: ArrayLike, dtype: Any = np.float64) -> FloatArray:
-        array = frozen_array(values, dtype=dtype)
+        array = arrays.frozen_array(values, dtype=dtype)
         if array.shape != self.u_zz.shape:
             raise InputError(f"{name} has shape {array.shape}, but u_zz has {self.u_zz.shape}.")
         return array
@@ -526,7 +523,7 @@ class Scan:
                 cure="Give the indenter's load (/entry/indenter/load).",
             )
         if self.load_uncertainty is not None:
-            require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+            arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         require_rod_friction(self.rod_friction)
         loads, errors_of_loads = self.normal_load, self.normal_load_errors
         stated = {"u_zz_errors": self.u_zz_errors, "normal_load_errors": errors_of_loads}
@@ -547,13 +544,13 @@ class Scan:
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
         if self.position_scale_uncertainty is not None:
-            require_non_negative(
+            arrays.require_non_negative(
                 "relative standard uncertainty of the stage's scale",
                 self.position_scale_uncertainty,
             )
         if self.x_errors is None:
             return
-        errors = finite_vector("x_errors of the scan", self.x_errors)
+        errors = arrays.finite_vector("x_errors of the scan", self.x_errors)
         if errors.shape != self.x.shape or np.any(errors < 0):
             raise InputError(
                 f"x_errors holds {errors.size} values for {self.x.size} positions, the smallest "

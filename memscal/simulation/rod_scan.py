@@ -16,13 +16,7 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan, StressSensor
 from memscal.parallel import single_threaded
-from memscal.simulation.sensor import (
-    Disturbances,
-    apparatus_function,
-    blurred_stress,
-    disturbance,
-    shear_channel,
-)
+from memscal.simulation import sensor
 
 #: The paper's film, with its uncertainties where it gives them and modest ones elsewhere.
 PAPER_FILM = ElasticFilm(
@@ -131,8 +125,8 @@ def simulate(
             f"The centre is {centre} m and the seed {seed}; the one must be finite, the other not "
             "negative."
         )
-    truth = apparatus_function(kernel)
-    shear = shear_channel(channels, shear_kernel, shear_conversion_constant)
+    truth = sensor.apparatus_function(kernel)
+    shear = sensor.shear_channel(channels, shear_kernel, shear_conversion_constant)
     loads = checked_loads(load)
     if raster and loads.size * repeats > 1:
         raise InputError("A raster has one repeat at one load.", cure="Simulate several rasters.")
@@ -146,18 +140,18 @@ def simulate(
     contacts = [press_rod(film, rod, float(value), rod_friction) for value in solved]
 
     def blurred(kernel: RadialKernel, order: int = 0) -> FloatArray:
-        stress = blurred_stress(contacts, kernel, radius, order=order)
+        stress = sensor.blurred_stress(contacts, kernel, radius, order=order)
         stress = stress * (loads / solved)[:, None, None]
         return np.asarray(stress[0] if raster else np.repeat(stress[:, 0], repeats, axis=0))
 
     row_loads = np.repeat(loads, repeats)
     signal = conversion_constant * blurred(truth)
     largest = float(signal.max() if raster else signal.max(axis=1).mean())
-    clean = signal + largest * disturbance(x, baseline, drift)
+    clean = signal + largest * sensor.disturbance(x, baseline, drift)
     u = clean + np.random.default_rng(seed).normal(0.0, noise * largest, clean.shape)
     if not raster and row_loads.size == 1:
         u = u[0]
-    disturbed = Disturbances(noise, baseline, drift, state_noise, seed)
+    disturbed = sensor.Disturbances(noise, baseline, drift, state_noise, seed)
     channel_data: dict[str, FloatArray] = {}
     shear_truth: dict[str, float | str] = {}
     if shear is not None:
