@@ -389,7 +389,9 @@ def _compared(
     """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
     mean, spread = float(column.mean()), float(column.std(ddof=1))
-    error, u = spread * _sampling_error(column), _random_part(budget)
+    # Of the inputs and noise; a correlation's contribution has a sign.
+    parts = np.array([u for source, u in budget.items() if source not in uncertainty.NOT_RANDOM])
+    error, u = spread * _sampling_error(column), float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
     # Beyond what the number of draws allows: two standard errors.
     same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
@@ -409,12 +411,6 @@ def _compared(
         stated=parameters.uncertainty(name),
         reason="" if agrees else _reason(spread, mean - expected, u, budget, solved),
     )
-
-
-def _random_part(budget: Mapping[str, float]) -> float:
-    """Standard uncertainty of noise and inputs; a correlation's contribution has a sign."""
-    u = np.array([u for source, u in budget.items() if source not in uncertainty.NOT_RANDOM])
-    return float(np.sqrt(max(float(np.sum(u * np.abs(u))), 0.0)))
 
 
 def _reason(

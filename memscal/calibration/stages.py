@@ -51,11 +51,9 @@ def solve(
     centre: str | None = COMMON,
     owners: Sequence[int] | None = None,
 ) -> Solution:
-    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back.
-
-    ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test.  ``owners``:
-    the number of the scan that each is a part of.
-    """
+    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back."""
+    # ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test. ``owners``:
+    # the number of the scan that each is a part of.
     require_channel_method(channel, method)
     owners, apart = tuple(owners or range(len(scans))), None
     if centre != PER_REPEAT:

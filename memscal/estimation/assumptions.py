@@ -213,13 +213,11 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
 def hysteresis_test(
     estimate: ProfileEstimate, owner: NDArray[np.intp] | None = None
 ) -> ExtraColumns | None:
-    """Compare approach and retreat within each scan that has both; ``None`` without any.
-
-    The columns are the relative difference of A, that of the position along the scan in m (of the
-    sensor's centre), and that of the baseline in V: each is approach minus retreat.  Where
-    repeats have centres and baselines of their own, it is A alone.  ``owner`` (n,): number of the
-    scan of each point, all repeats included.
-    """
+    """Compare approach and retreat within each scan that has both; ``None`` without any."""
+    # The columns are the relative difference of A, that of the position along the scan in m (of the
+    # sensor's centre), and that of the baseline in V: each is approach minus retreat. Where repeats
+    # have centres and baselines of their own, it is A alone. ``owner`` (n,): number of the scan of
+    # each point, all repeats included.
     # A step of the baseline between the branches would else be taken for a difference of A.
     points, model = estimate.points, estimate.model
     owner = points.scan if owner is None else owner

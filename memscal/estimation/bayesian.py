@@ -212,10 +212,8 @@ class DepartureBasis:
 def departure_basis(
     model: ForwardModel, fit: GaussianFit, weights: FloatArray | None = None
 ) -> DepartureBasis:
-    """Return the kernels of the fit's own parameters and of every shape about it.
-
-    With the weights of the points, (n,), of the families' best fits, too.
-    """
+    """Return the kernels of the fit's own parameters and of every shape about it."""
+    # With the weights of the points, (n,), of the families' best fits, too.
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
     families = () if weights is None else tuple(_fitted_families(model, fit, weights, width))

@@ -314,10 +314,8 @@ def _gaussian_shape(k: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray
 
 
 def linearise(model: ForwardModel, theta: FloatArray, shape: Shape | None = None) -> GaussianFit:
-    """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity.
-
-    ``shape``: transform of a round kernel in the place of the Gaussian, and its slope by the width.
-    """
+    """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
+    # ``shape``: transform of a round kernel in place of the Gaussian, and its slope by the width.
     free, elliptic = model.points.free, 0 if shape else model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)

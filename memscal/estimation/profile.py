@@ -187,13 +187,11 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
 def log_marginal_likelihood(
     estimate: ProfileEstimate, inputs: FloatArray | None = None, noise: float = 1.0
 ) -> FloatArray:
-    """Logarithm of p(u) of all voltages by the references of an estimate, at its weights, (2,).
-
-    The first is by the hypotheses' priors of the estimate, the second by those of the uncertainty.
-    It is comparable between references for the same points, weights and ``noise``.  ``inputs``
-    (n, q), in V: what one standard uncertainty of each uncertain input changes, each a Gaussian of
-    unit variance that is integrated, beside ``noise``, that of a point of weight one.
-    """
+    """Logarithm of p(u) of all voltages by the references of an estimate, at its weights, (2,)."""
+    # The first is by the hypotheses' priors of the estimate, the second by those of the
+    # uncertainty. It is comparable between references for the same points, weights and ``noise``.
+    # ``inputs`` (n, q), in V: what one standard uncertainty of each uncertain input changes, each a
+    # Gaussian of unit variance that is integrated, beside ``noise``, that of a point of weight one.
     points, weights, volume = estimate.points, estimate.weights, 0.0
     if inputs is not None and inputs.size:
         # The covariance 1 + S S^T of standardised voltages is made white by its inverse root.
@@ -315,10 +313,8 @@ def _share(estimate: ProfileEstimate, block: NDArray[np.intp]) -> float:
 def outlier_weights(
     standardised: FloatArray, threshold: float, least: float = np.finfo(float).tiny
 ) -> FloatArray:
-    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3.
-
-    The residuals count in robust standard deviations of their own, of ``least`` or more.
-    """
+    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
+    # The residuals count in robust standard deviations of their own, of ``least`` or more.
     scale = 1.4826 * np.median(np.abs(standardised))
     z = np.abs(standardised) / max(scale, least)
     return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))

@@ -85,11 +85,9 @@ def require_same_set_up(
     *,
     override: bool,
 ) -> list[str]:
-    """Refuse a reference of another film, rod or load than its scan; or return the differences.
-
-    :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
-    alternative may have another law and friction, which it is given for.
-    """
+    """Refuse a reference of another film, rod or load than its scan; or return the differences."""
+    # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
+    # alternative may have another law and friction, which it is given for.
     differences: list[str] = []
     for scan, given in zip(scans, references, strict=True):
         if (stress := scan.reference if given is None else given) is not None:
@@ -306,13 +304,11 @@ def press_neo_hookean(scan: Scan) -> Contact:
 
 
 def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
-    """Change of the reference's transform by what is not known of the film's law.
-
-    Rectangles, of which the standard uncertainty is the half width over the root of three: where
-    no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
-    at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
-    sliding.
-    """
+    """Change of the reference's transform by what is not known of the film's law."""
+    # Rectangles, of which the standard uncertainty is the half width over the root of three: where
+    # no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
+    # at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
+    # sliding.
     film, rod, load = scan.film, scan.indenter, scan.load
     if film.law == LINEAR or (film.law and scan.rod_friction is not None):
         return {}

@@ -90,8 +90,10 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     """Smooth the voltages of scans about their centres; of several references, put together."""
     points, references = estimate.points, estimate.model.references
     predicted, weight = np.zeros(points.u.size), np.ones(points.u.size)
-    gains = []
-    for scans in _groups(references):
+    gains, groups = [], dict[bytes, list[int]]()
+    for scan, reference in enumerate(references):
+        groups.setdefault(reference.values.tobytes(), []).append(scan)
+    for scans in groups.values():
         rows = np.flatnonzero(np.isin(points.scan, scans))
         load = points.load[rows]
         of_scans, smoothed, weight[rows] = _fitted(estimate, references[scans[0]], rows)
@@ -100,14 +102,6 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
         gain[:, rows] = of_scans / load
         gains.append((references[scans[0]].values, gain))
     return SmoothedProfile(estimate, _joined(gains, estimate), predicted, weight)
-
-
-def _groups(references: Sequence[RadialSpectrum]) -> list[list[int]]:
-    """Return the scans that share a reference."""
-    groups: dict[bytes, list[int]] = {}
-    for scan, reference in enumerate(references):
-        groups.setdefault(reference.values.tobytes(), []).append(scan)
-    return list(groups.values())
 
 
 def _joined(
@@ -199,11 +193,9 @@ class _RadialSpline:
 
 
 def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, count: int) -> float:
-    """Return the smoothing parameter of the largest restricted likelihood, its noise free.
-
-    ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
-    the voltages along their vectors; ``total``: sum of the squares of all ``count``.
-    """
+    """Return the smoothing parameter of the largest restricted likelihood, its noise free."""
+    # ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
+    # the voltages along their vectors; ``total``: sum of the squares of all ``count``.
     from scipy.optimize import minimize_scalar
 
     squares, power = values**2, data**2
@@ -276,7 +268,10 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
     sampled = np.pi / estimate.points.step
     relevant = min(_falls_below(k, signal / noise, RELEVANT), sampled)
-    resolved = min(_first_below(k, yardstick / error, RESOLVED), sampled)
+    ratio = yardstick / error
+    lost = np.flatnonzero(ratio < RESOLVED)
+    end = int(lost[0]) + 1 if lost.size else k.size
+    resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
     weakest_voltage = float(np.interp(relevant, k, signal))
     weakest_reference = float(np.interp(relevant, k, reference))
     return Band(k, signal, noise, relevant, resolved, weakest_voltage, weakest_reference)
@@ -288,13 +283,6 @@ def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
     rows = (basis.kernels(estimate.model.k) - np.outer(estimate.kernel / a, basis.integrals)) / a
     variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
-
-
-def _first_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
-    """Return where a ratio first falls below a threshold, log-interpolated."""
-    below = ratio < threshold
-    end = int(np.argmax(below)) + 1 if below.any() else k.size
-    return _falls_below(k[:end], ratio[:end], threshold)
 
 
 def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:

@@ -228,11 +228,12 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
     prepared = PreparedScan(_at_nominal(scan, np.zeros_like(scan.u_zz)), _stated(scan), False)
     if scan.normal_load is None:
         return prepared
-    errors = scan.normal_load_errors
+    errors, (x, y) = scan.normal_load_errors, scan.positions
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.load
     for _ in range(_ROUNDS):
         estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
-        slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
+        distance = np.hypot(x - estimate.centre[0], y - estimate.centre[1])
+        slope = signal.slope(distance, _sticking(estimate, signal))
         of_load = np.abs(slope) * load_share
         electronic, estimated = _stated(scan), False
         if scan.u_zz_errors is None and of_load.any():
@@ -287,12 +288,6 @@ def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
     tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * estimate.largest_signal)
     variance = tried[:, None] ** 2 + of_load**2
     return float(tried[np.argmin(np.sum(np.log(variance) + square / variance, axis=1))])
-
-
-def _distance(scan: Scan, centre: FloatArray) -> FloatArray:
-    """Distance of every point of a scan from a centre, shape of ``u_zz``, in m."""
-    x, y = scan.positions
-    return np.asarray(np.hypot(x - centre[0], y - centre[1]))
 
 
 #: Radii of the smooth curve.

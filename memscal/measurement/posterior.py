@@ -150,7 +150,8 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), shape)
     weighed = weigh_departures(model, fit, basis, weights, float(start.outlier_weight.sum()))
-    rows = _state_rows(model.k, basis)
+    kernels = basis.kernels(model.k)
+    rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])
     kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)
     first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
     growth = start.adopted_noise(weighed.noise) / weighed.noise
@@ -184,14 +185,6 @@ def _fit(
     if best is None or not best[0] > 0 or not 1 / _FARTHEST < best[1] < _FARTHEST:
         best = theta / scale
     return linearise(model, best * scale, shape.with_slope)
-
-
-def _state_rows(k: FloatArray, basis: _Basis) -> FloatArray:
-    """Derivative of the state by the parameters and the departures' amplitudes."""
-    kernels = basis.kernels(k)
-    others = np.zeros((basis.flat - 2, kernels.shape[1]))
-    others[:, 2 : basis.flat] = np.eye(basis.flat - 2)
-    return np.vstack([kernels, others])
 
 
 def _log_information(model: ForwardModel, weights: FloatArray, fit: GaussianFit) -> float:

@@ -114,15 +114,6 @@ _FORCE_LIMIT = 3.0
 _NEGLIGIBLE_FORCE = 0.01
 
 
-def restoration_checks(restored: Restoration) -> tuple[QualityCheck, ...]:
-    """Run every check that applies to the scan."""
-    checks = [_reconvolution(restored), _force(restored), *_noise(restored)]
-    checks += [_symmetry(restored), _outliers(restored)]
-    if restored.comparison is not None:
-        checks.append(_expected(restored.comparison))
-    return tuple(checks)
-
-
 def _reconvolution(restored: Restoration) -> QualityCheck:
     degrees = restored.degrees
     return check(
@@ -217,7 +208,7 @@ def _expected(compared: StressComparison) -> QualityCheck:
 
 
 def restoration_messages(
-    restored: Restoration, checks: tuple[QualityCheck, ...]
+    restored: Restoration, checks: Sequence[QualityCheck]
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, warnings first."""
     estimate, points = restored.posterior.estimate, restored.points
@@ -346,8 +337,12 @@ def restore_known(
     )
     if expected is not None:
         restored = replace(restored, comparison=restored.compare(expected))
-    checks = restoration_checks(restored)
-    return replace(restored, checks=checks, messages=restoration_messages(restored, checks))
+    checks = [_reconvolution(restored), _force(restored), *_noise(restored)]
+    checks += [_symmetry(restored), _outliers(restored)]
+    if restored.comparison is not None:
+        checks.append(_expected(restored.comparison))
+    messages = restoration_messages(restored, checks)
+    return replace(restored, checks=tuple(checks), messages=messages)
 
 
 def gaussian_pressure(

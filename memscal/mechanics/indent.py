@@ -10,12 +10,12 @@ import numpy as np
 
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact, too_deep
+from memscal.mechanics.film_response import HankelField
 from memscal.mechanics.finite_strain.solve import press_at_finite_strain
-from memscal.mechanics.hankel_film import HankelField
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.rod import solve_rod
-from memscal.mechanics.solver.problem import Depth, Load, Target
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
+from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.model.arrays import FloatArray, require_positive
 from memscal.model.film import LINEAR, ElasticFilm, more_and_less
 from memscal.model.indenter import Indenter, Rod
@@ -110,7 +110,7 @@ def indent(
 
     Notes
     -----
-    Contact is unilateral, friction Amontons' (:mod:`memscal.mechanics.solver.problem`).  A rod that
+    Contact is unilateral, friction Amontons' (:mod:`memscal.mechanics.solver.step`).  A rod that
     slides freely or sticks is solved to higher accuracy (:mod:`memscal.mechanics.rod`).  Solutions
     are cached: the same request is answered at once.
 

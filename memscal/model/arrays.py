@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,15 @@ def freeze_arrays(owner: object, *names: str) -> None:
     """Replace arrays of a frozen dataclass by read-only copies."""
     for name in names:
         object.__setattr__(owner, name, frozen_array(getattr(owner, name)))
+
+
+@dataclass(frozen=True, eq=False)
+class FrozenArrays:
+    """Base of a frozen dataclass whose arrays are read-only copies of what it was made of."""
+
+    def __post_init__(self) -> None:
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        freeze_arrays(self, *(n for n, v in values.items() if isinstance(v, np.ndarray | list)))
 
 
 def finite_vector(name: str, values: ArrayLike) -> FloatArray:

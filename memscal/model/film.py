@@ -100,10 +100,8 @@ class ElasticFilm:
 
 
 def more_and_less(record: Any, name: str) -> tuple[Any, Any, float] | None:
-    """Return a film or indenter with more and less of a quantity by u, and u over the difference.
-
-    ``None`` where no u is stated; one-sided at the ends of a Poisson's ratio, 0 and 1/2.
-    """
+    """Return a film or indenter with more and less of a quantity, and u over the difference."""
+    # None where no u is stated; one-sided at the ends of a Poisson's ratio, 0 and 1/2.
     value, u = getattr(record, name), getattr(record, f"{name}_uncertainty", None)
     if not u:
         return None

@@ -67,11 +67,9 @@ class EvenAxis:
 
 
 def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
-    """Group points by place: equal positions, and of several passes those close to each other.
-
-    Close is a tenth of the usual distance within a pass.  On a plane the readings at one node of
-    an even lattice share a place too.
-    """
+    """Group points by place: equal positions, and of several passes those close to each other."""
+    # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
+    # an even lattice share a place too.
     positions = np.stack([x, y], axis=1)
     close, pairs = _neighbours(positions, repeat)
     index = _linked(positions, pairs)
@@ -92,10 +90,8 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
 
 
 def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, EvenAxis] | None:
-    """Fit an even lattice to the positions of ``count`` places in a plane, or return ``None``.
-
-    Rows may be missing, but not most nodes: all positions lie on a lattice that is fine enough.
-    """
+    """Fit an even lattice to the positions of ``count`` places in a plane, or return ``None``."""
+    # Rows may be missing, but not most nodes: all positions lie on a lattice that is fine enough.
     along_x, along_y = _even_axis(x), _even_axis(y)
     if along_x is None or along_y is None:
         return None

@@ -31,7 +31,7 @@ from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray, freeze_arrays, require_non_negative, require_positive
+from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.result import Result
@@ -171,7 +171,7 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design(Result):
+class Design(Result, FrozenArrays):
     """A planned scan and its expected results, with standard uncertainties (k = 1).
 
     Parameters
@@ -209,9 +209,6 @@ class Design(Result):
 
     _summary: ClassVar[str] = "design"
     _figure: ClassVar[str] = "design.design_figure"
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self, "r", "g", "g_errors", "k", "transfer", "transfer_errors")
 
     def __repr__(self) -> str:
         """Return the plan and its main numbers in place of arrays."""
@@ -412,26 +409,22 @@ def _out_of_reach(search: _Search, targets: Mapping[str, float], tried: list[Des
     reached = f"{_in_words(name, _reached(best, name))}, with {search.words(best.plan)}"
     problem = f"{goal[0].upper()}{goal[1:]}: the best is {reached}."
     if name == "resolved_wavenumber":
-        return _band_ends(best, problem)
+        step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
+        if best.resolved_wavenumber >= 0.99 * sampled:
+            why = f"A step of {step:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
+            return FitError(problem, why=why, cure="Plan a finer step.")
+        return FitError(
+            problem,
+            why=f"A film of {best.plan.film.thickness * 1e3:.4g} mm passes little of larger "
+            "wavenumbers, and noise hides it.",
+            cure="Plan less noise, a larger load, or a thinner film.",
+        )
     source = best.largest_source(name)
     share = best.budget[name][source] / abs(best.parameters[name])
     return FitError(
         problem,
         why=f"{source} alone contributes {share * 100:.3g} %.",
         cure=_CURES.get(source, "Reduce that contribution, or want less."),
-    )
-
-
-def _band_ends(best: Design, problem: str) -> FitError:
-    step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
-    if best.resolved_wavenumber >= 0.99 * sampled:
-        why = f"A step of {step:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
-        return FitError(problem, why=why, cure="Plan a finer step.")
-    return FitError(
-        problem,
-        why=f"A film of {best.plan.film.thickness * 1e3:.4g} mm passes little of larger "
-        "wavenumbers, and noise hides it.",
-        cure="Plan less noise, a larger load, or a thinner film.",
     )
 
 

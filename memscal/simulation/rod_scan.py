@@ -157,6 +157,7 @@ def simulate(
     if shear is not None:
         sheared = blurred(shear.kernel, order=1) * shear.side(x - centre[0], radius)
         channel_data, shear_truth = shear.recorded(sheared.reshape(u.shape), x, disturbed)
+    of_law = {"mooney_rivlin_ratio": film.mooney_rivlin_ratio, "rod_friction": rod_friction}
     return Scan(
         x=x,
         y=x if raster else None,
@@ -177,7 +178,8 @@ def simulate(
             "conversion_constant": conversion_constant,
             "centre": centre[0],
             "centre_y": centre[1],
-            **described_law(film, rod_friction),
+            "film_law": film.law or LINEAR,
+            **{name: value for name, value in of_law.items() if value is not None},
             **disturbed.in_volts(largest),
             "seed": float(seed),
             **shear_truth,
@@ -188,13 +190,6 @@ def simulate(
 def without_law(film: ElasticFilm) -> ElasticFilm:
     """Return the film without a law, as a scan that does not state it has it."""
     return replace(film, law="", mooney_rivlin_ratio=None)
-
-
-def described_law(film: ElasticFilm, rod_friction: float | None) -> dict[str, float | str]:
-    """Return the film's law and the rod's friction, by the names of a truth."""
-    numbers = {"mooney_rivlin_ratio": film.mooney_rivlin_ratio, "rod_friction": rod_friction}
-    stated = {name: value for name, value in numbers.items() if value is not None}
-    return {"film_law": film.law or LINEAR, **stated}
 
 
 def checked_loads(load: float | Sequence[float]) -> FloatArray:

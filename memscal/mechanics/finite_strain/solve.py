@@ -27,8 +27,8 @@ from memscal.mechanics.finite_strain.pressing import (
     follow,
 )
 from memscal.mechanics.finite_strain.state import FiniteStrainField, interface_traction, outermost
-from memscal.mechanics.solver.problem import Depth, Load, Target
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
+from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 
