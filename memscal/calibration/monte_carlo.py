@@ -414,14 +414,10 @@ def _compared(
 
 
 def _reason(
-    spread: float,
-    shift: float,
-    u: float,
-    budget: Mapping[str, float],
-    inputs: Sequence[SolvedInput],
+    spread: float, off: float, u: float, budget: Mapping[str, float], inputs: Sequence[SolvedInput]
 ) -> str:
     """Return by how much draws and budget disagree, and whether a distribution is cut off."""
-    text = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
+    text = f"The draws scatter by {spread / u:.2f} u, and their mean is {off / u:+.2f} u off."
     for item in inputs:
         kept = float(item.truncated(ndtri((np.arange(1000) + 0.5) / 1000)).std())
         if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:

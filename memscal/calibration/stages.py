@@ -28,11 +28,10 @@ from memscal.estimation.points import (
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
-from memscal.mechanics.contact import Contact
+from memscal.mechanics.contact import BaseStress
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
 
 #: Whose centre is fitted: a scan's, or each repeat's.
 COMMON, PER_REPEAT = "common", "per-repeat"
@@ -43,7 +42,7 @@ _RADII = 2001
 
 def solve(
     scans: Sequence[Scan],
-    stresses: Sequence[StressProfile | Contact],
+    stresses: Sequence[BaseStress],
     method: Method,
     channel: str = "zz",
     *,
@@ -75,7 +74,7 @@ def solve(
 
 def solved(
     scans: Sequence[Scan],
-    stresses: Sequence[StressProfile | Contact],
+    stresses: Sequence[BaseStress],
     estimate: ProfileEstimate,
     method: Method,
     *,
@@ -96,9 +95,7 @@ def solved(
 
 
 def require_profile(
-    scans: Sequence[Scan],
-    stresses: Sequence[StressProfile | Contact],
-    channel: str,
+    scans: Sequence[Scan], stresses: Sequence[BaseStress], channel: str
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
     points = [measured_points(scan, channel) for scan in scans]
@@ -204,7 +201,7 @@ class Solution:
     """Every step of a calibration."""
 
     scans: tuple[Scan, ...]
-    stresses: tuple[StressProfile | Contact, ...]  # the reference of each scan
+    stresses: tuple[BaseStress, ...]  # the reference of each scan
     estimate: ProfileEstimate  # centre, baseline, noise, and the posterior of the profile
     smoothed: SmoothedProfile | None  # the profile that is divided; none of a shear
     band: Band  # signal and noise of the voltage's transform
@@ -228,7 +225,7 @@ class Solution:
         return self.scans[0]
 
     @property
-    def stress(self) -> StressProfile | Contact:
+    def stress(self) -> BaseStress:
         """The reference of the first scan, which the fields are made with."""
         return self.stresses[0]
 

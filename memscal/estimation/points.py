@@ -498,11 +498,7 @@ def file_in_words(source: SourceFile | None, kind: str) -> str:
 
 
 def stated_differences(
-    record: Record,
-    names: Sequence[str],
-    stated: Sequence[object],
-    places: Sequence[str],
-    of: str = "",
+    record: Record, names: Sequence[str], stated: Sequence[Any], places: Sequence[str], of: str = ""
 ) -> list[str]:
     """Return in words which quantities two sides both state, and with values that do not agree."""
     # Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of

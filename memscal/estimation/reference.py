@@ -20,7 +20,7 @@ from memscal.estimation.points import (
     require_plausible,
     stated_differences,
 )
-from memscal.mechanics.contact import Contact
+from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.finite_strain.table import largest_tabulated_load
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
@@ -80,8 +80,8 @@ def require_calibration_rod(scan: Scan) -> None:
 
 def require_same_set_up(
     scans: Sequence[Scan],
-    references: Sequence[StressProfile | Contact | None],
-    alternatives: Sequence[StressProfile | Contact | None] = (),
+    references: Sequence[BaseStress | None],
+    alternatives: Sequence[BaseStress | None] = (),
     *,
     override: bool,
 ) -> list[str]:
@@ -110,7 +110,7 @@ def require_same_set_up(
     )
 
 
-def _other_set_up(scan: Scan, stress: StressProfile | Contact, kind: str) -> list[str]:
+def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
     """Return in words what of film, rod and load a stress was not calculated for."""
     source = None if isinstance(stress, Contact) else stress.source
     places = file_in_words(scan.source, "scan"), file_in_words(source, kind)
@@ -143,7 +143,7 @@ def _other_set_up(scan: Scan, stress: StressProfile | Contact, kind: str) -> lis
     ]
 
 
-def _farthest(scan: Scan, stress: StressProfile | Contact) -> SimpleNamespace:
+def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     """Return the load of the scan that agrees least with a stress's, and its uncertainty, in N."""
     loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
@@ -153,9 +153,7 @@ def _farthest(scan: Scan, stress: StressProfile | Contact) -> SimpleNamespace:
     return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 
 
-def reference_profile(
-    scan: Scan, reference: StressProfile | Contact | None
-) -> StressProfile | Contact:
+def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     """Choose the reference: the argument, the scan's own, or the rod's solution."""
     if reference is not None:
         return reference
@@ -165,9 +163,7 @@ def reference_profile(
 
 
 def reference_spectra(
-    references: Sequence[StressProfile | Contact],
-    points: Sequence[ScanPoints],
-    thicknesses: Sequence[float],
+    references: Sequence[BaseStress], points: Sequence[ScanPoints], thicknesses: Sequence[float]
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
     order = points[0].order
@@ -180,9 +176,7 @@ def reference_spectra(
     )
 
 
-def _per_newton(
-    reference: StressProfile | Contact, k: FloatArray, span: float, order: int
-) -> FloatArray:
+def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:
     if isinstance(reference, Contact):
         return _base_spectrum(reference, k.tobytes(), order) / reference.load
     stress = reference.sigma_rz if order else reference.sigma_zz
@@ -221,7 +215,7 @@ def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
     return values
 
 
-def carried_force(stress: StressProfile | Contact, reference: RadialSpectrum) -> float:
+def carried_force(stress: BaseStress, reference: RadialSpectrum) -> float:
     """Force that a reference (a shear: its normal stress) carries, over its load."""
     if reference.order == 0:
         return reference.integral

@@ -43,6 +43,8 @@ from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 MOST_POSITIONS = 4096
 #: A range that is a whole number of steps but for rounding is one.
 _ROUNDING = 1e-6
+#: What a plan and a simulated scan have in common.
+_OF_SIMULATION = ("film", "rod", "kernel", "conversion_constant", "load", "load_uncertainty")
 #: The film passes nothing beyond exp(-kh) of this.
 _LARGEST_KH = 20.0
 
@@ -125,20 +127,10 @@ class Plan:
     def scan(self) -> Scan:
         """Return the expected mean of all repeats: without noise, whose size is stated."""
         count = self.positions
-        scan = simulate(
-            film=self.film,
-            rod=self.rod,
-            kernel=self.kernel,
-            conversion_constant=self.conversion_constant,
-            load=self.load,
-            load_uncertainty=self.load_uncertainty,
-            half_range=self.step * (count - 1) / 2,
-            points=count,
-            noise=0.0,
-            centre=(self.centre, 0.0),
-            baseline=0.0,
-            drift=0.0,
-        )
+        shared: dict[str, Any] = {name: getattr(self, name) for name in _OF_SIMULATION}
+        reach, centre = self.step * (count - 1) / 2, (self.centre, 0.0)
+        nothing = dict.fromkeys(("noise", "baseline", "drift"), 0.0)
+        scan = simulate(half_range=reach, points=count, centre=centre, **shared, **nothing)
         noise = self.point_noise / math.sqrt(self.repeats)
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
 
