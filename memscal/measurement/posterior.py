@@ -154,6 +154,10 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])
     kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)
     first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
+    # Priors are flat in log force, log width and the others: the information's log determinant.
+    flat = fit.jacobian * np.r_[fit.conversion_constant, fit.sigma, np.ones(basis.flat - 2)]
+    root = np.linalg.qr(model.points.standardised(flat, weights), mode="r")
+    log_information = 2 * float(np.log(np.abs(np.diag(root))).sum())
     growth = start.adopted_noise(weighed.noise) / weighed.noise
     return ShapeFit(
         shape=shape,
@@ -162,7 +166,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
         gain=rows @ weighed.gain,
         residual=weighed.residual,
         noise=weighed.noise,
-        log_marginal=weighed.log_marginal_likelihood - 0.5 * _log_information(model, weights, fit),
+        log_marginal=weighed.log_marginal_likelihood - 0.5 * log_information,
     )
 
 
@@ -185,14 +189,6 @@ def _fit(
     if best is None or not best[0] > 0 or not 1 / _FARTHEST < best[1] < _FARTHEST:
         best = theta / scale
     return linearise(model, best * scale, shape.with_slope)
-
-
-def _log_information(model: ForwardModel, weights: FloatArray, fit: GaussianFit) -> float:
-    """Log determinant of the information; priors flat in log force, log width and the others."""
-    scale = np.ones(fit.jacobian.shape[1])
-    scale[:2] = fit.conversion_constant, fit.sigma
-    scaled = model.points.standardised(fit.jacobian * scale, weights)
-    return 2 * float(np.log(np.abs(np.diag(np.linalg.qr(scaled, mode="r")))).sum())
 
 
 #: A shape of less probability is left out.

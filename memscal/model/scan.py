@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -422,7 +423,7 @@ class Scan:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the fields, and prove them again: a read-only mapping cannot be pickled."""
         values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return _rebuilt, ({**values, "channels": dict(self.channels)},)
+        return partial(Scan, **{**values, "channels": dict(self.channels)}), ()
 
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
@@ -554,7 +555,3 @@ class Scan:
                 cure="Give one standard uncertainty for each position, in m, none negative.",
             )
         object.__setattr__(self, "x_errors", errors)
-
-
-def _rebuilt(values: Mapping[str, Any]) -> Scan:
-    return Scan(**values)

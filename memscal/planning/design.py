@@ -285,13 +285,6 @@ class _Search:
     most: int
     plan: Callable[[int], Plan]
 
-    def words(self, plan: Plan) -> str:
-        """Return the number that a plan has."""
-        if self.name == "repeats":
-            return f"{plan.repeats} repeats"
-        length = plan.step if self.name == "step" else plan.half_range
-        return f"a {self.name} of {length * 1e3:.4g} mm"
-
 
 def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
     """Return the targets by their full names; refuse unknown ones, and those without ``vary``."""
@@ -398,7 +391,11 @@ def _out_of_reach(search: _Search, targets: Mapping[str, float], tried: list[Des
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
     goal = f"{_in_words(name, targets[name])} is out of reach by the {search.name} alone"
-    reached = f"{_in_words(name, _reached(best, name))}, with {search.words(best.plan)}"
+    length = best.plan.step if search.name == "step" else best.plan.half_range
+    count = f"a {search.name} of {length * 1e3:.4g} mm"
+    if search.name == "repeats":
+        count = f"{best.plan.repeats} repeats"
+    reached = f"{_in_words(name, _reached(best, name))}, with {count}"
     problem = f"{goal[0].upper()}{goal[1:]}: the best is {reached}."
     if name == "resolved_wavenumber":
         step, sampled = best.plan.step * 1e3, np.pi / best.plan.step

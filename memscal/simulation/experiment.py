@@ -35,15 +35,11 @@ class LoadPath:
     spread: float  # their distance in ln P
 
     def near(
-        self,
-        index: int,
-        kernel: RadialKernel,
-        radius: FloatArray,
-        ratio: FloatArray,
-        order: int = 0,  # one for the shear's radial component
+        self, i: int, kernel: RadialKernel, radius: FloatArray, ratio: FloatArray, order: int = 0
     ) -> FloatArray:
         """Return the blurred stress (Pa) at ``radius`` (m); ``ratio``: load over nominal."""
-        values = sensor.blurred_stress(self.states[index], kernel, radius, order=order)
+        # Of order one: the radial component of the shear.
+        values = sensor.blurred_stress(self.states[i], kernel, radius, order=order)
         if len(values) == 1:
             return np.asarray(values[0])
         below, middle, above = values

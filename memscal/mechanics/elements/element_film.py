@@ -238,7 +238,13 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
     outward, inward = dofs[0::2], dofs[1::2]
     nodes, index = np.unique(inward, return_inverse=True)
     index = index.reshape(inward.shape)
-    gradient, squeeze = _at_local_points(system, solution, local)
+    # The displacement's gradient and the mean pressure at the nodes of every triangle.
+    basis = system.displacement
+    points = (local.T, np.ones(local.shape[0]))
+    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=points)
+    moved, pressed = np.split(solution, [basis.N])
+    gradient = at_nodes.interpolate(moved).grad
+    squeeze = np.asarray(at_nodes.with_element(system.pressure.elem).interpolate(pressed))
     r, depth = system.displacement.doflocs[:, nodes]
     displacement = np.empty((nodes.size, 2))
     displacement[index, 0], displacement[index, 1] = solution[outward], -solution[inward]
@@ -259,17 +265,6 @@ def field_mesh(system: MixedSystem, solution: FloatArray, film: ElasticFilm) -> 
         notes=f"Linear elastic film, E = {film.young_modulus:g} Pa, nu = {film.poisson_ratio:g}, "
         f"thickness {film.thickness * 1e3:g} mm, bonded at z = 0. Stress positive in tension.",
     )
-
-
-def _at_local_points(system: MixedSystem, solution: FloatArray, local: FloatArray) -> Any:
-    """Return the displacement's gradient and the mean pressure at points of every triangle."""
-    import skfem
-
-    basis, points = system.displacement, (local.T, np.ones(local.shape[0]))
-    at_nodes = skfem.Basis(basis.mesh, basis.elem, quadrature=points)
-    moved, pressed = np.split(solution, [basis.N])
-    cubic = at_nodes.with_element(system.pressure.elem)
-    return at_nodes.interpolate(moved).grad, np.asarray(cubic.interpolate(pressed))
 
 
 def _quadratic_triangles(

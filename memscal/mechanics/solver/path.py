@@ -201,18 +201,14 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
             walk.step_to(_mixture(walk.state, following, target))
             return before
         walk.step_to(following)
-    _walk_with_given_contact(walk, target)
-    return walk
-
-
-def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
-    """Go to a target under an indenter with no more rings to touch, such as a rod."""
-    # On a rigid interface the first loading is one step: everything grows in proportion.
-    proportional = walk.state.load == 0 and walk.problem.interface.rigid
+    # No more rings can touch, as under a rod.  On a rigid interface the first loading is then one
+    # step: everything grows in proportion.
+    proportional = walk.state.load == 0 and problem.interface.rigid
     count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
     for value in np.linspace(_reached(walk.state, target), target.value, count + 1)[1:]:
         goal = replace(target, value=float(value))
-        walk.step_to(step.take_step(walk.problem, walk.state, goal, same_contact=True))
+        walk.step_to(step.take_step(problem, walk.state, goal, same_contact=True))
+    return walk
 
 
 def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) -> None:
