@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -188,8 +187,6 @@ def _undetermined(model: ForwardModel, conversion_constant: float | None = None)
     )
 
 
-_Loss = Literal["linear", "soft_l1"]
-
 #: Scale of the ellipticity in the solver.
 _TYPICAL_ELLIPTICITY = 0.2
 #: Standardised residual from which on the robust fit's loss grows linearly.
@@ -245,14 +242,16 @@ def fit_gaussian_to_points(
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     if start is None:
-        return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
+        return _solve(model, weights, _robust_start(model, weights), robust=True)
     centres = start.centre[model.points.free]
     shape = [start.conversion_constant, start.sigma]
     theta = np.concatenate([shape, centres, start.drift, start.ellipticity[: model.points.ellipse]])
-    return _solve(model, weights, theta, loss="linear")
+    return _solve(model, weights, theta, robust=False)
 
 
-def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _Loss) -> GaussianFit:
+def _solve(
+    model: ForwardModel, weights: FloatArray, start: FloatArray, robust: bool
+) -> GaussianFit:
     from scipy.optimize import least_squares
 
     standardised = model.points.standardised
@@ -277,7 +276,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
         return standardised(evaluate(scaled).jacobian, weights) * scale / noise
 
     # A robust fit is the start of the next one: a low accuracy is enough.
-    knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
+    knee, tolerance = (_KNEE, 1e-4) if robust else (np.inf, 1e-9)
     begin = start / scale
     solution = gauss_newton(
         lambda scaled: (residual(scaled), slope(scaled)), begin, tolerance=tolerance, knee=knee
@@ -285,7 +284,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     # At a width of zero every slope by the width is zero: steps do not leave it.
     if solution is None or solution[1] < _NARROWEST:
         result = least_squares(
-            residual, begin, slope, loss=loss, f_scale=_KNEE,
+            residual, begin, slope, loss="soft_l1" if robust else "linear", f_scale=_KNEE,
             xtol=1e-10, ftol=1e-12, gtol=1e-10, max_nfev=100,
         )  # fmt: skip
         if not result.success:

@@ -261,9 +261,13 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     if smoothed is None:
         signal = np.abs(estimate.spectrum.values)
         noise = error * estimate.conversion_constant * reference
-    else:
+    elif (points := estimate.points).as_raster:
+        # Of all points of a raster the noise is equal at all wavenumbers.
+        share = points.cell / points.of_places("readings") * estimate.outlier_weight
+        noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
         signal = np.abs(smoothed.spectrum.values)
-        noise = _planar_noise(estimate) if estimate.points.as_raster else smoothed.noise
+    else:
+        signal, noise = np.abs(smoothed.spectrum.values), smoothed.noise
     noise = np.maximum(noise, np.finfo(float).tiny)
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
     sampled = np.pi / estimate.points.step
@@ -293,11 +297,3 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
         return float(k[max(i - 1, 0)])
     upper, lower = np.log(ratio[i - 1]), np.log(max(ratio[i], np.finfo(float).tiny))
     return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
-
-
-def _planar_noise(estimate: ProfileEstimate) -> FloatArray:
-    """Noise of a component of a raster's transform, of all points: equal at all wavenumbers."""
-    points = estimate.points
-    share = points.cell / points.of_places("readings")
-    noise = estimate.noise / points.load * estimate.outlier_weight
-    return np.full(estimate.model.k.size, np.sqrt(np.sum((share * noise) ** 2)))

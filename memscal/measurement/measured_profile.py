@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import Wavenumbers
@@ -51,7 +50,13 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     loads = np.array([_line_load(scan, row, f", line {i + 1}") for i, row in enumerate(rows)])
     order = np.argsort(loads, kind="stable")
     starts = np.flatnonzero(np.diff(loads[order]) > _SAME_LOAD * loads[order][:-1]) + 1
-    return tuple(_lines_of(scan, np.sort(group)) for group in np.split(order, starts))
+    singles = []
+    for group in np.split(order, starts):
+        load = float(np.nanmedian(scan.normal_load[np.isin(passes, group)]))
+        u = None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
+        only = scan.only_passes(np.sort(group))
+        singles.append(replace(only, load=load, load_uncertainty=u))
+    return tuple(singles)
 
 
 def place_of(scan: Scan) -> str:
@@ -83,15 +88,6 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
             "with a number in repeat.",
         )
     return load
-
-
-def _lines_of(scan: Scan, rows: NDArray[np.intp]) -> Scan:
-    only = scan.only_passes(rows)
-    assert only.normal_load is not None
-    load = float(np.nanmedian(only.normal_load))
-    common = scan.load_uncertainty
-    uncertainty = None if common is None else common * load / scan.load
-    return replace(only, load=load, load_uncertainty=uncertainty)
 
 
 _LARGEST_KH = 20.0

@@ -240,7 +240,7 @@ def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     return hankel_transform(apparatus.radial_profile.r, apparatus.radial_profile.g, k)
 
 
-def restore_posterior(
+def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""

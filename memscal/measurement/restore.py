@@ -23,12 +23,7 @@ from memscal.estimation.points import (
 from memscal.estimation.profile import CentreError, ProfileEstimate, estimate_profile
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
-from memscal.measurement.posterior import (
-    film_transfer,
-    reach_of,
-    restore_posterior,
-    sensor_transfer,
-)
+from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
 from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
@@ -323,7 +318,7 @@ def restore_known(
     points = measured_points(scan)
     estimate, transfer = gaussian_pressure(scan, apparatus, points)
     wavenumbers = estimate.model.reference.wavenumbers
-    posterior = restore_posterior(scan, apparatus, estimate, transfer)
+    posterior = posterior_of(scan, apparatus, estimate, transfer)
     nodes = posterior.nodes
     r = np.linspace(0.0, reach_of(points) / 3, _RADII)
     matrix = wavenumbers.synthesise(np.eye(nodes), r)

@@ -49,12 +49,7 @@ from numpy.typing import ArrayLike
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import gauss_between, gauss_panels
-from memscal.mechanics.surface import (
-    SurfaceCompliance,
-    coupling_integrals,
-    on_hats,
-    singular_integrals,
-)
+from memscal.mechanics import surface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
@@ -237,8 +232,8 @@ class RingTraction:
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
-        p, q, singular = self.pressures, self.shears, singular_integrals(r, self.rings)
-        beyond, within = coupling_integrals(r, self.rings)
+        p, q, singular = self.pressures, self.shears, surface.singular_integrals(r, self.rings)
+        beyond, within = surface.coupling_integrals(r, self.rings)
         return singular[0] @ p, beyond @ q, within @ p, singular[1] @ q
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
@@ -266,7 +261,7 @@ def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatA
     for bessel in (j0, j1):
         waves = bessel(np.multiply.outer(k, s)) * (weights * s)
         right = np.add.reduceat(waves * rising, starts, axis=1)
-        transforms.append(on_hats(np.add.reduceat(waves, starts, axis=1) - right, right))
+        transforms.append(surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right))
     return transforms[0], transforms[1]
 
 
@@ -289,14 +284,14 @@ class HankelFilm:
     r: FloatArray
 
     @cached_property
-    def compliance(self) -> SurfaceCompliance:
+    def compliance(self) -> surface.SurfaceCompliance:
         """Displacements of the rings under tractions on the rings."""
         film, r = self.film, self.r
-        (w_by_p, u_by_q), (w_by_q, u_by_p) = singular_integrals(r, r), coupling_integrals(r, r)
+        direct, across = surface.singular_integrals(r, r), surface.coupling_integrals(r, r)
         k, weights = _wavenumbers(film, 2 * r[-1])
-        hats = hat_transforms(r, k)
-        layer = _layer_integrals(film, r, (k, weights), hats)
-        return SurfaceCompliance(r, *_displacements(film, (w_by_p, w_by_q, u_by_p, u_by_q), layer))
+        layer = _layer_integrals(film, r, (k, weights), hat_transforms(r, k))
+        matrices = _displacements(film, (direct[0], *across, direct[1]), layer)
+        return surface.SurfaceCompliance(r, *matrices)
 
     @property
     def discretisation(self) -> str:

@@ -128,9 +128,8 @@ class Plan:
         """Return the expected mean of all repeats: without noise, whose size is stated."""
         count = self.positions
         shared: dict[str, Any] = {name: getattr(self, name) for name in _OF_SIMULATION}
-        reach, centre = self.step * (count - 1) / 2, (self.centre, 0.0)
-        nothing = dict.fromkeys(("noise", "baseline", "drift"), 0.0)
-        scan = simulate(half_range=reach, points=count, centre=centre, **shared, **nothing)
+        shared |= {"half_range": self.step * (count - 1) / 2, "centre": (self.centre, 0.0)}
+        scan = simulate(points=count, noise=0.0, baseline=0.0, drift=0.0, **shared)
         noise = self.point_noise / math.sqrt(self.repeats)
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
 
@@ -321,9 +320,14 @@ def least_design(
 
     def meets(count: int) -> bool:
         if count not in tried:
-            tried[count] = _attempt(search.plan(count), evaluate)
-        design = tried[count]
-        return design is not None and all(_met(design, *target) for target in targets.items())
+            # None where the plan determines nothing, or does not sample G.
+            tried[count], attempt = None, search.plan(count)
+            with suppress(FitError):
+                design = evaluate(attempt)
+                samples = attempt.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"]
+                tried[count] = design if samples else None
+        found = tried[count]
+        return found is not None and all(_met(found, *target) for target in targets.items())
 
     fails, works = search.least - 1, search.least
     while not meets(works):
@@ -351,15 +355,6 @@ def _search(plan: Plan, vary: str) -> _Search:
     return _Search(
         "half range", least, most, lambda count: replace(plan, half_range=step * (count - 1) / 2)
     )
-
-
-def _attempt(plan: Plan, evaluate: Callable[[Plan], Design]) -> Design | None:
-    """Return the design, or nothing where the plan determines nothing, or does not sample G."""
-    try:
-        design = evaluate(plan)
-    except FitError:
-        return None
-    return design if plan.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"] else None
 
 
 def _reached(design: Design, name: str) -> float:

@@ -74,16 +74,11 @@ class QuarticLine:
         r"""Return :math:`\int N_i \phi_j\,r\,dr` of the rings' hats, exactly."""
         knots = np.union1d(rings, self.corners[self.corners < rings[-1]])
         nodes, weights = gauss_between(knots, _ORDER)
-        hats = _hat_values(rings, nodes)
+        element = np.clip(np.searchsorted(rings, nodes, side="right") - 1, 0, rings.size - 2)
+        rising = (nodes - rings[element]) / (rings[element + 1] - rings[element])
+        columns = np.stack([element, element + 1], axis=1)
+        hats = _sparse(np.stack([1 - rising, rising], axis=1), columns, rings.size)
         return csr_array(self.at(nodes).T @ hats.multiply((weights * nodes)[:, None]))
-
-
-def _hat_values(rings: FloatArray, r: FloatArray) -> csr_array:
-    """Return the matrix, shape (r.size, rings.size), of the rings' hats at ``r``."""
-    element = np.clip(np.searchsorted(rings, r, side="right") - 1, 0, rings.size - 2)
-    rising = (r - rings[element]) / (rings[element + 1] - rings[element])
-    values = np.stack([1 - rising, rising], axis=1)
-    return _sparse(values, np.stack([element, element + 1], axis=1), rings.size)
 
 
 def _sparse(values: FloatArray, columns: NDArray[np.int64], count: int) -> csr_array:
