@@ -17,14 +17,9 @@ from memscal.deconvolution import fourier_ratio
 from memscal.deconvolution.division import Method, WhiteNoise
 from memscal.deconvolution.fourier_ratio import Field, Quotient
 from memscal.errors import FitError, InputError, MemscalError
+from memscal.estimation import points
 from memscal.estimation.assumptions import CentresApart, repeat_centres_test
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.points import (
-    channel_order,
-    joined_points,
-    measured_points,
-    scans_of_repeats,
-)
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
@@ -60,7 +55,7 @@ def solve(
         apart = repeat_centres_test(estimate)
     if centre == PER_REPEAT or (centre is None and apart and apart.p_value < FALSE_ALARM):
         try:
-            separate, numbers = scans_of_repeats(scans, channel)
+            separate, numbers = points.scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
             estimate = require_profile(separate, of_repeats, channel)
             scans, stresses, owners = separate, of_repeats, tuple(owners[i] for i in numbers)
@@ -98,13 +93,13 @@ def require_profile(
     scans: Sequence[Scan], stresses: Sequence[BaseStress], channel: str
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
-    points = [measured_points(scan, channel) for scan in scans]
-    references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
+    measured = [points.measured_points(scan, channel) for scan in scans]
+    references = reference_spectra(stresses, measured, [scan.film.thickness for scan in scans])
     outcome: ProfileEstimate | Exception
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
         with np.errstate(all="ignore"):
-            outcome = estimate_profile(joined_points(points), *references)
+            outcome = estimate_profile(points.joined_points(measured), *references)
         if outcome.gaussian.has_width(outcome.weights, outcome.noise_scale):
             return outcome
     except (FitError, np.linalg.LinAlgError) as failure:
@@ -112,7 +107,7 @@ def require_profile(
     # Imported here, for it searches only where something is wrong.
     from memscal.calibration.diagnosis import diagnosed
 
-    raise diagnosed(scans, stresses, points, outcome) from None
+    raise diagnosed(scans, stresses, measured, outcome) from None
 
 
 def deconvolve(
@@ -152,7 +147,7 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
 
 def require_channel_method(channel: str, method: Method) -> None:
     """Refuse to divide the fields of a tangential channel, and a channel that does not exist."""
-    if channel_order(channel) and not isinstance(method, Bayesian):
+    if points.channel_order(channel) and not isinstance(method, Bayesian):
         raise InputError(
             f"Channel {channel} cannot be calibrated by method {method.name}.",
             why="It divides fields, and the transform of a shear is zero along a line and at "

@@ -12,14 +12,8 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import InputError
-from memscal.estimation.points import (
-    COVERAGE,
-    ScanPoints,
-    accepted_differences,
-    file_in_words,
-    require_plausible,
-    stated_differences,
-)
+from memscal.estimation import points
+from memscal.estimation.points import ScanPoints
 from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.finite_strain.table import largest_tabulated_load
 from memscal.mechanics.press_rod import is_tabulated, press_rod
@@ -75,7 +69,7 @@ def require_calibration_rod(scan: Scan) -> None:
             "linear in load.",
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
-    require_plausible(scan)
+    points.require_plausible(scan)
 
 
 def require_same_set_up(
@@ -100,7 +94,7 @@ def require_same_set_up(
     if any(text.startswith("load") for text in differences):
         cure += " If the film of the reference is linear, state it (memscal import --film-law "
         cure += "linear; ElasticFilm(law='linear') in Python)."
-    return accepted_differences(
+    return points.accepted_differences(
         differences,
         override=override,
         problem="Scan and calculated stress are not of one set-up",
@@ -113,7 +107,7 @@ def require_same_set_up(
 def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
     """Return in words what of film, rod and load a stress was not calculated for."""
     source = None if isinstance(stress, Contact) else stress.source
-    places = file_in_words(scan.source, "scan"), file_in_words(source, kind)
+    places = points.file_in_words(scan.source, "scan"), points.file_in_words(source, kind)
     film = stress.film_of_law if isinstance(stress, Contact) else stress.film
     law = "" if film is None else film.law
     names = ["thickness", "poisson_ratio"]
@@ -126,20 +120,20 @@ def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
         names += ["law", "mooney_rivlin_ratio"]
     differences = []
     if film is not None:
-        differences += stated_differences(FILM, names, (scan.film, film), places, "film")
+        differences += points.stated_differences(FILM, names, (scan.film, film), places, "film")
     if stress.indenter is not None:
         pair = scan.indenter, stress.indenter
-        differences += stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+        differences += points.stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
     if kind == "reference" and finite:
         friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         rods = scan, SimpleNamespace(rod_friction=friction)
-        differences += stated_differences(LOAD, ("rod_friction",), rods, places)
+        differences += points.stated_differences(LOAD, ("rod_friction",), rods, places)
     if law == LINEAR:
         return differences
-    stated = f"law is {law}" if law else "law is not stated"
+    loads, stated = (_farthest(scan, stress), stress), f"law is {law or 'not stated'}"
     return differences + [
         f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
-        for text in stated_differences(LOAD, ("load",), (_farthest(scan, stress), stress), places)
+        for text in points.stated_differences(LOAD, ("load",), loads, places)
     ]
 
 
@@ -148,7 +142,7 @@ def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
     spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
-    i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
+    i = np.nanargmax(np.abs(loads - stress.load) - points.COVERAGE * spread)
     uncertainty = float(spread.flat[i]) if stated else None
     return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 
@@ -163,11 +157,11 @@ def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
 
 
 def reference_spectra(
-    references: Sequence[BaseStress], points: Sequence[ScanPoints], thicknesses: Sequence[float]
+    references: Sequence[BaseStress], data: Sequence[ScanPoints], thicknesses: Sequence[float]
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
-    order = points[0].order
-    spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in points]
+    order = data[0].order
+    spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in data]
     # Fields are lifted to squares that reach one span from the centre, to their corners.
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / min(thicknesses), 1.5 * max(spans))
     return tuple(
