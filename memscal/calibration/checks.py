@@ -12,49 +12,23 @@ from memscal.axisymmetry.hankel import ring_areas
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.calibration.stages import Misfit, Solution
 from memscal.calibration.uncertainty import Results, route_difference
-from memscal.estimation.assumptions import (
-    ExtraColumns,
-    axisymmetry_test,
-    clipped_points,
-    departure_test,
-    hold_out,
-    hysteresis_test,
-    linearity_test,
-    load_groups,
-    symmetry_test,
-)
+from memscal.estimation import assumptions
+from memscal.estimation import residuals as unexplained
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate
 from memscal.estimation.reference import carried_force
-from memscal.estimation.residuals import (
-    FEWEST_RESIDUALS,
-    Residuals,
-    TestOutcome,
-    chi_square_test,
-    free_model,
-    neighbour_correlation_test,
-    pure_error_test,
-    residuals_of,
-    runs_test,
-)
+from memscal.estimation.residuals import FEWEST_RESIDUALS, Residuals, TestOutcome
 from memscal.estimation.smoothing import RESOLVED
 from memscal.mechanics.press_rod import press_rod
+from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
-from memscal.model.checks import (
-    FALSE_ALARM,
-    NOISE_LIMIT,
-    OUTLIER_LIMIT,
-    OUTLIER_WEIGHT,
-    QualityCheck,
-    check,
-    chi_square_limit,
-)
+from memscal.model.checks import QualityCheck, check, chi_square_limit
 from memscal.model.film import LINEAR
 from memscal.model.notation import format_measured
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
 #: thousand (Markov's inequality).
-_LOG_BAYES_LIMIT = -float(np.log(FALSE_ALARM))
+_LOG_BAYES_LIMIT = -float(np.log(quality.FALSE_ALARM))
 _EDGE = "an edge: a flat top with steep flanks, as of a disc"
 _CORE = "a core of its own: a ring or a spike in the middle"
 _KINDS = {
@@ -72,18 +46,18 @@ def _noise(estimate: ProfileEstimate) -> list[QualityCheck]:
         "failure means that something besides electronic noise scatters the scan, such as position "
         "or load; the uncertainties have been raised accordingly."
     )
-    return [check("noise_as_stated", estimate.weighed.noise, NOISE_LIMIT, meaning)]
+    return [check("noise_as_stated", estimate.weighed.noise, quality.NOISE_LIMIT, meaning)]
 
 
 def _size(estimate: ProfileEstimate, residuals: Residuals) -> list[QualityCheck]:
     """Compare what no G explains with the stated noise, or with the scatter of repeats."""
     degrees = residuals.degrees
     if residuals.stated:
-        outcome = chi_square_test(residuals)
+        outcome = unexplained.chi_square_test(residuals)
         compared = f"with the stated noise: reduced chi-square of {degrees} degrees"
         noise = "the noise is larger than stated, or "
     else:
-        pure = pure_error_test(estimate)
+        pure = unexplained.pure_error_test(estimate)
         if pure is None:
             return []
         outcome, noise = pure, ""
@@ -113,8 +87,8 @@ def _order(residuals: Residuals) -> list[QualityCheck]:
         f"alike: {cause}"
     )
     return [
-        _tested("residual_runs", runs_test(residuals), in_runs),
-        _tested("residual_correlation", neighbour_correlation_test(residuals), alike),
+        _tested("residual_runs", unexplained.runs_test(residuals), in_runs),
+        _tested("residual_correlation", unexplained.neighbour_correlation_test(residuals), alike),
     ]
 
 
@@ -123,7 +97,7 @@ def _tested(name: str, outcome: TestOutcome, meaning: str) -> QualityCheck:
 
 
 def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
-    departure = departure_test(estimate)
+    departure = assumptions.departure_test(estimate)
     meaning = (
         "Natural logarithm of the Bayes factor for a departure of G from a Gaussian (within ±8.5); "
         "below zero it is in favour of the Gaussian, and gaussian_sigma may be used. A failure "
@@ -135,14 +109,14 @@ def _bayes_factor(estimate: ProfileEstimate) -> QualityCheck:
 
 def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
     if estimate.points.planar:
-        uneven = axisymmetry_test(estimate)
+        uneven = assumptions.axisymmetry_test(estimate)
         meaning = (
             f"Fall of chi-square by {uneven.count} columns of an elliptic sensor, which then make "
             f"up {uneven.size:.2%} of the largest signal. A failure means that the radial profile "
             "is only a mean over directions: use the field."
         )
         return _added("axisymmetry", uneven, meaning)
-    extra = symmetry_test(estimate)
+    extra = assumptions.symmetry_test(estimate)
     parity, failure = "odd", ": a tilted rod, an uneven film, or a drifting load"
     if estimate.model.order:
         parity, failure = "even", " by more than their sign: cross-talk of the normal stress, "
@@ -156,7 +130,7 @@ def _symmetry(estimate: ProfileEstimate) -> QualityCheck:
 
 
 def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
-    linear = linearity_test(estimate)
+    linear = assumptions.linearity_test(estimate)
     if linear is None:
         return []
     meaning = (
@@ -169,7 +143,7 @@ def _linearity(estimate: ProfileEstimate) -> list[QualityCheck]:
 
 def _hysteresis(solution: Solution) -> list[QualityCheck]:
     owner = np.array(solution.owners)[solution.estimate.points.scan]
-    extra = hysteresis_test(solution.estimate, owner)
+    extra = assumptions.hysteresis_test(solution.estimate, owner)
     if extra is None:
         return []
     scales = ("A", 1e2, "%"), ("the centre's position", 1e6, "um"), ("the baseline", 1e3, "mV")
@@ -189,7 +163,7 @@ def _hysteresis(solution: Solution) -> list[QualityCheck]:
     return [_added("hysteresis", extra, meaning)]
 
 
-def _added(name: str, extra: ExtraColumns, meaning: str) -> QualityCheck:
+def _added(name: str, extra: assumptions.ExtraColumns, meaning: str) -> QualityCheck:
     p_value = float(chdtrc(extra.count, extra.fall))
     return check(name, extra.fall, chi_square_limit(extra.count), meaning, p_value)
 
@@ -210,7 +184,7 @@ def _repeat_centres(solution: Solution) -> list[QualityCheck]:
 def _held_out(solution: Solution) -> list[QualityCheck]:
     """Predict each repeat, load and scan from the others, whichever there are several of."""
     estimate, points = solution.estimate, solution.estimate.points
-    load, scan = load_groups(points.load), np.array(solution.owners)[points.scan]
+    load, scan = assumptions.load_groups(points.load), np.array(solution.owners)[points.scan]
     # Where every repeat has a load, or a scan, of its own, it is held out under that name.
     repeat = not _same(points.repeat, load) and not _same(points.repeat, scan)
     checks = [
@@ -230,7 +204,7 @@ def _same(first: NDArray[np.intp], second: NDArray[np.intp]) -> bool:
 def _prediction(
     estimate: ProfileEstimate, what: str, group: NDArray[np.intp]
 ) -> QualityCheck | None:
-    worst = hold_out(estimate, group)
+    worst = assumptions.hold_out(estimate, group)
     if worst is None:
         return None
     causes = {
@@ -279,7 +253,7 @@ _MOST_NAMED = 12
 
 def quality_checks(solution: Solution, results: Results) -> tuple[QualityCheck, ...]:
     """Run every check that applies to the scan."""
-    estimate, residuals = solution.estimate, residuals_of(solution.estimate)
+    estimate, residuals = solution.estimate, unexplained.residuals_of(solution.estimate)
     enough = residuals.degrees >= FEWEST_RESIDUALS
     return (
         *_reconvolutions(solution),
@@ -334,7 +308,7 @@ def _constraint(solution: Solution) -> list[QualityCheck]:
         for u in (solution.deconvolution.predicted, estimate.predicted)
     ]
     # As many combinations of departures as the scan determines, and as a constraint may remove.
-    determined = free_model(estimate).design.shape[1] - estimate.basis.flat
+    determined = unexplained.free_model(estimate).design.shape[1] - estimate.basis.flat
     rise, limit = max(misfits[0] - misfits[1], 0.0), chi_square_limit(max(determined, 1))
     meaning = (
         "Rise of chi-square by the constraint on G (nonnegative, monotone) over the free "
@@ -412,7 +386,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
     sigma = estimate.gaussian.sigma
     change = 2 * float(np.abs(estimate.drift[1:]).max()) / estimate.largest_signal
     force = abs(carried_force(solution.stress, estimate.model.reference) - 1.0)
-    outliers = float(np.mean(estimate.outlier_weight < OUTLIER_WEIGHT))
+    outliers = float(np.mean(estimate.outlier_weight < quality.OUTLIER_WEIGHT))
     transfer = float(gaussian_transfer(np.array(resolved), sigma))
     tail = _SHEAR_TAIL_LIMIT if estimate.model.order else _TAIL_LIMIT
     values = {
@@ -421,7 +395,7 @@ def _set_up(solution: Solution) -> list[QualityCheck]:
         "tail_share": (solution.tail_share, tail),
         "baseline_drift": (change, _BASELINE_DRIFT_LIMIT),
         "reference_force": (force, _FORCE_LIMIT),
-        "outliers": (outliers, OUTLIER_LIMIT),
+        "outliers": (outliers, quality.OUTLIER_LIMIT),
     }
     meanings = {
         "width_over_thickness": "Width of G over the film's thickness. A failure means that the "
@@ -482,7 +456,7 @@ def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:
     points = estimate.points
     if estimate.model.order:
         return []
-    clipped = np.flatnonzero(clipped_points(estimate))
+    clipped = np.flatnonzero(assumptions.clipped_points(estimate))
     axes = np.stack([points.x, points.y], axis=1)[:, points.free.any(axis=0)] * 1e3
     places = [", ".join(f"{p:.4g}" for p in place) for place in axes[clipped[:_MOST_NAMED]]]
     more = f" and {clipped.size - _MOST_NAMED} more" if clipped.size > _MOST_NAMED else ""

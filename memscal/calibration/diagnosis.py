@@ -20,12 +20,11 @@ from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, rob
 from memscal.estimation.points import ScanPoints, joined_points, mistaken_unit
 from memscal.estimation.profile import LEAST_SIGNIFICANCE, ProfileEstimate
 from memscal.estimation.reference import reference_spectra
-from memscal.mechanics.contact import Contact
+from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.indenter import Rod
 from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
 
 #: Residuals of this share of the largest signal, and twice the stated noise, are a misfit.
 _MISFIT = 0.03
@@ -44,7 +43,7 @@ _LOAD = 1e-6
 
 def diagnosed(
     scans: Sequence[Scan],
-    stresses: Sequence[StressProfile | Contact],
+    stresses: Sequence[BaseStress],
     points: Sequence[ScanPoints],
     outcome: ProfileEstimate | Exception,
 ) -> Exception:
@@ -141,7 +140,7 @@ class _Search:
     """Scans whose stated lengths are scaled, one at a time."""
 
     scans: tuple[Scan, ...]
-    stresses: tuple[StressProfile | Contact, ...]
+    stresses: tuple[BaseStress, ...]
     points: tuple[ScanPoints, ...]
 
     @cached_property
@@ -252,7 +251,7 @@ class _Search:
         return _Trial(factor, None, np.full(1, np.inf), weights)
 
 
-def _scaled(stress: StressProfile | Contact, path: str, factor: float) -> StressProfile | Contact:
+def _scaled(stress: BaseStress, path: str, factor: float) -> BaseStress:
     """Return the linear rod with one length scaled, or a profile at scaled radii."""
     if isinstance(stress, Contact) and isinstance(stress.indenter, Rod) and path != "reference/r":
         film, rod = stress.film, stress.indenter

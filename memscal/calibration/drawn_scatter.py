@@ -18,8 +18,7 @@ import numpy as np
 from memscal.calibration.fields import choose_grid
 from memscal.calibration.stages import Solution, deconvolve, prepare_fields
 from memscal.calibration.uncertainty import DrawnScatter, read_off
-from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw
-from memscal.deconvolution.scikit_image import Wiener
+from memscal.deconvolution.division import Method, Tikhonov, WhiteNoise, WhiteNoiseDraw, Wiener
 from memscal.errors import FitError
 from memscal.estimation.bayesian import Bayesian
 from memscal.estimation.profile import ProfileEstimate

@@ -175,7 +175,10 @@ class RasterFields:
         if rows.size:
             # A point that is missing keeps the profile; an outlier keeps most of it.
             departure = (smoothed.signal - smoothed.predicted) * smoothed.outlier_weight
-            voltage += _mean_at(voltage.shape, (rows, columns), departure / points.load)
+            total, number = np.zeros(voltage.shape), np.zeros(voltage.shape)
+            np.add.at(total, (rows, columns), departure / points.load)
+            np.add.at(number, (rows, columns), 1.0)
+            voltage += total / np.maximum(number, 1.0)
         stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
         fit, index, reach = estimate.gaussian, (rows, columns), choice.support
         return cls(grid, Field(grid, voltage), stress, reach, step, fit, index, even)
@@ -209,10 +212,8 @@ class RasterFields:
         return np.asarray(field[self.index])
 
     def gain(self, smoothed: SmoothedProfile) -> FloatArray:
-        """Derivative of the field's transform by the voltages, (k, n), its mean over directions.
-
-        The transform is a sum over the lattice: of the points, and of the profile elsewhere.
-        """
+        """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""
+        # The transform is a sum over the lattice: of the points, and of the profile elsewhere.
         points, k = smoothed.estimate.points, smoothed.estimate.model.k
         weights = smoothed.spectrum.wavenumbers.weights
         readings = np.zeros(self.voltage.values.shape)
@@ -254,13 +255,3 @@ def _continued(axis: EvenAxis, reach: float, extent: float) -> tuple[FloatArray,
     count = steps + 1 + 2 * padding + steps % 2
     nodes = axis.start + axis.step * (np.arange(count) - padding)
     return np.asarray(nodes, dtype=np.float64), axis.index + padding
-
-
-def _mean_at(
-    shape: tuple[int, ...], index: tuple[NDArray[np.intp], ...], values: FloatArray
-) -> FloatArray:
-    """Mean of the values at each node of a lattice, zero where there is none."""
-    total, number = np.zeros(shape), np.zeros(shape)
-    np.add.at(total, index, values)
-    np.add.at(number, index, 1.0)
-    return total / np.maximum(number, 1.0)

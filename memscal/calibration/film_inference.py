@@ -34,7 +34,6 @@ from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
 from memscal.model.notation import format_measured
 from memscal.model.quantities import MM, MV
 from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
 
 #: Name of an input that scans may be asked to determine.
 THICKNESS = "thickness"
@@ -104,7 +103,8 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
     loads = tuple(scan.load for scan in solution.scans)
     if not loads_differ(loads):
         return None
-    stated = {law for stress in solution.stresses for law in [_law_of(stress)]}
+    made_on = [s.film_of_law if isinstance(s, Contact) else s.film for s in solution.stresses]
+    stated = {("", None) if f is None else (f.law, f.mooney_rivlin_ratio) for f in made_on}
     reference, ratio = stated.pop() if len(stated) == 1 else ("", None)
     solved: dict[str, Solution] = {}
     for law in dict.fromkeys((reference or LINEAR, LINEAR, NEO_HOOKEAN)):
@@ -135,12 +135,6 @@ def weigh_laws(solution: Solution) -> FilmLawComparison | None:
         laws.append(WeighedLaw(law, evidence, a, sigma))
     ranked = sorted(laws, key=lambda law: -law.log_evidence)
     return FilmLawComparison(tuple(ranked), reference, loads)
-
-
-def _law_of(stress: StressProfile | Contact) -> tuple[str, float | None]:
-    """Law by which a reference was made, with its ratio; empty where it states none."""
-    film = stress.film_of_law if isinstance(stress, Contact) else stress.film
-    return ("", None) if film is None else (film.law, film.mooney_rivlin_ratio)
 
 
 def _input_columns(solution: Solution, without: str = "") -> FloatArray:

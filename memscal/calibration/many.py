@@ -133,12 +133,11 @@ def _calibrated(item: tuple[int, Scans], options: Mapping[str, Any]) -> FleetCal
     except MemscalError as failure:
         return FleetCalibration(index=index, budget={}, error=failure)
     except Exception as failure:  # noqa: BLE001 - the rest must go on
-        problem = f"Scan {index} met {type(failure).__name__}: {failure}"
-        why, cure = (
-            "This should have been refused with a reason.",
-            "Please report it, with the scan.",
+        error = MemscalError(
+            f"Scan {index} met {type(failure).__name__}: {failure}",
+            why="This should have been refused with a reason.",
+            cure="Please report it, with the scan.",
         )
-        error = MemscalError(problem, why=why, cure=cure)
         return FleetCalibration(index=index, budget={}, error=error)
     return FleetCalibration(
         index=index,

@@ -16,17 +16,10 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from memscal.axisymmetry.hankel import RadialSpectrum
+from memscal.calibration import uncertainty
 from memscal.calibration.calibrate import Calibration, uncertainties
 from memscal.calibration.stages import Solution, solve
-from memscal.calibration.uncertainty import (
-    BUDGETED,
-    NOT_RANDOM,
-    InputEffect,
-    correlation_matrix,
-    drawn_about,
-    expected_values,
-    read_off,
-)
+from memscal.calibration.uncertainty import BUDGETED, InputEffect
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
@@ -106,7 +99,7 @@ class DrawnScans:
         noise: FloatArray = rng.standard_normal(points.u.size)
         if points.decorrelation is not None:
             noise = np.asarray(np.linalg.solve(points.decorrelation, noise), dtype=float)
-        residual = points.u - drawn_about(self.solution)
+        residual = points.u - uncertainty.drawn_about(self.solution)
         stray = np.where(estimate.outlier_weight < OUTLIER_WEIGHT, residual, 0.0)
         voltages = self.voltages(standard) + stray + estimate.noise * noise
         return [
@@ -116,7 +109,8 @@ class DrawnScans:
 
     def standardised(self, normal: FloatArray) -> dict[str, FloatArray]:
         """Turn normal draws, (inputs, ...), into each input's error over its uncertainty."""
-        values, vectors = np.linalg.eigh(correlation_matrix(list(self.effects), self.correlations))
+        matrix = uncertainty.correlation_matrix(list(self.effects), self.correlations)
+        values, vectors = np.linalg.eigh(matrix)
         # By the symmetric root every input keeps its draw where there are no correlations.
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
         joined: dict[str, FloatArray] = dict(zip(self.effects, root @ normal, strict=True))
@@ -126,7 +120,7 @@ class DrawnScans:
 
     def voltages(self, standard: Mapping[str, FloatArray]) -> FloatArray:
         """Voltages without noise (n,), in V: A G convolved with the stress of the true inputs."""
-        estimate, voltages = self.solution.estimate, drawn_about(self.solution)
+        estimate, voltages = self.solution.estimate, uncertainty.drawn_about(self.solution)
         signal = voltages - estimate.background
         exact = {item.source for item in self.solved}
         for source, effect in self.effects.items():
@@ -189,7 +183,7 @@ class DrawnScans:
         first = self.solution
         channel = first.estimate.points.channel
         solution = solve(scans, first.stresses, first.method, channel, both=False)
-        numbers, g = read_off(solution.deconvolution, first.deconvolution.g.r)
+        numbers, g = uncertainty.read_off(solution.deconvolution, first.deconvolution.g.r)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
 
@@ -365,7 +359,7 @@ def monte_carlo(
             cure="The scan is close to failing, too; measure with less noise.",
         )
     samples, g = np.split(np.array(rows), [len(BUDGETED)], axis=1)
-    expected, result = expected_values(solution), solution.deconvolution
+    expected, result = uncertainty.expected_values(solution), solution.deconvolution
     comparisons = tuple(
         _compared(calibration, name, expected[name], column, model.solved)
         for name, column in zip(BUDGETED, samples.T, strict=True)
@@ -397,7 +391,9 @@ def _compared(
     """Compare the draws of a parameter, shape (m,), with its budget."""
     parameters, budget = calibration.apparatus.parameters, calibration.apparatus.budget[name]
     mean, spread = float(column.mean()), float(column.std(ddof=1))
-    error, u = spread * _sampling_error(column), _random_part(budget)
+    # Of the inputs and noise; a correlation's contribution has a sign.
+    parts = np.array([u for source, u in budget.items() if source not in uncertainty.NOT_RANDOM])
+    error, u = spread * _sampling_error(column), float(np.sqrt(max(parts @ np.abs(parts), 0.0)))
     # Beyond what the number of draws allows: two standard errors.
     same_spread = abs(spread - u) <= _TOLERANCE * u + 2 * error
     same_mean = abs(mean - expected) <= _LARGEST_SHIFT * u + 2 * spread / np.sqrt(column.size)
@@ -419,21 +415,11 @@ def _compared(
     )
 
 
-def _random_part(budget: Mapping[str, float]) -> float:
-    """Standard uncertainty of noise and inputs; a correlation's contribution has a sign."""
-    u = np.array([value for source, value in budget.items() if source not in NOT_RANDOM])
-    return float(np.sqrt(max(float(np.sum(u * np.abs(u))), 0.0)))
-
-
 def _reason(
-    spread: float,
-    shift: float,
-    u: float,
-    budget: Mapping[str, float],
-    inputs: Sequence[SolvedInput],
+    spread: float, off: float, u: float, budget: Mapping[str, float], inputs: Sequence[SolvedInput]
 ) -> str:
     """Return by how much draws and budget disagree, and whether a distribution is cut off."""
-    text = f"The draws scatter by {spread / u:.2f} u, and their mean is {shift / u:+.2f} u off."
+    text = f"The draws scatter by {spread / u:.2f} u, and their mean is {off / u:+.2f} u off."
     for item in inputs:
         kept = float(item.truncated(ndtri((np.arange(1000) + 0.5) / 1000)).std())
         if kept < 1 - _CUT and budget[item.source] > _COUNTS * u:

@@ -13,32 +13,20 @@ import numpy as np
 from scipy.special import j1
 
 from memscal.calibration.fields import Fields, GridChoice, LineFields, RasterFields, choose_grid
+from memscal.deconvolution import fourier_ratio
 from memscal.deconvolution.division import Method, WhiteNoise
-from memscal.deconvolution.fourier_ratio import (
-    Field,
-    Quotient,
-    divide,
-    fit_gaussian,
-    normalise,
-    reconvolve,
-)
+from memscal.deconvolution.fourier_ratio import Field, Quotient
 from memscal.errors import FitError, InputError, MemscalError
+from memscal.estimation import points
 from memscal.estimation.assumptions import CentresApart, repeat_centres_test
 from memscal.estimation.bayesian import Bayesian
-from memscal.estimation.points import (
-    channel_order,
-    joined_points,
-    measured_points,
-    scans_of_repeats,
-)
 from memscal.estimation.profile import ProfileEstimate, constrained_profile, estimate_profile
 from memscal.estimation.reference import reference_spectra
 from memscal.estimation.smoothing import Band, SmoothedProfile, find_band, smooth_profile
-from memscal.mechanics.contact import Contact
+from memscal.mechanics.contact import BaseStress
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 from memscal.model.scan import Scan
-from memscal.model.stress import StressProfile
 
 #: Whose centre is fitted: a scan's, or each repeat's.
 COMMON, PER_REPEAT = "common", "per-repeat"
@@ -49,7 +37,7 @@ _RADII = 2001
 
 def solve(
     scans: Sequence[Scan],
-    stresses: Sequence[StressProfile | Contact],
+    stresses: Sequence[BaseStress],
     method: Method,
     channel: str = "zz",
     *,
@@ -57,11 +45,9 @@ def solve(
     centre: str | None = COMMON,
     owners: Sequence[int] | None = None,
 ) -> Solution:
-    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back.
-
-    ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test.  ``owners``:
-    the number of the scan that each is a part of.
-    """
+    """Find A and G; with ``both`` by the other route, too: Bayesian beside a division, or back."""
+    # ``centre``: of a scan, or of each of its repeats; ``None`` leaves it to a test. ``owners``:
+    # the number of the scan that each is a part of.
     require_channel_method(channel, method)
     owners, apart = tuple(owners or range(len(scans))), None
     if centre != PER_REPEAT:
@@ -69,7 +55,7 @@ def solve(
         apart = repeat_centres_test(estimate)
     if centre == PER_REPEAT or (centre is None and apart and apart.p_value < FALSE_ALARM):
         try:
-            separate, numbers = scans_of_repeats(scans, channel)
+            separate, numbers = points.scans_of_repeats(scans, channel)
             of_repeats = [stresses[i] for i in numbers]
             estimate = require_profile(separate, of_repeats, channel)
             scans, stresses, owners = separate, of_repeats, tuple(owners[i] for i in numbers)
@@ -77,6 +63,19 @@ def solve(
             # Repeats that cannot be fitted by themselves keep one centre, and fail its check.
             if centre == PER_REPEAT:
                 raise
+    solution = solved(scans, stresses, estimate, method, both=both)
+    return replace(solution, owners=owners, apart=apart)
+
+
+def solved(
+    scans: Sequence[Scan],
+    stresses: Sequence[BaseStress],
+    estimate: ProfileEstimate,
+    method: Method,
+    *,
+    both: bool,
+) -> Solution:
+    """Find A and G from the estimate of the profile; see :func:`solve`."""
     smoothed = None if estimate.model.order else smooth_profile(estimate)
     band = find_band(estimate, smoothed)
     choice = choose_grid(estimate, band)
@@ -87,22 +86,20 @@ def solve(
     result = deconvolve(estimate, band, fields, method)
     gaussian = _misfit(estimate, estimate.gaussian.predicted)
     steps = (tuple(scans), tuple(stresses), estimate, smoothed, band, choice, fields, method)
-    return Solution(*steps, result, beside, gaussian, owners, apart)
+    return Solution(*steps, result, beside, gaussian)
 
 
 def require_profile(
-    scans: Sequence[Scan],
-    stresses: Sequence[StressProfile | Contact],
-    channel: str,
+    scans: Sequence[Scan], stresses: Sequence[BaseStress], channel: str
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
-    points = [measured_points(scan, channel) for scan in scans]
-    references = reference_spectra(stresses, points, [scan.film.thickness for scan in scans])
+    measured = [points.measured_points(scan, channel) for scan in scans]
+    references = reference_spectra(stresses, measured, [scan.film.thickness for scan in scans])
     outcome: ProfileEstimate | Exception
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
         with np.errstate(all="ignore"):
-            outcome = estimate_profile(joined_points(points), *references)
+            outcome = estimate_profile(points.joined_points(measured), *references)
         if outcome.gaussian.has_width(outcome.weights, outcome.noise_scale):
             return outcome
     except (FitError, np.linalg.LinAlgError) as failure:
@@ -110,7 +107,7 @@ def require_profile(
     # Imported here, for it searches only where something is wrong.
     from memscal.calibration.diagnosis import diagnosed
 
-    raise diagnosed(scans, stresses, points, outcome) from None
+    raise diagnosed(scans, stresses, measured, outcome) from None
 
 
 def deconvolve(
@@ -122,11 +119,11 @@ def deconvolve(
         return _of_posterior(estimate, fields, method)
     # Eq. 2: A G.
     weakest = (band.weakest_reference, band.weakest_voltage)
-    quotient = divide(fields.voltage, fields.stress, weakest=weakest, method=method)
+    quotient = fourier_ratio.divide(fields.voltage, fields.stress, weakest=weakest, method=method)
     quotient = replace(quotient, values=quotient.values * fields.confinement)
     # Eq. 3: A, and G of unit integral.
-    a, g = normalise(fields.on_support(quotient.values, None))
-    sigma = fit_gaussian(g, estimate.gaussian.sigma)
+    a, g = fourier_ratio.normalise(fields.on_support(quotient.values, None))
+    sigma = fourier_ratio.fit_gaussian(g, estimate.gaussian.sigma)
     # Eq. 1: the voltage that A and G predict.
     predicted = _reconvolved(estimate, fields, quotient) + estimate.background
     return Deconvolution(quotient, a, g, sigma, predicted, _misfit(estimate, predicted))
@@ -139,8 +136,8 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
     )
     values = fields.kernel(profile.radial) * fields.confinement
     quotient = Quotient(fields.grid, values, np.ones(fields.grid.transfer(values).shape))
-    a, g = normalise(fields.on_support(values, profile))
-    sigma = fit_gaussian(g, estimate.gaussian.sigma)
+    a, g = fourier_ratio.normalise(fields.on_support(values, profile))
+    sigma = fourier_ratio.fit_gaussian(g, estimate.gaussian.sigma)
     model = estimate.model
     signal = model.signal(model.geometry(estimate.centres), profile.transform(model.k))
     predicted = signal + estimate.oval + estimate.background
@@ -150,7 +147,7 @@ def _of_posterior(estimate: ProfileEstimate, fields: Fields, method: Bayesian) -
 
 def require_channel_method(channel: str, method: Method) -> None:
     """Refuse to divide the fields of a tangential channel, and a channel that does not exist."""
-    if channel_order(channel) and not isinstance(method, Bayesian):
+    if points.channel_order(channel) and not isinstance(method, Bayesian):
         raise InputError(
             f"Channel {channel} cannot be calibrated by method {method.name}.",
             why="It divides fields, and the transform of a shear is zero along a line and at "
@@ -199,7 +196,7 @@ class Solution:
     """Every step of a calibration."""
 
     scans: tuple[Scan, ...]
-    stresses: tuple[StressProfile | Contact, ...]  # the reference of each scan
+    stresses: tuple[BaseStress, ...]  # the reference of each scan
     estimate: ProfileEstimate  # centre, baseline, noise, and the posterior of the profile
     smoothed: SmoothedProfile | None  # the profile that is divided; none of a shear
     band: Band  # signal and noise of the voltage's transform
@@ -223,7 +220,7 @@ class Solution:
         return self.scans[0]
 
     @property
-    def stress(self) -> StressProfile | Contact:
+    def stress(self) -> BaseStress:
         """The reference of the first scan, which the fields are made with."""
         return self.stresses[0]
 
@@ -245,7 +242,7 @@ class Solution:
 def _reconvolved(estimate: ProfileEstimate, fields: Fields, quotient: Quotient) -> FloatArray:
     """Signal of the quotient at the points, in V: each scan through its own reference."""
     if estimate.points.scans == 1:
-        back = reconvolve(1.0, quotient, fields.stress)
+        back = fourier_ratio.reconvolve(1.0, quotient, fields.stress)
         return fields.at_points(back.values) * estimate.points.load
     k, kernel = fields.along_axis(fields.grid.transfer(quotient.values).real)
     spectrum = np.interp(estimate.model.k, k, kernel, right=0.0)

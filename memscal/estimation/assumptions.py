@@ -14,17 +14,12 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, ndtri
 
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.errors import FitError
+from memscal.estimation import residuals
 from memscal.estimation.bayesian import HYPOTHESES, departure_basis, weigh_departures
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import MINIMUM_POSITIONS
 from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
-from memscal.estimation.residuals import (
-    FEWEST_RESIDUALS,
-    FreeModel,
-    TestOutcome,
-    free_model,
-    orthonormal,
-)
+from memscal.estimation.residuals import FEWEST_RESIDUALS, FreeModel, TestOutcome
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import FALSE_ALARM
 
@@ -60,7 +55,7 @@ def hold_out(estimate: ProfileEstimate, group: NDArray[np.intp]) -> HeldOut | No
     if np.unique(group).size < 2:
         return None
     # Clipped: many outliers in one group count together, and a single one counts little.
-    model = free_model(estimate, clip_outliers=True)
+    model = residuals.free_model(estimate, clip_outliers=True)
     # Centre, baseline and drift are fitted to a held-out group by itself.
     nuisances = int(estimate.points.free.sum()) + estimate.model.drift_columns.shape[1]
     columns = model.design[:, 2 : 2 + nuisances]
@@ -101,7 +96,7 @@ def _predict(
 
 def _residual(design: FloatArray, data: FloatArray) -> tuple[float, int]:
     """Residual sum of squares and its degrees of freedom."""
-    basis = orthonormal(design)
+    basis = residuals.orthonormal(design)
     rest = data - basis @ (basis.T @ data)
     return float(rest @ rest), int(data.size - basis.shape[1])
 
@@ -120,7 +115,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     scan = points.scan[first]
     if points.planar or repeats.size == points.scans or size.min() < MINIMUM_POSITIONS:
         return None
-    model = free_model(estimate, clip_outliers=True)
+    model = residuals.free_model(estimate, clip_outliers=True)
     inside = (points.repeat[:, None] == repeats).astype(np.float64)
     axis = np.argmax(points.free[points.scan], axis=1)
     along = np.where(axis == 0, points.x, points.y)
@@ -133,7 +128,7 @@ def repeat_centres_test(estimate: ProfileEstimate) -> CentresApart | None:
     weights = estimate.weights / estimate.outlier_weight
     columns = points.standardised(columns, weights)[model.point]
     own, moved = np.split(columns, [2 * repeats.size], axis=1)
-    base = orthonormal(np.hstack([model.design, own]))
+    base = residuals.orthonormal(np.hstack([model.design, own]))
     rest, free = (values - base @ (base.T @ values) for values in (model.data, moved))
     shifts, _, count, _ = np.linalg.lstsq(free, rest, rcond=None)
     degrees = rest.size - base.shape[1] - int(count)
@@ -218,13 +213,11 @@ def linearity_test(estimate: ProfileEstimate) -> ExtraColumns | None:
 def hysteresis_test(
     estimate: ProfileEstimate, owner: NDArray[np.intp] | None = None
 ) -> ExtraColumns | None:
-    """Compare approach and retreat within each scan that has both; ``None`` without any.
-
-    The columns are the relative difference of A, that of the position along the scan in m (of the
-    sensor's centre), and that of the baseline in V: each is approach minus retreat.  Where
-    repeats have centres and baselines of their own, it is A alone.  ``owner`` (n,): number of the
-    scan of each point, all repeats included.
-    """
+    """Compare approach and retreat within each scan that has both; ``None`` without any."""
+    # The columns are the relative difference of A, that of the position along the scan in m (of the
+    # sensor's centre), and that of the baseline in V: each is approach minus retreat. Where repeats
+    # have centres and baselines of their own, it is A alone. ``owner`` (n,): number of the scan of
+    # each point, all repeats included.
     # A step of the baseline between the branches would else be taken for a difference of A.
     points, model = estimate.points, estimate.model
     owner = points.scan if owner is None else owner

@@ -40,15 +40,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from memscal.axisymmetry.kernels import (
-    GaussianMixture,
-    RadialKernel,
-    Rings,
-    SmoothedDisc,
-    gaussian_transfer,
-    unit_gaussian,
-    unit_gaussian_slope,
-)
+from memscal.axisymmetry import kernels
+from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel, Rings, SmoothedDisc
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray
@@ -179,7 +172,7 @@ class DepartureBasis:
     def kernels(self, k: FloatArray) -> FloatArray:
         """Transforms of all columns at ``k`` (rad/m), shape (k, p)."""
         # The first two are by A and width; parameters that move no kernel hold zeros.
-        gaussian = gaussian_transfer(k, self.sigma)
+        gaussian = kernels.gaussian_transfer(k, self.sigma)
         widening = -self.conversion_constant * self.sigma * k**2 * gaussian
         rings = [ring.transform(k) for ring in self.rings]
         families = self._families(gaussian, lambda kernel: kernel.transform(k))
@@ -187,8 +180,8 @@ class DepartureBasis:
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values of all columns at radii ``r`` (m), shape (r, p)."""
-        gaussian = unit_gaussian(r, self.sigma)
-        widening = self.conversion_constant * unit_gaussian_slope(r, self.sigma)
+        gaussian = kernels.unit_gaussian(r, self.sigma)
+        widening = self.conversion_constant * kernels.unit_gaussian_slope(r, self.sigma)
         rings = [ring.radial(r) for ring in self.rings]
         families = self._families(gaussian, lambda kernel: kernel.radial(r))
         return self._columns(gaussian, widening, rings + families)
@@ -219,10 +212,8 @@ class DepartureBasis:
 def departure_basis(
     model: ForwardModel, fit: GaussianFit, weights: FloatArray | None = None
 ) -> DepartureBasis:
-    """Return the kernels of the fit's own parameters and of every shape about it.
-
-    With the weights of the points, (n,), of the families' best fits, too.
-    """
+    """Return the kernels of the fit's own parameters and of every shape about it."""
+    # With the weights of the points, (n,), of the families' best fits, too.
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
     families = () if weights is None else tuple(_fitted_families(model, fit, weights, width))
@@ -247,16 +238,16 @@ def _fitted_families(
         values = standardised(values, weights)
         return np.asarray(values - others @ (others.T @ values))
 
-    gaussian = fit.conversion_constant * gaussian_transfer(model.k, fit.sigma)
+    gaussian = fit.conversion_constant * kernels.gaussian_transfer(model.k, fit.sigma)
     data = free(model.points.u - fit.predicted + model.signal(fit.geometry, gaussian))
     widths, amplitudes = np.full((2, len(FAMILIES)), start)
     for _ in range(_FAMILY_ROUNDS):
-        kernels = [
+        sensors = [
             family.kernel(width * factor).transform(model.k)
             for factor in (1.0, 1 + step)
             for family, width in zip(FAMILIES, widths, strict=True)
         ]
-        signal, wider = np.hsplit(free(model.signal(fit.geometry, np.stack(kernels, axis=1))), 2)
+        signal, wider = np.hsplit(free(model.signal(fit.geometry, np.stack(sensors, axis=1))), 2)
         # Least squares in A and A d ln(width), of all families at once.
         slope = (wider - signal) / step
         a, b, c = (np.sum(x, axis=0) for x in (signal**2, signal * slope, slope**2))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -25,6 +24,7 @@ _LONGEST_STEP = 1.0
 _ROUNDING = 1e-10
 
 Linearised = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+Shape = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
 
 
 def gauss_newton(
@@ -187,8 +187,6 @@ def _undetermined(model: ForwardModel, conversion_constant: float | None = None)
     )
 
 
-_Loss = Literal["linear", "soft_l1"]
-
 #: Scale of the ellipticity in the solver.
 _TYPICAL_ELLIPTICITY = 0.2
 #: Standardised residual from which on the robust fit's loss grows linearly.
@@ -244,14 +242,16 @@ def fit_gaussian_to_points(
 ) -> GaussianFit:
     """Fit a Gaussian by weighted least squares, from an earlier fit or a robust global search."""
     if start is None:
-        return _solve(model, weights, _robust_start(model, weights), loss="soft_l1")
+        return _solve(model, weights, _robust_start(model, weights), robust=True)
     centres = start.centre[model.points.free]
     shape = [start.conversion_constant, start.sigma]
     theta = np.concatenate([shape, centres, start.drift, start.ellipticity[: model.points.ellipse]])
-    return _solve(model, weights, theta, loss="linear")
+    return _solve(model, weights, theta, robust=False)
 
 
-def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _Loss) -> GaussianFit:
+def _solve(
+    model: ForwardModel, weights: FloatArray, start: FloatArray, robust: bool
+) -> GaussianFit:
     from scipy.optimize import least_squares
 
     standardised = model.points.standardised
@@ -276,7 +276,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
         return standardised(evaluate(scaled).jacobian, weights) * scale / noise
 
     # A robust fit is the start of the next one: a low accuracy is enough.
-    knee, tolerance = (_KNEE, 1e-4) if loss == "soft_l1" else (np.inf, 1e-9)
+    knee, tolerance = (_KNEE, 1e-4) if robust else (np.inf, 1e-9)
     begin = start / scale
     solution = gauss_newton(
         lambda scaled: (residual(scaled), slope(scaled)), begin, tolerance=tolerance, knee=knee
@@ -284,7 +284,7 @@ def _solve(model: ForwardModel, weights: FloatArray, start: FloatArray, loss: _L
     # At a width of zero every slope by the width is zero: steps do not leave it.
     if solution is None or solution[1] < _NARROWEST:
         result = least_squares(
-            residual, begin, slope, loss=loss, f_scale=_KNEE,
+            residual, begin, slope, loss="soft_l1" if robust else "linear", f_scale=_KNEE,
             xtol=1e-10, ftol=1e-12, gtol=1e-10, max_nfev=100,
         )  # fmt: skip
         if not result.success:
@@ -307,9 +307,15 @@ def _typical(model: ForwardModel, theta: FloatArray) -> FloatArray:
     return np.concatenate([[abs(theta[0]), width], np.full(centres, width), drift, ellipse])
 
 
-def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
+def _gaussian_shape(k: FloatArray, sigma: float) -> tuple[FloatArray, FloatArray]:
+    kernel = gaussian_transfer(k, sigma)
+    return kernel, -sigma * k**2 * kernel
+
+
+def linearise(model: ForwardModel, theta: FloatArray, shape: Shape | None = None) -> GaussianFit:
     """Return the model and its derivatives at A, sigma, centres, drifts and ellipticity."""
-    free, elliptic = model.points.free, model.points.ellipse
+    # ``shape``: transform of a round kernel in place of the Gaussian, and its slope by the width.
+    free, elliptic = model.points.free, 0 if shape else model.points.ellipse
     amplitude, sigma = float(theta[0]), float(theta[1])
     centre = np.zeros(free.shape)
     centre[free] = theta[2 : 2 + free.sum()]
@@ -317,16 +323,15 @@ def linearise(model: ForwardModel, theta: FloatArray) -> GaussianFit:
     ellipticity = np.zeros(2)
     ellipticity[:elliptic] = theta[theta.size - elliptic :]
     geometry = model.geometry(centre)
-    kernel = gaussian_transfer(model.k, sigma)
-    columns = np.stack([kernel, -sigma * model.k**2 * kernel], axis=1)
+    kernel, slope = (shape or _gaussian_shape)(model.k, sigma)
     if elliptic:
-        shape, widening, *ovals = elliptic_columns(model, geometry, sigma, ellipticity).T
+        signal, widening, *ovals = elliptic_columns(model, geometry, sigma, ellipticity).T
     else:
-        shape, widening, *ovals = model.signal(geometry, columns).T
+        signal, widening, *ovals = model.signal(geometry, np.stack([kernel, slope], axis=1)).T
     shift, baseline = model.centre_derivative(geometry, amplitude * kernel), model.drift_columns
     oval = [amplitude * column for column in ovals[:elliptic]]
-    jacobian = np.column_stack([shape, amplitude * widening, shift, baseline, *oval])
-    predicted = amplitude * shape + baseline @ drift
+    jacobian = np.column_stack([signal, amplitude * widening, shift, baseline, *oval])
+    predicted = amplitude * signal + baseline @ drift
     return GaussianFit(
         amplitude, sigma, centre, drift, ellipticity, model.points, geometry, jacobian, predicted
     )

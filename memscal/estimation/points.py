@@ -498,17 +498,11 @@ def file_in_words(source: SourceFile | None, kind: str) -> str:
 
 
 def stated_differences(
-    record: Record,
-    names: Sequence[str],
-    stated: Sequence[object],
-    places: Sequence[str],
-    of: str = "",
+    record: Record, names: Sequence[str], stated: Sequence[Any], places: Sequence[str], of: str = ""
 ) -> list[str]:
-    """Return in words which quantities two sides both state, and with values that do not agree.
-
-    Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of them
-    where no uncertainty is stated; texts if they are equal.
-    """
+    """Return in words which quantities two sides both state, and with values that do not agree."""
+    # Numbers agree within twice the standard uncertainty of their difference, or within 1e-6 of
+    # them where no uncertainty is stated; texts if they are equal.
     differences = []
     for quantity in (q for q in record.quantities if q.name in names):
         values: list[Any] = [getattr(side, quantity.name, None) for side in stated]

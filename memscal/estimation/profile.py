@@ -11,13 +11,8 @@ from numpy.typing import NDArray
 from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
-from memscal.estimation.bayesian import (
-    DepartureBasis,
-    WeighedFit,
-    departure_basis,
-    supported,
-    weigh_departures,
-)
+from memscal.estimation import bayesian
+from memscal.estimation.bayesian import DepartureBasis, WeighedFit
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.points import ScanPoints
@@ -68,7 +63,11 @@ class ProfileEstimate:
     @property
     def noise_scale(self) -> float:
         """Noise of a point (V); with stated uncertainties, the factor they must grow by (Birge)."""
-        scatter = max(self.weighed.noise, NUMERICAL_FLOOR * self.largest_signal)
+        return self.adopted_noise(self.weighed.noise)
+
+    def adopted_noise(self, scatter: float) -> float:
+        """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
+        scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
     @property
@@ -173,13 +172,14 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
     for _ in range(_WEIGHING_ROUNDS):
         weights, count = stated * outlier, float(outlier.sum())
         fit = fit_gaussian_to_points(model, weights, start=fit)
-        basis = departure_basis(model, fit, weights)
-        weighed = weigh_departures(model, fit, basis, weights, count, least_noise=least)
+        basis = bayesian.departure_basis(model, fit, weights)
+        weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=least)
         updated = outlier_weights(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
         outlier = updated
-    estimate = ProfileEstimate(model, fit, *supported(basis, weighed), weights, outlier, basis)
+    within = bayesian.supported(basis, weighed)
+    estimate = ProfileEstimate(model, fit, *within, weights, outlier, basis)
     _require_determined(estimate)
     return estimate
 
@@ -187,13 +187,11 @@ def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> Profile
 def log_marginal_likelihood(
     estimate: ProfileEstimate, inputs: FloatArray | None = None, noise: float = 1.0
 ) -> FloatArray:
-    """Logarithm of p(u) of all voltages by the references of an estimate, at its weights, (2,).
-
-    The first is by the hypotheses' priors of the estimate, the second by those of the uncertainty.
-    It is comparable between references for the same points, weights and ``noise``.  ``inputs``
-    (n, q), in V: what one standard uncertainty of each uncertain input changes, each a Gaussian of
-    unit variance that is integrated, beside ``noise``, that of a point of weight one.
-    """
+    """Logarithm of p(u) of all voltages by the references of an estimate, at its weights, (2,)."""
+    # The first is by the hypotheses' priors of the estimate, the second by those of the
+    # uncertainty. It is comparable between references for the same points, weights and ``noise``.
+    # ``inputs`` (n, q), in V: what one standard uncertainty of each uncertain input changes, each a
+    # Gaussian of unit variance that is integrated, beside ``noise``, that of a point of weight one.
     points, weights, volume = estimate.points, estimate.weights, 0.0
     if inputs is not None and inputs.size:
         # The covariance 1 + S S^T of standardised voltages is made white by its inverse root.
@@ -208,8 +206,9 @@ def log_marginal_likelihood(
     if not fit.has_width(weights, noise):
         # The flat prior of ln(width) has no end there, where the width changes no voltage.
         return np.full(2, -np.inf)
-    basis, count = departure_basis(model, fit, weights), float(estimate.outlier_weight.sum())
-    weighed = weigh_departures(model, fit, basis, weights, count, least_noise=_least_noise(fit))
+    basis, least = bayesian.departure_basis(model, fit, weights), _least_noise(fit)
+    count = float(estimate.outlier_weight.sum())
+    weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=least)
     both = weighed.log_marginal_likelihood, weighed.log_marginal_of_uncertainty
     return np.asarray(both) - volume / 2
 
@@ -314,10 +313,8 @@ def _share(estimate: ProfileEstimate, block: NDArray[np.intp]) -> float:
 def outlier_weights(
     standardised: FloatArray, threshold: float, least: float = np.finfo(float).tiny
 ) -> FloatArray:
-    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3.
-
-    The residuals count in robust standard deviations of their own, of ``least`` or more.
-    """
+    """Weights of one, and beyond the threshold such that the influence w z falls as 1/z^3."""
+    # The residuals count in robust standard deviations of their own, of ``least`` or more.
     scale = 1.4826 * np.median(np.abs(standardised))
     z = np.abs(standardised) / max(scale, least)
     return np.asarray(np.minimum(1.0, (threshold / np.maximum(z, threshold)) ** 4))

@@ -12,20 +12,14 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.errors import ConvergenceError, DomainError, InputError
-from memscal.estimation.points import (
-    COVERAGE,
-    ScanPoints,
-    accepted_differences,
-    file_in_words,
-    require_plausible,
-    stated_differences,
-)
-from memscal.mechanics.contact import Contact
+from memscal.estimation import points
+from memscal.estimation.points import ScanPoints
+from memscal.mechanics.contact import BaseStress, Contact
 from memscal.mechanics.finite_strain.table import largest_tabulated_load
 from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
-from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
-from memscal.model.indenter import Rod, RoundIndenter
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
+from memscal.model.indenter import Rod
 from memscal.model.records import FILM, INDENTER, LOAD
 from memscal.model.scan import Scan
 from memscal.model.stress import StressProfile
@@ -75,21 +69,19 @@ def require_calibration_rod(scan: Scan) -> None:
             "linear in load.",
             cure="Calibrate with a rod scan, then apply the apparatus function to this scan.",
         )
-    require_plausible(scan)
+    points.require_plausible(scan)
 
 
 def require_same_set_up(
     scans: Sequence[Scan],
-    references: Sequence[StressProfile | Contact | None],
-    alternatives: Sequence[StressProfile | Contact | None] = (),
+    references: Sequence[BaseStress | None],
+    alternatives: Sequence[BaseStress | None] = (),
     *,
     override: bool,
 ) -> list[str]:
-    """Refuse a reference of another film, rod or load than its scan; or return the differences.
-
-    :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
-    alternative may have another law and friction, which it is given for.
-    """
+    """Refuse a reference of another film, rod or load than its scan; or return the differences."""
+    # :func:`stated_differences` has the rule; ``None`` stands for the reference in the scan, and an
+    # alternative may have another law and friction, which it is given for.
     differences: list[str] = []
     for scan, given in zip(scans, references, strict=True):
         if (stress := scan.reference if given is None else given) is not None:
@@ -102,7 +94,7 @@ def require_same_set_up(
     if any(text.startswith("load") for text in differences):
         cure += " If the film of the reference is linear, state it (memscal import --film-law "
         cure += "linear; ElasticFilm(law='linear') in Python)."
-    return accepted_differences(
+    return points.accepted_differences(
         differences,
         override=override,
         problem="Scan and calculated stress are not of one set-up",
@@ -112,10 +104,10 @@ def require_same_set_up(
     )
 
 
-def _other_set_up(scan: Scan, stress: StressProfile | Contact, kind: str) -> list[str]:
+def _other_set_up(scan: Scan, stress: BaseStress, kind: str) -> list[str]:
     """Return in words what of film, rod and load a stress was not calculated for."""
     source = None if isinstance(stress, Contact) else stress.source
-    places = file_in_words(scan.source, "scan"), file_in_words(source, kind)
+    places = points.file_in_words(scan.source, "scan"), points.file_in_words(source, kind)
     film = stress.film_of_law if isinstance(stress, Contact) else stress.film
     law = "" if film is None else film.law
     names = ["thickness", "poisson_ratio"]
@@ -128,36 +120,34 @@ def _other_set_up(scan: Scan, stress: StressProfile | Contact, kind: str) -> lis
         names += ["law", "mooney_rivlin_ratio"]
     differences = []
     if film is not None:
-        differences += stated_differences(FILM, names, (scan.film, film), places, "film")
+        differences += points.stated_differences(FILM, names, (scan.film, film), places, "film")
     if stress.indenter is not None:
         pair = scan.indenter, stress.indenter
-        differences += stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
+        differences += points.stated_differences(INDENTER, ("shape", "radius"), pair, places, "rod")
     if kind == "reference" and finite:
         friction = stress.friction if isinstance(stress, Contact) else stress.friction_coefficient
         rods = scan, SimpleNamespace(rod_friction=friction)
-        differences += stated_differences(LOAD, ("rod_friction",), rods, places)
+        differences += points.stated_differences(LOAD, ("rod_friction",), rods, places)
     if law == LINEAR:
         return differences
-    stated = f"law is {law}" if law else "law is not stated"
+    loads, stated = (_farthest(scan, stress), stress), f"law is {law or 'not stated'}"
     return differences + [
         f"{text}, whose {stated}: the stress is proportional to the load under a linear law only"
-        for text in stated_differences(LOAD, ("load",), (_farthest(scan, stress), stress), places)
+        for text in points.stated_differences(LOAD, ("load",), loads, places)
     ]
 
 
-def _farthest(scan: Scan, stress: StressProfile | Contact) -> SimpleNamespace:
+def _farthest(scan: Scan, stress: BaseStress) -> SimpleNamespace:
     """Return the load of the scan that agrees least with a stress's, and its uncertainty, in N."""
     loads = np.atleast_1d(scan.load if scan.normal_load is None else scan.normal_load)
     stated = [u for u in (scan.load_uncertainty, scan.normal_load_errors) if u is not None]
     spread = np.sqrt(sum((np.square(u) for u in stated), start=np.zeros(loads.shape)))
-    i = np.nanargmax(np.abs(loads - stress.load) - COVERAGE * spread)
+    i = np.nanargmax(np.abs(loads - stress.load) - points.COVERAGE * spread)
     uncertainty = float(spread.flat[i]) if stated else None
     return SimpleNamespace(load=float(loads.flat[i]), load_uncertainty=uncertainty)
 
 
-def reference_profile(
-    scan: Scan, reference: StressProfile | Contact | None
-) -> StressProfile | Contact:
+def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
     """Choose the reference: the argument, the scan's own, or the rod's solution."""
     if reference is not None:
         return reference
@@ -167,13 +157,11 @@ def reference_profile(
 
 
 def reference_spectra(
-    references: Sequence[StressProfile | Contact],
-    points: Sequence[ScanPoints],
-    thicknesses: Sequence[float],
+    references: Sequence[BaseStress], data: Sequence[ScanPoints], thicknesses: Sequence[float]
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
-    order = points[0].order
-    spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in points]
+    order = data[0].order
+    spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in data]
     # Fields are lifted to squares that reach one span from the centre, to their corners.
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / min(thicknesses), 1.5 * max(spans))
     return tuple(
@@ -182,9 +170,7 @@ def reference_spectra(
     )
 
 
-def _per_newton(
-    reference: StressProfile | Contact, k: FloatArray, span: float, order: int
-) -> FloatArray:
+def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:
     if isinstance(reference, Contact):
         return _base_spectrum(reference, k.tobytes(), order) / reference.load
     stress = reference.sigma_rz if order else reference.sigma_zz
@@ -223,7 +209,7 @@ def _base_spectrum(contact: Contact, nodes: bytes, order: int) -> FloatArray:
     return values
 
 
-def carried_force(stress: StressProfile | Contact, reference: RadialSpectrum) -> float:
+def carried_force(stress: BaseStress, reference: RadialSpectrum) -> float:
     """Force that a reference (a shear: its normal stress) carries, over its load."""
     if reference.order == 0:
         return reference.integral
@@ -277,20 +263,15 @@ def film_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Fl
     # for a reference from elsewhere.
     film = scan.film
     changes: dict[str, FloatArray] = {}
-    if (u := film.young_modulus_uncertainty) is not None:
-        # At a given load it does not change the stress in a linear film.
+    if film.young_modulus_uncertainty is not None:
         changes["young_modulus"] = np.zeros_like(reference.values)
-        if u and film.law not in ("", LINEAR):
-            films = [replace(film, young_modulus=film.young_modulus + step) for step in (u, -u)]
-            changes["young_modulus"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
-    if u := film.thickness_uncertainty:
-        films = [replace(film, thickness=film.thickness + step) for step in (u, -u)]
-        changes["thickness"] = _difference(scan, reference, films, [scan.indenter] * 2) / 2
-    if u := film.poisson_ratio_uncertainty:
-        above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
-        films = [replace(film, poisson_ratio=ratio) for ratio in (above, below)]
-        difference = _difference(scan, reference, films, [scan.indenter] * 2)
-        changes["poisson_ratio"] = difference * u / (above - below)
+    # At a given load the modulus does not change the stress in a linear film.
+    names = ["thickness", "poisson_ratio"]
+    for name in names if film.law in ("", LINEAR) else ["young_modulus", *names]:
+        if ends := more_and_less(film, name):
+            *films, share = ends
+            varied = [replace(scan, film=film) for film in films]
+            changes[name] = share * _difference(scan, reference, varied)
     return changes
 
 
@@ -300,8 +281,8 @@ def rod_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     if not (u := rod.radius_uncertainty):
         return {}
     radii = (rod.radius + u, max(rod.radius - u, rod.radius / 2))
-    rods = [replace(rod, radius=radius) for radius in radii]
-    return {"rod_radius": _difference(scan, reference, [scan.film] * 2, rods) / 2}
+    varied = [replace(scan, indenter=replace(rod, radius=radius)) for radius in radii]
+    return {"rod_radius": _difference(scan, reference, varied) / 2}
 
 
 def press_neo_hookean(scan: Scan) -> Contact:
@@ -311,13 +292,11 @@ def press_neo_hookean(scan: Scan) -> Contact:
 
 
 def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, FloatArray]:
-    """Change of the reference's transform by what is not known of the film's law.
-
-    Rectangles, of which the standard uncertainty is the half width over the root of three: where
-    no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
-    at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
-    sliding.  Nothing where the rod goes deeper than can be solved.
-    """
+    """Change of the reference's transform by what is not known of the film's law."""
+    # Rectangles, of which the standard uncertainty is the half width over the root of three: where
+    # no law is stated (``model_form``) the difference of neo-Hookean and linear film, and of a film
+    # at finite strain whose rod's friction is not stated (``rod_friction``) that of sticking and
+    # sliding. Nothing where the rod goes deeper than is solved.
     film, rod, load = scan.film, scan.indenter, scan.load
     if film.law == LINEAR or (film.law and scan.rod_friction is not None):
         return {}
@@ -338,19 +317,10 @@ def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     return {name: RECTANGLE * change * load / pair[0].load}
 
 
-def _difference(
-    scan: Scan,
-    reference: RadialSpectrum,
-    films: Sequence[ElasticFilm],
-    rods: Sequence[RoundIndenter],
-) -> FloatArray:
-    """Difference of two rods' solutions, scaled from the rod's own to the reference."""
+def _difference(scan: Scan, reference: RadialSpectrum, varied: Sequence[Scan]) -> FloatArray:
+    """Difference of the rods of two scans, scaled from the scan's own rod to the reference."""
     law = law_at_once(scan)
-    upper, lower = (
-        rod_spectrum(replace(scan, film=film, indenter=rod), reference, law)
-        for film, rod in zip(films, rods, strict=True)
-    )
-    own = rod_spectrum(scan, reference, law)
+    upper, lower, own = (rod_spectrum(rod, reference, law) for rod in (*varied, scan))
     return (upper - lower) * relative(reference.values, own)
 
 

@@ -128,7 +128,11 @@ class Residuals:
         # is then nearest to their own residuals.
         dropped = qr(self.basis.T, mode="r", pivoting=True)[1][: self.basis.shape[1]]
         rest = np.delete(np.arange(self.values.size), dropped)
-        return _whitened(self.basis[rest], self.values[rest]), rest
+        # The symmetric inverse root of 1 - QQ' for the rows that are left of Q.
+        left, singular, _ = np.linalg.svd(self.basis[rest], full_matrices=False)
+        growth = 1 / np.sqrt(np.maximum(1 - singular**2, np.finfo(float).eps)) - 1
+        values = self.values[rest]
+        return np.asarray(values + left @ (growth * (left.T @ values))), rest
 
 
 def residuals_of(estimate: ProfileEstimate) -> Residuals:
@@ -261,13 +265,6 @@ def orthonormal(design: FloatArray) -> FloatArray:
     size = np.linalg.norm(design, axis=0)
     left, singular, _ = np.linalg.svd(design[:, size > 0] / size[size > 0], full_matrices=False)
     return np.asarray(left[:, singular > 1e-10 * singular[0]])
-
-
-def _whitened(basis: FloatArray, values: FloatArray) -> FloatArray:
-    """Apply the symmetric inverse root of 1 - QQ' for some rows of Q."""
-    left, singular, _ = np.linalg.svd(basis, full_matrices=False)
-    growth = 1 / np.sqrt(np.maximum(1 - singular**2, np.finfo(float).eps)) - 1
-    return np.asarray(values + left @ (growth * (left.T @ values)))
 
 
 def _passes(estimate: ProfileEstimate) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -90,8 +90,10 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     """Smooth the voltages of scans about their centres; of several references, put together."""
     points, references = estimate.points, estimate.model.references
     predicted, weight = np.zeros(points.u.size), np.ones(points.u.size)
-    gains = []
-    for scans in _groups(references):
+    gains, groups = [], dict[bytes, list[int]]()
+    for scan, reference in enumerate(references):
+        groups.setdefault(reference.values.tobytes(), []).append(scan)
+    for scans in groups.values():
         rows = np.flatnonzero(np.isin(points.scan, scans))
         load = points.load[rows]
         of_scans, smoothed, weight[rows] = _fitted(estimate, references[scans[0]], rows)
@@ -100,14 +102,6 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
         gain[:, rows] = of_scans / load
         gains.append((references[scans[0]].values, gain))
     return SmoothedProfile(estimate, _joined(gains, estimate), predicted, weight)
-
-
-def _groups(references: Sequence[RadialSpectrum]) -> list[list[int]]:
-    """Return the scans that share a reference."""
-    groups: dict[bytes, list[int]] = {}
-    for scan, reference in enumerate(references):
-        groups.setdefault(reference.values.tobytes(), []).append(scan)
-    return list(groups.values())
 
 
 def _joined(
@@ -199,11 +193,9 @@ class _RadialSpline:
 
 
 def _restricted_likelihood(values: FloatArray, data: FloatArray, total: float, count: int) -> float:
-    """Return the smoothing parameter of the largest restricted likelihood, its noise free.
-
-    ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
-    the voltages along their vectors; ``total``: sum of the squares of all ``count``.
-    """
+    """Return the smoothing parameter of the largest restricted likelihood, its noise free."""
+    # ``values``: singular values of the weighted splines over the root of the penalty; ``data``:
+    # the voltages along their vectors; ``total``: sum of the squares of all ``count``.
     from scipy.optimize import minimize_scalar
 
     squares, power = values**2, data**2
@@ -269,14 +261,21 @@ def find_band(estimate: ProfileEstimate, smoothed: SmoothedProfile | None) -> Ba
     if smoothed is None:
         signal = np.abs(estimate.spectrum.values)
         noise = error * estimate.conversion_constant * reference
-    else:
+    elif (points := estimate.points).as_raster:
+        # Of all points of a raster the noise is equal at all wavenumbers.
+        share = points.cell / points.of_places("readings") * estimate.outlier_weight
+        noise = np.full(k.size, np.linalg.norm(share * estimate.noise / points.load))
         signal = np.abs(smoothed.spectrum.values)
-        noise = _planar_noise(estimate) if estimate.points.as_raster else smoothed.noise
+    else:
+        signal, noise = np.abs(smoothed.spectrum.values), smoothed.noise
     noise = np.maximum(noise, np.finfo(float).tiny)
     # Nothing finer than two steps of the scan was sampled, whatever its signal.
     sampled = np.pi / estimate.points.step
     relevant = min(_falls_below(k, signal / noise, RELEVANT), sampled)
-    resolved = min(_first_below(k, yardstick / error, RESOLVED), sampled)
+    ratio = yardstick / error
+    lost = np.flatnonzero(ratio < RESOLVED)
+    end = int(lost[0]) + 1 if lost.size else k.size
+    resolved = min(_falls_below(k[:end], ratio[:end], RESOLVED), sampled)
     weakest_voltage = float(np.interp(relevant, k, signal))
     weakest_reference = float(np.interp(relevant, k, reference))
     return Band(k, signal, noise, relevant, resolved, weakest_voltage, weakest_reference)
@@ -290,13 +289,6 @@ def transfer_uncertainty(estimate: ProfileEstimate) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _first_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
-    """Return where a ratio first falls below a threshold, log-interpolated."""
-    below = ratio < threshold
-    end = int(np.argmax(below)) + 1 if below.any() else k.size
-    return _falls_below(k[:end], ratio[:end], threshold)
-
-
 def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
     """Return where a ratio falls below a threshold for good, log-interpolated."""
     # The transform of a ring-shaped G passes through zero and comes back: such a gap ends no band.
@@ -305,11 +297,3 @@ def _falls_below(k: FloatArray, ratio: FloatArray, threshold: float) -> float:
         return float(k[max(i - 1, 0)])
     upper, lower = np.log(ratio[i - 1]), np.log(max(ratio[i], np.finfo(float).tiny))
     return float(k[i - 1] + (k[i] - k[i - 1]) * (upper - np.log(threshold)) / (upper - lower))
-
-
-def _planar_noise(estimate: ProfileEstimate) -> FloatArray:
-    """Noise of a component of a raster's transform, of all points: equal at all wavenumbers."""
-    points = estimate.points
-    share = points.cell / points.of_places("readings")
-    noise = estimate.noise / points.load * estimate.outlier_weight
-    return np.full(estimate.model.k.size, np.sqrt(np.sum((share * noise) ** 2)))

@@ -19,17 +19,9 @@ from memscal.formats.opened import Scans, opened_scans
 from memscal.measurement import measured_profile as one_load
 from memscal.measurement import restore
 from memscal.measurement.restoration import Restoration
+from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import (
-    FAILED_CALIBRATION,
-    FAILED_CHECK,
-    NOISE_UNSTATED,
-    Message,
-    QualityCheck,
-    check,
-    failed_check_messages,
-    override_messages,
-)
+from memscal.model.checks import Message, QualityCheck, check
 from memscal.model.measured_stress import MeasuredProfile, MeasuredScan, MeasuredStress
 from memscal.model.provenance import Process, timestamp
 from memscal.model.scan import Scan
@@ -130,7 +122,7 @@ def _two_sided(z: float) -> float:
 _NUMBERED = re.compile(r"(\w+)_(\d+)")
 
 #: Messages of a restoration that the measured stress gives itself.
-_OF_ALL_PROFILES = (FAILED_CHECK, FAILED_CALIBRATION, NOISE_UNSTATED)
+_OF_ALL_PROFILES = (quality.FAILED_CHECK, quality.FAILED_CALIBRATION, quality.NOISE_UNSTATED)
 
 
 @single_threaded()
@@ -239,7 +231,7 @@ def joined_stress(stresses: Sequence[MeasuredStress]) -> MeasuredStress:
     for stress in stresses:
         names = ", ".join(scan.source.file_name for scan in stress.scans if scan.source)
         place = names or f"{stress.profiles[0].label} and on"
-        others = (message for message in stress.messages if message.kind != FAILED_CHECK)
+        others = (message for message in stress.messages if message.kind != quality.FAILED_CHECK)
         messages += [replace(message, text=f"{place}: {message.text}") for message in others]
     return replace(
         first,
@@ -297,8 +289,8 @@ def _messages(
     overridden: Sequence[str],
 ) -> Iterator[Message]:
     """Yield the messages of a measured stress, warnings first."""
-    yield from failed_check_messages(checks)
-    yield from override_messages(overridden)
+    yield from quality.failed_check_messages(checks)
+    yield from quality.override_messages(overridden)
     yield from restore.failed_calibration_messages(sensor)
     # A message that several profiles have in common is given once.
     numbers: dict[Message, list[str]] = {}

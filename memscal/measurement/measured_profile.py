@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.hankel import Wavenumbers
@@ -51,7 +50,13 @@ def single_loads(scan: Scan) -> tuple[Scan, ...]:
     loads = np.array([_line_load(scan, row, f", line {i + 1}") for i, row in enumerate(rows)])
     order = np.argsort(loads, kind="stable")
     starts = np.flatnonzero(np.diff(loads[order]) > _SAME_LOAD * loads[order][:-1]) + 1
-    return tuple(_lines_of(scan, np.sort(group)) for group in np.split(order, starts))
+    singles = []
+    for group in np.split(order, starts):
+        load = float(np.nanmedian(scan.normal_load[np.isin(passes, group)]))
+        u = None if scan.load_uncertainty is None else scan.load_uncertainty * load / scan.load
+        only = scan.only_passes(np.sort(group))
+        singles.append(replace(only, load=load, load_uncertainty=u))
+    return tuple(singles)
 
 
 def place_of(scan: Scan) -> str:
@@ -83,15 +88,6 @@ def _line_load(scan: Scan, loads: FloatArray, line: str) -> float:
             "with a number in repeat.",
         )
     return load
-
-
-def _lines_of(scan: Scan, rows: NDArray[np.intp]) -> Scan:
-    only = scan.only_passes(rows)
-    assert only.normal_load is not None
-    load = float(np.nanmedian(only.normal_load))
-    common = scan.load_uncertainty
-    uncertainty = None if common is None else common * load / scan.load
-    return replace(only, load=load, load_uncertainty=uncertainty)
 
 
 _LARGEST_KH = 20.0
@@ -228,11 +224,12 @@ def prepared_scan(scan: Scan, apparatus: ApparatusFunction, signal: ContactSigna
     prepared = PreparedScan(_at_nominal(scan, np.zeros_like(scan.u_zz)), _stated(scan), False)
     if scan.normal_load is None:
         return prepared
-    errors = scan.normal_load_errors
+    errors, (x, y) = scan.normal_load_errors, scan.positions
     load_share = 0.0 if errors is None else np.nan_to_num(errors) / scan.load
     for _ in range(_ROUNDS):
         estimate, _ = gaussian_pressure(prepared.scan, apparatus, measured_points(prepared.scan))
-        slope = signal.slope(_distance(scan, estimate.centre), _sticking(estimate, signal))
+        distance = np.hypot(x - estimate.centre[0], y - estimate.centre[1])
+        slope = signal.slope(distance, _sticking(estimate, signal))
         of_load = np.abs(slope) * load_share
         electronic, estimated = _stated(scan), False
         if scan.u_zz_errors is None and of_load.any():
@@ -287,14 +284,6 @@ def _noise_of_load(estimate: ProfileEstimate, of_load: FloatArray) -> float:
     tried = np.maximum(_TRIED * scatter, NUMERICAL_FLOOR * estimate.largest_signal)
     variance = tried[:, None] ** 2 + of_load**2
     return float(tried[np.argmin(np.sum(np.log(variance) + square / variance, axis=1))])
-
-
-def _distance(scan: Scan, centre: FloatArray) -> FloatArray:
-    """Distance of every point of a scan from a centre, shape of ``u_zz``, in m."""
-    x, y = scan.positions
-    if scan.planar:
-        return np.asarray(np.hypot(x - centre[0], y - centre[1]))
-    return np.asarray(np.abs(y - centre[1] if scan.direction == "y" else x - centre[0]))
 
 
 #: Radii of the smooth curve.

@@ -38,12 +38,12 @@ from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, gauss_newton
+from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
-from memscal.estimation.profile import NUMERICAL_FLOOR, ProfileEstimate
+from memscal.estimation.profile import ProfileEstimate
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm
+from memscal.model.film import ElasticFilm, more_and_less
 from memscal.model.scan import Scan
 
 _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
@@ -84,6 +84,10 @@ class PressureShape:
         ratio = 1.0 if math.isinf(m) else (m + 2) / (m + 3)
         rise = k * first - ratio * width**2 * k**3 * self._order(2, k, width)
         return np.asarray(slope - 0.5 * self._share(k) * rise)
+
+    def with_slope(self, k: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
+        """Transform and its derivative by the width."""
+        return self.transform(k, width), self.widening(k, width)
 
     def _order(self, further: int, k: FloatArray, width: float) -> FloatArray:
         """Return the transform of the exponent m + further, at the radius a of this shape."""
@@ -146,10 +150,15 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
     smaller = tuple(replace(ring, amplitude=_SMALLER * ring.amplitude) for ring in rings.rings)
     basis = _Basis(rings.conversion_constant, rings.sigma, rings.flat, smaller, (), shape)
     weighed = weigh_departures(model, fit, basis, weights, float(start.outlier_weight.sum()))
-    rows = _state_rows(model.k, basis)
+    kernels = basis.kernels(model.k)
+    rows = np.vstack([kernels, np.eye(basis.flat, kernels.shape[1])[2:]])
     kernel = fit.conversion_constant * shape.transform(model.k, fit.sigma)
     first = np.concatenate([kernel, fit.centre[model.points.free], fit.drift])
-    growth = adopted_noise(start, weighed.noise) / weighed.noise
+    # Priors are flat in log force, log width and the others: the information's log determinant.
+    flat = fit.jacobian * np.r_[fit.conversion_constant, fit.sigma, np.ones(basis.flat - 2)]
+    root = np.linalg.qr(model.points.standardised(flat, weights), mode="r")
+    log_information = 2 * float(np.log(np.abs(np.diag(root))).sum())
+    growth = start.adopted_noise(weighed.noise) / weighed.noise
     return ShapeFit(
         shape=shape,
         state=first + rows @ weighed.mean,
@@ -157,7 +166,7 @@ def fit_shape(shape: PressureShape, start: ProfileEstimate) -> ShapeFit:
         gain=rows @ weighed.gain,
         residual=weighed.residual,
         noise=weighed.noise,
-        log_marginal=weighed.log_marginal_likelihood - 0.5 * _log_information(model, weights, fit),
+        log_marginal=weighed.log_marginal_likelihood - 0.5 * log_information,
     )
 
 
@@ -172,53 +181,14 @@ def _fit(
     scale = np.concatenate([[force], widths, np.full(start.drift.size, np.ptp(model.points.u))])
 
     def linearised(scaled: FloatArray) -> tuple[FloatArray, FloatArray]:
-        fit = _linearise(shape, model, scaled * scale)
+        fit = linearise(model, scaled * scale, shape.with_slope)
         misfit = standardised(fit.predicted - model.points.u, weights)
         return misfit, standardised(fit.jacobian, weights) * scale
 
     best = gauss_newton(linearised, theta / scale, tolerance=1e-9)
     if best is None or not best[0] > 0 or not 1 / _FARTHEST < best[1] < _FARTHEST:
-        return _linearise(shape, model, theta)
-    return _linearise(shape, model, best * scale)
-
-
-def _linearise(shape: PressureShape, model: ForwardModel, theta: FloatArray) -> GaussianFit:
-    """Return the model at given force, width, centres and drift, and its derivatives."""
-    free = model.points.free
-    force, width, centres = float(theta[0]), float(theta[1]), np.zeros(free.shape)
-    centres[free] = theta[2 : 2 + free.sum()]
-    drift = theta[2 + free.sum() :]
-    geometry = model.geometry(centres)
-    kernel, slope = shape.transform(model.k, width), shape.widening(model.k, width)
-    signal, widening = model.signal(geometry, np.stack([kernel, slope], axis=1)).T
-    shift = model.centre_derivative(geometry, force * kernel)
-    jacobian = np.column_stack([signal, force * widening, shift, model.drift_columns])
-    predicted = force * signal + model.drift_columns @ drift
-    return GaussianFit(
-        force, width, centres, drift, np.zeros(2), model.points, geometry, jacobian, predicted
-    )
-
-
-def _state_rows(k: FloatArray, basis: _Basis) -> FloatArray:
-    """Derivative of the state by the parameters and the departures' amplitudes."""
-    kernels = basis.kernels(k)
-    others = np.zeros((basis.flat - 2, kernels.shape[1]))
-    others[:, 2 : basis.flat] = np.eye(basis.flat - 2)
-    return np.vstack([kernels, others])
-
-
-def _log_information(model: ForwardModel, weights: FloatArray, fit: GaussianFit) -> float:
-    """Log determinant of the information; priors flat in log force, log width and the others."""
-    scale = np.ones(fit.jacobian.shape[1])
-    scale[:2] = fit.conversion_constant, fit.sigma
-    scaled = model.points.standardised(fit.jacobian * scale, weights)
-    return 2 * float(np.log(np.abs(np.diag(np.linalg.qr(scaled, mode="r")))).sum())
-
-
-def adopted_noise(start: ProfileEstimate, noise: float) -> float:
-    """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
-    at_least = max(noise, NUMERICAL_FLOOR * start.largest_signal)
-    return at_least if start.points.u_errors is None else max(at_least, 1.0)
+        best = theta / scale
+    return linearise(model, best * scale, shape.with_slope)
 
 
 #: A shape of less probability is left out.
@@ -252,7 +222,7 @@ class Posterior:
     @property
     def noise_ratio(self) -> float:
         """Adopted noise over the Gaussian estimate's."""
-        return adopted_noise(self.estimate, self.found_noise) / self.estimate.noise_scale
+        return self.estimate.adopted_noise(self.found_noise) / self.estimate.noise_scale
 
     @property
     def nodes(self) -> int:
@@ -270,7 +240,7 @@ def sensor_transfer(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray:
     return hankel_transform(apparatus.radial_profile.r, apparatus.radial_profile.g, k)
 
 
-def restore_posterior(
+def posterior_of(
     scan: Scan, apparatus: ApparatusFunction, estimate: ProfileEstimate, transfer: FloatArray
 ) -> Posterior:
     """Average the shapes of pressure and propagate the inputs; ``transfer``: A G's, in V/Pa."""
@@ -352,14 +322,10 @@ def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray
 def _film_changes(film: ElasticFilm, k: FloatArray) -> FloatArray:
     """Change of the film's transfer function by one standard uncertainty of each property."""
     columns = []
-    if u := film.thickness_uncertainty:
-        thicker, thinner = (replace(film, thickness=film.thickness + s * u) for s in (1, -1))
-        columns.append((film_transfer(thicker, k) - film_transfer(thinner, k)) / 2)
-    if u := film.poisson_ratio_uncertainty:
-        # One-sided at nu = 1/2.
-        above, below = min(film.poisson_ratio + u, 0.5), max(film.poisson_ratio - u, 0.0)
-        upper, lower = (replace(film, poisson_ratio=nu) for nu in (above, below))
-        columns.append((film_transfer(upper, k) - film_transfer(lower, k)) * u / (above - below))
+    for name in ("thickness", "poisson_ratio"):
+        if ends := more_and_less(film, name):
+            more, less, share = ends
+            columns.append(share * (film_transfer(more, k) - film_transfer(less, k)))
     return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
 
 

@@ -17,15 +17,9 @@ from memscal.errors import InputError
 from memscal.estimation.points import ScanPoints
 from memscal.measurement.posterior import Posterior, film_transfer, reach_of, sensor_transfer
 from memscal.mechanics.contact import Contact
+from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import (
-    OVERRIDE,
-    Checked,
-    Message,
-    QualityCheck,
-    chi_square_limit,
-    state_of_checks,
-)
+from memscal.model.checks import Checked, Message, QualityCheck
 from memscal.model.indenter import Rod
 from memscal.model.notation import format_measured
 from memscal.model.result import Result
@@ -85,7 +79,7 @@ def compare_stress(
         sigma_zz=calculated,
         chi_square=chi_square / degrees,
         degrees=degrees,
-        limit=chi_square_limit(degrees) / degrees,
+        limit=quality.chi_square_limit(degrees) / degrees,
         p_value=float(chdtrc(degrees, chi_square)),
         difference=float(apart.max()) / peak,
         within=float(np.mean(apart <= allowed)),
@@ -175,7 +169,7 @@ class Restoration(Result, Checked):
     def __repr__(self) -> str:
         """Return the main numbers in place of thousands of array elements."""
         force = format_measured(self.force, self.force_uncertainty, "N")
-        state = state_of_checks(self.checks)
+        state = quality.state_of_checks(self.checks)
         return f"<Restoration: force {force}, {self.r.size} radii, {state}>"
 
     @property
@@ -312,7 +306,7 @@ class Restoration(Result, Checked):
 
     def profile(self) -> StressProfile:
         """Return the restored stress as a table with its uncertainty, as a file holds it."""
-        overridden = (message.text for message in self.messages if message.kind == OVERRIDE)
+        overridden = (message.text for message in self.messages if message.kind == quality.OVERRIDE)
         return StressProfile(
             r=self.r,
             sigma_zz=self.sigma_zz,

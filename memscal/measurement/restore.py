@@ -23,28 +23,11 @@ from memscal.estimation.points import (
 from memscal.estimation.profile import CentreError, ProfileEstimate, estimate_profile
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
-from memscal.measurement.posterior import (
-    film_transfer,
-    reach_of,
-    restore_posterior,
-    sensor_transfer,
-)
+from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
 from memscal.measurement.restoration import SAME_LOAD, Expected, Restoration, StressComparison
+from memscal.model import checks as quality
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import (
-    FAILED_CALIBRATION,
-    NOISE_LIMIT,
-    NOISE_UNSTATED,
-    OUTLIER_LIMIT,
-    OUTLIER_WEIGHT,
-    Message,
-    QualityCheck,
-    check,
-    chi_square_limit,
-    failed_check_messages,
-    override_messages,
-    state_of_checks,
-)
+from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.indenter import Rod
 from memscal.model.measured_stress import MeasuredScan
 from memscal.model.records import FILM, SENSOR
@@ -126,15 +109,6 @@ _FORCE_LIMIT = 3.0
 _NEGLIGIBLE_FORCE = 0.01
 
 
-def restoration_checks(restored: Restoration) -> tuple[QualityCheck, ...]:
-    """Run every check that applies to the scan."""
-    checks = [_reconvolution(restored), _force(restored), *_noise(restored)]
-    checks += [_symmetry(restored), _outliers(restored)]
-    if restored.comparison is not None:
-        checks.append(_expected(restored.comparison))
-    return tuple(checks)
-
-
 def _reconvolution(restored: Restoration) -> QualityCheck:
     degrees = restored.degrees
     return check(
@@ -169,7 +143,7 @@ def _noise(restored: Restoration) -> list[QualityCheck]:
         check(
             "noise_as_stated",
             restored.posterior.found_noise,
-            NOISE_LIMIT,
+            quality.NOISE_LIMIT,
             "Scatter about the fitted profile over the stated u_zz_errors. A failure means that "
             "something besides electronic noise scatters the scan, such as position or load; the "
             "uncertainties have been raised accordingly.",
@@ -207,8 +181,8 @@ def _symmetry(restored: Restoration) -> QualityCheck:
 def _outliers(restored: Restoration) -> QualityCheck:
     return check(
         "outliers",
-        float(np.mean(restored.posterior.estimate.outlier_weight < OUTLIER_WEIGHT)),
-        OUTLIER_LIMIT,
+        float(np.mean(restored.posterior.estimate.outlier_weight < quality.OUTLIER_WEIGHT)),
+        quality.OUTLIER_LIMIT,
         "Share of points whose weight was more than halved. A failure means that the noise is not "
         "what the uncertainties take it for: look at the residuals.",
     )
@@ -229,11 +203,11 @@ def _expected(compared: StressComparison) -> QualityCheck:
 
 
 def restoration_messages(
-    restored: Restoration, checks: tuple[QualityCheck, ...]
+    restored: Restoration, checks: Sequence[QualityCheck]
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, warnings first."""
     estimate, points = restored.posterior.estimate, restored.points
-    messages = failed_check_messages(checks)
+    messages = quality.failed_check_messages(checks)
     messages += failed_calibration_messages(restored.apparatus)
     if points.missing:
         text = f"{points.missing} points of the scan are missing and were left out."
@@ -244,7 +218,7 @@ def restoration_messages(
             f"Outlier {restored.distance[i] * 1e3:.4g} mm from the centre: "
             f"{points.u[i] * 1e3:.4g} mV instead of {restored.predicted[i] * 1e3:.4g} mV.",
         )
-        for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]
+        for i in (estimate.outlier_weight < quality.OUTLIER_WEIGHT).nonzero()[0]
     ]
     if points.u_errors is None:
         messages.append(noise_unstated_message(float(restored.noise.min())))
@@ -269,14 +243,14 @@ def restoration_messages(
 
 def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
     """Return one message if a check of the calibration had failed, else none."""
-    text = f"Quality checks of the calibration itself {state_of_checks(apparatus.checks)}."
-    return [] if apparatus.passed else [Message(FAILED_CALIBRATION, text)]
+    text = f"Quality checks of the calibration itself {quality.state_of_checks(apparatus.checks)}."
+    return [] if apparatus.passed else [Message(quality.FAILED_CALIBRATION, text)]
 
 
 def noise_unstated_message(noise: float) -> Message:
     """Return the message for a scan without u_zz_errors, with the estimated noise in V."""
     text = f"u_zz_errors is absent: a noise of {noise * 1e3:.3g} mV was estimated from the scatter."
-    return Message(NOISE_UNSTATED, text)
+    return Message(quality.NOISE_UNSTATED, text)
 
 
 #: A film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
@@ -332,7 +306,7 @@ def restore(
     """
     sensor, measured = opened_apparatus(apparatus), opened_scan(scan)
     require_measurement(measured, sensor)
-    overridden = override_messages(accept_mismatches(measured, sensor, override=override))
+    overridden = quality.override_messages(accept_mismatches(measured, sensor, override=override))
     restored = restore_known(measured, sensor, expected)
     return replace(restored, messages=(*overridden, *restored.messages))
 
@@ -344,7 +318,7 @@ def restore_known(
     points = measured_points(scan)
     estimate, transfer = gaussian_pressure(scan, apparatus, points)
     wavenumbers = estimate.model.reference.wavenumbers
-    posterior = restore_posterior(scan, apparatus, estimate, transfer)
+    posterior = posterior_of(scan, apparatus, estimate, transfer)
     nodes = posterior.nodes
     r = np.linspace(0.0, reach_of(points) / 3, _RADII)
     matrix = wavenumbers.synthesise(np.eye(nodes), r)
@@ -358,8 +332,12 @@ def restore_known(
     )
     if expected is not None:
         restored = replace(restored, comparison=restored.compare(expected))
-    checks = restoration_checks(restored)
-    return replace(restored, checks=checks, messages=restoration_messages(restored, checks))
+    checks = [_reconvolution(restored), _force(restored), *_noise(restored)]
+    checks += [_symmetry(restored), _outliers(restored)]
+    if restored.comparison is not None:
+        checks.append(_expected(restored.comparison))
+    messages = restoration_messages(restored, checks)
+    return replace(restored, checks=tuple(checks), messages=messages)
 
 
 def gaussian_pressure(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -225,6 +225,10 @@ class Contact(Result):
             convergence=self.convergence,
             notes=f"Interface: {self.interface.description}." if not self.interface.rigid else "",
         )
+
+
+BaseStress: TypeAlias = StressProfile | Contact
+"""A calculated stress at the base of a film, as a table or as the contact itself."""
 
 
 def too_deep(film: ElasticFilm, indenter: Indenter, load: float, depth: float) -> DomainError:

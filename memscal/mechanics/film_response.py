@@ -30,12 +30,18 @@ large :math:`x`; a ``correction`` is the difference, free of cancellation.  They
 decaying exponentials, so that nothing overflows, and by a series where the closed form would
 cancel.  All take ``x`` of any shape, from 0 to infinity, and Poisson's ratio from 0 to 0.5.
 (For :math:`W` and :math:`T` see also Frétigny and Chateauminois, J. Phys. D 40 (2007) 5418.)
+
+In space the half-space's share of the surface's compliance is in closed form
+(:mod:`memscal.mechanics.surface`).  What the rigid base adds falls off as
+:math:`(kh)^2 e^{-2kh}` and is summed by Gauss quadrature over :math:`k`, in panels that resolve
+the oscillation of the Bessel functions.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -43,7 +49,7 @@ from numpy.typing import ArrayLike
 from scipy.special import j0, j1
 
 from memscal.axisymmetry.hankel import gauss_between, gauss_panels
-from memscal.mechanics.half_space import coupling_integrals, on_hats, singular_integrals
+from memscal.mechanics import surface
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 
@@ -226,8 +232,8 @@ class RingTraction:
 
     def half_space_integrals(self, r: FloatArray) -> HalfSpaceIntegrals:
         """Return the four integrals of :class:`InterfaceTraction` at ``r`` (m), in Pa m."""
-        p, q, singular = self.pressures, self.shears, singular_integrals(r, self.rings)
-        beyond, within = coupling_integrals(r, self.rings)
+        p, q, singular = self.pressures, self.shears, surface.singular_integrals(r, self.rings)
+        beyond, within = surface.coupling_integrals(r, self.rings)
         return singular[0] @ p, beyond @ q, within @ p, singular[1] @ q
 
     def _transform(self, values: FloatArray, k: FloatArray, order: int) -> FloatArray:
@@ -255,10 +261,121 @@ def hat_transforms(rings: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatA
     for bessel in (j0, j1):
         waves = bessel(np.multiply.outer(k, s)) * (weights * s)
         right = np.add.reduceat(waves * rising, starts, axis=1)
-        transforms.append(on_hats(np.add.reduceat(waves, starts, axis=1) - right, right))
+        transforms.append(surface.on_hats(np.add.reduceat(waves, starts, axis=1) - right, right))
     return transforms[0], transforms[1]
 
 
 def _nodes(rings: FloatArray, fastest: float) -> tuple[FloatArray, FloatArray]:
     """Return Gauss nodes between the rings, enough for ``fastest`` rad/m in the widest gap."""
     return gauss_between(rings, order=4 + math.ceil(0.7 * fastest * float(np.diff(rings).max())))
+
+
+# x^2 exp(-2x) is below 1e-16 here: the layer's correction to the half-space ends.
+_LARGEST_KH_OF_LAYER = 22.0
+# Phase, in rad, that one panel of the k-quadrature may span.
+_PHASE_OF_LAYER = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class HankelFilm:
+    """A bonded film of infinite extent with tractions on rings of radii ``r`` (m), from 0."""
+
+    film: ElasticFilm
+    r: FloatArray
+
+    @cached_property
+    def compliance(self) -> surface.SurfaceCompliance:
+        """Displacements of the rings under tractions on the rings."""
+        film, r = self.film, self.r
+        direct, across = surface.singular_integrals(r, r), surface.coupling_integrals(r, r)
+        k, weights = _wavenumbers(film, 2 * r[-1])
+        layer = _layer_integrals(film, r, (k, weights), hat_transforms(r, k))
+        matrices = _displacements(film, (direct[0], *across, direct[1]), layer)
+        return surface.SurfaceCompliance(r, *matrices)
+
+    @property
+    def discretisation(self) -> str:
+        """What was discretised, in words."""
+        return "Hankel transforms, Gauss-Legendre in k"
+
+    def field(self, pressure: FloatArray, shear: FloatArray) -> HankelField:
+        """Return the field under ``pressure`` and ``shear`` (Pa) at the rings, shapes (n,)."""
+        return HankelField(self.film, RingTraction(self.r, pressure, shear))
+
+
+@dataclass(frozen=True, eq=False)
+class HankelField:
+    """The field in a film under a traction; see :class:`memscal.mechanics.surface.FilmField`."""
+
+    film: ElasticFilm
+    traction: InterfaceTraction
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa; zero where it is below 1e-13 of its peak."""
+        return base_stress(self.film, self.traction, r)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa."""
+        return base_stress(self.film, self.traction, r, order=1)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+        return 2 * np.pi * base_spectrum(self.film, self.traction, k)
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
+        return 2 * np.pi * base_spectrum(self.film, self.traction, k, order=1)
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return the normal displacement of the surface in m, positive into the film."""
+        w_by_p, w_by_q, _, _ = self._surface(r)
+        return np.asarray(w_by_p + w_by_q).reshape(np.shape(r))
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return the radial displacement of the surface in m, positive outward."""
+        _, _, u_by_p, u_by_q = self._surface(r)
+        return np.asarray(u_by_p + u_by_q).reshape(np.shape(r))
+
+    def _surface(self, r: FloatArray) -> HalfSpaceIntegrals:
+        x = np.ravel(np.asarray(r, dtype=np.float64))
+        traction = self.traction
+        k, weights = _wavenumbers(self.film, float(x.max(initial=0.0)) + traction.radius)
+        transforms = traction.pressure_transform(k), traction.shear_transform(k)
+        layer = _layer_integrals(self.film, x, (k, weights), transforms)
+        return _displacements(self.film, traction.half_space_integrals(x), layer)
+
+
+_Pair = tuple[FloatArray, FloatArray]
+
+
+def _wavenumbers(film: ElasticFilm, reach: float) -> _Pair:
+    """Return quadrature nodes for the layer's share, seen at distances up to ``reach``."""
+    h = film.thickness
+    return gauss_panels(_LARGEST_KH_OF_LAYER / h, min(1.5 / h, _PHASE_OF_LAYER / max(reach, h)))
+
+
+def _layer_integrals(
+    film: ElasticFilm, x: FloatArray, wavenumbers: _Pair, transforms: _Pair
+) -> HalfSpaceIntegrals:
+    """Return what the base takes from the surface's displacements at ``x``, times G/(1 - nu)."""
+    (k, weights), (p, q) = wavenumbers, transforms
+    kh, nu = k * film.thickness, film.poisson_ratio
+    normal, radial = j0(np.multiply.outer(x, k)) * weights, j1(np.multiply.outer(x, k)) * weights
+    coupling = coupling_correction(kh, nu)
+    w_by_p = (normal * normal_correction(kh, nu)) @ p
+    u_by_q = (radial * radial_correction(kh, nu)) @ q
+    return w_by_p, (normal * coupling) @ q, (radial * coupling) @ p, u_by_q
+
+
+def _displacements(
+    film: ElasticFilm, half_space: HalfSpaceIntegrals, layer: HalfSpaceIntegrals
+) -> HalfSpaceIntegrals:
+    """Add both shares up to the depression by p and q, and the outward displacement by p and q."""
+    nu = film.poisson_ratio
+    scale, beta = (1 - nu) / film.shear_modulus, half_space_coupling(nu)
+    return (
+        scale * (half_space[0] + layer[0]),
+        scale * (beta * half_space[1] + layer[1]),
+        scale * (beta * half_space[2] + layer[2]),
+        scale * (half_space[3] + layer[3]),
+    )

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, overload
 
 import numpy as np
 
 from memscal.errors import InputError
 from memscal.mechanics.contact import Contact, too_deep
+from memscal.mechanics.film_response import HankelField
 from memscal.mechanics.finite_strain.solve import press_at_finite_strain
-from memscal.mechanics.hankel_film import HankelField
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.rod import solve_rod
-from memscal.mechanics.solver.problem import Depth, Load, Target
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
+from memscal.mechanics.solver.step import Depth, Load, Target
 from memscal.model.arrays import FloatArray, require_positive
-from memscal.model.film import LINEAR, ElasticFilm
+from memscal.model.film import LINEAR, ElasticFilm, more_and_less
 from memscal.model.indenter import Indenter, Rod
 from memscal.parallel import single_threaded
 
@@ -116,7 +115,7 @@ def indent(
 
     Notes
     -----
-    Contact is unilateral, friction Amontons' (:mod:`memscal.mechanics.solver.problem`).  A rod that
+    Contact is unilateral, friction Amontons' (:mod:`memscal.mechanics.solver.step`).  A rod that
     slides freely or sticks is solved to higher accuracy (:mod:`memscal.mechanics.rod`).  Solutions
     are cached: the same request is answered at once.
 
@@ -154,9 +153,12 @@ def indent(
     request = RingRequest(
         film, indenter, interface, targets, friction, loading, backend, film_radius, rings
     )
+    slides_or_sticks = friction == 0 or math.isinf(friction)
+    # Without friction there is nothing for a slip length to act on.
+    rigid = interface.rigid or (friction == 0 and interface.normal_law is None)
     if strain == "finite":
         contacts = press_at_finite_strain(request, progress)
-    elif _is_plain_rod(indenter, friction, backend, interface):
+    elif isinstance(indenter, Rod) and slides_or_sticks and rigid and backend == "hankel":
         contacts = tuple(_rod_contact(film, indenter, target, friction) for target in targets)
     else:
         contacts = solve_on_rings(request)
@@ -189,15 +191,11 @@ def changes_by_inputs(contact: Contact) -> list[tuple[Contact, Contact, float]]:
     varied = []
     for name in ("young_modulus", "poisson_ratio", "thickness", "radius"):
         holder: Any = indenter if name == "radius" else film
-        if not (u := getattr(holder, f"{name}_uncertainty", None)):
-            continue
-        value = getattr(holder, name)
-        # One-sided at nu = 1/2.
-        ends = (value + u if name != "poisson_ratio" else min(value + u, 0.5), max(value - u, 0.0))
-        records = [replace(holder, **{name: end}) for end in ends]
-        pairs = [(film, new) if name == "radius" else (new, indenter) for new in records]
-        more, less = (again(*pair) for pair in pairs)
-        varied.append((more, less, u / (ends[0] - ends[1])))
+        if ends := more_and_less(holder, name):
+            *records, share = ends
+            pairs = [(film, new) if name == "radius" else (new, indenter) for new in records]
+            more, less = (again(*pair) for pair in pairs)
+            varied.append((more, less, share))
     return varied
 
 
@@ -219,16 +217,8 @@ def _targets(
     return tuple(kind(float(value)) for value in values.flat), values.ndim == 1
 
 
-def _is_plain_rod(indenter: Indenter, friction: float, backend: str, interface: Interface) -> bool:
-    """Whether the solution in spherical Bessel functions applies."""
-    slides_or_sticks = friction == 0 or math.isinf(friction)
-    # Without friction there is nothing for a slip length to act on.
-    rigid = interface.rigid or (friction == 0 and interface.normal_law is None)
-    return isinstance(indenter, Rod) and slides_or_sticks and rigid and backend == "hankel"
-
-
-def _rod_contact(film: ElasticFilm, rod: Indenter, target: Target, friction: float) -> Contact:
-    assert isinstance(rod, Rod)
+def _rod_contact(film: ElasticFilm, rod: Rod, target: Target, friction: float) -> Contact:
+    """Return the solution in spherical Bessel functions."""
     sticking = math.isinf(friction)
     solution = solve_rod(rod.radius / film.thickness, float(film.poisson_ratio), sticking=sticking)
     stiffness = 2 * film.contact_modulus * rod.radius * solution.stiffness_factor

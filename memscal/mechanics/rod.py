@@ -39,11 +39,9 @@ from memscal.model.film import ElasticFilm
 def rod_integrals(
     rho: FloatArray, pressure_terms: FloatArray, shear_terms: FloatArray
 ) -> HalfSpaceIntegrals:
-    r"""Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's.
-
-    By :math:`j_{2n}(\xi) = (-1)^n\int_0^1 P_{2n}(t)\cos\xi t\,dt`, of odd order with sines, and the
-    Hankel transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
-    """
+    """Return the transforms' integrals times J0 and J1 at radii ``rho`` in units of the rod's."""
+    # By j_2n(x) = (-1)^n int_0^1 P_2n(t) cos(xt) dt, of odd order with sines, and the Hankel
+    # transforms of cosine and sine (Gradshteyn and Ryzhik 6.671); exact by Gauss quadrature.
     even, odd = _series(pressure_terms, 0), _series(shear_terms, 1)
     nodes, weights = np.polynomial.legendre.leggauss(max(even.size, odd.size) + 24)
     share, weights = (nodes + 1) / 2, weights / 2

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, freeze_arrays
+from memscal.model.arrays import FloatArray, FrozenArrays
 from memscal.model.checks import Checked, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -19,7 +19,7 @@ from memscal.model.stress import StressProfile
 
 
 @dataclass(frozen=True, eq=False)
-class ApparatusField:
+class ApparatusField(FrozenArrays):
     """The apparatus function on a Cartesian grid, with unit integral over it.
 
     ``x`` (n,) and ``y`` (m,) in m; ``g`` and ``g_errors`` (m, n) in 1/m^2.
@@ -30,12 +30,9 @@ class ApparatusField:
     g: FloatArray
     g_errors: FloatArray
 
-    def __post_init__(self) -> None:
-        freeze_arrays(self, "x", "y", "g", "g_errors")
-
 
 @dataclass(frozen=True, eq=False)
-class ApparatusRadial:
+class ApparatusRadial(FrozenArrays):
     """The radial profile of the apparatus function.
 
     ``r`` (n,) in m; ``g``, ``g_errors`` (k = 1) and ``g_gaussian`` (n,) in 1/m^2;
@@ -50,14 +47,9 @@ class ApparatusRadial:
     g_covariance: FloatArray
     conversion_correlation: FloatArray | None = None
 
-    def __post_init__(self) -> None:
-        freeze_arrays(self, "r", "g", "g_errors", "g_gaussian", "g_covariance")
-        if self.conversion_correlation is not None:
-            freeze_arrays(self, "conversion_correlation")
-
 
 @dataclass(frozen=True, eq=False)
-class TransferFunction:
+class TransferFunction(FrozenArrays):
     """Modulus of the apparatus function's 2-D Fourier transform along a radius.
 
     ``k`` (n,) in rad/m; ``modulus``, ``modulus_errors`` and ``window`` (the
@@ -71,12 +63,9 @@ class TransferFunction:
     window: FloatArray
     resolved_wavenumber: float
 
-    def __post_init__(self) -> None:
-        freeze_arrays(self, "k", "modulus", "modulus_errors", "window")
-
 
 @dataclass(frozen=True, eq=False)
-class Reconvolution:
+class Reconvolution(FrozenArrays):
     """The scan beside what the calibration predicts for it; all in V against ``x`` in m.
 
     In a raster ``x`` is the distance from the sensor's centre.  ``u_zz_predicted`` uses the
@@ -91,14 +80,9 @@ class Reconvolution:
     u_zz_gaussian: FloatArray
     residual: FloatArray
 
-    def __post_init__(self) -> None:
-        freeze_arrays(
-            self, "x", "u_zz", "u_zz_errors", "u_zz_predicted", "u_zz_gaussian", "residual"
-        )
-
 
 @dataclass(frozen=True, eq=False)
-class ParameterSet:
+class ParameterSet(FrozenArrays):
     """Estimated scalars with their joint covariance, in SI units.
 
     Parameters
@@ -122,7 +106,7 @@ class ParameterSet:
     units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        freeze_arrays(self, "values", "covariance")
+        super().__post_init__()
         n = len(self.names)
         if self.units and len(self.units) != n:
             raise InputError(f"{n} parameter names, but {len(self.units)} units.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,15 @@ def freeze_arrays(owner: object, *names: str) -> None:
         object.__setattr__(owner, name, frozen_array(getattr(owner, name)))
 
 
+@dataclass(frozen=True, eq=False)
+class FrozenArrays:
+    """Base of a frozen dataclass whose arrays are read-only copies of what it was made of."""
+
+    def __post_init__(self) -> None:
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        freeze_arrays(self, *(n for n, v in values.items() if isinstance(v, np.ndarray | list)))
+
+
 def finite_vector(name: str, values: ArrayLike) -> FloatArray:
     """Return a read-only 1-D copy; refuse another shape or a value that is not finite."""
     array = frozen_array(values)
@@ -79,6 +88,16 @@ def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     numbers = array.astype(np.int64)
     numbers.setflags(write=False)
     return numbers
+
+
+class ByContent:
+    """A record with arrays that is equal to another of its class with the same content."""
+
+    def __eq__(self, other: object) -> bool:
+        return same_content(self, other) if isinstance(other, type(self)) else NotImplemented
+
+    # Arrays have no hash; object's own is declared as a method.
+    __hash__ = None  # type: ignore[assignment]
 
 
 def same_content(first: Any, second: Any) -> bool:

@@ -143,11 +143,9 @@ def messages_to_json(messages: Iterable[Message]) -> list[dict[str, str]]:
 
 def messages_from_json(stored: Sequence[Any]) -> tuple[Message, ...]:
     """Return messages from a file; a plain text, as older files hold them, is a note."""
-    return tuple(map(_message_from_json, stored))
-
-
-def _message_from_json(entry: object) -> Message:
-    if not isinstance(entry, Mapping):
-        return Message("note", str(entry))
-    kind, text = str(entry.get("kind", "note")), str(entry.get("text", ""))
-    return Message(kind, text, "warning" if entry.get("severity") == "warning" else "note")
+    messages = []
+    for entry in (e if isinstance(e, Mapping) else {"text": e} for e in stored):
+        kind, text = str(entry.get("kind", "note")), str(entry.get("text", ""))
+        warns = entry.get("severity") == "warning"
+        messages.append(Message(kind, text, "warning" if warns else "note"))
+    return tuple(messages)

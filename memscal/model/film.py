@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from memscal.errors import InputError
 from memscal.model.arrays import require_non_negative, require_positive, require_range
@@ -96,3 +97,13 @@ class ElasticFilm:
         ratio = self.mooney_rivlin_ratio
         words = self.law or "of a law that is not stated"
         return words if ratio is None else f"{words} of C2/C1 = {ratio:.4g}"
+
+
+def more_and_less(record: Any, name: str) -> tuple[Any, Any, float] | None:
+    """Return a film or indenter with more and less of a quantity, and u over the difference."""
+    # None where no u is stated; one-sided at the ends of a Poisson's ratio, 0 and 1/2.
+    value, u = getattr(record, name), getattr(record, f"{name}_uncertainty", None)
+    if not u:
+        return None
+    more, less = min(value + u, 0.5) if name == "poisson_ratio" else value + u, max(value - u, 0.0)
+    return replace(record, **{name: more}), replace(record, **{name: less}), u / (more - less)

@@ -11,13 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
-from memscal.model.arrays import (
-    FloatArray,
-    finite_vector,
-    require_increasing,
-    require_non_negative,
-    require_positive,
-)
+from memscal.model import arrays
+from memscal.model.arrays import FloatArray
 
 
 class Indenter:
@@ -51,9 +46,9 @@ class RoundIndenter(Indenter):
     radius_uncertainty: float | None = None
 
     def __post_init__(self) -> None:
-        require_positive(f"{self.shape} radius", self.radius, "m")
-        if self.radius_uncertainty is not None:
-            require_non_negative(f"uncertainty of the {self.shape} radius", self.radius_uncertainty)
+        arrays.require_positive(f"{self.shape} radius", self.radius, "m")
+        if (u := self.radius_uncertainty) is not None:
+            arrays.require_non_negative(f"uncertainty of the {self.shape} radius", u)
 
     @property
     def extent(self) -> float:
@@ -162,9 +157,10 @@ class Profile(Indenter):
     z: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "r", finite_vector("r of the indenter's profile", self.r))
-        object.__setattr__(self, "z", finite_vector("height of the indenter's profile", self.z))
-        require_increasing("r of the indenter's profile", self.r)
+        for name, words in (("r", "r"), ("z", "height")):
+            values = arrays.finite_vector(f"{words} of the indenter's profile", getattr(self, name))
+            object.__setattr__(self, name, values)
+        arrays.require_increasing("r of the indenter's profile", self.r)
         if self.r.size != self.z.size or self.r.size < 4 or self.r[0] != 0:
             raise InputError(
                 f"The indenter's profile has {self.r.size} radii from {self.r[0] * 1e3:g} mm and "
@@ -185,7 +181,7 @@ class Profile(Indenter):
         cls, height: Callable[[FloatArray], ArrayLike], *, extent: float, points: int = 2001
     ) -> Profile:
         """Return the profile of a function: ``points`` even radii up to ``extent``, all in m."""
-        require_positive("extent of the indenter's profile", extent, "m")
+        arrays.require_positive("extent of the indenter's profile", extent, "m")
         r = np.linspace(0.0, extent, points)
         return cls(r=r, z=np.broadcast_to(np.asarray(height(r), dtype=np.float64), r.shape))
 

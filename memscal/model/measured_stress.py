@@ -21,7 +21,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from memscal.model.arrays import FloatArray, frozen_array, same_content
+from memscal.model.arrays import ByContent, FloatArray, frozen_array
 from memscal.model.checks import Checked, Message, QualityCheck, state_of_checks
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
@@ -60,7 +60,7 @@ class MeasuredScan:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MeasuredPoints:
+class MeasuredPoints(ByContent):
     """The measured points of one load and channel, missing ones left out; arrays of shape (n,).
 
     ``x``, ``y``: positions, zero across a line, ``x_errors``: standard uncertainty along the
@@ -83,19 +83,13 @@ class MeasuredPoints:
         _freeze(self, "weight", "load", "load_errors", "correlation")
         _freeze(self, "x", "y", "x_errors", "u", "noise", scale=_FILE_SCALE)
 
-    def __eq__(self, other: object) -> bool:
-        return same_content(self, other) if isinstance(other, MeasuredPoints) else NotImplemented
-
-    # Arrays have no hash; object's own is declared as a method.
-    __hash__ = None  # type: ignore[assignment]
-
     def __repr__(self) -> str:
         """Return the number of points in place of arrays."""
         return f"<MeasuredPoints: {self.u.size}>"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class MeasuredProfile:
+class MeasuredProfile(ByContent):
     """The measured stress of one load, from the centre outward.
 
     Parameters
@@ -160,11 +154,6 @@ class MeasuredProfile:
         for name in ("baseline", "baseline_uncertainty", "contact_radius"):
             object.__setattr__(self, name, _kept(getattr(self, name)))
 
-    def __eq__(self, other: object) -> bool:
-        return same_content(self, other) if isinstance(other, MeasuredProfile) else NotImplemented
-
-    __hash__ = None  # type: ignore[assignment]
-
     def __repr__(self) -> str:
         """Return load, force and maximum in place of arrays."""
         force = format_measured(self.force, self.force_uncertainty, "N")
@@ -208,7 +197,7 @@ class MeasuredProfile:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class MeasuredStress(Result, Checked):
+class MeasuredStress(Result, Checked, ByContent):
     """The measured stress of all loads of one or several scans, live or read from its file.
 
     Made by :func:`memscal.measure_stress` or :func:`memscal.read_stress`; the two are equal if one
@@ -249,11 +238,6 @@ class MeasuredStress(Result, Checked):
     def __post_init__(self) -> None:
         for name in ("conversion_constant", "conversion_constant_uncertainty"):
             object.__setattr__(self, name, _kept(getattr(self, name)))
-
-    def __eq__(self, other: object) -> bool:
-        return same_content(self, other) if isinstance(other, MeasuredStress) else NotImplemented
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         """Return the loads and the state of the checks."""

@@ -16,11 +16,9 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def format_measured(
     value: float, uncertainty: float | None, unit: str = "", *, concise: bool = False
 ) -> str:
-    """Write a value with its standard uncertainty and unit, for people to read.
-
-    The uncertainty keeps two significant digits and the value is rounded to the same place
-    (GUM, JCGM 100:2008, 7.2).
-    """
+    """Write a value with its standard uncertainty and unit, for people to read."""
+    # The uncertainty keeps two significant digits and the value is rounded to the same place (GUM,
+    # JCGM 100:2008, 7.2).
     tail = "" if unit in ("", "1") else f" {unit}"
     if not math.isfinite(value):
         return "not determined"
@@ -41,10 +39,8 @@ def format_measured(
 
 
 def _rounded(value: float, uncertainty: float) -> tuple[str, str, int]:
-    """Return value and uncertainty as digits, and the power of ten that they share.
-
-    Decimal arithmetic, because a binary 0.0145 would round differently from what is read.
-    """
+    """Return value and uncertainty as digits, and the power of ten that they share."""
+    # Decimal arithmetic, because a binary 0.0145 would round differently from what is read.
     with localcontext() as context:
         context.prec = 800  # the widest span of two doubles
         number, spread = Decimal(repr(float(value))), Decimal(repr(float(uncertainty)))

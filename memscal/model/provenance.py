@@ -48,10 +48,9 @@ class Process:
 
 
 def timestamp() -> str:
-    """Return the current time in UTC, in ISO 8601, to the second; ``SOURCE_DATE_EPOCH`` counts.
-
-    This variable (https://reproducible-builds.org/specs/) makes the same input give the same bytes.
-    """
+    """Return the current time in UTC, in ISO 8601, to the second; ``SOURCE_DATE_EPOCH`` counts."""
+    # This variable (https://reproducible-builds.org/specs/) makes the same input give the same
+    # bytes.
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:
         return datetime.now(UTC).isoformat(timespec="seconds")

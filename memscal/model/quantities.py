@@ -202,10 +202,8 @@ def declared_quantity(name: str) -> Quantity | None:
 
 
 def estimated_quantity(name: str, si_unit: str = "") -> Quantity:
-    """Return how an estimated parameter is shown; one that is not known keeps its name.
-
-    A number at the end of a known name says which scan it belongs to.
-    """
+    """Return how an estimated parameter is shown; one that is not known keeps its name."""
+    # A number at the end of a known name says which scan it belongs to.
     start, _, number = name.rpartition("_")
     if start in ESTIMATED and number.isdigit():
         words = f"{ESTIMATED[start].words}, scan {number}"

@@ -5,20 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from memscal.errors import InputError
-from memscal.model.arrays import (
-    FloatArray,
-    finite_vector,
-    frozen_array,
-    require_non_negative,
-    whole_numbers,
-)
+from memscal.model import arrays
+from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import RoundIndenter
 from memscal.model.provenance import SourceFile
@@ -72,11 +68,9 @@ class EvenAxis:
 
 
 def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
-    """Group points by place: equal positions, and of several passes those close to each other.
-
-    Close is a tenth of the usual distance within a pass.  On a plane the readings at one node of
-    an even lattice share a place too.
-    """
+    """Group points by place: equal positions, and of several passes those close to each other."""
+    # Close is a tenth of the usual distance within a pass. On a plane the readings at one node of
+    # an even lattice share a place too.
     positions = np.stack([x, y], axis=1)
     close, pairs = _neighbours(positions, repeat)
     index = _linked(positions, pairs)
@@ -97,10 +91,8 @@ def places_of(x: FloatArray, y: FloatArray, repeat: IntArray) -> Places:
 
 
 def even_lattice(x: FloatArray, y: FloatArray, count: int) -> tuple[EvenAxis, EvenAxis] | None:
-    """Fit an even lattice to the positions of ``count`` places in a plane, or return ``None``.
-
-    Rows may be missing, but not most nodes: all positions lie on a lattice that is fine enough.
-    """
+    """Fit an even lattice to the positions of ``count`` places in a plane, or return ``None``."""
+    # Rows may be missing, but not most nodes: all positions lie on a lattice that is fine enough.
     along_x, along_y = _even_axis(x), _even_axis(y)
     if along_x is None or along_y is None:
         return None
@@ -196,33 +188,14 @@ _LEAST_EIGENVALUE = 1e-8
 _LINE = 0.01
 
 
-class _Contacts(Protocol):
-    """What of a scan describes its contacts."""
-
-    @property
-    def normal_load(self) -> FloatArray | None: ...
-    @property
-    def normal_load_errors(self) -> FloatArray | None: ...
-    @property
-    def lubrication(self) -> str: ...
-    @property
-    def lubricant(self) -> str: ...
-
-
-def require_contacts(scan: _Contacts) -> None:
+def require_contacts(scan: Scan) -> None:
     """Refuse uncertainties of loads that are none, and an unknown state of lubrication."""
-    errors = scan.normal_load_errors
-    if errors is not None:
-        if scan.normal_load is None:
-            raise InputError(
-                "normal_load_errors is given without normal_load.",
-                why="It is the standard uncertainty of the load at each point.",
-                cure="Give normal_load too, the load that was set at each point.",
-            )
-        if np.any((errors < 0) | np.isinf(errors)):
-            raise InputError(
-                "normal_load_errors holds a standard uncertainty that is negative or infinite."
-            )
+    if scan.normal_load_errors is not None and scan.normal_load is None:
+        raise InputError(
+            "normal_load_errors is given without normal_load.",
+            why="It is the standard uncertainty of the load at each point.",
+            cure="Give normal_load too, the load that was set at each point.",
+        )
     if scan.lubrication not in LUBRICATIONS:
         raise InputError(
             f"The lubrication of the scan is {scan.lubrication!r}.",
@@ -265,7 +238,7 @@ def branch_numbers(name: str, stated: ArrayLike) -> NDArray[np.int64]:
 
 def checked_correlation(stated: ArrayLike, size: int) -> FloatArray:
     """Return a read-only copy of a correlation of ``size`` points, which must be one of noise."""
-    correlation = frozen_array(stated)
+    correlation = arrays.frozen_array(stated)
     if correlation.shape != (size, size) or not np.isfinite(correlation).all():
         raise InputError(
             f"u_zz_correlation has shape {correlation.shape}, but it should be ({size}, {size}) "
@@ -420,16 +393,18 @@ class Scan:
     source: SourceFile | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "x", finite_vector("x of the scan", self.x))
-        if self.y is not None:
-            object.__setattr__(self, "y", finite_vector("y of the scan", self.y))
-        object.__setattr__(self, "u_zz", frozen_array(self.u_zz))
+        for name in ("x", "y"):
+            if (values := getattr(self, name)) is not None:
+                vector = arrays.finite_vector(f"{name} of the scan", values)
+                object.__setattr__(self, name, vector)
+        object.__setattr__(self, "u_zz", arrays.frozen_array(self.u_zz))
         if self.repeat is not None:
-            object.__setattr__(self, "repeat", whole_numbers("repeat of the scan", self.repeat))
+            repeat = arrays.whole_numbers("repeat of the scan", self.repeat)
+            object.__setattr__(self, "repeat", repeat)
         self._check_signal_shape()
         for name in ("u_zz_errors", "normal_load", "normal_load_errors"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, self._like_signal(name, getattr(self, name)))
+            if (values := getattr(self, name)) is not None:
+                object.__setattr__(self, name, self._like_signal(name, values))
         if self.branch is not None:
             branch = branch_numbers("branch of the scan", self.branch)
             if branch.shape == self.u_zz.shape[:-1] != ():
@@ -448,7 +423,7 @@ class Scan:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the fields, and prove them again: a read-only mapping cannot be pickled."""
         values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return _rebuilt, ({**values, "channels": dict(self.channels)},)
+        return partial(Scan, **{**values, "channels": dict(self.channels)}), ()
 
     def __repr__(self) -> str:
         """Return what was scanned in place of thousands of array elements."""
@@ -528,7 +503,7 @@ class Scan:
             require_plane(self.x, self.y)
 
     def _like_signal(self, name: str, values: ArrayLike, dtype: Any = np.float64) -> FloatArray:
-        array = frozen_array(values, dtype=dtype)
+        array = arrays.frozen_array(values, dtype=dtype)
         if array.shape != self.u_zz.shape:
             raise InputError(f"{name} has shape {array.shape}, but u_zz has {self.u_zz.shape}.")
         return array
@@ -545,13 +520,14 @@ class Scan:
                 cure="Give the indenter's load (/entry/indenter/load).",
             )
         if self.load_uncertainty is not None:
-            require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+            arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         require_rod_friction(self.rod_friction)
-        errors, loads = self.u_zz_errors, self.normal_load
-        if errors is not None and np.any((errors < 0) | np.isinf(errors)):
-            raise InputError(
-                "u_zz_errors holds a standard uncertainty that is negative or infinite."
-            )
+        loads, errors_of_loads = self.normal_load, self.normal_load_errors
+        stated = {"u_zz_errors": self.u_zz_errors, "normal_load_errors": errors_of_loads}
+        for name, errors in stated.items():
+            if errors is not None and np.any((errors < 0) | np.isinf(errors)):
+                problem = "holds a standard uncertainty that is negative or infinite."
+                raise InputError(f"{name} {problem}")
         if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
             raise InputError(
                 "normal_load holds a load that is infinite or not above zero.",
@@ -565,13 +541,13 @@ class Scan:
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
         if self.position_scale_uncertainty is not None:
-            require_non_negative(
+            arrays.require_non_negative(
                 "relative standard uncertainty of the stage's scale",
                 self.position_scale_uncertainty,
             )
         if self.x_errors is None:
             return
-        errors = finite_vector("x_errors of the scan", self.x_errors)
+        errors = arrays.finite_vector("x_errors of the scan", self.x_errors)
         if errors.shape != self.x.shape or np.any(errors < 0):
             raise InputError(
                 f"x_errors holds {errors.size} values for {self.x.size} positions, the smallest "
@@ -579,7 +555,3 @@ class Scan:
                 cure="Give one standard uncertainty for each position, in m, none negative.",
             )
         object.__setattr__(self, "x_errors", errors)
-
-
-def _rebuilt(values: Mapping[str, Any]) -> Scan:
-    return Scan(**values)

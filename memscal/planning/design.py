@@ -18,10 +18,9 @@ import numpy as np
 
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel
-from memscal.calibration.drawn_scatter import drawn_scatter
-from memscal.calibration.fields import choose_grid
-from memscal.calibration.stages import Solution, deconvolve, prepare_fields
-from memscal.calibration.uncertainty import Results, input_effects, propagate
+from memscal.calibration.calibrate import uncertainties
+from memscal.calibration.stages import Solution, solved
+from memscal.calibration.uncertainty import Results, input_effects
 from memscal.deconvolution.division import Method, Regulariser, chosen_method
 from memscal.errors import FitError, InputError
 from memscal.estimation import reference
@@ -30,10 +29,9 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import fit_gaussian_to_points
 from memscal.estimation.points import measured_points
 from memscal.estimation.profile import ProfileEstimate, require_significant
-from memscal.estimation.smoothing import find_band, smooth_profile
 from memscal.mechanics.press_rod import press_rod
 from memscal.model.apparatus import ParameterSet
-from memscal.model.arrays import FloatArray, freeze_arrays, require_non_negative, require_positive
+from memscal.model.arrays import FloatArray, FrozenArrays, require_non_negative, require_positive
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod
 from memscal.model.result import Result
@@ -45,6 +43,8 @@ from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, simulate
 MOST_POSITIONS = 4096
 #: A range that is a whole number of steps but for rounding is one.
 _ROUNDING = 1e-6
+#: What a plan and a simulated scan have in common.
+_OF_SIMULATION = ("film", "rod", "kernel", "conversion_constant", "load", "load_uncertainty")
 #: The film passes nothing beyond exp(-kh) of this.
 _LARGEST_KH = 20.0
 
@@ -127,20 +127,9 @@ class Plan:
     def scan(self) -> Scan:
         """Return the expected mean of all repeats: without noise, whose size is stated."""
         count = self.positions
-        scan = simulate(
-            film=self.film,
-            rod=self.rod,
-            kernel=self.kernel,
-            conversion_constant=self.conversion_constant,
-            load=self.load,
-            load_uncertainty=self.load_uncertainty,
-            half_range=self.step * (count - 1) / 2,
-            points=count,
-            noise=0.0,
-            centre=(self.centre, 0.0),
-            baseline=0.0,
-            drift=0.0,
-        )
+        shared: dict[str, Any] = {name: getattr(self, name) for name in _OF_SIMULATION}
+        shared |= {"half_range": self.step * (count - 1) / 2, "centre": (self.centre, 0.0)}
+        scan = simulate(points=count, noise=0.0, baseline=0.0, drift=0.0, **shared)
         noise = self.point_noise / math.sqrt(self.repeats)
         return replace(scan, title="Planned rod scan", u_zz_errors=np.full(count, noise))
 
@@ -153,28 +142,9 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     points = measured_points(scan)
     references = reference.reference_spectra([stress], [points], [plan.film.thickness])
     estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)
-    smoothed = smooth_profile(estimate)
-    band = find_band(estimate, smoothed)
-    choice = choose_grid(estimate, band)
-    fields = prepare_fields(estimate, smoothed, choice)
-    deconvolution = deconvolve(estimate, band, fields, method)
-    solution = Solution(
-        scans=(scan,),
-        stresses=(stress,),
-        estimate=estimate,
-        smoothed=smoothed,
-        band=band,
-        choice=choice,
-        fields=fields,
-        method=method,
-        deconvolution=deconvolution,
-        other=None,
-        gaussian_misfit=deconvolution.misfit,
-    )
-    effects = input_effects(solution.scans, solution.stresses, estimate)
-    wavenumbers = fields.along_axis(deconvolution.quotient.window)[0]
-    results = propagate(solution, deconvolution, wavenumbers, effects, {}, drawn_scatter(solution))
-    return solution, results
+    solution = solved([scan], [stress], estimate, method, both=False)
+    effects = input_effects([scan], [stress], estimate)
+    return solution, uncertainties(solution, solution.deconvolution, effects, {})
 
 
 def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
@@ -192,7 +162,7 @@ def _expected_estimate(model: ForwardModel, repeats: int) -> ProfileEstimate:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design(Result):
+class Design(Result, FrozenArrays):
     """A planned scan and its expected results, with standard uncertainties (k = 1).
 
     Parameters
@@ -230,9 +200,6 @@ class Design(Result):
 
     _summary: ClassVar[str] = "design"
     _figure: ClassVar[str] = "design.design_figure"
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self, "r", "g", "g_errors", "k", "transfer", "transfer_errors")
 
     def __repr__(self) -> str:
         """Return the plan and its main numbers in place of arrays."""
@@ -317,13 +284,6 @@ class _Search:
     most: int
     plan: Callable[[int], Plan]
 
-    def words(self, plan: Plan) -> str:
-        """Return the number that a plan has."""
-        if self.name == "repeats":
-            return f"{plan.repeats} repeats"
-        length = plan.step if self.name == "step" else plan.half_range
-        return f"a {self.name} of {length * 1e3:.4g} mm"
-
 
 def require_targets(want: Mapping[str, float], vary: str | None) -> dict[str, float]:
     """Return the targets by their full names; refuse unknown ones, and those without ``vary``."""
@@ -360,9 +320,14 @@ def least_design(
 
     def meets(count: int) -> bool:
         if count not in tried:
-            tried[count] = _attempt(search.plan(count), evaluate)
-        design = tried[count]
-        return design is not None and all(_met(design, *target) for target in targets.items())
+            # None where the plan determines nothing, or does not sample G.
+            tried[count], attempt = None, search.plan(count)
+            with suppress(FitError):
+                design = evaluate(attempt)
+                samples = attempt.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"]
+                tried[count] = design if samples else None
+        found = tried[count]
+        return found is not None and all(_met(found, *target) for target in targets.items())
 
     fails, works = search.least - 1, search.least
     while not meets(works):
@@ -390,15 +355,6 @@ def _search(plan: Plan, vary: str) -> _Search:
     return _Search(
         "half range", least, most, lambda count: replace(plan, half_range=step * (count - 1) / 2)
     )
-
-
-def _attempt(plan: Plan, evaluate: Callable[[Plan], Design]) -> Design | None:
-    """Return the design, or nothing where the plan determines nothing, or does not sample G."""
-    try:
-        design = evaluate(plan)
-    except FitError:
-        return None
-    return design if plan.step <= _WIDEST_STEP * design.parameters["gaussian_sigma"] else None
 
 
 def _reached(design: Design, name: str) -> float:
@@ -430,29 +386,29 @@ def _out_of_reach(search: _Search, targets: Mapping[str, float], tried: list[Des
     sign = -1 if name == "resolved_wavenumber" else 1
     best = min(tried, key=lambda design: sign * _reached(design, name))
     goal = f"{_in_words(name, targets[name])} is out of reach by the {search.name} alone"
-    reached = f"{_in_words(name, _reached(best, name))}, with {search.words(best.plan)}"
+    length = best.plan.step if search.name == "step" else best.plan.half_range
+    count = f"a {search.name} of {length * 1e3:.4g} mm"
+    if search.name == "repeats":
+        count = f"{best.plan.repeats} repeats"
+    reached = f"{_in_words(name, _reached(best, name))}, with {count}"
     problem = f"{goal[0].upper()}{goal[1:]}: the best is {reached}."
     if name == "resolved_wavenumber":
-        return _band_ends(best, problem)
+        step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
+        if best.resolved_wavenumber >= 0.99 * sampled:
+            why = f"A step of {step:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
+            return FitError(problem, why=why, cure="Plan a finer step.")
+        return FitError(
+            problem,
+            why=f"A film of {best.plan.film.thickness * 1e3:.4g} mm passes little of larger "
+            "wavenumbers, and noise hides it.",
+            cure="Plan less noise, a larger load, or a thinner film.",
+        )
     source = best.largest_source(name)
     share = best.budget[name][source] / abs(best.parameters[name])
     return FitError(
         problem,
         why=f"{source} alone contributes {share * 100:.3g} %.",
         cure=_CURES.get(source, "Reduce that contribution, or want less."),
-    )
-
-
-def _band_ends(best: Design, problem: str) -> FitError:
-    step, sampled = best.plan.step * 1e3, np.pi / best.plan.step
-    if best.resolved_wavenumber >= 0.99 * sampled:
-        why = f"A step of {step:.4g} mm samples no more than {sampled * 1e-3:.4g} rad/mm."
-        return FitError(problem, why=why, cure="Plan a finer step.")
-    return FitError(
-        problem,
-        why=f"A film of {best.plan.film.thickness * 1e3:.4g} mm passes little of larger "
-        "wavenumbers, and noise hides it.",
-        cure="Plan less noise, a larger load, or a thinner film.",
     )
 
 

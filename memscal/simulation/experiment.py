@@ -18,7 +18,7 @@ from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 from memscal.model.scan import Scan, StressSensor
 from memscal.parallel import single_threaded
-from memscal.simulation import sensor
+from memscal.simulation import rod_scan
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, checked_loads, simulate, without_law
 
 # Distance in ln P of the outer states from the middle one, in standard deviations of the load, and
@@ -35,15 +35,11 @@ class LoadPath:
     spread: float  # their distance in ln P
 
     def near(
-        self,
-        index: int,
-        kernel: RadialKernel,
-        radius: FloatArray,
-        ratio: FloatArray,
-        order: int = 0,  # one for the shear's radial component
+        self, i: int, kernel: RadialKernel, radius: FloatArray, ratio: FloatArray, order: int = 0
     ) -> FloatArray:
         """Return the blurred stress (Pa) at ``radius`` (m); ``ratio``: load over nominal."""
-        values = sensor.blurred_stress(self.states[index], kernel, radius, order=order)
+        # Of order one: the radial component of the shear.
+        values = rod_scan.blurred_stress(self.states[i], kernel, radius, order=order)
         if len(values) == 1:
             return np.asarray(values[0])
         below, middle, above = values
@@ -140,8 +136,8 @@ def simulate_contacts(
             f"The centre is {centre} m, the offset {baseline:g} and the drift {drift:g} of the "
             "largest signal; they must be finite."
         )
-    interface, truth = interface or Interface(), sensor.apparatus_function(kernel)
-    shear = sensor.shear_channel(channels, shear_kernel, shear_conversion_constant)
+    interface, truth = interface or Interface(), rod_scan.apparatus_function(kernel)
+    shear = rod_scan.shear_channel(channels, shear_kernel, shear_conversion_constant)
     law: dict[str, Any] = {"friction": friction, "loading": loading, "interface": interface}
     path = pressed_path(
         lambda at: indent(film, sphere, load=at, strain="linear", **law),
@@ -155,17 +151,17 @@ def simulate_contacts(
     along = x + position_error * draws["position"] - centre[0]
     away = np.hypot(along, centre[1])
     at_nominal = [state[len(state) // 2] for state in path.states]
-    nominal = sensor.blurred_stress(at_nominal, truth, np.hypot(x - centre[0], centre[1]))
+    nominal = rod_scan.blurred_stress(at_nominal, truth, np.hypot(x - centre[0], centre[1]))
     largest = conversion_constant * float(nominal.max())
     signal = np.stack([path.near(int(j), truth, away[i], ratio[i]) for i, j in enumerate(row)])
-    added = sensor.disturbance(x, baseline, drift) + noise * draws["noise"]
+    added = rod_scan.disturbance(x, baseline, drift) + noise * draws["noise"]
     u = conversion_constant * signal + largest * added
     stated = np.broadcast_to(loads[row, None], u.shape)
     unsure = load_scatter
     if record_loads:
         stated, unsure = stated * ratio * (1 + load_reading * draws["reading"]), load_reading
     shape = u.shape[1:] if len(u) == 1 else u.shape
-    disturbed = sensor.Disturbances(noise, baseline, drift, state_noise, seed)
+    disturbed = rod_scan.Disturbances(noise, baseline, drift, state_noise, seed)
     channel_data: dict[str, FloatArray] = {}
     shear_truth: dict[str, float | str] = {}
     if shear is not None:

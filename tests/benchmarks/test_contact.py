@@ -10,10 +10,10 @@ from scipy.optimize import nnls
 from scipy.special import ellipk
 
 from memscal import ElasticFilm, Interface, Sphere
-from memscal.mechanics.hankel_film import HankelFilm
+from memscal.mechanics.film_response import HankelFilm
 from memscal.mechanics.solver.path import follow
-from memscal.mechanics.solver.problem import ContactProblem, ContactState, Depth, Load
 from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
+from memscal.mechanics.solver.step import ContactProblem, ContactState, Depth, Load
 from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.benchmark

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from memscal.axisymmetry.grids import Lattice
-from memscal.deconvolution.division import DivisionProblem, Regulariser, Tikhonov
-from memscal.deconvolution.scikit_image import RichardsonLucy, UnsupervisedWiener, Wiener
+from memscal.deconvolution.division import (
+    DivisionProblem,
+    Regulariser,
+    RichardsonLucy,
+    Tikhonov,
+    UnsupervisedWiener,
+    Wiener,
+)
 
 CLASSICAL = [Wiener(), UnsupervisedWiener(), RichardsonLucy()]
 

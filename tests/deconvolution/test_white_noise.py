@@ -7,8 +7,12 @@ import pytest
 from scipy.stats import chi2, gamma
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice
-from memscal.deconvolution.division import DivisionProblem, WhiteNoise, WhiteNoiseDraw
-from memscal.deconvolution.scikit_image import UnsupervisedWiener
+from memscal.deconvolution.division import (
+    DivisionProblem,
+    UnsupervisedWiener,
+    WhiteNoise,
+    WhiteNoiseDraw,
+)
 
 RARE = 1e-9
 """Probability with which a correct program would fail one of the random tests here."""

@@ -7,7 +7,7 @@ from scipy.integrate import quad
 from scipy.special import ellipe, ellipk, j0, j1
 
 from memscal.mechanics.film_response import hat_transforms
-from memscal.mechanics.half_space import coupling_integrals, singular_integrals
+from memscal.mechanics.surface import coupling_integrals, singular_integrals
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 
 from memscal import ElasticFilm, Rod, indent
 from memscal.axisymmetry.hankel import gauss_between, gauss_panels
-from memscal.mechanics.hankel_film import HankelField, HankelFilm
+from memscal.mechanics.film_response import HankelField, HankelFilm
 
 
 def film(nu: float, thickness: float = 2e-3) -> ElasticFilm:

@@ -20,8 +20,7 @@ from memscal.simulation.experiment import (
     drawn,
     simulate_contacts,
 )
-from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
-from memscal.simulation.sensor import blurred_stress
+from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, blurred_stress
 
 RARE = 1e-9
 """Probability with which a correct program would fail one of the random tests here."""

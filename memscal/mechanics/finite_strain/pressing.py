@@ -135,10 +135,8 @@ class Pressing:
     upright: bool = False
 
     def press(self, start: Pressed, goal: Goal, before: Pressed) -> Pressed:
-        """Return the equilibrium at a goal from a state near it and the last one on the way.
-
-        It raises :class:`NewtonError` where it finds none.
-        """
+        """Return the equilibrium at a goal from a state near it and the last one on the way."""
+        # It raises :class:`NewtonError` where it finds none.
         state = start if goal.is_load else replace(start, depth=goal.value)
         seen: set[bytes] = set()
         state = self.placed(self._touching(state, before, set(), guess=True) or state)

@@ -1,4 +1,4 @@
-"""Film at finite strain under a rigid rod or sphere, by finite elements.
+"""Film at finite strain under a rigid rod or sphere, by finite elements, and the field in it.
 
 The linear model is formal where an indenter sinks by a good part of the film's thickness.
 """
@@ -6,21 +6,19 @@ The linear model is formal where an indenter sinks by a good part of the film's 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from memscal.axisymmetry.hankel import gauss_between, hankel_transform
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact
-from memscal.mechanics.finite_strain.film_elements import (
-    FilmElements,
-    Rubber,
-    mesh_below_a_rod,
-    mesh_below_a_sphere,
-)
+from memscal.mechanics.film_response import RingTraction
+from memscal.mechanics.finite_strain import film_elements
 from memscal.mechanics.finite_strain.pressing import (
     Goal,
     NewtonError,
@@ -32,13 +30,15 @@ from memscal.mechanics.finite_strain.pressing import (
     Step,
     follow,
 )
-from memscal.mechanics.finite_strain.state import FiniteStrainField, interface_traction, outermost
-from memscal.mechanics.solver.problem import Depth, Load, Target
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
+from memscal.mechanics.solver.step import Depth, Load, Target
+from memscal.model.arrays import FloatArray
+from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 
 _MM = 1e3
+_MPA = 1e6
 # The mesh that tells the convergence has sides longer by this factor.
 _COARSER = 1.5
 # Share of the work that it takes.
@@ -118,12 +118,8 @@ def solve_finite_strain(
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
     tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
-    coarse = request.solve(
-        refinement / _COARSER, coarse=None, progress=lambda x: tell(_COARSE_WORK * x)
-    )
-    return tuple(
-        request.solve(refinement, coarse=coarse, progress=lambda x: tell(1 - rest + rest * x))
-    )
+    coarse = tuple(request.solve(refinement / _COARSER, progress=lambda x: tell(_COARSE_WORK * x)))
+    return tuple(request.solve(refinement, coarse, progress=lambda x: tell(1 - rest + rest * x)))
 
 
 def follow_depths(
@@ -132,10 +128,8 @@ def follow_depths(
     """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
     goals = [Goal(depth * _MM, False) for depth in depths]
     request = _Request(film, rod, goals, sticking, _FREE_EDGE * film.thickness * _MM, None)
-    pressing = request._pressing(1.0, None)
-    with suppress(NewtonError):
-        for step in follow(pressing, request._start(pressing), goals):
-            yield request._contact(pressing, step)
+    with suppress(ConvergenceError):
+        yield from request.solve(1.0)
 
 
 @dataclass(frozen=True)
@@ -150,18 +144,21 @@ class _Request:
     edge: float | None
 
     def solve(
-        self, refinement: float, *, coarse: list[Contact] | None, progress: Progress
-    ) -> list[Contact]:
-        """Return the contacts on one mesh; convergence against a coarser one."""
+        self,
+        refinement: float,
+        coarse: Sequence[Contact] = (),
+        progress: Progress = lambda _: None,
+    ) -> Iterator[Contact]:
+        """Yield the contacts on one mesh; their convergence against those on a coarser one."""
         pressing = self._pressing(refinement, coarse)
-        contacts: list[Contact] = []
         try:
-            for step in follow(pressing, self._start(pressing), self.goals, progress):
+            steps = follow(pressing, self._start(pressing), self.goals, progress)
+            for i, step in enumerate(steps):
                 contact = self._contact(pressing, step)
-                if coarse is not None:
-                    r, other = _SAMPLES * self.film.thickness, coarse[len(contacts)]
-                    contact = replace(contact, convergence=relative_change(contact, other, r))
-                contacts.append(contact)
+                if coarse:
+                    change = relative_change(contact, coarse[i], _SAMPLES * self.film.thickness)
+                    contact = replace(contact, convergence=change)
+                yield contact
         except NewtonError as problem:
             error = ConvergenceError(
                 problem.problem,
@@ -171,9 +168,8 @@ class _Request:
             if isinstance(problem.last, Step):
                 error.last = self._contact(pressing, problem.last)
             raise error from problem
-        return contacts
 
-    def _pressing(self, refinement: float, coarse: list[Contact] | None) -> Pressing:
+    def _pressing(self, refinement: float, coarse: Sequence[Contact]) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
         size = (self.film.thickness * _MM, self.radius, refinement)
         face: RodFace | SphereFace
@@ -186,11 +182,12 @@ class _Request:
             else:
                 finest, (inner, outer) = _FINEST_SLIDING, _FOLD_SLIDING
             fold = (inner * rod, outer * rod)
-            mesh = mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest * face.edge)
+            finest *= face.edge
+            mesh = film_elements.mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest)
         else:
             face = SphereFace(self.indenter.radius * _MM)
             widest = max(map(self._hertz_radius, self.goals))
-            if coarse is not None:  # now it is known
+            if coarse:  # now it is known
                 widest = 1.1 * max(contact.contact_radius for contact in coarse) * _MM
             if widest > min(self.radius / 2, 0.9 * face.radius):
                 raise DomainError(
@@ -198,8 +195,8 @@ class _Request:
                     f"{self.radius:g} mm and the sphere's {face.radius:g} mm.",
                     why="It must end well within both.",
                 )
-            mesh = mesh_below_a_sphere(size, contact=widest)
-        elements = FilmElements(mesh, Rubber.of(self.film))
+            mesh = film_elements.mesh_below_a_sphere(size, contact=widest)
+        elements = film_elements.FilmElements(mesh, film_elements.Rubber.of(self.film))
         upright = isinstance(self.indenter, Sphere) and self.sticking
         return Pressing(elements, face, self.sticking, upright=upright)
 
@@ -258,3 +255,153 @@ class _Request:
             dissipated_energy=None if work is None else 0.0,
             strain="finite",
         )
+
+
+@dataclass(frozen=True, eq=False)
+class FiniteStrainField:
+    """The field in a film at finite strain; see :class:`memscal.mechanics.surface.FilmField`."""
+
+    # An element of the bonded base does not deform: its Cauchy traction is the nominal one.
+    # ``depression`` and ``outward`` are functions of a point's radius *before* the deformation.
+    pressing: Pressing
+    pressed: Pressed
+
+    @cached_property
+    def base(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Radii at the base (m), pressure and outward shear on the film there (Pa)."""
+        # Of the splines that do the same work as the nodal forces on every displacement that is
+        # linear between the corners: more accurate than stresses taken inside the elements, and in
+        # balance with the load to rounding.
+        elements = self.pressing.elements
+        forces, nodes = elements.forces(self.pressed.x), elements.base
+        r = elements.nodes[0][nodes][::2]
+        # The hat on the axis has hardly any area: its force is added to that of the next one.
+        normal, shear = (
+            np.linalg.solve(_spline_masses(r, parity), _without_axis(_on_corners(forces[which])))
+            for parity, which in ((1, nodes + elements.n), (-1, nodes))
+        )
+        return np.asarray(r[1:]) / _MM, np.asarray(normal * _MPA), np.asarray(shear * _MPA)
+
+    @cached_property
+    def surface(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Radii of the surface's nodes before deformation, their depression and outward shift."""
+        elements, x = self.pressing.elements, self.pressed.x
+        nodes = elements.surface
+        r, w, u = elements.nodes[0][nodes], -x[nodes + elements.n], x[nodes]
+        return r / _MM, w / _MM, u / _MM
+
+    def base_normal(self, r: FloatArray) -> FloatArray:
+        """Return the normal stress at the base in Pa, compression positive; 0 beyond the film."""
+        return _interpolated(self.base[0], self.base[1], r, parity=1)
+
+    def base_shear(self, r: FloatArray) -> FloatArray:
+        """Return the radial traction of the base on the film in Pa, positive outward."""
+        return _interpolated(self.base[0], self.base[2], r, parity=-1)
+
+    def base_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\sigma_{zz}\,J_0(kr)\,r\,dr` at ``k`` (rad/m), in N."""
+        return hankel_transform(self.base[0], self.base[1], np.ravel(k)).reshape(np.shape(k))
+
+    def base_shear_spectrum(self, k: FloatArray) -> FloatArray:
+        r"""Return :math:`2\pi\int\tau\,J_1(kr)\,r\,dr` of the base shear at ``k``, in N."""
+        r, shear = self.base[0], self.base[2]
+        return hankel_transform(r, shear, np.ravel(k), order=1).reshape(np.shape(k))
+
+    def depression(self, r: FloatArray) -> FloatArray:
+        """Return how far the points at ``r`` before deformation (m) moved into the film, in m."""
+        return _interpolated(self.surface[0], self.surface[1], r, parity=0)
+
+    def outward(self, r: FloatArray) -> FloatArray:
+        """Return how far the points at ``r`` before deformation (m) moved outward, in m."""
+        return _interpolated(self.surface[0], self.surface[2], r, parity=0)
+
+    def mesh(self) -> FieldMesh:
+        """Return displacement and Cauchy stress on the undeformed mesh."""
+        elements, x = self.pressing.elements, self.pressed.x
+        basis = elements.bases[0]
+        corners = basis.doflocs[:, basis.element_dofs[:3]]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        turned = first[0] * second[1] < first[1] * second[0]
+        triangles = basis.element_dofs.T.copy()
+        triangles[turned] = triangles[turned][:, [0, 2, 1, 5, 4, 3]]
+        return FieldMesh(
+            points=elements.nodes.T / _MM,
+            triangles=triangles,
+            displacement=x[: 2 * elements.n].reshape(2, -1).T / _MM,
+            stress=elements.nodal_stress(x) * _MPA,
+            notes=f"{elements.material.law} film at finite strain under {self.pressed.load:.6g} N",
+        )
+
+
+def interface_traction(pressing: Pressing, pressed: Pressed) -> RingTraction:
+    """Return pressure and shear (Pa) at the deformed radii of the corners in contact."""
+    # Means over the hats of the corners: nodal forces of quadratic elements are no tractions (that
+    # on the axis has no area).  A rod's wall is left out.
+    elements, x = pressing.elements, pressed.x
+    nodes = elements.surface
+    forces = elements.forces(x)
+    touching = np.isin(nodes, pressed.touching)
+    place = np.zeros(nodes.size)
+    place[touching] = pressed.place
+    _, (along, up), _ = pressing.face.contour(place)
+    radial, upward = forces[nodes] * touching, forces[nodes + elements.n] * touching
+    pushed, dragged = up * radial - along * upward, along * radial + up * upward
+    r, z = elements.nodes[0][nodes] + x[nodes], x[nodes + elements.n]
+    # The axis is held: its radial force is not the indenter's.
+    if r[0] < 1e-12:
+        dragged[0] = 0.0
+    side = np.hypot(np.diff(r[::2]), np.diff(z[::2]))
+    left, right = r[:-2:2], r[2::2]
+    falling, rising = side * (2 * left + right), side * (left + 2 * right)
+    area = np.pi / 3 * (np.append(falling, 0.0) + np.append(0.0, rising))
+
+    chosen = np.flatnonzero(touching[::2] & (along[::2] > 1e-6))
+    chosen = chosen[np.argsort(r[::2][chosen], kind="stable")]
+    pressure, shear = _on_corners(pushed) / area, _on_corners(dragged) / area
+    return RingTraction(r[::2][chosen] / _MM, pressure[chosen] * _MPA, shear[chosen] * _MPA)
+
+
+def _on_corners(forces: FloatArray) -> FloatArray:
+    """Return the forces on hats between corners; nodes are corners and middles by turns."""
+    halves = forces[1::2] / 2
+    return np.asarray(forces[::2] + np.append(halves, 0.0) + np.append(0.0, halves))
+
+
+def _without_axis(rows: FloatArray) -> FloatArray:
+    """Add the first row to the second, and leave it out."""
+    return np.concatenate([rows[:1] + rows[1:2], rows[2:]])
+
+
+def _spline(r: FloatArray, values: FloatArray, parity: int) -> Callable[[FloatArray], FloatArray]:
+    """Return an even (1) or odd (-1) cubic spline through a table that begins off the axis."""
+    from scipy.interpolate import CubicSpline
+
+    mirrored = np.concatenate([parity * values[3::-1], values])
+    spline = CubicSpline(np.concatenate([-r[3::-1], r]), mirrored)
+    return lambda radii: np.asarray(spline(radii))
+
+
+def _spline_masses(r: FloatArray, parity: int) -> FloatArray:
+    """Return integrals around the axis of hats times splines that are 1 at one corner off it."""
+    nodes, weights = gauss_between(r, order=6)
+    splines = _spline(r[1:], np.eye(r.size - 1), parity)(nodes)
+    corner = np.arange(r.size)
+    hats = np.maximum(0.0, 1 - np.abs(np.interp(nodes, r, corner) - corner[:, None]))
+    return _without_axis(hats @ (splines * (2 * np.pi * nodes * weights)[:, None]))
+
+
+def _interpolated(nodes: FloatArray, values: FloatArray, r: ArrayLike, parity: int) -> FloatArray:
+    """Return a table's values at ``r``: by an even or odd spline, or without overshoot (0)."""
+    from scipy.interpolate import PchipInterpolator
+
+    radii = np.asarray(r, dtype=np.float64)
+    spline = _spline(nodes, values, parity) if parity else PchipInterpolator(nodes, values)
+    return np.where(radii <= nodes[-1], spline(np.minimum(radii, nodes[-1])), 0.0)
+
+
+def outermost(pressing: Pressing, pressed: Pressed) -> float:
+    """Return the radius after deformation at which the contact ends, in mm, between two nodes."""
+    nodes = pressing.elements.surface
+    r = pressing.elements.nodes[0][nodes] + pressed.x[nodes]
+    last = int(np.flatnonzero(np.isin(nodes, pressed.touching))[-1])
+    return float((r[last] + r[min(last + 1, r.size - 1)]) / 2)

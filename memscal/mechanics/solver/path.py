@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import ConvergenceError
-from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target, Touch
-from memscal.mechanics.solver.step import take_step
+from memscal.mechanics.solver import step
+from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target, Touch
 from memscal.model.arrays import FloatArray
 
 # Shares of the largest pressure that may pull, and of the depth that may overlap, at the very edge.
@@ -32,14 +32,10 @@ _TENSION = 2e-3
 def _meet_at(problem: ContactProblem, start: ContactState, ring: int) -> ContactState:
     """Return the state that follows ``start`` when the surfaces meet, or part, at ``ring``."""
     # The rings in contact stay in contact, unless one pulls by more than a little at the edge.
-    state = take_step(problem, start, Touch(ring), same_contact=True)
-    return state if _is_contact(problem, state) else take_step(problem, start, Touch(ring))
-
-
-def _is_contact(problem: ContactProblem, state: ContactState) -> bool:
-    """Whether a state fulfils Signorini's conditions, but for what an edge does not resolve."""
+    state = step.take_step(problem, start, Touch(ring), same_contact=True)
     pulls = state.pressure.min() < -_PULL * state.pressure.max()
-    return not pulls and not _overlaps(problem, state)
+    wrong = pulls or _overlaps(problem, state)
+    return step.take_step(problem, start, Touch(ring)) if wrong else state
 
 
 def _overlaps(problem: ContactProblem, state: ContactState) -> bool:
@@ -74,7 +70,7 @@ def _step_at_once(problem: ContactProblem, smooth: ContactState, target: Target)
     untouched = np.zeros(problem.size)
     start = replace(smooth, anchor=untouched, outward=untouched)
     try:
-        return take_step(problem, start, target)
+        return step.take_step(problem, start, target)
     except ConvergenceError:
         rings = int(np.count_nonzero(start.touching))
         if problem.normal_law is not None or not np.all(start.touching[:rings]):
@@ -88,8 +84,8 @@ def _between_rings(
     """Find the neighbouring rings between which the edge lies; mix the states that meet there."""
 
     def meeting_at(ring: int) -> ContactState:
-        inside = np.arange(problem.size) < ring
-        return take_step(problem, replace(start, touching=inside), Touch(ring), same_contact=True)
+        inside = replace(start, touching=np.arange(problem.size) < ring)
+        return step.take_step(problem, inside, Touch(ring), same_contact=True)
 
     rings = min(rings, problem.size - 1)
     upper = meeting_at(rings)
@@ -130,18 +126,13 @@ def follow(
     problem: ContactProblem, targets: Sequence[Target], loading: str, increments: int
 ) -> list[PathPoint]:
     """Return the states at ``targets``; the ``last`` of a ConvergenceError is a PathPoint."""
-    at_once = problem.friction > 0 and loading == "total"
-    return list((_in_one_step if at_once else _step_by_step)(problem, targets, increments))
-
-
-def _in_one_step(
-    problem: ContactProblem, targets: Sequence[Target], increments: int
-) -> Iterator[PathPoint]:
-    """Solve each target from the untouched film; the frictionless contact is where to begin."""
-    smooth = replace(problem, friction=0.0)
-    for target, point in zip(targets, _step_by_step(smooth, targets, increments), strict=True):
-        state = _step_at_once(problem, point.state, target)
-        yield PathPoint(state, 1, _elastic_energy(problem, state), None, None)
+    if problem.friction == 0 or loading != "total":
+        return list(_step_by_step(problem, targets, increments))
+    # Each from the untouched film; the frictionless contact is where to begin.
+    begin = _step_by_step(replace(problem, friction=0.0), targets, increments)
+    pairs = zip(begin, targets, strict=True)
+    states = [_step_at_once(problem, point.state, target) for point, target in pairs]
+    return [PathPoint(s, 1, _elastic_energy(problem, s), None, None) for s in states]
 
 
 @dataclass(eq=False)
@@ -188,7 +179,7 @@ def _step_by_step(
             if problem.normal_law is not None:
                 _walk_evenly(walk, target, farthest, increments)
             elif problem.friction == 0:
-                walk.step_to(take_step(problem, walk.state, target))
+                walk.step_to(step.take_step(problem, walk.state, target))
             else:
                 resume, upward = _walk_ring_by_ring(walk, target, rising=rising), rising
         except ConvergenceError as error:
@@ -210,18 +201,14 @@ def _walk_ring_by_ring(walk: _Walk, target: Target, *, rising: bool) -> _Walk:
             walk.step_to(_mixture(walk.state, following, target))
             return before
         walk.step_to(following)
-    _walk_with_given_contact(walk, target)
-    return walk
-
-
-def _walk_with_given_contact(walk: _Walk, target: Target) -> None:
-    """Go to a target under an indenter with no more rings to touch, such as a rod."""
-    # On a rigid interface the first loading is one step: everything grows in proportion.
-    proportional = walk.state.load == 0 and walk.problem.interface.rigid
+    # No more rings can touch, as under a rod.  On a rigid interface the first loading is then one
+    # step: everything grows in proportion.
+    proportional = walk.state.load == 0 and problem.interface.rigid
     count = 1 if proportional else _STEPS_OF_A_FIXED_CONTACT
     for value in np.linspace(_reached(walk.state, target), target.value, count + 1)[1:]:
         goal = replace(target, value=float(value))
-        walk.step_to(take_step(walk.problem, walk.state, goal, same_contact=True))
+        walk.step_to(step.take_step(problem, walk.state, goal, same_contact=True))
+    return walk
 
 
 def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) -> None:
@@ -232,8 +219,8 @@ def _walk_evenly(walk: _Walk, target: Target, farthest: float, increments: int) 
     count = max(1, math.ceil(increments * abs(end - begin) - 1e-9))
     for share in np.linspace(begin, end, count + 1)[1:-1]:
         goal = replace(target, value=farthest * float(share) ** power)
-        walk.step_to(take_step(walk.problem, walk.state, goal))
-    walk.step_to(take_step(walk.problem, walk.state, target))
+        walk.step_to(step.take_step(walk.problem, walk.state, goal))
+    walk.step_to(step.take_step(walk.problem, walk.state, target))
 
 
 def _next_meeting(

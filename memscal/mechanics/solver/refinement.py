@@ -12,11 +12,10 @@ import numpy as np
 
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact, too_deep
-from memscal.mechanics.film_response import RingTraction
-from memscal.mechanics.hankel_film import HankelFilm
+from memscal.mechanics.film_response import HankelFilm, RingTraction
 from memscal.mechanics.interface import Interface
 from memscal.mechanics.solver.path import PathPoint, follow
-from memscal.mechanics.solver.problem import ContactProblem, ContactState, Load, Target
+from memscal.mechanics.solver.step import ContactProblem, ContactState, Load, Target
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter, Rod

@@ -1,8 +1,24 @@
-r"""Step of a contact from one equilibrium to the next, by an active-set Newton method.
+r"""Contact of a rigid indenter with a film, ring by ring: its conditions, its state, its steps.
 
-Which rings touch, stick and slip decides which equations hold.  These are solved, the rings that
-contradict their status change it, and so on until none does: a semismooth Newton method on the
-conditions of Signorini and Amontons.  Friction acts at the end of the step (implicit Euler).
+At every ring the separation of the two surfaces is
+
+.. math:: g_i = f_i - \delta + w_i,
+
+with the indenter's height :math:`f` above its lowest point, the depth :math:`\delta` and the
+film's depression :math:`w`.  A rigid interface asks for :math:`g \ge 0`, :math:`p \ge 0` and
+:math:`g\,p = 0` (Signorini); a compliant one for :math:`p = F(g)`.  Tangentially, with the
+displacement :math:`u - u^0` of the film since the ring was last free of elastic strain,
+
+.. math:: |q| \le \mu p, \qquad
+          q = -\mu p\,\frac{u - u^0}{\ell}\ \text{(sticking)}, \qquad
+          q = \mp\mu p\ \text{(slipping outward, inward)},
+
+where sticking on a rigid interface (:math:`\ell = 0`) means :math:`u = u^0`.
+
+A step leads from one equilibrium to the next, by an active-set Newton method.  Which rings touch,
+stick and slip decides which equations hold.  These are solved, the rings that contradict their
+status change it, and so on until none does: a semismooth Newton method on the conditions of
+Signorini and Amontons.  Friction acts at the end of the step (implicit Euler).
 """
 
 from __future__ import annotations
@@ -14,10 +30,94 @@ import numpy as np
 from numpy.typing import NDArray
 
 from memscal.errors import ConvergenceError
-from memscal.mechanics.interface import NormalLaw
-from memscal.mechanics.solver.problem import ContactProblem, ContactState, Depth, Goal, Load, Touch
+from memscal.mechanics.interface import Interface, NormalLaw
+from memscal.mechanics.surface import SurfaceCompliance
 from memscal.model.arrays import FloatArray
 from memscal.model.film import ElasticFilm
+
+
+@dataclass(frozen=True, eq=False)
+class ContactProblem:
+    """A film, an indenter and what is between them."""
+
+    film: ElasticFilm
+    compliance: SurfaceCompliance
+    heights: FloatArray  # of the face above its lowest point, in m; inf where it has ended
+    friction: float
+    interface: Interface
+
+    @property
+    def size(self) -> int:
+        """Number of rings."""
+        return self.heights.size
+
+    @property
+    def normal_law(self) -> NormalLaw | None:
+        """The interface's normal compliance, or ``None`` where it is rigid."""
+        return self.interface.normal_law
+
+    def displacements(self, p: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return depression and outward displacement (m) under tractions (Pa) at the rings."""
+        c = self.compliance
+        return c.normal @ p + c.normal_by_shear @ q, c.radial_by_pressure @ p + c.radial @ q
+
+    def separations(self, state: ContactState) -> FloatArray:
+        """Return the distance between the two surfaces in m, ``inf`` beyond the indenter."""
+        w, _ = self.displacements(state.pressure, state.shear)
+        return np.asarray(self.heights - state.depth + w)
+
+    def virgin(self) -> ContactState:
+        """Return the state of the first touch, at the ring (or rings) of the lowest height."""
+        nothing, lowest = np.zeros(self.size), float(self.heights.min())
+        touching, slip = self.heights <= lowest, np.zeros(self.size, dtype=np.int8)
+        return ContactState(nothing, nothing, lowest, 0.0, touching, slip, nothing, nothing)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactState:
+    """A contact in equilibrium, as arrays over the rings."""
+
+    pressure: FloatArray  # Pa
+    shear: FloatArray  # Pa, positive outward on the film
+    depth: float  # m
+    load: float  # N
+    touching: NDArray[np.bool_]
+    slip: NDArray[np.int8]  # sign of the shear where a ring slips, 0 where it sticks
+    anchor: FloatArray  # outward displacement at which a sticking ring bears no shear, in m
+    outward: FloatArray  # outward displacement in m
+    iterations: int = 0  # linear systems that were solved
+
+    def sticking(self, friction: float) -> NDArray[np.bool_]:
+        """Return the rings in contact that stick."""
+        if friction == 0:
+            return np.zeros_like(self.touching)
+        return np.asarray(self.touching & (self.slip == 0))
+
+
+@dataclass(frozen=True)
+class Load:
+    """Press until the load is ``value`` N."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Depth:
+    """Press until the depth is ``value`` m."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Move until the surfaces meet at ``ring`` without pressing there."""
+
+    ring: int
+
+
+Target = Load | Depth
+Goal = Load | Depth | Touch
+
 
 _Rings = NDArray[np.intp]
 _Pair = tuple[_Rings, _Rings]  # that press, and that stick
@@ -65,7 +165,13 @@ def _solve_system(problem: ContactProblem, status: _Status, goal: Goal) -> _Trac
     last, value = _goal_row(problem, goal, normal, rows, unit)
     matrix = np.vstack([normal[rows], radial, last])
     right = np.concatenate([-problem.heights[rows], status.anchor[stuck], [value]])
-    _add_normal_compliance(problem, status, rows, matrix, right)
+    if (law := problem.normal_law) is not None:
+        # g = 0 becomes g = F^-1(p), linearised at the trial's separation.
+        gap = status.separation[rows]
+        stiffness = law.stiffness(gap, problem.film)
+        diagonal = np.arange(rows.size)
+        matrix[diagonal, diagonal] += 1 / stiffness
+        right[diagonal] += gap + law.pressure(gap, problem.film) / stiffness
     if problem.interface.slip_length > 0 and math.isfinite(mu):
         _add_tangential_compliance(problem, status, (rows, stuck), matrix, right)
     try:
@@ -98,19 +204,6 @@ def _goal_row(
         row[-1] = unit
         return row, goal.value
     return normal[goal.ring], -float(problem.heights[goal.ring])
-
-
-def _add_normal_compliance(
-    problem: ContactProblem, status: _Status, rows: _Rings, matrix: FloatArray, right: FloatArray
-) -> None:
-    """Replace g = 0 by g = F^-1(p), linearised at the trial's separation."""
-    if (law := problem.normal_law) is None:
-        return
-    gap = status.separation[rows]
-    stiffness = law.stiffness(gap, problem.film)
-    diagonal = np.arange(rows.size)
-    matrix[diagonal, diagonal] += 1 / stiffness
-    right[diagonal] += gap + law.pressure(gap, problem.film) / stiffness
 
 
 def _add_tangential_compliance(
@@ -149,8 +242,13 @@ def take_step(
 ) -> ContactState:
     """Return the equilibrium that follows ``start`` when ``goal`` has been reached."""
     # With same_contact the rings in contact stay those of ``start``, whatever their pressure.
-    status = _first_status(problem, start, goal)
+    law, separation = problem.normal_law, problem.separations(start)
+    pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
     held = goal.ring if isinstance(goal, Touch) else None
+    if held is not None:
+        pressing[held] = False
+    stretch = start.outward - start.anchor
+    status = _Status(pressing, start.slip, start.anchor, separation, start.pressure, stretch)
     for iteration in range(1, _MOST_ITERATIONS + 1):
         tractions = _solve_system(problem, status, goal)
         revised, settled = _revise(problem, status, tractions, held, iteration > _CAREFUL_AFTER)
@@ -165,16 +263,6 @@ def take_step(
         why=f"Before it, {start.load:.6g} N were borne at a depth of {start.depth * 1e6:.6g} um.",
         cure="Try another number of rings, or a friction coefficient nearby.",
     )
-
-
-def _first_status(problem: ContactProblem, start: ContactState, goal: Goal) -> _Status:
-    """Begin with the status of the state before."""
-    law, separation = problem.normal_law, problem.separations(start)
-    pressing = start.touching.copy() if law is None else _bearing(problem, law, separation)
-    if isinstance(goal, Touch):
-        pressing[goal.ring] = False
-    stretch = start.outward - start.anchor
-    return _Status(pressing, start.slip, start.anchor, separation, start.pressure, stretch)
 
 
 def _bearing(problem: ContactProblem, law: NormalLaw, separation: FloatArray) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ import pytest
 
 from memscal.errors import DomainError
 from memscal.mechanics.elements.element_film import ElementFilm
-from memscal.mechanics.hankel_film import HankelFilm
+from memscal.mechanics.film_response import HankelFilm
 from memscal.model.film import ElasticFilm
 
 H = 2e-3

@@ -11,7 +11,7 @@ from memscal.errors import ConvergenceError
 from memscal.mechanics.finite_strain.film_elements import FilmElements, Rubber
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
-from memscal.mechanics.solver.problem import Depth, Load
+from memscal.mechanics.solver.step import Depth, Load
 
 FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 ROD = Rod(radius=0.25e-3)
