@@ -31,6 +31,7 @@ def press_rod(
     return indent(film, rod, load=load, friction=friction)
 
 
+@lru_cache(maxsize=256)
 def is_tabulated(
     film: ElasticFilm, rod: RoundIndenter, load: float, friction: float | None = None
 ) -> bool:
