@@ -67,7 +67,7 @@ back, radial = apparatus.reconvolution, apparatus.radial_profile
 x = back.x / MM
 order = np.argsort(x)
 r = np.linspace(0, 16 * MM, 321)
-rod_stress = memscal.indent(film, rod.indenter, load=rod.load).base_stress(r)
+rod_stress = memscal.indent(film, rod.indenter, load=rod.load, friction=np.inf).base_stress(r)
 
 fig, (left, right) = plt.subplots(1, 2)
 left.plot(x, back.u_zz / MV, "o", ms=3, color=BLACK, label="voltage")

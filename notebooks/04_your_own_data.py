@@ -80,6 +80,7 @@ def run(line):
 FILM = (
     "--young-modulus 1.9 --young-modulus-uncertainty 0.05 --poisson-ratio 0.5 "
     "--poisson-ratio-uncertainty 0.003 --thickness 1.5 --thickness-uncertainty 0.015 "
+    "--film-law neo-hookean "
 )
 COLUMNS = '--x "x (mm)" --x-unit mm --u "U (mV)" --u-unit mV --sensor-name S7 '
 SPHERE = (
@@ -90,7 +91,8 @@ SPHERE = (
 
 run(
     f"import {TABLES}/rod.csv -o {folder}/rod.h5 {COLUMNS} {FILM} --repeat pass "
-    "--radius 0.3 --radius-uncertainty 0.002 --load 0.5 --load-uncertainty 0.0025"
+    "--radius 0.3 --radius-uncertainty 0.002 --load 0.5 --load-uncertainty 0.0025 "
+    "--rod-friction inf"
 )
 
 # %%

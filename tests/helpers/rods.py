@@ -6,7 +6,7 @@ import pytest
 from memscal import ElasticFilm, Rod
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.finite_strain.table import tabulated_rod
-from memscal.mechanics.solver.problem import Depth
+from memscal.mechanics.solver.step import Depth
 
 H = 2e-3
 
