@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from helpers.bounds import FULL
 from helpers.machine import once, show, turns
+from helpers.scans import LINEAR_FILM
 from scipy.optimize import curve_fit
 
 import memscal
@@ -65,7 +66,9 @@ def plain(problem: DivisionProblem) -> PlainDivision:
 
 @pytest.fixture(scope="module")
 def scan() -> Scan:
-    return memscal.simulate(points=65, noise=0.002, centre=(0.0, 0.0), drift=0.0, seed=4)
+    return memscal.simulate(
+        film=LINEAR_FILM, points=65, noise=0.002, centre=(0.0, 0.0), drift=0.0, seed=4
+    )
 
 
 @pytest.fixture(scope="module")

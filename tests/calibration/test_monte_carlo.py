@@ -181,8 +181,9 @@ def test_what_regularisation_hides_is_said_not_to_scatter(hundred: memscal.Monte
 
 
 def test_correlated_inputs_are_drawn_together_and_a_models_form_is_a_rectangle() -> None:
-    scan = simulated(film=PAPER_FILM, rod=PAPER_ROD, load_uncertainty=0.01, noise=0.003)
-    other = memscal.indent(replace(PAPER_FILM, poisson_ratio=0.45), PAPER_ROD, load=1.0)
+    scan = simulated(film=LINEAR_FILM, rod=PAPER_ROD, load_uncertainty=0.01, noise=0.003)
+    film = replace(LINEAR_FILM, poisson_ratio=0.45)
+    other = replace(memscal.indent(film, PAPER_ROD, load=1.0).profile(), film=None)
     options = {"alternative": other, "correlations": {("thickness", "load"): 0.9}}
     together = memscal.calibrate(scan, method="evidence", **options)
     normal = np.random.default_rng(0).standard_normal((len(together.effects), 4000))

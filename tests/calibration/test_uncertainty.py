@@ -5,29 +5,29 @@ from functools import partial
 
 import numpy as np
 import pytest
-from helpers.scans import RING, SIGMA, TAILS, simulated
+from helpers.scans import LINEAR_FILM, RING, SIGMA, TAILS, simulated
 
 import memscal
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.uncertainty import kernel_functionals
 from memscal.deconvolution.division import Division, DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
-from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD
+from memscal.simulation.rod_scan import PAPER_ROD
 
 PARAMETERS = ("conversion_constant", "gaussian_sigma", "gaussian_sigma_deconvolved")
 
 
-def calibrated(scan, film=PAPER_FILM, rod=PAPER_ROD):
+def calibrated(scan, film=LINEAR_FILM, rod=PAPER_ROD):
     return memscal.calibrate(scan, reference=memscal.indent(film, rod, load=1.0)).apparatus
 
 
 @pytest.mark.parametrize(("source", "change"), [
-    ("thickness", lambda: {"film": replace(PAPER_FILM, thickness=2.02e-3)}),
-    ("poisson_ratio", lambda: {"film": replace(PAPER_FILM, poisson_ratio=0.495)}),
+    ("thickness", lambda: {"film": replace(LINEAR_FILM, thickness=2.02e-3)}),
+    ("poisson_ratio", lambda: {"film": replace(LINEAR_FILM, poisson_ratio=0.495)}),
     ("rod_radius", lambda: {"rod": replace(PAPER_ROD, radius=0.2525e-3)}),
 ])  # fmt: skip
 def test_each_input_of_the_reference_counts_what_moving_it_changes(source, change) -> None:
-    scan = simulated(film=PAPER_FILM, rod=PAPER_ROD, noise=0.002)
+    scan = simulated(film=LINEAR_FILM, rod=PAPER_ROD, noise=0.002)
     usual, moved = calibrated(scan), calibrated(scan, **change())
     # The window of the deconvolved G follows the reference too, which first order leaves out.
     for name, tolerance in (("gaussian_sigma", 0.05), ("gaussian_sigma_deconvolved", 0.25)):

