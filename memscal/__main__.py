@@ -1,7 +1,5 @@
 """``python -m memscal`` is the command ``memscal``."""
 
-from __future__ import annotations
-
 import sys
 
 from memscal.cli import main

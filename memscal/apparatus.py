@@ -1,7 +1,5 @@
 """Apparatus function: predicted voltages, convolved stresses, measured stresses."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from os import PathLike

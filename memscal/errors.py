@@ -3,8 +3,6 @@
 The command line exits with the ``exit_code`` of an error; a user catches :class:`MemscalError`.
 """
 
-from __future__ import annotations
-
 
 class MemscalError(Exception):
     """Base of every error that memscal raises on purpose.

@@ -1,7 +1,5 @@
 """Radial apparatus functions of unit integral whose transform has a closed form."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable

@@ -1,7 +1,5 @@
 """Calibration: from rod scans to an apparatus function with its covariance and checks."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Quality checks of a calibration: value, limit, and what a failure means."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -7,8 +7,6 @@ numbers of its own.  Profile, centre, baseline and width follow the voltages to 
 do for every method; band, grid and fields are made anew; the weights of the points are kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import is_dataclass, replace
 from typing import Any

@@ -9,8 +9,6 @@ all loads is part of A.  A thickness has the posterior mean by the same likeliho
 prior, and the expected squared error of it by the priors of G's uncertainty.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Calibration of many scans, in processes: a result or an error for each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial

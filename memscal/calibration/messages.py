@@ -1,7 +1,5 @@
 """Messages of a calibration: what a user has to know of its result beside the checks."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Each draw is a scan with new noise and other true inputs; it states the nominal ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace

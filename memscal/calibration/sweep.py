@@ -1,7 +1,5 @@
 """Sweep of the white noise: how a calibration depends on its amplitude and its seed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """The command line: each command has a module of its own, imported when it is used."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from memscal.cli.commands import memscal

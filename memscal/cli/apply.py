@@ -1,7 +1,5 @@
 """``memscal apply``: contact scans and a calibrated sensor to measured stress."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -1,7 +1,5 @@
 """``memscal check``: safety, schema, digest and content of a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

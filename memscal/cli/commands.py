@@ -1,7 +1,5 @@
 """The group of commands: their names and one line on each, without importing any of them."""
 
-from __future__ import annotations
-
 import os
 from importlib import import_module
 

@@ -1,7 +1,5 @@
 """``memscal completion``: the shell's completion script."""
 
-from __future__ import annotations
-
 import click
 
 from memscal.cli.failures import DONE, debug_option

@@ -1,7 +1,5 @@
 """Exit codes and messages of exceptions; a traceback is shown with --debug only."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from collections.abc import Callable, Sequence

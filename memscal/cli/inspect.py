@@ -1,7 +1,5 @@
 """``memscal inspect``: contents of a file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any

@@ -10,8 +10,6 @@ r"""Fourier ratio, the paper's method on arrays: lift, divide, normalise, fit, c
 profiles from any source.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any

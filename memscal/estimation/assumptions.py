@@ -4,8 +4,6 @@ Some add m columns to the fitted model: chi-square falls by a chi-square variabl
 of freedom.  Others predict a group of points from the rest, or look for a ceiling of the voltage.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 It is fitted by weighted least squares, with A, centre, baseline and linear drift.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Estimate of a radial profile from the points of scans: centre, baseline, noise and outliers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Reference stress of a calibration: its source, its transform, and its sensitivities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

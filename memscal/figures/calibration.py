@@ -1,7 +1,5 @@
 """Figure of a calibration: the paper's Fig. 2, with residuals, transfer function and checks."""
 
-from __future__ import annotations
-
 import textwrap
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figure of a planned scan: expected G, its transfer function, uncertainties along a variation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of a comparison of measured with calculated stress."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Measured stress profiles beside calculated ones, and what all figures of friction share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """Report of a calibration as one HTML page, without other files, network or scripts."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterator
 from html import escape

@@ -1,7 +1,5 @@
 """Figures of measured stress, of restored stress, and of contacts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any

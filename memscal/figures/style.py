@@ -1,7 +1,5 @@
 """Style of all figures: type, colours, layout, and the bytes of a figure's file."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Figure of a sweep: results of a calibration against the amplitude of the noise."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """memscal-artifact: the apparatus function with all that it rests on, as HDF5."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -4,8 +4,6 @@ A folder of such files is a cache.  Each is named after the SHA-256 of everythin
 depend on (SI units, bit for bit); a damaged, foreign or older file counts as not found.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

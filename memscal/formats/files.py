@@ -1,7 +1,5 @@
 """Bytes of files: written whole or not at all, never over an input; read within a limit."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

@@ -1,7 +1,5 @@
 """Groups that several files share, and the codec that writes, reads and lists declared records."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager

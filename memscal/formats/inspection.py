@@ -1,7 +1,5 @@
 """Contents of a file, and its checks step by step: for ``memscal inspect`` and ``check``."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

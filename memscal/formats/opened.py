@@ -1,7 +1,5 @@
 """Scans and measured stress, given as objects or as the paths of their files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import Any, TypeAlias

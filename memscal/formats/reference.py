@@ -1,7 +1,5 @@
 """memscal-reference: a calculated stress profile at the base of the film, as HDF5."""
 
-from __future__ import annotations
-
 import os
 
 from memscal.formats.groups import profile_groups, read_profile

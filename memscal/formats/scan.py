@@ -1,7 +1,5 @@
 """memscal-scan: the sensor's voltage against the indenter's position, as HDF5."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

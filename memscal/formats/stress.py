@@ -1,7 +1,5 @@
 """memscal-stress: the stress that a calibrated sensor measured, load by load, as HDF5."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

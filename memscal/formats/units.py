@@ -3,8 +3,6 @@
 Canonical units are powers of ten, so that 0.25 mm is exactly 0.25e-3; others are left to pint.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """Single values of a safe file by kind, its schema, and its digest."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Families of base stresses of a sphere on a film, calculated here, or elsewhere as tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

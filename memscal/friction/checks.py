@@ -1,7 +1,5 @@
 """Quality checks of a comparison: whether any calculated contact explains what was measured."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """From contact scans and a calibrated sensor to the friction that explains what it measured."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The effective friction coefficient, by whole profiles, their maxima, and dry less lubricated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

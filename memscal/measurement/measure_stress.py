@@ -1,7 +1,5 @@
 """Measurement of stress from contact scans with a calibrated sensor, with its checks."""
 
-from __future__ import annotations
-
 import math
 import platform
 import re

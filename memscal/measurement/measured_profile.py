@@ -8,8 +8,6 @@ The stress on the axis is the restored one, blurred by G: an error of A is left 
 only where the scan does not determine it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -24,8 +24,6 @@ voltages were wrong by :math:`-\delta(A\hat G T) \otimes p`; and the film turns 
 stress by the wrong :math:`T`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

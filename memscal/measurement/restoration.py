@@ -1,7 +1,5 @@
 """Restored stress: the stress at the base of the film that explains a scan, and its comparison."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike

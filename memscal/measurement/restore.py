@@ -1,7 +1,5 @@
 """Restoration of the stress at the base of the film from a scan and a calibrated sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike

@@ -1,7 +1,5 @@
 """Contact of a rigid indenter with a bonded film: tractions, displacements, stress at the base."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property

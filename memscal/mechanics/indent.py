@@ -1,7 +1,5 @@
 """Indentation of a film by a rigid indenter: the entry point of the mechanics."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, overload

@@ -6,8 +6,6 @@ the rms roughness: :math:`q = -\mu p\,e/\ell` for an elastic displacement :math:
 (Bureau, Caroli and Baumberger, Proc. R. Soc. A 459 (2003) 2787).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Rod on a film by the film's law: closed form, table of rods, or finite elements."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

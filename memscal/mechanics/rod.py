@@ -19,8 +19,6 @@ incompressible).  A sticking compressible film has an oscillating edge, exponent
 :math:`-1/2 \pm i\ln(3-4\nu)/2\pi`: the number of terms is doubled until the base stress settles.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

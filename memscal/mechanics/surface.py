@@ -19,8 +19,6 @@ into the film) and the outward displacement :math:`u`.  Of a half-space they are
 integrated with nodes that crowd there, others by a plain Gauss rule; both to about 1e-11.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol, runtime_checkable

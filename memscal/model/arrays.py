@@ -1,7 +1,5 @@
 """The few checks that the dataclasses share."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass

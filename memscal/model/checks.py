@@ -1,7 +1,5 @@
 """Quality checks and messages of a result: their records, the limits they share, their wording."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal

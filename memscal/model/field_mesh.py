@@ -1,7 +1,5 @@
 """Displacement and stress on a mesh of the film's cross-section, as finite elements give them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The elastic film between the indenter and the sensor."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -11,8 +11,6 @@ Files state lengths in mm and voltages in mV.  Every length and voltage here is 
 that this conversion gives back, so that what was saved and read again is equal to the last bit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Notation of measured values: with uncertainty, rounded by it, and unit; printable text."""
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal, localcontext
 

@@ -1,7 +1,5 @@
 """Provenance of data: files that were read, processing, time."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field

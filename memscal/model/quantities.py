@@ -3,8 +3,6 @@
 Files, tables, figures and reports take what they write from here and :mod:`memscal.model.records`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple

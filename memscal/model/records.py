@@ -1,7 +1,5 @@
 """Records of memscal as tables of quantities, in the order in which files hold them."""
 
-from __future__ import annotations
-
 from memscal.model.quantities import Quantity, Record, measured, record
 
 _L, _P, _U, _ONE = "length", "stress", "voltage", "dimensionless"

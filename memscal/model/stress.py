@@ -1,7 +1,5 @@
 """A radial stress profile at the base of the film: the reference of a calibration."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

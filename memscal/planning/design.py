@@ -5,8 +5,6 @@ The Gaussian's parameters have the covariance of the inverse Fisher information 
 with the expected squares of signal plus noise in place of the data's own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A whole synthetic experiment: a sensor's calibration, and what it then measures of contacts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any

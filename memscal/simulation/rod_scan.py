@@ -1,7 +1,5 @@
 """Synthetic sensor and its rod scans: base stress through a known G, disturbed; and the truth."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A calibration, or an apparatus function from a file, as tables, a mapping and arrays."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Comparisons of measured with calculated stress, as tables, JSON, data frames and notes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Contacts as tables, mapping and arrays, as ``memscal reference`` prints them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A planned scan as tables, mapping and arrays, as ``memscal design`` prints it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

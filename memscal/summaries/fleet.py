@@ -1,7 +1,5 @@
 """One calibration of many as tables, a mapping and a row of a data frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from memscal.calibration.many import FleetCalibration

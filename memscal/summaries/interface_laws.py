@@ -1,7 +1,5 @@
 """Laws of the interface and their evidence, as tables and as JSON."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

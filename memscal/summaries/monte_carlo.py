@@ -1,7 +1,5 @@
 """Monte Carlo draws of a calibration as a table, a mapping and a data frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from memscal.calibration.monte_carlo import BudgetComparison, MonteCarlo

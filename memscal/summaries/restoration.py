@@ -1,7 +1,5 @@
 """Restored stress as tables, mapping and arrays, as ``memscal restore`` prints it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

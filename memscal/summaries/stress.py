@@ -1,7 +1,5 @@
 """Measured stress as tables, mapping and arrays, as ``memscal apply`` prints it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sweep over the noise amplitude as a table, a mapping and arrays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

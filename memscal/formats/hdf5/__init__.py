@@ -1,7 +1,5 @@
 """HDF5 files: one safe reader and one writer, with HDF5's loading of plugins switched off."""
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -5,8 +5,6 @@ through a damaged heap.  The claim is a descriptor of 16 bytes: length, address,
 Format Specification", section VIII).
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ meshio does not check what a file claims.  It reads in a child process with limi
 memory, on a copy in a folder of its own, and returns plain arrays, never pickles.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import importlib.util

@@ -1,7 +1,5 @@
 """Import of a stress profile from the mesh of any FEM program."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ It imports nothing of memscal.  The request comes on standard input; the answer 
 in numpy's format, the first of which is text in JSON.
 """
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import io

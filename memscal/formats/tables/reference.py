@@ -1,7 +1,5 @@
 """References from samples of a calculated stress, checked; and from tables."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Scans from tables with one row per reading."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Tables of numbers as text, whose delimiter, decimal mark and header are detected."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import itertools

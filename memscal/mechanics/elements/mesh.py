@@ -6,8 +6,6 @@ depends on how fine the rings are.  Where the surface is finer, a row goes down 
 and there are more of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -8,8 +8,6 @@ second derivatives, so that the forces are normal to the face where it slides.  
 active set: a node that is pulled leaves, and one that lies inside the indenter is taken in.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any

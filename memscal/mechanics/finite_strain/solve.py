@@ -3,8 +3,6 @@
 The linear model is formal where an indenter sinks by a good part of the film's thickness.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress

@@ -6,8 +6,6 @@ normal stress and shear over the load.  A rod between the columns is found by po
 the four nearest, one between depths by cubic splines.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

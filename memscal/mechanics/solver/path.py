@@ -7,8 +7,6 @@ first touched.  On a compliant one, contact has no edge; steps are even in the c
 is one step from the untouched film.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
