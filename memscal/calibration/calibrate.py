@@ -31,7 +31,7 @@ from memscal.estimation.reference import (
     require_same_set_up,
 )
 from memscal.formats.opened import Scans, opened_scans
-from memscal.mechanics.contact import Contact
+from memscal.mechanics.contact import BaseStress, Contact
 from memscal.model.apparatus import (
     ApparatusField,
     ApparatusRadial,
@@ -317,8 +317,8 @@ def calibrate(
     for rod_scan in scans:
         require_calibration_rod(rod_scan)
     references = _references(reference, scans)
-    known = (film_law, mooney_rivlin_ratio, rod_friction)
-    scans = tuple(_of_law(s, r, *known) for s, r in zip(scans, references, strict=True))
+    known = film_law, mooney_rivlin_ratio, rod_friction
+    scans = tuple(_of_law(s, r, known) for s, r in zip(scans, references, strict=True))
     alternatives = None if alternative is None else _references(alternative, scans)
     overridden = require_same_set_up(scans, references, alternatives or (), override=override)
     owners: Sequence[int] | None = None
@@ -348,7 +348,6 @@ def calibrate(
     other = None if beside is None else uncertainties(solution, beside, effects, pairs)
     checks = quality_checks(solution, results)
     messages = calibration_messages(solution, results, checks)
-    messages = (*override_messages(overridden), *messages)
     of_method: Any = chosen
     settings = asdict(of_method) if is_dataclass(chosen) else {}
     configuration: dict[str, Any] = {"method": chosen.name, "seed": seed, "options": settings}
@@ -361,12 +360,9 @@ def calibrate(
         if (compared := weigh_laws(solution)) is not None:
             messages = (compared.message, *messages)
             configuration["film_laws"] = compared.record
-    if channel != "zz":
-        configuration["channel"] = channel
-    if film_law is not None:
-        configuration["film_law"] = film_law
-    if rod_friction is not None:
-        configuration["rod_friction"] = rod_friction
+    of_channel = None if channel == "zz" else channel
+    asked = {"channel": of_channel, "film_law": film_law, "rod_friction": rod_friction}
+    configuration |= {name: value for name, value in asked.items() if value is not None}
     if centre is not None or solution.apart is not None:
         choice = PER_REPEAT if solution.per_repeat else COMMON
         configuration["centre"] = {"choice": choice, "chosen_by": "option" if centre else "test"}
@@ -376,18 +372,16 @@ def calibrate(
         configuration["override"] = overridden
     if pairs:
         configuration["correlations"] = {" ".join(pair): c for pair, c in pairs.items()}
+    messages = (*override_messages(overridden), *messages)
     apparatus = assemble(solution, results, other, checks, messages, configuration)
     return Calibration(apparatus, solution, effects, dict(pairs))
 
 
 def _of_law(
-    scan: Scan,
-    reference: StressProfile | Contact | None,
-    law: str | None,
-    ratio: float | None,
-    friction: float | None,
+    scan: Scan, reference: BaseStress | None, known: tuple[str | None, float | None, float | None]
 ) -> Scan:
     """Return the scan with the law and the rod's friction that are known: asked for, or stated."""
+    law, ratio, friction = known
     if law is not None:
         if reference is not None:
             raise InputError(
@@ -410,7 +404,7 @@ def _of_law(
 
 def _references(
     reference: Reference | Sequence[Reference], scans: Sequence[Scan]
-) -> list[StressProfile | Contact | None]:
+) -> list[BaseStress | None]:
     """Read a reference for each scan; a single one is that of all scans."""
     if isinstance(reference, Sequence) and not isinstance(reference, str):
         if len(reference) != len(scans):
@@ -422,7 +416,7 @@ def _references(
     return [_read(reference)] * len(scans)
 
 
-def _read(reference: Reference) -> StressProfile | Contact | None:
+def _read(reference: Reference) -> BaseStress | None:
     if isinstance(reference, str | PathLike):
         from memscal.formats.reference import read_reference
 
@@ -436,7 +430,7 @@ def _read(reference: Reference) -> StressProfile | Contact | None:
 
 
 def _effects(
-    solution: Solution, alternatives: Sequence[StressProfile | Contact | None] | None
+    solution: Solution, alternatives: Sequence[BaseStress | None] | None
 ) -> Mapping[str, InputEffect]:
     scans, estimate, spectra, others = solution.scans, solution.estimate, None, None
     if alternatives is not None:

@@ -422,10 +422,8 @@ def _indentation(solution: Solution, results: Results) -> QualityCheck:
     """Compare the depth with the thickness: beyond the limit a linear film is formal."""
     film, depths = solution.scan.film, []
     for scan, stress in zip(solution.scans, solution.stresses, strict=True):
-        depth = stress.depth
-        if depth is None:
-            linear = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None)
-            depth = press_rod(linear, scan.indenter, scan.load).depth
+        linear = replace(scan.film, law=LINEAR, mooney_rivlin_ratio=None)
+        depth = stress.depth or press_rod(linear, scan.indenter, scan.load).depth
         depths.append(depth / scan.film.thickness)
     meaning = "Largest depth of the rod over the film's thickness. "
     formal = film.law == LINEAR or not (film.law or "model_form" in results.changes)
@@ -435,16 +433,13 @@ def _indentation(solution: Solution, results: Results) -> QualityCheck:
             "counted, is strained too far for that: give its law (film/law, --film-law), or leave "
             "it out to have the law's form counted, or calibrate at a lighter load."
         )
-    elif not film.law:
-        meaning += (
-            "It passes at any depth, for the form of the film's law, which is not stated, is "
-            "counted (model_form); a failure means that a film was stated to be linear."
-        )
     else:
-        meaning += (
-            f"It passes at any depth, for the reference is that of a {film.law} film; a failure "
-            "means that a film was stated to be linear."
+        why = (
+            f"the reference is that of a {film.law} film"
+            if film.law
+            else ("the form of the film's law, which is not stated, is counted (model_form)")
         )
+        meaning += f"It passes at any depth, for {why}; a failure means that it was stated linear."
     passed = not formal or max(depths) <= INDENTATION_LIMIT
     return QualityCheck("indentation", max(depths), INDENTATION_LIMIT, passed, meaning)
 

@@ -203,11 +203,9 @@ _VARIED = 0.01
 def _unstated(solution: Solution, results: Results) -> list[Message]:
     """Return which inputs state no uncertainty, and how much hangs on those of the film."""
     scan, film = solution.scan, solution.scan.film
-    missing = {name: getattr(film, f"{attribute}_uncertainty")
-               for name, (attribute, _) in _OF_FILM.items()}  # fmt: skip
-    if film.law in ("", LINEAR):
-        # At a given load the stress in a linear film does not depend on it.
-        del missing["Young's modulus"]
+    # At a given load the stress in a linear film does not depend on its modulus.
+    names = [n for n in _OF_FILM if n != "Young's modulus" or film.law not in ("", LINEAR)]
+    missing = {name: getattr(film, f"{_OF_FILM[name][0]}_uncertainty") for name in names}
     missing |= {"rod radius": scan.indenter.radius_uncertainty, "load": scan.load_uncertainty}
     names = [name for name, value in missing.items() if value is None]
     if not names:
