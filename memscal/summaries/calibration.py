@@ -72,16 +72,16 @@ def advice(apparatus: ApparatusData) -> str:
 
 def _of_the_law(apparatus: ApparatusData) -> str:
     """Return that the law of the film, which is not stated, dominates the uncertainty, if so."""
-    shares = {}
-    for symbol, name in (("A", "conversion_constant"), ("sigma", "gaussian_sigma")):
+    dominated = []
+    for symbol, name in (("A", "conversion_constant"), ("σ", "gaussian_sigma")):
         form = apparatus.budget.get(name, {}).get("model_form", 0.0)
-        shares[symbol] = (form / apparatus.parameters.uncertainty(name)) ** 2
-    dominated = [f"{share:.0%} of that of {of}" for of, share in shares.items() if share > 0.5]
-    if not dominated:
+        if (share := (form / apparatus.parameters.uncertainty(name)) ** 2) > 0.5:
+            dominated.append(f"{share:.0%} of the variance of {symbol}")
+    if not dominated or apparatus.film.law:
         return ""
     return (
         "The film's law, which is not stated, dominates the uncertainty: it makes up "
-        f"{' and '.join(dominated)} (of the variance).\n"
+        f"{' and '.join(dominated)}.\n"
     )
 
 
