@@ -311,8 +311,8 @@ def law_sensitivities(scan: Scan, reference: RadialSpectrum) -> Mapping[str, Flo
     except (ConvergenceError, DomainError):
         return {}
     change = np.subtract(*(_base_spectrum(c, k, order) / c.load for c in pair))
-    name = "rod_friction" if film.law else "model_form"
-    return {name: RECTANGLE * change * load / pair[0].load}
+    source = "rod_friction" if film.law else "model_form"
+    return {source: RECTANGLE * change * load / pair[0].load}
 
 
 def _difference(scan: Scan, reference: RadialSpectrum, varied: Sequence[Scan]) -> FloatArray:

@@ -22,11 +22,10 @@ def press_rod(
     if film.law in ("", LINEAR):
         return indent(film, rod, load=load, friction=friction or 0.0, strain="linear")
     friction = math.inf if friction is None else friction
+    tabulated = None
     if isinstance(rod, Rod) and film.law == NEO_HOOKEAN:
         tabulated = tabulated_rod(film, rod, load, sticking=friction > 0)
-        if tabulated is not None:
-            return tabulated
-    return indent(film, rod, load=load, friction=friction)
+    return tabulated or indent(film, rod, load=load, friction=friction)
 
 
 @lru_cache(maxsize=256)

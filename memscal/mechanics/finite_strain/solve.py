@@ -37,10 +37,8 @@ from memscal.model.indenter import Rod, Sphere
 
 _MM = 1e3
 _MPA = 1e6
-# The mesh that tells the convergence has sides longer by this factor.
-_COARSER = 1.5
-# Share of the work that it takes.
-_COARSE_WORK = 0.3
+# The mesh that tells the convergence has sides longer by a factor, and takes a share of the work.
+_COARSER, _COARSE_WORK = 1.5, 0.3
 # Distance of the film's free edge from the axis, in thicknesses, where none is given.
 _FREE_EDGE = 12.5
 # Radius of the rounding of a rod's edge, as a share of the rod's radius, where none is given: a
