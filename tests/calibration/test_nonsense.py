@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from helpers.scans import RING, TAILS, simulated
+from helpers.scans import LINEAR_FILM, RING, TAILS, simulated
 
 import memscal
 from memscal import Scan
@@ -19,7 +19,7 @@ from memscal.mechanics.press_rod import press_rod
 from memscal.model.checks import QualityCheck
 
 SHIPPED = Path(__file__).parents[2] / "calibration_data" / "rod_scan_65.h5"
-SCAN = memscal.read_scan(SHIPPED)
+SCAN = memscal.simulate(film=LINEAR_FILM, seed=65)
 
 
 def altered(scan: Scan = SCAN, film: float = 1.0, x: float = 1.0, rod: float = 0.0) -> Scan:

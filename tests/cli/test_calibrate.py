@@ -80,7 +80,16 @@ def test_figures_and_report_are_written_in_their_formats(run: Run, scan: Path, f
     assert all(name in done.err for name in ("a.png", "a.pdf", "a.html"))
 
 
-def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, scan: Path):
+@pytest.fixture
+def lawless(folder: Path) -> Path:
+    """A scan that does not state its film's law."""
+    path = folder / "scan.h5"
+    memscal.write_scan(memscal.simulate(seed=1, state_law=False), path)
+    return path
+
+
+def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, lawless: Path):
+    scan = lawless
     own = run("calibrate", scan, "--json", "-o", "own.h5").json
     assert run("reference", "rod", "-o", "rod.h5").code == 0
     given = run("calibrate", scan, "--reference", "rod.h5", "--json", "-o", "given.h5").json
@@ -91,7 +100,8 @@ def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, scan: Path
     assert memscal.load_apparatus("given.h5").process.input_reference.file_name == "rod.h5"
 
 
-def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Run, scan: Path):
+def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Run, lawless: Path):
+    scan = lawless
     run("reference", "rod", "--thickness", "2.1", "-o", "thick.h5")
     for further in ([], ["--dry-run"]):
         refused = run("calibrate", scan, "--reference", "thick.h5", *further).exits(3, "--override")

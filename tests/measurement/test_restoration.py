@@ -109,7 +109,7 @@ def test_an_uncertain_input_counts_as_much_as_it_changes(source: str) -> None:
         stated = replace(scan, position_scale_uncertainty=share)
         wrong = replace(scan, x=(1 + share) * scan.x)
     found = memscal.restore(stated, EXACT)
-    changed = memscal.restore(wrong, EXACT)
+    changed = memscal.restore(wrong, EXACT, override=True)
     difference = np.append(changed.stress(r) - found.stress(r), changed.force - found.force)
     counted = np.append(apparatus_part(found, source, r), found.force_budget[source])
     size = np.append(np.full(r.size, found.sigma_zz[0]), found.force)
