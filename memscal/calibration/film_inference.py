@@ -93,7 +93,7 @@ class FilmLawComparison:
                 "reference."
             )
         strong = against and 2 * factor.log_factor >= STRONG
-        return Message("film_law", text, "warning" if strong else "note")
+        return Message("film_laws", text, "warning" if strong else "note")
 
 
 def weigh_laws(solution: Solution) -> FilmLawComparison | None:

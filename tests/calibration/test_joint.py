@@ -252,7 +252,7 @@ def test_several_loads_weigh_the_laws_of_the_film_and_one_does_not() -> None:
         1e3 * made.apparatus.conversion_constant
     )
     assert (other["law"], other["best_against_it"]) == ("neo-hookean", "very strong")
-    [message] = [m for m in made.apparatus.process.messages if m.kind == "film_law"]
+    [message] = [m for m in made.apparatus.process.messages if m.kind == "film_laws"]
     assert message.severity == "note"
     assert "film_laws" not in memscal.calibrate(scans[:1]).to_dict()
 

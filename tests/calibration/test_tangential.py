@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from helpers.bounds import root_mean_square_limit
 from helpers.machine import assert_same_to_rounding
-from helpers.scans import CENTRE, SHEAR_CONVERSION, SHEAR_SIGMA, plane_error, shear_scan
+from helpers.scans import CENTRE, EXACT_FILM, SHEAR_CONVERSION, SHEAR_SIGMA, plane_error, shear_scan
 from scipy.stats import binom, norm
 
 import memscal
@@ -36,7 +36,7 @@ def checks_of(scan: Scan) -> dict[str, QualityCheck]:
 def study(noise: float) -> dict[str, np.ndarray]:
     """Errors in standard uncertainties; the film and the rod are exact, and so is the load."""
     exact = {
-        "film": memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3),
+        "film": EXACT_FILM,
         "rod": replace(memscal.simulate().indenter, radius_uncertainty=None),
         "load_uncertainty": None,
     }
