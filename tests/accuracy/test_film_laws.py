@@ -42,7 +42,7 @@ def scans_of(
 
 
 @pytest.mark.parametrize("truth", [LINEAR, RUBBER])
-@pytest.mark.parametrize("sensor", SENSORS)
+@pytest.mark.parametrize("sensor", [*SENSORS][: None if FULL else 1])
 def test_loads_prefer_the_law_of_the_film(sensor: str, truth: str) -> None:
     factors = []
     for seed in range(SEEDS):
@@ -56,10 +56,10 @@ def test_loads_prefer_the_law_of_the_film(sensor: str, truth: str) -> None:
     assert strongly <= binom.isf(CHANCE, SEEDS, 0.01)
 
 
-@pytest.mark.parametrize("sensor", SENSORS)
+@pytest.mark.parametrize("sensor", [*SENSORS][: None if FULL else 1])
 @pytest.mark.parametrize(("law", "setting"), [
-    (LINEAR, {"loads": (1.0,), "radii": (0.15e-3, 0.35e-3)}), (RUBBER, {}),
-])  # fmt: skip
+    (RUBBER, {}), (LINEAR, {"loads": (1.0,), "radii": (0.15e-3, 0.35e-3)}),
+][: None if FULL else 1])  # fmt: skip
 def test_an_estimated_thickness_is_off_by_what_it_states(law: str, setting, sensor: str) -> None:
     # What is stated is drawn about the truth: of both, the difference is all that counts.
     u, truth, deviates, left = 0.1e-3, PAPER_FILM.thickness, [], []

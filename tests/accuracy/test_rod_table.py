@@ -1,7 +1,10 @@
 """The table of rods at finite strain against rods solved directly, throughout its range."""
 
 import pytest
+from helpers.bounds import FULL
 from helpers.rods import compare_with_the_table
+
+pytestmark = pytest.mark.accuracy
 
 
 @pytest.mark.parametrize(("nu", "radius", "depths"), [
@@ -13,7 +16,7 @@ def test_a_rod_that_sticks(nu: float, radius: float, depths: list[float]) -> Non
 
 
 @pytest.mark.parametrize(("nu", "radius", "depths"), [
-    (0.46, 0.24, [0.01, 0.06, 0.14]), (0.485, 0.06, [0.03]), (0.495, 0.48, [0.06, 0.15]),
-])  # fmt: skip
+    (0.495, 0.48, [0.06, 0.15]), (0.46, 0.24, [0.01, 0.06, 0.14]), (0.485, 0.06, [0.03]),
+][: None if FULL else 1])  # fmt: skip
 def test_a_rod_that_slides(nu: float, radius: float, depths: list[float]) -> None:
     compare_with_the_table(nu, radius, depths, sticking=False)
