@@ -41,7 +41,7 @@ class ApparatusFunction(Result, ApparatusData):
     --------
     >>> import memscal
     >>> apparatus = memscal.calibrate(memscal.simulate(noise=0.002, seed=3)).apparatus
-    >>> contact = memscal.indent(apparatus.film, apparatus.indenter, load=0.5)
+    >>> contact = memscal.indent(apparatus.film, memscal.Sphere(radius=0.1), load=0.5)
     >>> r = np.linspace(0, 20e-3, 801)
     >>> volts = apparatus.predict(r, contact.base_stress(r))
     >>> bool(apparatus.stress(volts)[0] < contact.base_stress(0.0))

@@ -10,20 +10,14 @@ from memscal.calibration.stages import Solution
 from memscal.calibration.uncertainty import Results, input_effects, propagate
 from memscal.estimation.bayesian import HYPOTHESES
 from memscal.estimation.points import loads_differ
-from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.profile import ProfileEstimate, point_messages
 from memscal.estimation.reference import RECTANGLE
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.press_rod import is_tabulated
+from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
-from memscal.model.checks import (
-    NOISE_UNSTATED,
-    OUTLIER_WEIGHT,
-    REPEAT_CENTRES,
-    Message,
-    QualityCheck,
-    failed_check_messages,
-)
+from memscal.model.checks import Message, QualityCheck
 from memscal.model.film import LINEAR, NEO_HOOKEAN
 from memscal.model.scan import Scan
 
@@ -38,7 +32,7 @@ def calibration_messages(
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, warnings first."""
     scan, channel = solution.scan, solution.estimate.points.channel
-    messages = failed_check_messages(checks)
+    messages = quality.failed_check_messages(checks)
     if solution.estimate.model.order:
         text = (
             f"Channel {channel} is experimental: it was tested on synthetic data only. A and G are "
@@ -47,8 +41,11 @@ def calibration_messages(
         )
         messages.append(Message("experimental", text))
     messages += _centres(solution) + _points(solution.estimate) + _tails(solution.estimate)
-    messages += _method(solution) + _reference(solution) + _law(solution, results)
-    messages += _unstated(solution, results)
+    messages += _method(solution)
+    if not isinstance(solution.stress, Contact) and solution.stress.convergence is None:
+        text = "The reference states no convergence: its own error is not counted."
+        messages.append(Message("convergence_unstated", text))
+    messages += _law(solution, results) + _unstated(solution, results)
     if scan.synthetic is not None:
         messages.append(Message("synthetic", "The scan is synthetic: its truth is stored in it."))
     return tuple(messages)
@@ -69,31 +66,19 @@ def _centres(solution: Solution) -> list[Message]:
         f"Each of the {owners.size} repeats has its own centre, baseline and drift, {way}. The "
         f"centres are up to {apart * 1e6:.3g} um apart."
     )
-    return [Message(REPEAT_CENTRES, text)]
+    return [Message(quality.REPEAT_CENTRES, text)]
 
 
 def _points(estimate: ProfileEstimate) -> list[Message]:
     points = estimate.points
-    messages: list[Message] = []
-    if points.missing:
-        text = f"{points.missing} points of the scan are missing and were left out."
-        messages.append(Message("missing_points", text))
-    for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]:
-        place = f"x = {points.x[i] * 1e3:.4g} mm"
-        if points.planar:
-            place += f", y = {points.y[i] * 1e3:.4g} mm"
-        if points.repeat.any():
-            place += f" of repeat {points.repeat[i]}"
-        voltages = f"{points.u[i] * 1e3:.4g} mV instead of {estimate.predicted[i] * 1e3:.4g} mV"
-        text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
-        messages.append(Message("outlier", text))
+    messages = point_messages(estimate)
     if points.u_errors is None:
         text = (
             f"u_{points.channel}_errors is absent: a noise of {estimate.noise_scale * 1e3:.3g} mV "
             "was estimated from the scan's scatter, so that chi-square cannot tell noise from "
             "misfit of the same size, and has no p-value."
         )
-        messages.append(Message(NOISE_UNSTATED, text))
+        messages.append(Message(quality.NOISE_UNSTATED, text))
     return messages
 
 
@@ -124,14 +109,6 @@ def _method(solution: Solution) -> list[Message]:
         way += f"{draw_count(solution)} draws of the voltages"
         way += " and of its own random numbers" if hasattr(method, "seed") else ""
     return [Message("method", f"Method {method.name}: {way}. {method.fails}")]
-
-
-def _reference(solution: Solution) -> list[Message]:
-    stress = solution.stress
-    if isinstance(stress, Contact) or stress.convergence is not None:
-        return []
-    text = "The reference states no convergence: its own error is not counted."
-    return [Message("convergence_unstated", text)]
 
 
 def _law(solution: Solution, results: Results) -> list[Message]:
@@ -207,12 +184,8 @@ def _unstated(solution: Solution, results: Results) -> list[Message]:
     names = [n for n in _OF_FILM if n != "Young's modulus" or film.law not in ("", LINEAR)]
     missing = {name: getattr(film, f"{_OF_FILM[name][0]}_uncertainty") for name in names}
     missing |= {"rod radius": scan.indenter.radius_uncertainty, "load": scan.load_uncertainty}
-    names = [name for name, value in missing.items() if value is None]
-    if not names:
-        return []
-    pronoun = "them" if len(names) > 1 else "it"
-    text = f"No uncertainty is stated for {', '.join(names)}: nothing is counted for {pronoun}."
-    varied = {name: _OF_FILM[name] for name in names if name in _OF_FILM}
+    messages = quality.uncertainty_unstated_messages(missing)
+    varied = {name: of for name, of in _OF_FILM.items() if missing.get(name, 0.0) is None}
     if varied:
         shares = {f"{a}_uncertainty": _VARIED * getattr(film, a) for a, _ in varied.values()}
         films = [replace(s.film, **shares) for s in solution.scans]
@@ -223,8 +196,8 @@ def _unstated(solution: Solution, results: Results) -> list[Message]:
             for a, of in varied.values()
             for symbol, row, value in _a_and_sigma(results.parameters)
         ]
-        text += f" {', '.join(slopes)}."
-    return [Message("uncertainty_unstated", text)]
+        messages = [replace(m, text=f"{m.text} {', '.join(slopes)}.") for m in messages]
+    return messages
 
 
 def _a_and_sigma(parameters: ParameterSet) -> list[tuple[str, int, float]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -91,21 +92,16 @@ def error(problem: str, why: str = "", cure: str = "") -> None:
 
 
 def _to_stderr(lines: Sequence[str]) -> None:
+    width = min(100, max(40, shutil.get_terminal_size().columns))
     for line in lines:
         text = readable(line, sys.stderr)
         if sys.stderr is not None and sys.stderr.isatty():
             indent = "  " if text.startswith("  ") else ""
-            text = click.wrap_text(text.strip(), _width(), indent, "  ")
+            text = click.wrap_text(text.strip(), width, indent, "  ")
         try:
             click.echo(text, err=True)
         except OSError:  # standard error is closed
             return
-
-
-def _width() -> int:
-    import shutil
-
-    return min(100, max(40, shutil.get_terminal_size().columns))
 
 
 _FIRST_AFTER = 0.7

@@ -93,13 +93,13 @@ def command(
 
 
 def _beside_calculated(restored: Restoration) -> Restoration:
-    """Add the comparison with the frictionless contact; one that has no solution is left out."""
+    """Add the comparison with the calculated contact; one that has no solution is left out."""
     from memscal.errors import MemscalError
-    from memscal.mechanics.indent import indent
+    from memscal.mechanics.press_rod import press_rod
 
     scan = restored.scan
     try:
-        contact = indent(scan.film, scan.indenter, load=scan.load, strain="linear")
+        contact = press_rod(scan.film, scan.indenter, scan.load, scan.rod_friction)
         return replace(restored, comparison=restored.compare(contact))
     except MemscalError as failure:
         out.note(f"No contact is shown beside the result: {failure.problem}")

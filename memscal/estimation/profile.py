@@ -15,6 +15,7 @@ from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
 from memscal.estimation.points import ScanPoints
 from memscal.model.arrays import FloatArray
+from memscal.model.checks import OUTLIER_WEIGHT, Message
 
 #: A residual beyond this many robust standard deviations is an outlier: one in 2000 by chance.
 OUTLIER_THRESHOLD = 3.5
@@ -382,3 +383,22 @@ def _least_distance(matrix: FloatArray, bound: FloatArray) -> FloatArray:
             cure="Leave out the constraint: nonnegative=false, monotone=false.",
         )
     return np.asarray(-residual[:-1] / residual[-1])
+
+
+def point_messages(estimate: ProfileEstimate) -> list[Message]:
+    """Return what was left out of a scan, and which points are outliers."""
+    points = estimate.points
+    messages: list[Message] = []
+    if points.missing:
+        text = f"{points.missing} points of the scan are missing and were left out."
+        messages.append(Message("missing_points", text))
+    for i in (estimate.outlier_weight < OUTLIER_WEIGHT).nonzero()[0]:
+        place = f"x = {points.x[i] * 1e3:.4g} mm"
+        if points.planar:
+            place += f", y = {points.y[i] * 1e3:.4g} mm"
+        if points.repeat.any():
+            place += f" of repeat {points.repeat[i]}"
+        voltages = f"{points.u[i] * 1e3:.4g} mV instead of {estimate.predicted[i] * 1e3:.4g} mV"
+        text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
+        messages.append(Message("outlier", text))
+    return messages

@@ -38,12 +38,6 @@ def _read_points(file: SafeFile, path: str) -> dict[str, MeasuredPoints]:
     return {name: MeasuredPoints(**{"noise": None} | points) for name, points in stored.items()}
 
 
-def _scans_group(scans: Sequence[MeasuredScan]) -> Group:
-    """Return what was scanned as an NXcollection, one group for each scan."""
-    nodes: dict[str, Node] = {f"scan_{i + 1}": _scan_group(scan) for i, scan in enumerate(scans)}
-    return Group("NXcollection", {"names": to_json("scans", list(nodes)), **nodes})
-
-
 def _read_scans(
     file: SafeFile, paths: Sequence[str], of: Sequence[int], sources: Mapping[str, SourceFile]
 ) -> tuple[MeasuredScan, ...]:
@@ -174,6 +168,9 @@ def _entry(measured: MeasuredStress) -> Group:
         f"profile_{i + 1}": _profile_group(profile, measured.scans)
         for i, profile in enumerate(measured.profiles)
     }
+    scans: dict[str, Node] = {
+        f"scan_{i + 1}": _scan_group(scan) for i, scan in enumerate(measured.scans)
+    }
     first = measured.scans[0]
     sensor, digest = first.sensor.name, measured.artifact_digest
     children: dict[str, Node] = {
@@ -189,7 +186,7 @@ def _entry(measured: MeasuredStress) -> Group:
         "sample": groups.sample_group(first.film),
         "instrument": groups.instrument_group(first.sensor),
         "indenter": groups.indenter_group(first.indenter),
-        "scans": _scans_group(measured.scans),
+        "scans": Group("NXcollection", {"names": to_json("scans", list(scans)), **scans}),
         "inputs": _inputs_group(measured),
         "process": write_record(records.PROCESS, measured.process),
     }

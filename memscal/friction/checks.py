@@ -8,13 +8,8 @@ from scipy.special import chdtrc
 
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import BoundedEstimate, LoadComparison
-from memscal.model.checks import (
-    Message,
-    QualityCheck,
-    check,
-    chi_square_limit,
-    failed_check_messages,
-)
+from memscal.model import checks as quality
+from memscal.model.checks import Message, QualityCheck, check, chi_square_limit
 from memscal.model.measured_stress import MeasuredProfile, MeasuredStress
 from memscal.model.notation import format_bound
 
@@ -112,7 +107,7 @@ def comparison_messages(
 ) -> tuple[Message, ...]:
     """Return the messages of a comparison and of its measured stress, failed checks first."""
     messages = [
-        *failed_check_messages(checks),
+        *quality.failed_check_messages(checks),
         *synthetic_messages(measured),
         *_loadings(joint),
         *_against_macroscopic(joint, macroscopic),
@@ -186,9 +181,9 @@ def _calculated(families: Mapping[str, ProfileFamily]) -> Iterator[Message]:
         yield from (Message("calculated", text) for text in family.notes)
 
 
-def _unstated(measured: MeasuredStress) -> Iterator[Message]:
+def _unstated(measured: MeasuredStress) -> list[Message]:
     """Name what no uncertainty is stated for: the intervals count nothing for it."""
-    names = []
+    unstated: dict[str, float | None] = {}
     for profile in measured.profiles:
         film, indenter = profile.scan.film, profile.scan.indenter
         stated = {
@@ -198,13 +193,8 @@ def _unstated(measured: MeasuredStress) -> Iterator[Message]:
             f"{indenter.shape} radius": indenter.radius_uncertainty,
             "load": profile.load_uncertainty,
         }
-        names += [name for name, value in stated.items() if value is None]
-    if names:
-        yield Message(
-            "uncertainty_unstated",
-            f"No uncertainty is stated for {', '.join(dict.fromkeys(names))}: the intervals of "
-            "the friction coefficient count nothing for it.",
-        )
+        unstated |= {name: value for name, value in stated.items() if value is None}
+    return quality.uncertainty_unstated_messages(unstated)
 
 
 def in_words(estimate: BoundedEstimate) -> str:

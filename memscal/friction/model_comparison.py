@@ -341,8 +341,11 @@ def of_one_value(name: str, along: LawCurve, index: int, degrees: int) -> Interf
 
 def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter of each load; arguments as for :func:`one_of_all`."""
-    tables, near = zip(*(_where_it_matters(along) for along in curves), strict=True)
-    weights = [prior.weights(along.edges)[nodes] for along, nodes in zip(curves, near, strict=True)]
+    # Nodes that one load alone excludes are left out.
+    near = [2 * (c.log_likelihood.max() - c.log_likelihood) < _EXCLUDED for c in curves]
+    pairs = list(zip(curves, near, strict=True))
+    tables = [Tables(*(array[nodes] for array in c.tables.arrays)) for c, nodes in pairs]
+    weights = [prior.weights(along.edges)[nodes] for along, nodes in pairs]
     log_evidence, error = evidence_of_each(tables, weights)
     start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
     chosen, top, chi_square = _best_of_each(tables, start)
@@ -362,12 +365,6 @@ def _law(
 ) -> InterfaceLaw:
     p_value = float(chdtrc(degrees, least)) if degrees > 0 else 1.0
     return InterfaceLaw(name, best, log_evidence, top, error, least, degrees, p_value)
-
-
-def _where_it_matters(along: LawCurve) -> tuple[Tables, FloatArray]:
-    """Leave out the nodes that one load alone excludes."""
-    near = 2 * (along.log_likelihood.max() - along.log_likelihood) < _EXCLUDED
-    return Tables(*(array[near] for array in along.tables.arrays)), near
 
 
 def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int], float, float]:

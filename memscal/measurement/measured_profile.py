@@ -410,7 +410,7 @@ def _of_place(restored: Restoration, average: FloatArray) -> Mapping[str, FloatA
     posterior, model = restored.posterior, restored.posterior.estimate.model
     nodes, free = posterior.nodes, restored.points.free
     geometry = model.geometry(np.atleast_2d(restored.centre))
-    film = film_transfer(restored.scan.film, model.k)
+    film = film_transfer(restored.scan, model.reference.wavenumbers)
     pressure = posterior.state[:nodes] / restored.scan.load / film
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
     columns = [average @ column / restored.apparatus.conversion_constant for column in columns]

@@ -32,16 +32,17 @@ import numpy as np
 from scipy.special import hyp0f1
 
 from memscal.apparatus import ApparatusFunction
-from memscal.axisymmetry.hankel import RadialSpectrum, hankel_transform
+from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers, hankel_transform
 from memscal.axisymmetry.kernels import gaussian_transfer
 from memscal.estimation.bayesian import DepartureBasis, departure_basis, weigh_departures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit, gauss_newton, linearise
 from memscal.estimation.points import ScanPoints
 from memscal.estimation.profile import ProfileEstimate
+from memscal.estimation.reference import law_at_once, law_sensitivities, rod_spectrum
 from memscal.mechanics.film_response import base_normal_from_pressure, base_normal_from_shear
 from memscal.model.arrays import FloatArray
-from memscal.model.film import ElasticFilm, more_and_less
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, more_and_less
 from memscal.model.scan import Scan
 
 _EXPONENTS = (-0.5, 0.0, 0.5, 1.0, 2.0, math.inf)
@@ -52,9 +53,31 @@ _SHEARS_COMPRESSIBLE = (0.0, 0.1, 0.2)
 _FLOWING = 0.4
 
 
-def film_transfer(film: ElasticFilm, k: FloatArray) -> FloatArray:
-    """Transform of the base's normal stress under a pressure of unit transform."""
+#: Where a rod's pressure is below this share of its force, the film counts as linear.
+_LEAST_PRESSURE = 0.1
+
+
+def film_transfer(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
+    """Transform of the base's normal stress under a pressure of unit transform.
+
+    A film at finite strain is as under the scan's rod, where that is tabulated: a rod's pressure
+    on a linear film makes the rod's own base stress.  Other indenters sink less.
+    """
+    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.film, wavenumbers.k))
+    if (law := law_at_once(scan)) == LINEAR:
+        return linear.values
+    own, other = (rod_spectrum(scan, linear, name) for name in (law, LINEAR))
+    return linear.values + _per_pressure(scan, linear, own - other)
+
+
+def _linear_transfer(film: ElasticFilm, k: FloatArray) -> FloatArray:
     return base_normal_from_pressure(k * film.thickness, film.poisson_ratio)
+
+
+def _per_pressure(scan: Scan, linear: RadialSpectrum, change: FloatArray) -> FloatArray:
+    """Divide a change of the base stress (N) by the rod's pressure on a linear film."""
+    pressure = rod_spectrum(scan, linear, LINEAR) / linear.values
+    return change * pressure / (pressure**2 + (_LEAST_PRESSURE * scan.load) ** 2)
 
 
 @dataclass(frozen=True)
@@ -249,9 +272,10 @@ def posterior_of(
     within = _sum_of(shares, [fit.covariance for fit in fits])
     apart = np.stack([fit.state - mean for fit in fits], axis=1) * np.sqrt(shares)
     model, nodes = estimate.model, estimate.model.k.size
-    film = film_transfer(scan.film, model.k)
+    film = film_transfer(scan, model.reference.wavenumbers)
     scale = np.concatenate([scan.load * film, np.ones(mean.size - nodes)])
-    of_film, of_sensor = _film_changes(scan.film, model.k), apparatus_changes(apparatus, model.k)
+    of_film = _film_changes(scan, model.reference.wavenumbers)
+    of_sensor = apparatus_changes(apparatus, model.k)
     slope = model.radial_derivative(estimate.gaussian.geometry, mean[:nodes])
     scaled = slope * estimate.distance * (scan.position_scale_uncertainty or 0.0)
     shifts = {
@@ -317,14 +341,20 @@ def apparatus_changes(apparatus: ApparatusFunction, k: FloatArray) -> FloatArray
     return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
 
 
-def _film_changes(film: ElasticFilm, k: FloatArray) -> FloatArray:
-    """Change of the film's transfer function by one standard uncertainty of each property."""
+def _film_changes(scan: Scan, wavenumbers: Wavenumbers) -> FloatArray:
+    """Change of the film's transfer function by one standard uncertainty of what is not known."""
+    linear = RadialSpectrum(wavenumbers, _linear_transfer(scan.film, wavenumbers.k))
     columns = []
     for name in ("thickness", "poisson_ratio"):
-        if ends := more_and_less(film, name):
-            more, less, share = ends
-            columns.append(share * (film_transfer(more, k) - film_transfer(less, k)))
-    return np.stack(columns, axis=1) if columns else np.zeros((k.size, 0))
+        if ends := more_and_less(scan.film, name):
+            *films, share = ends
+            more, less = (film_transfer(replace(scan, film=film), wavenumbers) for film in films)
+            columns.append(share * (more - less))
+    rubber = replace(scan, film=replace(scan.film, law=NEO_HOOKEAN, mooney_rivlin_ratio=None))
+    if law_at_once(rubber) != LINEAR:
+        changes = law_sensitivities(scan, linear).values()
+        columns += [_per_pressure(scan, linear, change * scan.load) for change in changes]
+    return np.stack(columns, axis=1) if columns else np.zeros((wavenumbers.k.size, 0))
 
 
 def _resolved(posterior: Posterior, per_pressure: FloatArray) -> float:

@@ -96,7 +96,7 @@ def _direct(posterior: Posterior, scan: Scan, spectrum: FloatArray) -> tuple[flo
     model, free, centres = estimate.model, points.free, np.zeros(points.free.shape)
     centres[free] = posterior.state[posterior.nodes : posterior.nodes + free.sum()]
     geometry = model.geometry(centres)
-    pressure = spectrum / film_transfer(scan.film, model.k)
+    pressure = spectrum / film_transfer(scan, model.reference.wavenumbers)
     signal = model.signal(geometry, pressure)
     columns = [model.centre_derivative(geometry, pressure), model.drift_columns]
     # The film is not part of the direct way: the calculated stress is at its base already.

@@ -18,7 +18,12 @@ from memscal.estimation.points import (
     measured_points,
     stated_differences,
 )
-from memscal.estimation.profile import CentreError, ProfileEstimate, estimate_profile
+from memscal.estimation.profile import (
+    CentreError,
+    ProfileEstimate,
+    estimate_profile,
+    point_messages,
+)
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
@@ -204,20 +209,10 @@ def restoration_messages(
     restored: Restoration, checks: Sequence[QualityCheck]
 ) -> tuple[Message, ...]:
     """Return the messages that accompany a result, warnings first."""
-    estimate, points = restored.posterior.estimate, restored.points
+    points = restored.points
     messages = quality.failed_check_messages(checks)
     messages += failed_calibration_messages(restored.apparatus)
-    if points.missing:
-        text = f"{points.missing} points of the scan are missing and were left out."
-        messages.append(Message("missing_points", text))
-    messages += [
-        Message(
-            "outlier",
-            f"Outlier {restored.distance[i] * 1e3:.4g} mm from the centre: "
-            f"{points.u[i] * 1e3:.4g} mV instead of {restored.predicted[i] * 1e3:.4g} mV.",
-        )
-        for i in (estimate.outlier_weight < quality.OUTLIER_WEIGHT).nonzero()[0]
-    ]
+    messages += point_messages(restored.posterior.estimate)
     if points.u_errors is None:
         messages.append(noise_unstated_message(float(restored.noise.min())))
     if not restored.apparatus.radial_profile.g_errors.any():
@@ -229,14 +224,7 @@ def restoration_messages(
         "Poisson's ratio": film.poisson_ratio_uncertainty,
         "load": restored.scan.load_uncertainty,
     }
-    names = [name for name, value in unstated.items() if value is None]
-    if names:
-        text = (
-            f"No uncertainty is stated for {', '.join(names)}: nothing is counted for "
-            f"{'it' if len(names) == 1 else 'them'}."
-        )
-        messages.append(Message("uncertainty_unstated", text))
-    return tuple(messages)
+    return tuple(messages + quality.uncertainty_unstated_messages(unstated))
 
 
 def failed_calibration_messages(apparatus: ApparatusFunction) -> list[Message]:
@@ -344,7 +332,7 @@ def gaussian_pressure(
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
-    through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan.film, wavenumbers.k))
+    through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan, wavenumbers))
     try:
         return estimate_profile(points, through), transfer
     except CentreError:

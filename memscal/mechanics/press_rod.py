@@ -17,13 +17,14 @@ def press_rod(
     """Press a rod to a load (N) by the film's law, linear where it states none.
 
     ``friction``: 0 or ``inf``; by default a linear film slides, which changes its base stress by
-    1e-3, and one of another law sticks, which is solved at any depth.
+    1e-3, and one of another law sticks, which is solved at any depth.  A sphere sinks less: its
+    film is linear.
     """
-    if film.law in ("", LINEAR):
+    if film.law in ("", LINEAR) or not isinstance(rod, Rod):
         return indent(film, rod, load=load, friction=friction or 0.0, strain="linear")
     friction = math.inf if friction is None else friction
     tabulated = None
-    if isinstance(rod, Rod) and film.law == NEO_HOOKEAN:
+    if film.law == NEO_HOOKEAN:
         tabulated = tabulated_rod(film, rod, load, sticking=friction > 0)
     return tabulated or indent(film, rod, load=load, friction=friction)
 

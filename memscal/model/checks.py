@@ -119,6 +119,14 @@ def failed_check_messages(checks: Iterable[QualityCheck]) -> list[Message]:
     ]
 
 
+def uncertainty_unstated_messages(uncertainties: Mapping[str, float | None]) -> list[Message]:
+    """Return one message that names the inputs without an uncertainty, if there are any."""
+    names = [name for name, value in uncertainties.items() if value is None]
+    it = "it" if len(names) == 1 else "them"
+    text = f"No uncertainty is stated for {', '.join(names)}: nothing is counted for {it}."
+    return [Message("uncertainty_unstated", text)] if names else []
+
+
 def override_messages(differences: Iterable[str]) -> list[Message]:
     """Return a warning for each difference that was accepted."""
     return [Message(OVERRIDE, f"Overridden: {text}.", "warning") for text in differences]

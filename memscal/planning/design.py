@@ -478,7 +478,7 @@ def design(
     >>> import memscal
     >>> planned = memscal.design(noise=0.01)
     >>> round(planned.relative_uncertainty("gaussian_sigma"), 3)
-    0.031
+    0.03
     >>> planned.largest_source("gaussian_sigma")
     'thickness'
     >>> finer = memscal.design(noise=0.01, want={"sigma": 0.027}, vary="repeats")

@@ -22,6 +22,7 @@ SEEDS, NOISES = (40, (0.002, 0.005, 0.01)) if FULL else (3, (0.002, 0.01))
 SIGMAS = 4.0
 CHANCE = 1e-4
 REACH = 6e-3
+RUBBER = replace(made.EXACT_FILM, law="neo-hookean")
 
 CASES = {
     "light": (pressed(0.34), GAUSSIAN), "middle": (pressed(1.0), GAUSSIAN),
@@ -30,6 +31,7 @@ CASES = {
     "compressible": (pressed(film=replace(made.EXACT_FILM, poisson_ratio=0.3)), GAUSSIAN),
     "ring": (pressed(), RING), "tails": (pressed(), TAILS),
     "thin rod": (pressed(indenter=memscal.Rod(radius=0.25e-3)), GAUSSIAN),
+    "deep rod": (pressed(0.3, np.inf, film=RUBBER, indenter=made.EXACT_ROD), GAUSSIAN),
     "wide rod": (pressed(indenter=memscal.Rod(radius=2.5e-3)), GAUSSIAN),
 }  # fmt: skip
 
@@ -38,7 +40,7 @@ CASES = {
 def study(case: str, noise: float) -> np.ndarray:
     """Of each seed: share of radii within 95 % bounds, error, stated error, z of the force."""
     contact, kernel = CASES[case]
-    sensor = made.known_apparatus(kernel)
+    sensor = replace(made.known_apparatus(kernel), film=contact.film)
     # Every case and noise has draws of its own: shared ones would be unlucky together.
     first = 1000 * (list(CASES).index(case) * len(NOISES) + NOISES.index(noise))
     seeds = range(first, first + SEEDS)

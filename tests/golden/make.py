@@ -29,8 +29,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import ArrayLike
+
 import memscal
 from memscal.cli import main as run_memscal
+from memscal.model.arrays import FloatArray
 
 HERE = Path(__file__).parent
 TOP = HERE.parents[1]
@@ -183,7 +186,8 @@ def signatures() -> str:
                 definition = inspect.getattr_static(value, member)
                 getter = getattr(definition, "fget", None) or getattr(definition, "func", None)
                 if getter is not None:
-                    lines += [f"{name}.{member}: {inspect.signature(getter).return_annotation}"]
+                    returned = inspect.signature(getter).return_annotation
+                    lines += [f"{name}.{member}: {_type(returned)}"]
                 elif callable(getattr(value, member)):
                     lines += _signature(f"{name}.{member}", getattr(value, member))
     return "\n".join(lines) + "\n"
@@ -191,13 +195,25 @@ def signatures() -> str:
 
 def _signature(name: str, value: Any) -> list[str]:
     signature = inspect.signature(value)
-    lines = [f"{name}() -> {signature.return_annotation}"]
+    lines = [f"{name}() -> {_type(signature.return_annotation)}"]
     for parameter in signature.parameters.values():
         if parameter.name != "self":
             keyword = "keyword " if parameter.kind is parameter.KEYWORD_ONLY else ""
             default = "" if parameter.default is parameter.empty else f" = {parameter.default!r}"
-            lines.append(f"    {keyword}{parameter.name}: {parameter.annotation}{default}")
+            lines.append(f"    {keyword}{parameter.name}: {_type(parameter.annotation)}{default}")
     return lines
+
+
+def _type(annotation: Any) -> str:
+    """Return an annotation without modules; what NumPy's types consist of is its own affair."""
+    if isinstance(annotation, str) or annotation is inspect.Signature.empty:
+        return annotation if isinstance(annotation, str) else "not stated"
+    text = re.sub(r"(?:\w+\.)+", "", inspect.formatannotation(annotation))
+    text = re.sub(r"^Union\[(.*), NoneType\]$", r"\1 | None", text)
+    for alias, name in ((ArrayLike, "ArrayLike"), (FloatArray, "FloatArray")):
+        own = re.sub(r"(?:\w+\.)+", "", inspect.formatannotation(alias))
+        text = text.replace(own, name).replace(own.removeprefix("Union[")[:-1], name)
+    return text
 
 
 def _members(value: type) -> set[str]:

@@ -8,6 +8,8 @@ import pytest
 from helpers.bounds import cramer_rao
 from helpers.scans import (
     CONVERSION,
+    EXACT_FILM,
+    EXACT_ROD,
     SIGMA,
     known_apparatus,
     plane_error,
@@ -20,6 +22,7 @@ import memscal
 from memscal.measurement.restoration import Restoration
 
 EXACT = known_apparatus()
+RUBBER = replace(EXACT_FILM, law="neo-hookean")
 FEW = 6
 NOISE = 0.005
 SCAN = sphere_scan(pressed(), seed=1)
@@ -50,6 +53,23 @@ def test_without_noise_the_calculated_stress_comes_back(load: float, friction: f
     assert plane_error(found.r, found.sigma_zz, pressed(load, friction).base_stress(found.r)) < 4e-3
     assert found.force == pytest.approx(load, rel=0.02)
     assert found.passed
+
+
+@pytest.mark.parametrize("law", ["neo-hookean", ""])
+def test_a_film_at_finite_strain_is_not_taken_as_linear(law: str) -> None:
+    contact = pressed(1.0, np.inf, film=RUBBER, indenter=EXACT_ROD)
+    film = replace(RUBBER, law=law)
+    scans = [replace(sphere_scan(contact, seed=seed), film=film) for seed in range(FEW)]
+    found = [memscal.restore(scan, replace(EXACT, film=film)) for scan in scans]
+    errors = np.array([f.force - 1.0 for f in found])
+    stated = np.array([f.force_uncertainty for f in found])
+    if law:
+        assert np.sum((errors / stated) ** 2) < chi2.ppf(0.9999, FEW)
+        apart = [plane_error(f.r, f.sigma_zz, contact.base_stress(f.r)) for f in found]
+        assert np.mean(apart) < 0.02
+    else:
+        # By the linear film the force is too large, by the half width of a rectangle.
+        assert 0.05 < errors.mean() < 2 * stated.mean()
 
 
 def test_the_restored_stress_blurred_again_is_what_was_measured() -> None:
