@@ -78,9 +78,10 @@ def test_an_artifact_from_a_file_shows_what_it_holds(calibration, loaded) -> Non
 
 @pytest.mark.parametrize("methods", [("white-noise", "bayesian"), ("bayesian", "white-noise")])
 def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan: Path, methods) -> None:
+    path = scan.with_name("both.h5")
     apparatus = memscal.calibrate(scan, method=methods[0]).apparatus
-    apparatus.save(scan.with_name("both.h5"), overwrite=True)
-    loaded = memscal.load_apparatus(scan.with_name("both.h5"))
+    apparatus.save(path, overwrite=True)
+    loaded = memscal.load_apparatus(path)
     for ours, theirs in ((loaded, apparatus), (loaded.other, apparatus.other)):
         assert ours.parameters.names == theirs.parameters.names
         for record in ("parameters", "radial_profile"):
@@ -103,7 +104,8 @@ def test_a_file_holds_both_estimates_and_a_is_that_of_the_method(scan: Path, met
     r = np.linspace(0.0, 12e-3, 200)
     stress = np.exp(-((r / 1e-3) ** 2))
     np.testing.assert_allclose(loaded.predict(r, stress), a * loaded.convolve(r, stress))
-    assert memscal.measure_stress(contact_scan(load=(1.0,)), loaded).conversion_constant == a
+    contacts = contact_scan(load=(1.0,), film=loaded.film)
+    assert memscal.measure_stress(contacts, loaded).conversion_constant == a
 
 
 def test_html_holds_values_and_checks(calibration: memscal.Calibration) -> None:

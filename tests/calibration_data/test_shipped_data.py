@@ -245,11 +245,8 @@ def test_the_finite_element_table_moves_the_result_by_less_than_its_error_allows
 ) -> None:
     """Bound the shift of A and sigma by what the table changes in the predicted voltages.
 
-    Voltages predicted from the table differ from those predicted from the built-in solution by
-    e_i.  Fitting either to the same scan differs to first order as if the scan had changed by e_i.
-    For a weighted linear estimate of a parameter, with gains c_i and noise s_i, that is
-    |sum c_i e_i| <= sqrt(sum c_i^2 s_i^2) sqrt(sum e_i^2 / s_i^2) by Cauchy and Schwarz: at most
-    the parameter's uncertainty from noise times the root of a chi-square.  As G has unit
+    To first order the fit changes as if the scan had changed by that, e_i: by Cauchy and Schwarz by
+    at most the uncertainty from noise s_i times the root of sum e_i^2 / s_i^2.  As G has unit
     integral, e_i is at most A times the largest error of the table, 2e-3 of the maximum.
     """
     ours = calibrations["rod_scan_65.h5"].apparatus

@@ -89,20 +89,10 @@ def voltages(kernel: Kernel, points: int, centre: float, *pressed: Any) -> Float
 
 
 def direct_scan(
-    kernel: Kernel,
-    *,
-    noise: float,
-    seed: int = 0,
-    points: int = 65,
-    repeats: int = 1,
-    centre: float = CENTRE,
-    baseline: float = 0.01,
-    drift: float = 0.005,
-    state_noise: bool = True,
-    load: float = 1.0,
-    radius: float = EXACT_ROD.radius,
-    law: str = "linear",
-) -> memscal.Scan:
+    kernel: Kernel, *, noise: float, seed: int = 0, points: int = 65, repeats: int = 1,
+    centre: float = CENTRE, baseline: float = 0.01, drift: float = 0.005, state_noise: bool = True,
+    load: float = 1.0, radius: float = EXACT_ROD.radius, law: str = "linear",
+) -> memscal.Scan:  # fmt: skip
     """Scan as ``memscal.simulate`` does, with the same noise for a seed, by direct convolution.
 
     ``noise``, ``baseline`` and ``drift`` are shares of the largest signal.

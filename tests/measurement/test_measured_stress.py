@@ -5,19 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.scans import (
-    CENTRE,
-    CONVERSION,
-    EXACT_FILM,
-    GAUSSIAN,
-    LOADS,
-    SIGMA,
-    as_points,
-    contact_scan,
-    known_apparatus,
-    measured,
-    pressed,
-)
+from helpers import scans as made
 from scipy.stats import chi2
 
 import memscal
@@ -30,14 +18,14 @@ from memscal.measurement.restore import restore_known
 
 QUIET = {"noise": 0.0, "load_scatter": 0.0, "position_error": 0.0}
 SEEDS = 5
-SENSOR = known_apparatus()
+SENSOR = made.known_apparatus()
 
 
 def blurred(load: float, r: np.ndarray, friction: float = 0.0) -> np.ndarray:
     """The contact's base stress convolved with the Gaussian by its transform, in closed form."""
-    nodes = Wavenumbers.covering(40 / EXACT_FILM.thickness, 30e-3)
-    spectrum = pressed(load, friction).base_spectrum(nodes.k) * GAUSSIAN.transform(nodes.k)
-    return np.asarray(nodes.synthesise(spectrum, r))
+    nodes = Wavenumbers.covering(40 / made.EXACT_FILM.thickness, 30e-3)
+    stress = made.pressed(load, friction).base_spectrum(nodes.k)
+    return np.asarray(nodes.synthesise(stress * made.GAUSSIAN.transform(nodes.k), r))
 
 
 def reduced(profile: MeasuredProfile) -> float:
@@ -47,19 +35,19 @@ def reduced(profile: MeasuredProfile) -> float:
 
 
 def test_without_noise_the_profiles_are_the_calculated_ones() -> None:
-    found = measured(**QUIET, state_noise=False)
+    found = made.measured(**QUIET, state_noise=False)
     assert found.passed, found.messages
-    assert [profile.load for profile in found.profiles] == list(LOADS)
+    assert [profile.load for profile in found.profiles] == list(made.LOADS)
     for profile in found.profiles:
         truth = blurred(profile.load, profile.r)
         np.testing.assert_allclose(profile.s_zz, truth, atol=4e-3 * truth.max())
         assert profile.maximum == pytest.approx(blurred(profile.load, np.zeros(1))[0], rel=4e-3)
-        assert profile.centre[0] == pytest.approx(CENTRE, abs=2e-6)
+        assert profile.centre[0] == pytest.approx(made.CENTRE, abs=2e-6)
         assert np.all(np.diff(profile.r) >= 0)
 
 
 def test_the_stated_covariance_is_that_of_the_errors() -> None:
-    values = [reduced(profile) for seed in range(SEEDS) for profile in measured(seed).profiles]
+    values = [reduced(profile) for seed in range(SEEDS) for profile in made.measured(seed).profiles]
     # 33 points each; the scan's own baseline and centre take a few of them.
     assert np.mean(values) == pytest.approx(1.0, abs=4 * np.sqrt(2 / (33 * len(values))) + 0.12)
 
@@ -67,7 +55,7 @@ def test_the_stated_covariance_is_that_of_the_errors() -> None:
 def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
     z = []
     for seed in range(SEEDS):
-        for profile in measured(seed).profiles:
+        for profile in made.measured(seed).profiles:
             truth = float(blurred(profile.load, np.zeros(1))[0])
             z.append((profile.maximum - truth) / profile.maximum_uncertainty)
             z.append((profile.force - profile.load) / profile.force_uncertainty)
@@ -76,7 +64,7 @@ def test_the_maximum_and_the_force_have_the_errors_that_they_state() -> None:
 
 
 def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_maximum() -> None:
-    exact, found = measured(3), measured(3, conversion_uncertainty=0.02)
+    exact, found = made.measured(3), made.measured(3, conversion_uncertainty=0.02)
     for before, after in zip(exact.profiles, found.profiles, strict=True):
         part = after.covariances["conversion_constant"]
         np.testing.assert_allclose(part, 4e-4 * np.outer(after.s_zz, after.s_zz), rtol=1e-9)
@@ -87,19 +75,20 @@ def test_an_uncertain_conversion_constant_is_common_to_all_points_and_to_the_max
 
 
 def test_a_width_of_g_that_is_wrong_by_what_is_stated_hardly_moves_the_maximum() -> None:
-    scan = contact_scan(1)
-    right = memscal.measure_stress(scan, known_apparatus(width_uncertainty=0.05))
-    kernel = memscal.GaussianMixture((1.0,), (1.05 * SIGMA,))
-    wrong = memscal.measure_stress(scan, known_apparatus(kernel))
+    scan = made.contact_scan(1)
+    right = memscal.measure_stress(scan, made.known_apparatus(width_uncertainty=0.05))
+    kernel = memscal.GaussianMixture((1.0,), (1.05 * made.SIGMA,))
+    wrong = memscal.measure_stress(scan, made.known_apparatus(kernel))
     for a, b in zip(right.profiles, wrong.profiles, strict=True):
         assert abs(a.maximum - b.maximum) < 0.005 * a.maximum
         assert a.maximum_budget["apparatus"] < 0.005 * a.maximum
 
 
 def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() -> None:
-    for profile, part in zip(measured(2).profiles, single_loads(contact_scan(2)), strict=True):
+    parts = single_loads(made.contact_scan(2))
+    for profile, part in zip(made.measured(2).profiles, parts, strict=True):
         prepared = prepared_scan(part, SENSOR, contact_signal(part, SENSOR))
-        found, a = restore_known(prepared.scan, SENSOR), CONVERSION
+        found, a = restore_known(prepared.scan, SENSOR), made.CONVERSION
         nodes = found.posterior.nodes
         sigma = found.posterior.covariance[nodes:, nodes:]
         # Columns by differences: a shifted centre moves every point on the blurred profile.
@@ -121,14 +110,14 @@ def test_the_sources_of_the_place_share_their_joint_covariance_without_a_rest() 
 def test_recorded_loads_off_the_nominal_one_are_corrected(friction: float) -> None:
     """A contact that sticks follows its load by up to 40 % more than one that slides."""
     options = {**QUIET, "load_scatter": 0.03, "record_loads": True, "load_reading": 0.0}
-    for profile in measured(4, **options, state_noise=False, friction=friction).profiles:
+    for profile in made.measured(4, **options, state_noise=False, friction=friction).profiles:
         truth = blurred(profile.load, profile.r, friction)
         np.testing.assert_allclose(profile.s_zz, truth, atol=2e-3 * truth.max())
 
 
 def test_a_scatter_of_the_loads_is_noise_unless_they_are_recorded() -> None:
     options = {**QUIET, "load_scatter": 0.03, "load_reading": 0.0}
-    blind = measured(4, **options, record_loads=False, state_noise=False)
+    blind = made.measured(4, **options, record_loads=False, state_noise=False)
     off = [np.abs(p.s_zz - blurred(p.load, p.r)).max() / p.maximum for p in blind.profiles]
     assert min(off) > 0.01
 
@@ -136,7 +125,7 @@ def test_a_scatter_of_the_loads_is_noise_unless_they_are_recorded() -> None:
 def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
     ratios = []
     for seed in range(SEEDS):
-        scan = contact_scan(seed)
+        scan = made.contact_scan(seed)
         found = memscal.measure_stress(replace(scan, u_zz_errors=None), SENSOR)
         truth = float(scan.u_zz_errors[0, 0])
         ratios += [float(p.points["zz"].noise.min()) / truth for p in found.profiles]
@@ -147,9 +136,11 @@ def test_an_unstated_noise_is_told_from_the_scatter_of_the_loads() -> None:
 
 
 def test_contacts_at_single_points_give_what_rows_give() -> None:
-    scan = contact_scan(repeats=2, record_loads=True)
-    rows, points = (memscal.measure_stress(s, SENSOR).profiles for s in (scan, as_points(scan)))
-    assert len(points) == len(rows) == len(LOADS)
+    scan = made.contact_scan(repeats=2, record_loads=True)
+    rows, points = (
+        memscal.measure_stress(s, SENSOR).profiles for s in (scan, made.as_points(scan))
+    )
+    assert len(points) == len(rows) == len(made.LOADS)
     for one, other in zip(points, rows, strict=True):
         assert one.load == pytest.approx(other.load, rel=1e-12)
         assert one.force == pytest.approx(other.force, rel=1e-9)
@@ -157,7 +148,7 @@ def test_contacts_at_single_points_give_what_rows_give() -> None:
 
 
 def test_repeats_at_one_position_are_averaged() -> None:
-    once, thrice = measured(5), measured(5, repeats=3)
+    once, thrice = made.measured(5), made.measured(5, repeats=3)
     for few, many in zip(once.profiles, thrice.profiles, strict=True):
         assert many.r.size == few.r.size == 33
         ratio = np.diag(few.covariances["noise"]) / np.diag(many.covariances["noise"])
@@ -176,7 +167,7 @@ def test_a_rod_is_measured_like_a_sphere() -> None:
 
 def test_profiles_of_several_scans_know_theirs() -> None:
     found = memscal.measure_stress(
-        [contact_scan(1), contact_scan(2, load=(0.69,), lubrication="lubricated")], SENSOR
+        [made.contact_scan(1), made.contact_scan(2, load=(0.69,), lubrication="lubricated")], SENSOR
     )
     assert [found.scans.index(profile.scan) for profile in found.profiles] == [0, 0, 0, 0, 1]
     assert [p.lubrication for p in found.profiles] == ["dry"] * 4 + ["lubricated"]
@@ -185,20 +176,20 @@ def test_profiles_of_several_scans_know_theirs() -> None:
 @pytest.mark.parametrize(("changes", "words"), [
     ({"sensor": StressSensor(name="another", channel="zz")}, 'sensor "another".*"a simulated'),
     ({"sensor": StressSensor(name="a simulated sensor", channel="xz")}, 'channel .* "xz".*"zz"'),
-    ({"film": replace(EXACT_FILM, thickness=2.2e-3)}, r"thickness 2\.2 mm.*2 mm"),
-    ({"film": replace(EXACT_FILM, young_modulus=3e6)}, "Young's modulus 3 MPa.*2.2 MPa"),
-    ({"film": replace(EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
-    ({"film": replace(EXACT_FILM, law="neo-hookean")}, 'law "neo-hookean" .*"linear"'),
+    ({"film": replace(made.EXACT_FILM, thickness=2.2e-3)}, r"thickness 2\.2 mm.*2 mm"),
+    ({"film": replace(made.EXACT_FILM, young_modulus=3e6)}, "Young's modulus 3 MPa.*2.2 MPa"),
+    ({"film": replace(made.EXACT_FILM, poisson_ratio=0.45)}, "Poisson's ratio 0.45.*0.5"),
+    ({"film": replace(made.EXACT_FILM, law="neo-hookean")}, 'law "neo-hookean" .*"linear"'),
 ])  # fmt: skip
 def test_what_does_not_belong_together_is_refused_by_both_names(changes, words) -> None:
-    scan = replace(contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)
+    scan = replace(made.contact_scan(load=(1.37,)), source=SourceFile("s.h5", ""), **changes)
     with pytest.raises(InputError, match=rf"not belong together: .*{words}"):
-        memscal.measure_stress(scan, replace(SENSOR, film=replace(EXACT_FILM, law="linear")))
+        memscal.measure_stress(scan, replace(SENSOR, film=replace(made.EXACT_FILM, law="linear")))
 
 
 def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
-    named = replace(SENSOR, film=replace(EXACT_FILM, name="film 1"))
-    scan = replace(contact_scan(load=(1.37,)), film=replace(EXACT_FILM, name="film 2"))
+    named = replace(SENSOR, film=replace(made.EXACT_FILM, name="film 1"))
+    scan = replace(made.contact_scan(load=(1.37,)), film=replace(made.EXACT_FILM, name="film 2"))
     with pytest.raises(InputError, match='film "film 2" in the scan, "film 1" in the artifact'):
         memscal.measure_stress(scan, named)
     found = memscal.measure_stress(scan, named, override=True)
@@ -209,13 +200,13 @@ def test_a_film_of_another_name_is_refused_unless_it_is_overridden() -> None:
 
 
 def test_films_that_agree_within_their_uncertainties_are_one() -> None:
-    film = replace(EXACT_FILM, thickness=2.08e-3, thickness_uncertainty=0.05e-3)
-    found = memscal.measure_stress(replace(contact_scan(load=(1.37,)), film=film), SENSOR)
+    film = replace(made.EXACT_FILM, thickness=2.08e-3, thickness_uncertainty=0.05e-3)
+    found = memscal.measure_stress(replace(made.contact_scan(load=(1.37,)), film=film), SENSOR)
     assert found.overridden == ()
 
 
 def spoilt(row: int, columns: slice) -> Scan:
-    scan = contact_scan()
+    scan = made.contact_scan()
     u = scan.u_zz.copy()
     u[row, columns] = np.nan
     return replace(scan, u_zz=u, source=SourceFile("gaps.h5", ""))
@@ -238,18 +229,18 @@ def test_a_few_missing_points_are_no_gap() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_scan_that_never_comes_down_to_its_baseline_is_refused(friction: float) -> None:
-    short = contact_scan(spacing=0.22e-3, friction=friction, load=(0.69, 2.75))
+    short = made.contact_scan(spacing=0.22e-3, friction=friction, load=(0.69, 2.75))
     with pytest.raises(FitError, match=r"0\.69 N, dry: the scan ends .* still has \d+% of its max"):
         memscal.measure_stress(short, SENSOR)
 
 
 def test_a_scan_that_ends_on_one_side_of_the_contact_is_refused() -> None:
     with pytest.raises(FitError, match="the scan ends"):
-        memscal.measure_stress(contact_scan(load=(2.75,), centre=(6e-3, 0.0)), SENSOR)
+        memscal.measure_stress(made.contact_scan(load=(2.75,), centre=(6e-3, 0.0)), SENSOR)
 
 
 def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
-    scan = contact_scan(load=(1.37,))
+    scan = made.contact_scan(load=(1.37,))
     heavy = replace(scan, normal_load=scan.normal_load * 1e6, source=SourceFile("heavy.h5", ""))
     with pytest.raises(DomainError, match=r"heavy\.h5, 1\.37e\+06 N, dry"):
         memscal.measure_stress(heavy, SENSOR)
@@ -258,7 +249,7 @@ def test_a_load_beyond_the_model_is_refused_with_file_and_load() -> None:
 def test_paths_are_taken_wherever_objects_are(tmp_path: Path) -> None:
     scan, rod = tmp_path / "sphere.h5", tmp_path / "rod.h5"
     sensor = tmp_path / "sensor.apparatus.h5"
-    memscal.write_scan(contact_scan(3, load=(1.37,)), scan)
+    memscal.write_scan(made.contact_scan(3, load=(1.37,)), scan)
     memscal.write_scan(memscal.simulate(seed=3), rod)
     SENSOR.save(sensor)
     read, known = memscal.read_scan(scan), memscal.load_apparatus(sensor)
@@ -274,14 +265,14 @@ def test_paths_are_taken_wherever_objects_are(tmp_path: Path) -> None:
 
 
 def test_stresses_measured_one_by_one_are_those_measured_together() -> None:
-    dry = contact_scan(1, load=LOADS[:2])
-    wet = contact_scan(2, load=LOADS[:1], lubrication="lubricated")
+    dry = made.contact_scan(1, load=made.LOADS[:2])
+    wet = made.contact_scan(2, load=made.LOADS[:1], lubrication="lubricated")
     together = memscal.measure_stress([dry, wet], SENSOR)
     joined = joined_stress([memscal.measure_stress(scan, SENSOR) for scan in (dry, wet)])
     assert joined.profiles == together.profiles
     assert joined.scans == together.scans
     assert joined.checks == together.checks
-    other = memscal.measure_stress(wet, known_apparatus(conversion_uncertainty=0.01))
+    other = memscal.measure_stress(wet, made.known_apparatus(conversion_uncertainty=0.01))
     with pytest.raises(InputError, match="digests differ"):
         joined_stress([joined, other])
 

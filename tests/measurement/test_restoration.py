@@ -5,31 +5,22 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers import scans as made
 from helpers.bounds import cramer_rao
-from helpers.scans import (
-    CONVERSION,
-    EXACT_FILM,
-    EXACT_ROD,
-    SIGMA,
-    known_apparatus,
-    plane_error,
-    pressed,
-    sphere_scan,
-)  # fmt: skip
 from scipy.stats import chi2
 
 import memscal
 from memscal.measurement.restoration import Restoration
 
-EXACT = known_apparatus()
-RUBBER = replace(EXACT_FILM, law="neo-hookean")
+EXACT = made.known_apparatus()
+RUBBER = replace(made.EXACT_FILM, law="neo-hookean")
 FEW = 6
 NOISE = 0.005
-SCAN = sphere_scan(pressed(), seed=1)
+SCAN = made.sphere_scan(made.pressed(), seed=1)
 
 
 def wider(share: float) -> memscal.GaussianMixture:
-    return memscal.GaussianMixture((1.0,), ((1 + share) * SIGMA,))
+    return memscal.GaussianMixture((1.0,), ((1 + share) * made.SIGMA,))
 
 
 def apparatus_part(found: Restoration, source: str, r: np.ndarray) -> np.ndarray:
@@ -42,30 +33,31 @@ def apparatus_part(found: Restoration, source: str, r: np.ndarray) -> np.ndarray
 
 @lru_cache
 def restored(load: float, friction: float, seed: int, noise: float = NOISE) -> Restoration:
-    contact = pressed(load, friction)
-    return memscal.restore(sphere_scan(contact, noise=noise, seed=seed), EXACT, expected=contact)
+    contact = made.pressed(load, friction)
+    scan = made.sphere_scan(contact, noise=noise, seed=seed)
+    return memscal.restore(scan, EXACT, expected=contact)
 
 
 @pytest.mark.parametrize("load", [0.34, 1.0, 2.75])
 @pytest.mark.parametrize("friction", [0.0, np.inf])
 def test_without_noise_the_calculated_stress_comes_back(load: float, friction: float) -> None:
-    found = restored(load, friction, 0, 0.0)
-    assert plane_error(found.r, found.sigma_zz, pressed(load, friction).base_stress(found.r)) < 4e-3
+    found, contact = restored(load, friction, 0, 0.0), made.pressed(load, friction)
+    assert made.plane_error(found.r, found.sigma_zz, contact.base_stress(found.r)) < 4e-3
     assert found.force == pytest.approx(load, rel=0.02)
     assert found.passed
 
 
 @pytest.mark.parametrize("law", ["neo-hookean", ""])
 def test_a_film_at_finite_strain_is_not_taken_as_linear(law: str) -> None:
-    contact = pressed(1.0, np.inf, film=RUBBER, indenter=EXACT_ROD)
+    contact = made.pressed(1.0, np.inf, film=RUBBER, indenter=made.EXACT_ROD)
     film = replace(RUBBER, law=law)
-    scans = [replace(sphere_scan(contact, seed=seed), film=film) for seed in range(FEW)]
+    scans = [replace(made.sphere_scan(contact, seed=seed), film=film) for seed in range(FEW)]
     found = [memscal.restore(scan, replace(EXACT, film=film)) for scan in scans]
     errors = np.array([f.force - 1.0 for f in found])
     stated = np.array([f.force_uncertainty for f in found])
     if law:
         assert np.sum((errors / stated) ** 2) < chi2.ppf(0.9999, FEW)
-        apart = [plane_error(f.r, f.sigma_zz, contact.base_stress(f.r)) for f in found]
+        apart = [made.plane_error(f.r, f.sigma_zz, contact.base_stress(f.r)) for f in found]
         assert np.mean(apart) < 0.02
     else:
         # By the linear film the force is too large, by the half width of a rectangle.
@@ -80,7 +72,7 @@ def test_the_restored_stress_blurred_again_is_what_was_measured() -> None:
     for f in found:
         order = np.argsort(f.distance)
         apart = f.measured_stress[order] - f.blurred_stress(f.distance[order])
-        np.testing.assert_allclose(apart, f.residual[order] / CONVERSION, atol=20.0)
+        np.testing.assert_allclose(apart, f.residual[order] / made.CONVERSION, atol=20.0)
 
 
 def test_the_blur_is_that_of_the_apparatus_function() -> None:
@@ -93,7 +85,7 @@ def test_the_blur_is_that_of_the_apparatus_function() -> None:
 
 def test_a_calculated_contact_is_told_from_another() -> None:
     found = restored(1.0, np.inf, 3)
-    same, other = found.compare(pressed(1.0, np.inf)), found.compare(pressed(1.0, 0.0))
+    same, other = found.compare(made.pressed(1.0, np.inf)), found.compare(made.pressed(1.0, 0.0))
     assert same.p_value > 1e-3 > other.p_value
     assert same.within > 0.7 > other.within
 
@@ -106,8 +98,8 @@ def test_the_direct_comparison_has_the_chi_square_of_its_degrees() -> None:
 
 
 def test_an_uncertain_conversion_constant_makes_every_stress_as_uncertain() -> None:
-    scan = sphere_scan(pressed(), seed=2)
-    found = memscal.restore(scan, known_apparatus(conversion_uncertainty=0.02))
+    scan = made.sphere_scan(made.pressed(), seed=2)
+    found = memscal.restore(scan, made.known_apparatus(conversion_uncertainty=0.02))
     assert found.force_budget["apparatus"] == pytest.approx(0.02 * found.force, rel=0.05)
     r = np.linspace(0, 2e-3, 5)
     expected = 0.02 * found.stress(r)
@@ -115,10 +107,10 @@ def test_an_uncertain_conversion_constant_makes_every_stress_as_uncertain() -> N
 
 
 def test_an_uncertain_width_of_g_counts_as_much_as_it_changes() -> None:
-    scan, r = sphere_scan(pressed(), noise=0.001, seed=2), np.array([0.0, 1e-3, 3e-3])
+    scan, r = made.sphere_scan(made.pressed(), noise=0.001, seed=2), np.array([0.0, 1e-3, 3e-3])
     share = 0.02
-    found = memscal.restore(scan, known_apparatus(width_uncertainty=share))
-    changed = memscal.restore(scan, known_apparatus(wider(share)))
+    found = memscal.restore(scan, made.known_apparatus(width_uncertainty=share))
+    changed = memscal.restore(scan, made.known_apparatus(wider(share)))
     difference = np.abs(changed.stress(r) - found.stress(r))
     allowed = 0.35 * difference.max()
     np.testing.assert_allclose(apparatus_part(found, "apparatus", r), difference, atol=allowed)
@@ -126,7 +118,7 @@ def test_an_uncertain_width_of_g_counts_as_much_as_it_changes() -> None:
 
 @pytest.mark.parametrize("source", ["position_scale", "film"])
 def test_an_uncertain_input_counts_as_much_as_it_changes(source: str) -> None:
-    scan, r = sphere_scan(pressed(), noise=0.001, seed=2), np.array([0.0, 1.5e-3, 3e-3])
+    scan, r = made.sphere_scan(made.pressed(), noise=0.001, seed=2), np.array([0.0, 1.5e-3, 3e-3])
     share = 0.01
     if source == "film":
         film = replace(scan.film, thickness_uncertainty=share * scan.film.thickness)
@@ -187,7 +179,7 @@ def test_an_override_of_another_film_stands_in_the_restored_stress() -> None:
 
 
 def test_a_spoilt_point_is_named_and_moves_little() -> None:
-    scan = sphere_scan(pressed(), seed=4)
+    scan = made.sphere_scan(made.pressed(), seed=4)
     u = scan.u_zz.copy()
     u[14] *= 1.5
     clean, spoilt = (memscal.restore(s, EXACT) for s in (scan, replace(scan, u_zz=u)))
@@ -232,7 +224,7 @@ def test_what_cannot_be_restored_is_refused_with_a_reason(case: str) -> None:
     assert caught.value.cure
 
 
-@pytest.mark.parametrize("expected", [3, pressed(2.75)])
+@pytest.mark.parametrize("expected", [3, made.pressed(2.75)])
 def test_an_expected_stress_that_does_not_fit_is_refused(expected: object) -> None:
     with pytest.raises(memscal.MemscalError):
         memscal.restore(SCAN, EXACT, expected=expected)
