@@ -1,5 +1,6 @@
 """Quality checks of a calibration: value, limit, and what a failure means."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -439,9 +440,9 @@ def _indentation(solution: Solution, results: Results) -> QualityCheck:
             if film.law
             else ("the form of the film's law, which is not stated, is counted (model_form)")
         )
-        meaning += f"It passes at any depth, for {why}; a failure means that it was stated linear."
-    passed = not formal or max(depths) <= INDENTATION_LIMIT
-    return QualityCheck("indentation", max(depths), INDENTATION_LIMIT, passed, meaning)
+        meaning += f"It has no limit, for {why}. A failure means that the film was stated linear."
+    limit = INDENTATION_LIMIT if formal else math.inf
+    return check("indentation", max(depths), limit, meaning)
 
 
 def _saturation(estimate: ProfileEstimate) -> list[QualityCheck]:

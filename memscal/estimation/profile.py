@@ -397,7 +397,7 @@ def point_messages(estimate: ProfileEstimate) -> list[Message]:
         if points.planar:
             place += f", y = {points.y[i] * 1e3:.4g} mm"
         if points.repeat.any():
-            place += f" of repeat {points.repeat[i]}"
+            place += f" of repeat {points.repeat[i] + 1}"
         voltages = f"{points.u[i] * 1e3:.4g} mV instead of {estimate.predicted[i] * 1e3:.4g} mV"
         text = f"Outlier at {place}: {voltages}; its weight is {estimate.outlier_weight[i]:.2g}."
         messages.append(Message("outlier", text))

@@ -62,7 +62,7 @@ def checks_table(checks: Sequence[QualityCheck], *, meanings: bool = False) -> T
         (
             check.name.replace("_", " "),
             f"{check.value:.3g}",
-            f"{check.limit:.3g}",
+            "-" if math.isinf(check.limit) else f"{check.limit:.3g}",
             "" if check.p_value is None else f"{check.p_value:.2g}",
             "passed" if check.passed else "FAILED",
             *([check.meaning] if meanings else []),
