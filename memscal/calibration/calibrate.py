@@ -39,11 +39,7 @@ from memscal.model.apparatus import (
     Reconvolution,
     TransferFunction,
 )
-from memscal.model.checks import (
-    Message,
-    QualityCheck,
-    override_messages,
-)
+from memscal.model.checks import Message, QualityCheck, override_messages
 from memscal.model.film import LINEAR
 from memscal.model.provenance import Process, timestamp
 from memscal.model.result import Result

@@ -21,7 +21,7 @@ from memscal.calibration.uncertainty import BUDGETED, InputEffect
 from memscal.errors import FitError, InputError, MemscalError
 from memscal.estimation.forward import Geometry
 from memscal.estimation.points import measured_mask
-from memscal.estimation.reference import law_at_once, relative, rod_spectrum
+from memscal.estimation.reference import RECTANGLE, law_at_once, relative, rod_spectrum
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 from memscal.model.result import Result
@@ -82,16 +82,14 @@ class DrawnScans:
         rows, failures = [], []
         for index in range(first, last):
             try:
-                rows.append(self._calibrated(self.draw(index)))
+                rows.append(self._calibrated(self.draw(index)) + self._shift_by_law(index))
             except MemscalError as failure:
                 failures.append(failure.problem)
         return rows, failures
 
     def draw(self, index: int) -> list[Scan]:
         """Return the scans of one draw."""
-        # The same child as SeedSequence(seed).spawn() gives, whichever process asks for it.
-        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(index,)))
-        standard = self.standardised(rng.standard_normal(len(self.effects)))
+        rng, standard = self._random(index)
         estimate = self.solution.estimate
         points = estimate.points
         noise: FloatArray = rng.standard_normal(points.u.size)
@@ -104,6 +102,20 @@ class DrawnScans:
             _with_voltages(scan, points.channel, voltages[points.scan == i])
             for i, scan in enumerate(self.solution.scans)
         ]
+
+    def _random(self, index: int) -> tuple[np.random.Generator, dict[str, FloatArray]]:
+        """Return the generator of a draw, and its inputs' errors over their uncertainties."""
+        # The same child as SeedSequence(seed).spawn() gives, whichever process asks for it.
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(index,)))
+        return rng, self.standardised(rng.standard_normal(len(self.effects)))
+
+    def _shift_by_law(self, index: int) -> FloatArray | float:
+        """Change of a draw's results by the law: between the calibrations by either."""
+        effect = self.effects.get("model_form")
+        if effect is None or effect.exact is None:
+            return 0.0
+        share = RECTANGLE * self._random(index)[1]["model_form"]
+        return share * (self._results_of(effect.exact) - self._results_of(self.solution))
 
     def standardised(self, normal: FloatArray) -> dict[str, FloatArray]:
         """Turn normal draws, (inputs, ...), into each input's error over its uncertainty."""
@@ -121,9 +133,10 @@ class DrawnScans:
         estimate, voltages = self.solution.estimate, uncertainty.drawn_about(self.solution)
         signal = voltages - estimate.background
         exact = {item.source for item in self.solved}
+        calibrated = {source for source, effect in self.effects.items() if effect.exact}
         for source, effect in self.effects.items():
             # An effect is that of a larger value in the analysis, so its sign is turned.
-            if source not in exact:
+            if source not in exact | calibrated:
                 voltages = voltages - standard[source] * (effect.voltage + effect.scaling * signal)
         if exact:
             model = replace(estimate.model, references=self._reference_changes(standard))
@@ -180,8 +193,11 @@ class DrawnScans:
         """Calibrate a draw by the calibration's own steps, and read G off at its radii."""
         first = self.solution
         channel = first.estimate.points.channel
-        solution = solve(scans, first.stresses, first.method, channel, both=False)
-        numbers, g = uncertainty.read_off(solution.deconvolution, first.deconvolution.g.r)
+        return self._results_of(solve(scans, first.stresses, first.method, channel, both=False))
+
+    def _results_of(self, solution: Solution) -> FloatArray:
+        radii = self.solution.deconvolution.g.r
+        numbers, g = uncertainty.read_off(solution.deconvolution, radii)
         numbers["gaussian_sigma"] = solution.estimate.gaussian.sigma
         return np.array([*(numbers[name] for name in BUDGETED), *g])
 

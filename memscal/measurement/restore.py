@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
+from memscal.estimation import profile
 from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
 from memscal.estimation.points import (
     ScanPoints,
@@ -17,12 +18,6 @@ from memscal.estimation.points import (
     file_in_words,
     measured_points,
     stated_differences,
-)
-from memscal.estimation.profile import (
-    CentreError,
-    ProfileEstimate,
-    estimate_profile,
-    point_messages,
 )
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
@@ -62,10 +57,10 @@ def require_measurement(scan: Scan, apparatus: ApparatusFunction) -> None:
 
 def require_covariance(apparatus: ApparatusFunction) -> None:
     """Refuse an apparatus function without a covariance of G or an uncertainty of A."""
-    profile = apparatus.radial_profile
+    radial = apparatus.radial_profile
     stated = (
-        profile.g_covariance.shape == (profile.r.size, profile.r.size)
-        and np.isfinite(profile.g_covariance).all()
+        radial.g_covariance.shape == (radial.r.size, radial.r.size)
+        and np.isfinite(radial.g_covariance).all()
         and np.isfinite(apparatus.parameters.uncertainty("conversion_constant"))
     )
     if not stated:
@@ -212,7 +207,7 @@ def restoration_messages(
     points = restored.points
     messages = quality.failed_check_messages(checks)
     messages += failed_calibration_messages(restored.apparatus)
-    messages += point_messages(restored.posterior.estimate)
+    messages += profile.point_messages(restored.posterior.estimate)
     if points.u_errors is None:
         messages.append(noise_unstated_message(float(restored.noise.min())))
     if not restored.apparatus.radial_profile.g_errors.any():
@@ -328,14 +323,14 @@ def restore_known(
 
 def gaussian_pressure(
     scan: Scan, apparatus: ApparatusFunction, points: ScanPoints
-) -> tuple[ProfileEstimate, FloatArray]:
+) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))
     transfer = apparatus.conversion_constant * sensor_transfer(apparatus, wavenumbers.k)
     through = RadialSpectrum(wavenumbers, transfer * film_transfer(scan, wavenumbers))
     try:
-        return estimate_profile(points, through), transfer
-    except CentreError:
+        return profile.estimate_profile(points, through), transfer
+    except profile.CentreError:
         raise
     except FitError as failure:
         raise FitError(

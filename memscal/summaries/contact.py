@@ -16,14 +16,7 @@ from memscal.model.film import NEO_HOOKEAN
 from memscal.model.indenter import Cone, Rod, RoundIndenter
 from memscal.model.quantities import KPA, MM, Quantity, by_name
 from memscal.model.records import PROFILE, SOLUTION
-from memscal.summaries.declared import (
-    DataFrame,
-    Dataset,
-    correlated_numbers,
-    data_frame,
-    labelled_dataset,
-    members,
-)
+from memscal.summaries import declared
 from memscal.summaries.table import Table
 
 #: Share of the film's thickness up to which linear elasticity is taken as valid.
@@ -43,7 +36,7 @@ _PROFILE = (
 def mapping(contact: Contact) -> dict[str, Any]:
     """Return one solution of ``reference --json``; the contract fixes its form."""
     law = contact.film_of_law.law
-    return members(SOLUTION, contact, sticking=math.isinf(contact.friction), film_law=law)
+    return declared.members(SOLUTION, contact, sticking=math.isinf(contact.friction), film_law=law)
 
 
 def depth_messages(contacts: Sequence[Contact]) -> tuple[list[Message], list[str]]:
@@ -148,14 +141,14 @@ def _arrays(contact: Contact) -> dict[str, FloatArray]:
     }
 
 
-def dataset(contact: Contact) -> Dataset:
+def dataset(contact: Contact) -> declared.Dataset:
     """Return normal stress and shear at the base and at the interface along r."""
-    return labelled_dataset(_PROFILE, _arrays(contact))
+    return declared.labelled_dataset(_PROFILE, _arrays(contact))
 
 
-def frame(contact: Contact) -> DataFrame:
+def frame(contact: Contact) -> declared.DataFrame:
     """Return one row for each radius of the default profile."""
-    return data_frame(_PROFILE, _arrays(contact))
+    return declared.data_frame(_PROFILE, _arrays(contact))
 
 
 def correlated(contact: Contact) -> dict[str, Any]:
@@ -174,4 +167,4 @@ def correlated(contact: Contact) -> dict[str, Any]:
     for more, less, share in changes_by_inputs(contact):
         change = (numbers(more) - numbers(less)) * share
         covariance += np.outer(change, change)
-    return correlated_numbers(names, values, covariance)
+    return declared.correlated_numbers(names, values, covariance)

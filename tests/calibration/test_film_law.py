@@ -50,6 +50,14 @@ def test_the_form_of_a_law_that_is_not_stated_is_a_rectangle(deep: Scan, method:
     assert "model_form" not in linear.budget["gaussian_sigma"]
 
 
+def test_draws_scatter_by_the_form_of_the_law_as_the_budget_says(deep: Scan) -> None:
+    drawn = memscal.monte_carlo(memscal.calibrate(deep), draws=60)
+    widths = [found for found in drawn.comparisons if found.name == "gaussian_sigma"]
+    assert [found.ratio for found in widths] == pytest.approx(
+        [1.0], abs=0.1 + 4 * widths[0].sampling_error / widths[0].uncertainty
+    )
+
+
 def test_it_dominates_at_the_papers_load_and_hardly_counts_at_a_light_one(deep: Scan) -> None:
     usual = replace(LINEAR_FILM, law="")  # with the uncertainties of its thickness and others
     light = memscal.calibrate(simulated(film=usual, load=0.05, seed=1))

@@ -157,14 +157,9 @@ SHEAR_SIGMA = 400e-6
 
 
 def shear_scan(
-    *,
-    seed: int,
-    kernel: RadialKernel | None = None,
-    noise: float = 0.005,
-    crosstalk: float = 0.0,
-    channel: str = "xz",
-    **options: Any,
-) -> Scan:
+    *, seed: int, kernel: RadialKernel | None = None, noise: float = 0.005, crosstalk: float = 0.0,
+    channel: str = "xz", **options: Any,
+) -> Scan:  # fmt: skip
     """A scan whose tangential channel has a G and an A of its own; its noise is stated.
 
     ``noise``, and ``crosstalk`` of the normal channel, are shares of the largest voltage.
