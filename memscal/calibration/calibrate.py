@@ -434,12 +434,12 @@ def _effects(
         others = [alternatives[i] or stress for i, stress in pairs]
         points = [estimate.points.only(i) for i in range(len(scans))]
         spectra = reference_spectra(others, points, [scan.film.thickness for scan in scans])
-    elif all(isinstance(stress, Contact) for stress in solution.stresses):
-        others = [press_neo_hookean(scan) for scan in scans]
     effects = dict(input_effects(scans, solution.stresses, estimate, spectra))
-    if others is not None and "model_form" in effects:
+    contacts = all(isinstance(stress, Contact) for stress in solution.stresses)
+    if "model_form" in effects and (others or contacts):
         # Two laws differ by too much for the first order: calibrated by the other one, too.
         with suppress(MemscalError):
+            others = others or [press_neo_hookean(scan) for scan in scans]
             channel = estimate.points.channel
             both = solution.other is not None
             exact = solve(scans, others, solution.method, channel, both=both)

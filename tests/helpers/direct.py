@@ -1,6 +1,6 @@
 r"""Scans whose voltages share nothing with the analysis but the film: direct convolution.
 
-The base stress, by a film of either law, is that of the finite elements.  Convolved with a radial
+The base stress, by a film of any law, is that of the finite elements.  Convolved with a radial
 G it is at distance R
 
 .. math::
@@ -25,8 +25,8 @@ HALF_RANGE = 8e-3
 PANEL, NODES, OUTERMOST = 0.05e-3, 8, 10e-3
 """Panels of the radius of G and where it ends, in m; Gauss nodes of each."""
 ANGLES = 96
-LOADS = (0.1, 0.3, 1.0)
-"""Loads at which base stresses are solved, in N."""
+LOADS, RATIO = (0.1, 0.3, 1.0), 0.5
+"""Loads at which base stresses are solved, in N; C2/C1 of Mooney-Rivlin films."""
 TABLE = np.arange(0.0, 20e-3, 25e-6)
 
 
@@ -58,7 +58,8 @@ def quadrature() -> tuple[FloatArray, FloatArray]:
 @lru_cache
 def base_stresses(radius: float, law: str) -> dict[float, FloatArray]:
     """Base stress (Pa) along TABLE at each of LOADS, on a film whose mesh is of its own radius."""
-    rod, film = memscal.Rod(radius=radius), replace(EXACT_FILM, law=law)
+    other = {"mooney_rivlin_ratio": RATIO} if law == "mooney-rivlin" else {}
+    rod, film = memscal.Rod(radius=radius), replace(EXACT_FILM, law=law, **other)
     if law == "linear":
         stress = memscal.indent(film, rod, load=1.0, backend="fem").base_stress(TABLE)
         return {load: load * stress for load in LOADS}
