@@ -267,6 +267,17 @@ class FilmElements:
         F[..., [0, 3, 4]] += 1.0
         return F, (pressures @ x[pressing][:, :, None])[..., 0]
 
+    def volume_ratio(self, x: FloatArray) -> FloatArray:
+        """Return J at the points of integration, shape (cells, points)."""
+        return determinant(self._state(x)[0])
+
+    def interpolated(self, x: FloatArray, mesh: FilmElements) -> FloatArray:
+        """Return the unknowns ``x`` of another mesh of the same film at this mesh's nodes."""
+        displacement, pressure = mesh.bases
+        moved = displacement.probes(self.nodes) @ x[: 2 * mesh.n].reshape(2, -1).T
+        pressures = pressure.probes(self.bases[1].doflocs) @ x[2 * mesh.n :]
+        return np.concatenate([moved.T.ravel(), pressures])
+
     def energy(self, x: FloatArray) -> float:
         """Return the stored energy, in mJ."""
         return float(np.sum(self.material.energy(*self._state(x)) * self._shape[2]))

@@ -8,7 +8,8 @@ second derivatives, so that the forces are normal to the face where it slides.  
 active set: a node that is pulled leaves, and one that lies inside the indenter is taken in.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -81,7 +82,9 @@ _SETTLED = 1e-10
 _LOOSE = 1e-3
 # Near the end the factors are kept while each step is this much shorter than the one before.
 _KEPT = 0.1
-_MOST_ITERATIONS = 20
+_MOST_ITERATIONS = 30
+# A Newton step is halved, at most so many times, while it changes a point's volume by such factors.
+_HALVED, _CRUSHED, _SWOLLEN = 5, 10.0, 4.0
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
 # A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
@@ -112,6 +115,14 @@ class Pressed:
     iterations: int = 0  # Newton steps
 
 
+def halfway(first: Pressed, second: Pressed) -> Pressed:
+    """Return the state midway between two with the same nodes in contact."""
+    x, depth, place = (
+        (getattr(first, name) + getattr(second, name)) / 2 for name in ("x", "depth", "place")
+    )
+    return replace(second, x=x, depth=depth, place=place)
+
+
 @dataclass(frozen=True, eq=False)
 class _Tangent:
     """The forces' change with what is free and with the depth, at a state."""
@@ -135,16 +146,21 @@ class Pressing:
     def press(self, start: Pressed, goal: Goal, before: Pressed) -> Pressed:
         """Return the equilibrium at a goal from a state near it and the last one on the way."""
         # It raises :class:`NewtonError` where it finds none.
-        state = start if goal.is_load else replace(start, depth=goal.value)
         seen: set[bytes] = set()
-        state = self.placed(self._touching(state, before, set(), guess=True) or state)
+        state = self.placed(self._touching(start, before, set(), guess=True) or start)
         tangent, last = None, np.inf
         for iteration in range(1, _MOST_ITERATIONS + 1):
-            state, moved, tangent = self._step(state, goal, tangent)
+            ahead, moved, tangent = self._step(state, goal, tangent)
             if not moved < _FARTHEST * self.elements.thickness:
                 break
+            whole = ahead
+            for _ in range(_HALVED):
+                if self.is_sound(ahead, state):
+                    break
+                ahead = self.placed(halfway(state, ahead))
+            state, shortened = ahead, ahead is not whole
             near, last = moved < _KEPT * last, moved
-            if moved > _LOOSE * self.elements.thickness:
+            if shortened or moved > _LOOSE * self.elements.thickness:
                 tangent = None
                 continue
             changed = self._touching(state, before, seen)
@@ -159,6 +175,21 @@ class Pressing:
             elif not near:
                 tangent = None
         raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")
+
+    def interpolated(self, state: Pressed, mesh: "Pressing") -> Pressed:
+        """Return a guess at the state that was found on another mesh."""
+        elements, surface = self.elements, mesh.elements.surface
+        x = elements.interpolated(state.x, mesh.elements)
+        # A node touches between two that did.
+        r, before = elements.nodes[0][elements.surface], mesh.elements.nodes[0][surface]
+        touching = np.interp(r, before, np.isin(surface, state.touching)) > 1 - 1e-9
+        ahead = replace(state, x=x, touching=elements.surface[touching])
+        return replace(ahead, place=self.nearest(ahead)[0][touching])
+
+    def is_sound(self, state: Pressed, before: Pressed) -> bool:
+        """Whether no point's volume has changed by so much that Newton's method would go astray."""
+        now, last = (self.elements.volume_ratio(s.x) for s in (state, before))
+        return bool(np.all((last <= 0) | (now > last / _CRUSHED) & (now < last * _SWOLLEN)))
 
     def placed(self, state: Pressed) -> Pressed:
         """Return the state with its touching nodes on the face."""
@@ -226,11 +257,12 @@ class Pressing:
         touching, n = state.touching, self.elements.n
         forces, change = self.elements.forces(state.x), self._change(state)
         tangent = tangent or self._tangent(state, forces, change)
-        solution, sunk = tangent.factors.solve(-np.asarray(change.T @ forces)), 0.0
+        solution = tangent.factors.solve(-np.asarray(change.T @ forces))
+        sunk = goal.value - state.depth
         if goal.is_load:
             load = -float(np.sum(forces[touching + n]))
             sunk = (goal.value - load - tangent.pushed @ solution) / tangent.stiffness
-            solution = solution + sunk * tangent.along
+        solution = solution + sunk * tangent.along
         free = np.zeros(self.elements.size)
         free[self._free(state)] = solution
         place = state.place if self.sticking else state.place + free[touching]
@@ -314,16 +346,21 @@ def _value(state: Pressed, goal: Goal) -> float:
 
 
 def follow(
-    pressing: Pressing, start: Pressed, goals: list[Goal], progress: Progress | None = None
+    pressing: Pressing,
+    start: Pressed,
+    goals: list[Goal],
+    progress: Progress | None = None,
+    guesses: Sequence[Pressed] = (),
 ) -> Iterator[Step]:
     """Yield the states at the goals, in order; the ``last`` of a NewtonError is the last step.
 
-    ``progress`` is told the share of the way after each step.
+    ``progress`` is told the share of the way after each step.  A state that is guessed well needs
+    no way to it.
     """
     path = _Path(pressing, start)
     for number, goal in enumerate(goals):
         try:
-            for share in path.reach(goal):
+            for share in path.reach(goal, guesses[number : number + 1]):
                 if progress is not None:
                     progress((number + share) / len(goals))
         except NewtonError as problem:
@@ -358,11 +395,16 @@ class _Path:
         places = (number[:-1, None] + (t + 1) / 2).ravel()
         return float(np.tile(weights / 2, number.size - 1) @ (load(places) * depth(places, 1)))
 
-    def reach(self, goal: Goal) -> Iterator[float]:
-        """Go to a goal; yield the share of the way after each step."""
+    def reach(self, goal: Goal, guesses: Sequence[Pressed]) -> Iterator[float]:
+        """Go to a goal, at once from a guess that is good; yield the share after each step."""
+        for guess in guesses:
+            with suppress(NewtonError):
+                self.states.append(self.pressing.press(guess, goal, guess))
+                yield 1.0
+                return
         begin, halvings = _value(self.states[-1], goal) if self.states else 0.0, 0
         way = goal.value - begin
-        if not self.states:
+        if np.isinf(self.length):
             self.length = min(_FIRST * self._radius(goal), goal.value / _FIRST_STEPS)
         while begin != goal.value:
             left = goal.value - begin
@@ -395,18 +437,27 @@ class _Path:
         return face.radius * (stiffness if goal.is_load else 1.0)
 
     def _guess(self, goal: Goal) -> Pressed:
-        """Return the last state, carried on as it came: by a parabola through three states."""
+        """Return the last state, carried on as it came as far as that is sound."""
         states = self.states[-_THROUGH:] or [self.start]
         values = np.array([_value(state, goal) for state in states])
         if np.any(np.diff(values) * np.sign(goal.value - values[-1]) <= 0):  # it turned back
-            return states[-1]
+            states, values = states[-1:], values[-1:]
+        for halvings in range(_HALVED):
+            to = values[-1] + (goal.value - values[-1]) / 2**halvings
+            ahead = self._carried_on(states, values, replace(goal, value=to))
+            if self.pressing.is_sound(self.pressing.placed(ahead), states[-1]):
+                return ahead
+        return states[-1]
+
+    def _carried_on(self, states: list[Pressed], values: FloatArray, goal: Goal) -> Pressed:
+        """Return a guess at a goal: the parabola through three states."""
         weights = [
             np.prod((goal.value - np.delete(values, i)) / (values[i] - np.delete(values, i)))
             for i in range(values.size)
         ]
         x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
         depth = float(sum(w * s.depth for w, s in zip(weights, states, strict=True)))
-        ahead = replace(states[-1], x=x, depth=depth)
+        ahead = replace(states[-1], x=x, depth=depth if goal.is_load else goal.value)
         if self.pressing.sticking:
             return ahead
         place, _ = self.pressing.nearest(ahead)

@@ -38,7 +38,7 @@ from memscal.model.indenter import Rod, Sphere
 _MM = 1e3
 _MPA = 1e6
 # The mesh that tells the convergence has sides longer by a factor, and takes a share of the work.
-_COARSER, _COARSE_WORK = 1.5, 0.3
+_COARSER, _ROUGHER = 1.5, 1.5**3
 # Distance of the film's free edge from the axis, in thicknesses, where none is given.
 _FREE_EDGE = 12.5
 # Radius of the rounding of a rod's edge, as a share of the rod's radius, where none is given: a
@@ -113,9 +113,11 @@ def solve_finite_strain(
     by_load = isinstance(targets[0], Load)
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
-    coarse = tuple(request.solve(refinement / _COARSER, progress=lambda x: tell(_COARSE_WORK * x)))
-    return tuple(request.solve(refinement, coarse, progress=lambda x: tell(1 - rest + rest * x)))
+    tell = progress or (lambda _: None)
+    rough = () if request.stays else tuple(request.reached(refinement / _ROUGHER, lambda x: tell(x / 2)))
+    begin, middle = (0.0, 0.3) if request.stays else (0.5, 0.7)
+    coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(begin + (middle - begin) * x)))
+    return tuple(request.solve(refinement, coarse, lambda x: tell(middle + (1 - middle) * x)))
 
 
 def follow_depths(
@@ -124,8 +126,7 @@ def follow_depths(
     """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
     goals = [Goal(depth * _MM, False) for depth in depths]
     request = _Request(film, rod, goals, sticking, _FREE_EDGE * film.thickness * _MM, None)
-    with suppress(ConvergenceError):
-        yield from request.solve(1.0)
+    return request.reached(1.0)
 
 
 @dataclass(frozen=True)
@@ -148,10 +149,13 @@ class _Request:
         """Yield the contacts on one mesh; their convergence against those on a coarser one."""
         pressing = self._pressing(refinement, coarse)
         try:
-            steps = follow(pressing, self._start(pressing), self.goals, progress)
+            guesses = [] if self.stays else [
+                pressing.interpolated(contact.inside.pressed, contact.inside.pressing) for contact in coarse
+            ]
+            steps = follow(pressing, self._start(pressing), self.goals, progress, guesses)
             for i, step in enumerate(steps):
                 contact = self._contact(pressing, step)
-                if coarse:
+                if i < len(coarse):
                     change = relative_change(contact, coarse[i], _SAMPLES * self.film.thickness)
                     contact = replace(contact, convergence=change)
                 yield contact
@@ -164,6 +168,16 @@ class _Request:
             if isinstance(problem.last, Step):
                 error.last = self._contact(pressing, problem.last)
             raise error from problem
+
+    @property
+    def stays(self) -> bool:
+        """Whether the film stays where it first touched: its states hang on the way to them."""
+        return self.sticking and isinstance(self.indenter, Rod)
+
+    def reached(self, refinement: float, progress: Progress = lambda _: None) -> Iterator[Contact]:
+        """Yield the contacts on one mesh as far as it goes."""
+        with suppress(ConvergenceError):
+            yield from self.solve(refinement, (), progress)
 
     def _pressing(self, refinement: float, coarse: Sequence[Contact]) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
@@ -228,8 +242,9 @@ class _Request:
         """Return a state in SI units, of unknown convergence."""
         pressed, elements, rod = step.pressed, pressing.elements, isinstance(self.indenter, Rod)
         radius = min(outermost(pressing, pressed) / _MM, self.indenter.extent if rod else math.inf)
+        energy = elements.energy(pressed.x) / _MM
         # A sphere that sticks has no way: nothing moves radially wherever it touches.
-        work = None if pressing.upright else step.work / _MM
+        work = None if pressing.upright else step.work / _MM if self.sticking else energy
         return Contact(
             film=self.film,
             indenter=self.indenter,
@@ -246,7 +261,7 @@ class _Request:
             f"displacement, linear pressure), {elements.size} unknowns",
             traction=interface_traction(pressing, pressed),
             inside=FiniteStrainField(pressing, pressed),
-            elastic_energy=elements.energy(pressed.x) / _MM,
+            elastic_energy=energy,
             work=work,
             dissipated_energy=None if work is None else 0.0,
             strain="finite",
