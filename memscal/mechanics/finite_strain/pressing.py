@@ -85,6 +85,8 @@ _KEPT = 0.1
 _MOST_ITERATIONS = 30
 # A Newton step is halved, at most so many times, while it changes a point's volume by such factors.
 _HALVED, _CRUSHED, _SWOLLEN = 5, 10.0, 4.0
+# One that moves nothing by more than this share of the thickness is harmless.
+_HARMLESS = 1e-5
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
 # A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
@@ -146,31 +148,31 @@ class Pressing:
     def press(self, start: Pressed, goal: Goal, before: Pressed) -> Pressed:
         """Return the equilibrium at a goal from a state near it and the last one on the way."""
         # It raises :class:`NewtonError` where it finds none.
-        seen: set[bytes] = set()
-        state = self.placed(self._touching(start, before, set(), guess=True) or start)
-        tangent, last = None, np.inf
+        elements, seen = self.elements, set[bytes]()
+        state = self.placed(self._touching(start, before, set()) or start)
+        forces, tangent, last = elements.forces(state.x), None, np.inf
         for iteration in range(1, _MOST_ITERATIONS + 1):
-            ahead, moved, tangent = self._step(state, goal, tangent)
-            if not moved < _FARTHEST * self.elements.thickness:
+            ahead, moved, tangent = self._step(state, forces, goal, tangent)
+            if not moved < _FARTHEST * elements.thickness:
                 break
-            whole = ahead
-            for _ in range(_HALVED):
+            halved = 0
+            while halved < _HALVED and moved > _HARMLESS * elements.thickness:
                 if self.is_sound(ahead, state):
                     break
-                ahead = self.placed(halfway(state, ahead))
-            state, shortened = ahead, ahead is not whole
+                ahead, halved = self.placed(halfway(state, ahead)), halved + 1
+            state, forces = ahead, elements.forces(ahead.x)
             near, last = moved < _KEPT * last, moved
-            if shortened or moved > _LOOSE * self.elements.thickness:
+            if halved or moved > _LOOSE * elements.thickness:
                 tangent = None
                 continue
-            changed = self._touching(state, before, seen)
+            changed = self._touching(state, before, seen, forces)
             if changed is not None:
                 state, tangent = self.placed(changed), None
-            elif moved < _SETTLED * self.elements.thickness:
-                if self.elements.is_inside_out(state.x):
+                forces = elements.forces(state.x)
+            elif moved < _SETTLED * elements.thickness:
+                if elements.is_inside_out(state.x):
                     break
-                forces = self.elements.forces(state.x)
-                load = -float(np.sum(forces[state.touching + self.elements.n]))
+                load = -float(np.sum(forces[state.touching + elements.n]))
                 return replace(state, load=load, iterations=iteration)
             elif not near:
                 tangent = None
@@ -201,17 +203,21 @@ class Pressing:
         return replace(state, x=x)
 
     def _touching(
-        self, state: Pressed, before: Pressed, seen: set[bytes], *, guess: bool = False
+        self,
+        state: Pressed,
+        before: Pressed,
+        seen: set[bytes],
+        forces: FloatArray | None = None,
     ) -> Pressed | None:
         """Return the state with the nodes that should touch, or None if they do already."""
+        # Without forces none leaves.
         nodes = self.elements.surface
         place, gap = self.nearest(state)
         touches = np.isin(nodes, state.touching)
         place[touches] = state.place
         chosen = np.where(touches, True, gap < -_INSIDE * self.elements.thickness)
-        if not guess:
+        if forces is not None:
             _, (along, up), _ = self.face.contour(place)
-            forces = self.elements.forces(state.x)
             pushed = up * forces[nodes] - along * forces[nodes + self.elements.n] > 0
             chosen[touches] = pushed[touches]
         chosen[0] = True
@@ -251,11 +257,10 @@ class Pressing:
         return s
 
     def _step(
-        self, state: Pressed, goal: Goal, tangent: _Tangent | None
+        self, state: Pressed, forces: FloatArray, goal: Goal, tangent: _Tangent | None
     ) -> tuple[Pressed, float, _Tangent]:
         """Take Newton's step; return the state after it and how far it moved something, in mm."""
-        touching, n = state.touching, self.elements.n
-        forces, change = self.elements.forces(state.x), self._change(state)
+        touching, n, change = state.touching, self.elements.n, self._change(state)
         tangent = tangent or self._tangent(state, forces, change)
         solution = tangent.factors.solve(-np.asarray(change.T @ forces))
         sunk = goal.value - state.depth
