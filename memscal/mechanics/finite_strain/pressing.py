@@ -8,7 +8,7 @@ second derivatives, so that the forces are normal to the face where it slides.  
 active set: a node that is pulled leaves, and one that lies inside the indenter is taken in.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -83,10 +83,10 @@ _LOOSE = 1e-3
 # Near the end the factors are kept while each step is this much shorter than the one before.
 _KEPT = 0.1
 _MOST_ITERATIONS = 30
-# A Newton step is halved, at most so many times, while it changes a point's volume by such factors.
-_HALVED, _CRUSHED, _SWOLLEN = 5, 10.0, 4.0
-# One that moves nothing by more than this share of the thickness is harmless.
-_HARMLESS = 1e-5
+# A step or a guess that changes a point's volume by such factors is shortened to the first of these
+# shares that does not.  One that moves nothing by more than so many thicknesses is harmless.
+_CRUSHED, _SWOLLEN, _HARMLESS = 0.1, 4.0, 1e-5
+_SHARES = (1.0, 1 / 2, 1 / 4, 1 / 8, 1 / 16, 1 / 32)
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
 # A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
@@ -117,14 +117,6 @@ class Pressed:
     iterations: int = 0  # Newton steps
 
 
-def halfway(first: Pressed, second: Pressed) -> Pressed:
-    """Return the state midway between two with the same nodes in contact."""
-    x, depth, place = (
-        (getattr(first, name) + getattr(second, name)) / 2 for name in ("x", "depth", "place")
-    )
-    return replace(second, x=x, depth=depth, place=place)
-
-
 @dataclass(frozen=True, eq=False)
 class _Tangent:
     """The forces' change with what is free and with the depth, at a state."""
@@ -152,17 +144,11 @@ class Pressing:
         state = self.placed(self._touching(start, before, set()) or start)
         forces, tangent, last = elements.forces(state.x), None, np.inf
         for iteration in range(1, _MOST_ITERATIONS + 1):
-            ahead, moved, tangent = self._step(state, forces, goal, tangent)
+            state, moved, tangent = self._step(state, forces, goal, tangent)
             if not moved < _FARTHEST * elements.thickness:
                 break
-            halved = 0
-            while halved < _HALVED and moved > _HARMLESS * elements.thickness:
-                if self.is_sound(ahead, state):
-                    break
-                ahead, halved = self.placed(halfway(state, ahead)), halved + 1
-            state, forces = ahead, elements.forces(ahead.x)
-            near, last = moved < _KEPT * last, moved
-            if halved or moved > _LOOSE * elements.thickness:
+            forces, near, last = elements.forces(state.x), moved < _KEPT * last, moved
+            if tangent is None or moved > _LOOSE * elements.thickness:
                 tangent = None
                 continue
             changed = self._touching(state, before, seen, forces)
@@ -191,7 +177,7 @@ class Pressing:
     def is_sound(self, state: Pressed, before: Pressed) -> bool:
         """Whether no point's volume has changed by so much that Newton's method would go astray."""
         now, last = (self.elements.volume_ratio(s.x) for s in (state, before))
-        return bool(np.all((last <= 0) | (now > last / _CRUSHED) & (now < last * _SWOLLEN)))
+        return bool(np.all((last <= 0) | (now > _CRUSHED * last) & (now < _SWOLLEN * last)))
 
     def placed(self, state: Pressed) -> Pressed:
         """Return the state with its touching nodes on the face."""
@@ -258,8 +244,8 @@ class Pressing:
 
     def _step(
         self, state: Pressed, forces: FloatArray, goal: Goal, tangent: _Tangent | None
-    ) -> tuple[Pressed, float, _Tangent]:
-        """Take Newton's step; return the state after it and how far it moved something, in mm."""
+    ) -> tuple[Pressed, float, _Tangent | None]:
+        """Take Newton's step; return the state after it and how far it moves something, in mm."""
         touching, n, change = state.touching, self.elements.n, self._change(state)
         tangent = tangent or self._tangent(state, forces, change)
         solution = tangent.factors.solve(-np.asarray(change.T @ forces))
@@ -270,9 +256,14 @@ class Pressing:
         solution = solution + sunk * tangent.along
         free = np.zeros(self.elements.size)
         free[self._free(state)] = solution
-        place = state.place if self.sticking else state.place + free[touching]
-        ahead = replace(state, x=state.x + free, depth=state.depth + sunk, place=place)
-        return self.placed(ahead), max(float(np.max(np.abs(free[: 2 * n]))), abs(sunk)), tangent
+        moved = max(float(np.max(np.abs(free[: 2 * n]))), abs(sunk))
+        for share in _SHARES:
+            place = state.place if self.sticking else state.place + share * free[touching]
+            x, depth = state.x + share * free, state.depth + share * sunk
+            ahead = self.placed(replace(state, x=x, depth=depth, place=place))
+            if moved < _HARMLESS * self.elements.thickness or self.is_sound(ahead, state):
+                break
+        return ahead, moved, tangent if share == 1 else None
 
     def _free(self, state: Pressed) -> IntArray:
         """Return the unknowns that are free; those of sliding nodes are radial."""
@@ -333,75 +324,34 @@ _THROUGH = 3
 _HALVINGS = 8
 
 
-# What is told the share of the work that is done.
-Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """A state on the way, how many steps led there, and the work on the way in mJ."""
-
-    pressed: Pressed
-    count: int
-    work: float
-
-
 def _value(state: Pressed, goal: Goal) -> float:
     return state.load if goal.is_load else state.depth
 
 
-def follow(
-    pressing: Pressing,
-    start: Pressed,
-    goals: list[Goal],
-    progress: Progress | None = None,
-    guesses: Sequence[Pressed] = (),
-) -> Iterator[Step]:
-    """Yield the states at the goals, in order; the ``last`` of a NewtonError is the last step.
+def work(states: list[Pressed]) -> float:
+    """Return the integral of load over depth from the untouched film, by splines, in mJ."""
+    from scipy.interpolate import CubicSpline
 
-    ``progress`` is told the share of the way after each step.  A state that is guessed well needs
-    no way to it.
-    """
-    path = _Path(pressing, start)
-    for number, goal in enumerate(goals):
-        try:
-            for share in path.reach(goal, guesses[number : number + 1]):
-                if progress is not None:
-                    progress((number + share) / len(goals))
-        except NewtonError as problem:
-            problem.last = path.step if path.states else None
-            raise
-        yield path.step
+    # Over the number of the step, so that a path may turn back.
+    number = np.arange(len(states) + 1)
+    depth, load = (
+        CubicSpline(number, [0.0, *(getattr(state, name) for state in states)])
+        for name in ("depth", "load")
+    )
+    t, weights = np.polynomial.legendre.leggauss(4)
+    places = (number[:-1, None] + (t + 1) / 2).ravel()
+    return float(np.tile(weights / 2, number.size - 1) @ (load(places) * depth(places, 1)))
 
 
-class _Path:
-    """The state reached, the one before it, and the length of the next step."""
+class Path:
+    """The states so far, and the length of the next step."""
 
     def __init__(self, pressing: Pressing, start: Pressed) -> None:
         self.pressing, self.start, self.length = pressing, start, np.inf
         self.states: list[Pressed] = []
 
-    @property
-    def step(self) -> Step:
-        return Step(self.states[-1], len(self.states), self._work())
-
-    def _work(self) -> float:
-        """Return the integral of load over depth, by splines through four points or more."""
-        from scipy.interpolate import CubicSpline
-
-        depths = np.array([0.0] + [state.depth for state in self.states])
-        loads = np.array([0.0] + [state.load for state in self.states])
-        # Over the number of the step, so that a path may turn back.
-        number = np.arange(depths.size)
-        if number.size < 4:
-            return float(np.sum(np.diff(depths) * (loads[1:] + loads[:-1]) / 2))
-        depth, load = CubicSpline(number, depths), CubicSpline(number, loads)
-        t, weights = np.polynomial.legendre.leggauss(4)
-        places = (number[:-1, None] + (t + 1) / 2).ravel()
-        return float(np.tile(weights / 2, number.size - 1) @ (load(places) * depth(places, 1)))
-
     def reach(self, goal: Goal, guesses: Sequence[Pressed]) -> Iterator[float]:
-        """Go to a goal, at once from a guess that is good; yield the share after each step."""
+        """Go to a goal, at once from a good guess; yield the share of the way after each step."""
         for guess in guesses:
             with suppress(NewtonError):
                 self.states.append(self.pressing.press(guess, goal, guess))
@@ -447,24 +397,19 @@ class _Path:
         values = np.array([_value(state, goal) for state in states])
         if np.any(np.diff(values) * np.sign(goal.value - values[-1]) <= 0):  # it turned back
             states, values = states[-1:], values[-1:]
-        for halvings in range(_HALVED):
-            to = values[-1] + (goal.value - values[-1]) / 2**halvings
-            ahead = self._carried_on(states, values, replace(goal, value=to))
+        for share in _SHARES:
+            to = float(values[-1] + share * (goal.value - values[-1]))
+            # The parabola through three states.
+            weights = [
+                np.prod((to - np.delete(values, i)) / (values[i] - np.delete(values, i)))
+                for i in range(values.size)
+            ]
+            x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
+            depth = float(sum(w * s.depth for w, s in zip(weights, states, strict=True)))
+            ahead = replace(states[-1], x=x, depth=depth if goal.is_load else to)
+            if not self.pressing.sticking:
+                touching = np.isin(self.pressing.elements.surface, ahead.touching)
+                ahead = replace(ahead, place=self.pressing.nearest(ahead)[0][touching])
             if self.pressing.is_sound(self.pressing.placed(ahead), states[-1]):
-                return ahead
-        return states[-1]
-
-    def _carried_on(self, states: list[Pressed], values: FloatArray, goal: Goal) -> Pressed:
-        """Return a guess at a goal: the parabola through three states."""
-        weights = [
-            np.prod((goal.value - np.delete(values, i)) / (values[i] - np.delete(values, i)))
-            for i in range(values.size)
-        ]
-        x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
-        depth = float(sum(w * s.depth for w, s in zip(weights, states, strict=True)))
-        ahead = replace(states[-1], x=x, depth=depth if goal.is_load else goal.value)
-        if self.pressing.sticking:
-            return ahead
-        place, _ = self.pressing.nearest(ahead)
-        touching = np.isin(self.pressing.elements.surface, ahead.touching)
-        return replace(ahead, place=place[touching])
+                break
+        return ahead

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,13 +20,12 @@ from memscal.mechanics.finite_strain import film_elements
 from memscal.mechanics.finite_strain.pressing import (
     Goal,
     NewtonError,
+    Path,
     Pressed,
     Pressing,
-    Progress,
     RodFace,
     SphereFace,
-    Step,
-    follow,
+    work,
 )
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
@@ -35,10 +34,16 @@ from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 
+# What is told the share of the work that is done.
+Progress = Callable[[float], None]
+
 _MM = 1e3
 _MPA = 1e6
-# The mesh that tells the convergence has sides longer by a factor, and takes a share of the work.
+# The mesh that tells the convergence has sides longer by a factor; where states do not hang on the
+# way to them, it is followed on a rough mesh, and the others start from there.
 _COARSER, _ROUGHER = 1.5, 1.5**3
+# Shares of the work that are done before a rough, a coarse and a fine mesh, and after it.
+_WORK_STICKING, _WORK_SLIDING = (0.0, 0.0, 0.3, 1.0), (0.0, 0.5, 0.7, 1.0)
 # Distance of the film's free edge from the axis, in thicknesses, where none is given.
 _FREE_EDGE = 12.5
 # Radius of the rounding of a rod's edge, as a share of the rod's radius, where none is given: a
@@ -113,11 +118,17 @@ def solve_finite_strain(
     by_load = isinstance(targets[0], Load)
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    tell = progress or (lambda _: None)
-    rough = () if request.stays else tuple(request.reached(refinement / _ROUGHER, lambda x: tell(x / 2)))
-    begin, middle = (0.0, 0.3) if request.stays else (0.5, 0.7)
-    coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(begin + (middle - begin) * x)))
-    return tuple(request.solve(refinement, coarse, lambda x: tell(middle + (1 - middle) * x)))
+    ends = _WORK_STICKING if request.hangs_on_the_way else _WORK_SLIDING
+
+    def tell(mesh: int, share: float) -> None:
+        if progress is not None:
+            progress(float(np.interp(mesh + share, range(4), ends)))
+
+    rough: Sequence[Contact] = ()
+    if not request.hangs_on_the_way:
+        rough = tuple(request.reached(refinement / _ROUGHER, partial(tell, 0)))
+    coarse = tuple(request.solve(refinement / _COARSER, rough, partial(tell, 1)))
+    return tuple(request.solve(refinement, coarse, partial(tell, 2)))
 
 
 def follow_depths(
@@ -148,16 +159,22 @@ class _Request:
     ) -> Iterator[Contact]:
         """Yield the contacts on one mesh; their convergence against those on a coarser one."""
         pressing = self._pressing(refinement, coarse)
+        path = Path(pressing, self._start(pressing))
         try:
-            guesses = [] if self.stays else [
-                pressing.interpolated(contact.inside.pressed, contact.inside.pressing) for contact in coarse
-            ]
-            steps = follow(pressing, self._start(pressing), self.goals, progress, guesses)
-            for i, step in enumerate(steps):
-                contact = self._contact(pressing, step)
-                if i < len(coarse):
-                    change = relative_change(contact, coarse[i], _SAMPLES * self.film.thickness)
-                    contact = replace(contact, convergence=change)
+            for i, goal in enumerate(self.goals):
+                others = coarse[i : i + 1]
+                guesses = [
+                    pressing.interpolated(other.inside.pressed, other.inside.pressing)
+                    for other in others
+                    if isinstance(other.inside, FiniteStrainField) and not self.hangs_on_the_way
+                ]
+                for share in path.reach(goal, guesses):
+                    progress((i + share) / len(self.goals))
+                contact = self._contact(pressing, path.states)
+                for other in others:
+                    change = relative_change(contact, other, _SAMPLES * self.film.thickness)
+                    steps = max(contact.steps, other.steps)
+                    contact = replace(contact, convergence=change, steps=steps)
                 yield contact
         except NewtonError as problem:
             error = ConvergenceError(
@@ -165,13 +182,13 @@ class _Request:
                 why="The film folds around the indenter more sharply than its elements can follow.",
                 cure="Ask for less; or let the film stick (friction inf), which goes further.",
             )
-            if isinstance(problem.last, Step):
-                error.last = self._contact(pressing, problem.last)
+            if path.states:
+                error.last = self._contact(pressing, path.states)
             raise error from problem
 
     @property
-    def stays(self) -> bool:
-        """Whether the film stays where it first touched: its states hang on the way to them."""
+    def hangs_on_the_way(self) -> bool:
+        """Whether the film stays where it first touched the indenter."""
         return self.sticking and isinstance(self.indenter, Rod)
 
     def reached(self, refinement: float, progress: Progress = lambda _: None) -> Iterator[Contact]:
@@ -238,13 +255,15 @@ class _Request:
         chosen = r <= reach * (1 + 1e-9)
         return Pressed(np.zeros(elements.size), depth, nodes[chosen], pressing.place_at(r[chosen]))
 
-    def _contact(self, pressing: Pressing, step: Step) -> Contact:
-        """Return a state in SI units, of unknown convergence."""
-        pressed, elements, rod = step.pressed, pressing.elements, isinstance(self.indenter, Rod)
+    def _contact(self, pressing: Pressing, states: list[Pressed]) -> Contact:
+        """Return the last state on a way in SI units, of unknown convergence."""
+        pressed, elements, rod = states[-1], pressing.elements, isinstance(self.indenter, Rod)
         radius = min(outermost(pressing, pressed) / _MM, self.indenter.extent if rod else math.inf)
         energy = elements.energy(pressed.x) / _MM
-        # A sphere that sticks has no way: nothing moves radially wherever it touches.
-        work = None if pressing.upright else step.work / _MM if self.sticking else energy
+        done: float | None = energy
+        if self.sticking:
+            # A sphere that sticks has no way: nothing moves radially wherever it touches.
+            done = work(states) / _MM if rod else None
         return Contact(
             film=self.film,
             indenter=self.indenter,
@@ -256,14 +275,14 @@ class _Request:
             loading="" if rod or not self.sticking else "total",
             backend="fem",
             convergence=math.inf,
-            steps=step.count,
+            steps=len(states),
             discretisation=f"{elements.mesh.t.shape[1]} Taylor-Hood triangles (quadratic "
             f"displacement, linear pressure), {elements.size} unknowns",
             traction=interface_traction(pressing, pressed),
             inside=FiniteStrainField(pressing, pressed),
             elastic_energy=energy,
-            work=work,
-            dissipated_energy=None if work is None else 0.0,
+            work=done,
+            dissipated_energy=None if done is None else 0.0,
             strain="finite",
         )
 
