@@ -8,7 +8,7 @@ second derivatives, so that the forces are normal to the face where it slides.  
 active set: a node that is pulled leaves, and one that lies inside the indenter is taken in.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -164,15 +164,21 @@ class Pressing:
                 tangent = None
         raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")
 
-    def interpolated(self, state: Pressed, mesh: "Pressing") -> Pressed:
-        """Return a guess at the state that was found on another mesh."""
-        elements, surface = self.elements, mesh.elements.surface
-        x = elements.interpolated(state.x, mesh.elements)
+    def interpolated(self, contact: Any) -> Pressed:
+        """Return a guess at the state of a contact that was found on another mesh."""
+        elements, pressed = self.elements, contact.inside.pressed
+        mesh = contact.inside.pressing.elements
         # A node touches between two that did.
-        r, before = elements.nodes[0][elements.surface], mesh.elements.nodes[0][surface]
-        touching = np.interp(r, before, np.isin(surface, state.touching)) > 1 - 1e-9
-        ahead = replace(state, x=x, touching=elements.surface[touching])
-        return replace(ahead, place=self.nearest(ahead)[0][touching])
+        touched = np.isin(mesh.surface, pressed.touching)
+        r, before = elements.nodes[0][elements.surface], mesh.nodes[0][mesh.surface]
+        touching = elements.surface[np.interp(r, before, touched) > 1 - 1e-9]
+        x = elements.interpolated(pressed.x, mesh)
+        return self.at_nearest(replace(pressed, x=x, touching=touching))
+
+    def at_nearest(self, state: Pressed) -> Pressed:
+        """Return the state with its touching nodes' places where they are nearest to the face."""
+        touches = np.isin(self.elements.surface, state.touching)
+        return replace(state, place=self.nearest(state)[0][touches])
 
     def is_sound(self, state: Pressed, before: Pressed) -> bool:
         """Whether no point's volume has changed by so much that Newton's method would go astray."""
@@ -189,11 +195,7 @@ class Pressing:
         return replace(state, x=x)
 
     def _touching(
-        self,
-        state: Pressed,
-        before: Pressed,
-        seen: set[bytes],
-        forces: FloatArray | None = None,
+        self, state: Pressed, before: Pressed, seen: set[bytes], forces: Any = None
     ) -> Pressed | None:
         """Return the state with the nodes that should touch, or None if they do already."""
         # Without forces none leaves.
@@ -207,12 +209,10 @@ class Pressing:
             pushed = up * forces[nodes] - along * forces[nodes + self.elements.n] > 0
             chosen[touches] = pushed[touches]
         chosen[0] = True
-        if np.array_equal(chosen, touches):
-            return None
         if (key := chosen.tobytes()) in seen:  # a node that enters and leaves by turns is kept
             chosen |= touches
-            if np.array_equal(chosen, touches):
-                return None
+        if np.array_equal(chosen, touches):
+            return None
         seen.add(key)
         if self.sticking and not self.upright:
             # A node that sticks stays where its way since the last state crossed the face.
@@ -232,15 +232,9 @@ class Pressing:
         u, w = ((1 - share) * state.x[dofs] + share * to.x[dofs] for dofs in (nodes, nodes + n))
         depth = (1 - share) * state.depth + share * to.depth
         place, gap = self.face.nearest(radius + u, w + depth)
-        return (self.place_at(radius) if self.upright else place), gap
-
-    def place_at(self, r: FloatArray) -> FloatArray:
-        """Return the arc length at which the face has the radius ``r``."""
-        s = r.copy()
-        for _ in range(3):  # Newton; faces are nearly flat where this is asked
-            points, tangents, _ = self.face.contour(s)
-            s -= (points[0] - r) / np.maximum(tangents[0], 0.1)
-        return s
+        if self.upright:
+            place = self.face.radius * np.arcsin(np.minimum(radius / self.face.radius, 1.0))
+        return place, gap
 
     def _step(
         self, state: Pressed, forces: FloatArray, goal: Goal, tangent: _Tangent | None
@@ -350,7 +344,7 @@ class Path:
         self.pressing, self.start, self.length = pressing, start, np.inf
         self.states: list[Pressed] = []
 
-    def reach(self, goal: Goal, guesses: Sequence[Pressed]) -> Iterator[float]:
+    def reach(self, goal: Goal, guesses: Iterable[Pressed]) -> Iterator[float]:
         """Go to a goal, at once from a good guess; yield the share of the way after each step."""
         for guess in guesses:
             with suppress(NewtonError):
@@ -400,16 +394,12 @@ class Path:
         for share in _SHARES:
             to = float(values[-1] + share * (goal.value - values[-1]))
             # The parabola through three states.
-            weights = [
-                np.prod((to - np.delete(values, i)) / (values[i] - np.delete(values, i)))
-                for i in range(values.size)
-            ]
-            x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
-            depth = float(sum(w * s.depth for w, s in zip(weights, states, strict=True)))
+            powers = np.vander(values - to, increasing=True).T
+            weights = np.linalg.solve(powers, np.eye(values.size)[0])
+            x, depth = weights @ [s.x for s in states], float(weights @ [s.depth for s in states])
             ahead = replace(states[-1], x=x, depth=depth if goal.is_load else to)
             if not self.pressing.sticking:
-                touching = np.isin(self.pressing.elements.surface, ahead.touching)
-                ahead = replace(ahead, place=self.pressing.nearest(ahead)[0][touching])
+                ahead = self.pressing.at_nearest(ahead)
             if self.pressing.is_sound(self.pressing.placed(ahead), states[-1]):
                 break
         return ahead

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,11 +39,10 @@ Progress = Callable[[float], None]
 
 _MM = 1e3
 _MPA = 1e6
-# The mesh that tells the convergence has sides longer by a factor; where states do not hang on the
-# way to them, it is followed on a rough mesh, and the others start from there.
-_COARSER, _ROUGHER = 1.5, 1.5**3
-# Shares of the work that are done before a rough, a coarse and a fine mesh, and after it.
-_WORK_STICKING, _WORK_SLIDING = (0.0, 0.0, 0.3, 1.0), (0.0, 0.5, 0.7, 1.0)
+# The mesh that tells the convergence has sides longer by a factor, and takes a share of the work.
+_COARSER, _COARSE_WORK = 1.5, 0.3
+# Where a state does not depend on the path, this is followed on a mesh that is rougher still.
+_ROUGHER = 1.5**3
 # Distance of the film's free edge from the axis, in thicknesses, where none is given.
 _FREE_EDGE = 12.5
 # Radius of the rounding of a rod's edge, as a share of the rod's radius, where none is given: a
@@ -118,17 +117,10 @@ def solve_finite_strain(
     by_load = isinstance(targets[0], Load)
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
-    ends = _WORK_STICKING if request.hangs_on_the_way else _WORK_SLIDING
-
-    def tell(mesh: int, share: float) -> None:
-        if progress is not None:
-            progress(float(np.interp(mesh + share, range(4), ends)))
-
-    rough: Sequence[Contact] = ()
-    if not request.hangs_on_the_way:
-        rough = tuple(request.reached(refinement / _ROUGHER, partial(tell, 0)))
-    coarse = tuple(request.solve(refinement / _COARSER, rough, partial(tell, 1)))
-    return tuple(request.solve(refinement, coarse, partial(tell, 2)))
+    tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
+    rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
+    coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(_COARSE_WORK * x)))
+    return tuple(request.solve(refinement, coarse, lambda x: tell(1 - rest + rest * x)))
 
 
 def follow_depths(
@@ -152,10 +144,7 @@ class _Request:
     edge: float | None
 
     def solve(
-        self,
-        refinement: float,
-        coarse: Sequence[Contact] = (),
-        progress: Progress = lambda _: None,
+        self, refinement: float, coarse: Sequence[Contact] = (), progress: Progress = lambda _: None
     ) -> Iterator[Contact]:
         """Yield the contacts on one mesh; their convergence against those on a coarser one."""
         pressing = self._pressing(refinement, coarse)
@@ -163,11 +152,7 @@ class _Request:
         try:
             for i, goal in enumerate(self.goals):
                 others = coarse[i : i + 1]
-                guesses = [
-                    pressing.interpolated(other.inside.pressed, other.inside.pressing)
-                    for other in others
-                    if isinstance(other.inside, FiniteStrainField) and not self.hangs_on_the_way
-                ]
+                guesses = map(pressing.interpolated, () if self.path_dependent else others)
                 for share in path.reach(goal, guesses):
                     progress((i + share) / len(self.goals))
                 contact = self._contact(pressing, path.states)
@@ -187,14 +172,14 @@ class _Request:
             raise error from problem
 
     @property
-    def hangs_on_the_way(self) -> bool:
+    def path_dependent(self) -> bool:
         """Whether the film stays where it first touched the indenter."""
         return self.sticking and isinstance(self.indenter, Rod)
 
-    def reached(self, refinement: float, progress: Progress = lambda _: None) -> Iterator[Contact]:
+    def reached(self, refinement: float) -> Iterator[Contact]:
         """Yield the contacts on one mesh as far as it goes."""
         with suppress(ConvergenceError):
-            yield from self.solve(refinement, (), progress)
+            yield from self.solve(refinement)
 
     def _pressing(self, refinement: float, coarse: Sequence[Contact]) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
@@ -252,18 +237,21 @@ class _Request:
         else:
             reach = 0.8 * self._hertz_radius(self.goals[0])
             depth = reach**2 / (self.indenter.extent * _MM)
-        chosen = r <= reach * (1 + 1e-9)
-        return Pressed(np.zeros(elements.size), depth, nodes[chosen], pressing.place_at(r[chosen]))
+        touching = nodes[r <= reach * (1 + 1e-9)]
+        return pressing.at_nearest(Pressed(np.zeros(elements.size), depth, touching, np.empty(0)))
 
     def _contact(self, pressing: Pressing, states: list[Pressed]) -> Contact:
         """Return the last state on a way in SI units, of unknown convergence."""
         pressed, elements, rod = states[-1], pressing.elements, isinstance(self.indenter, Rod)
-        radius = min(outermost(pressing, pressed) / _MM, self.indenter.extent if rod else math.inf)
+        # Between the last node that touches and the next.
+        field = FiniteStrainField(pressing, pressed)
+        last = int(np.flatnonzero(np.isin(elements.surface, pressed.touching))[-1])
+        ends = field.surface[0][last : last + 2] + field.surface[2][last : last + 2]
+        radius = min(float(np.mean(ends)), self.indenter.extent if rod else math.inf)
         energy = elements.energy(pressed.x) / _MM
-        done: float | None = energy
-        if self.sticking:
-            # A sphere that sticks has no way: nothing moves radially wherever it touches.
-            done = work(states) / _MM if rod else None
+        # Without friction the energy is the work; a sphere that sticks has no way.
+        by_load = work(states) / _MM if self.path_dependent else energy
+        done = None if pressing.upright else by_load
         return Contact(
             film=self.film,
             indenter=self.indenter,
@@ -279,7 +267,7 @@ class _Request:
             discretisation=f"{elements.mesh.t.shape[1]} Taylor-Hood triangles (quadratic "
             f"displacement, linear pressure), {elements.size} unknowns",
             traction=interface_traction(pressing, pressed),
-            inside=FiniteStrainField(pressing, pressed),
+            inside=field,
             elastic_energy=energy,
             work=done,
             dissipated_energy=None if done is None else 0.0,
@@ -427,11 +415,3 @@ def _interpolated(nodes: FloatArray, values: FloatArray, r: ArrayLike, parity: i
     radii = np.asarray(r, dtype=np.float64)
     spline = _spline(nodes, values, parity) if parity else PchipInterpolator(nodes, values)
     return np.where(radii <= nodes[-1], spline(np.minimum(radii, nodes[-1])), 0.0)
-
-
-def outermost(pressing: Pressing, pressed: Pressed) -> float:
-    """Return the radius after deformation at which the contact ends, in mm, between two nodes."""
-    nodes = pressing.elements.surface
-    r = pressing.elements.nodes[0][nodes] + pressed.x[nodes]
-    last = int(np.flatnonzero(np.isin(nodes, pressed.touching))[-1])
-    return float((r[last] + r[min(last + 1, r.size - 1)]) / 2)
