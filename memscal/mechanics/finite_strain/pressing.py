@@ -114,7 +114,6 @@ class Pressed:
     touching: IntArray  # nodes, from the axis outward
     place: FloatArray  # their places on the contour, in mm of arc length
     load: float = 0.0  # N
-    iterations: int = 0  # Newton steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +137,11 @@ class Pressing:
     upright: bool = False
 
     def press(self, start: Pressed, goal: Goal, before: Pressed) -> Pressed:
-        """Return the equilibrium at a goal from a state near it and the last one on the way."""
-        # It raises :class:`NewtonError` where it finds none.
+        """Return the equilibrium at a goal, from a state near it and the last; or NewtonError."""
         elements, seen = self.elements, set[bytes]()
         state = self.placed(self._touching(start, before, set()) or start)
         forces, tangent, last = elements.forces(state.x), None, np.inf
-        for iteration in range(1, _MOST_ITERATIONS + 1):
+        for _ in range(_MOST_ITERATIONS):
             state, moved, tangent = self._step(state, forces, goal, tangent)
             if not moved < _FARTHEST * elements.thickness:
                 break
@@ -159,7 +157,7 @@ class Pressing:
                 if elements.is_inside_out(state.x):
                     break
                 load = -float(np.sum(forces[state.touching + elements.n]))
-                return replace(state, load=load, iterations=iteration)
+                return replace(state, load=load)
             elif not near:
                 tangent = None
         raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")
@@ -198,13 +196,12 @@ class Pressing:
         self, state: Pressed, before: Pressed, seen: set[bytes], forces: Any = None
     ) -> Pressed | None:
         """Return the state with the nodes that should touch, or None if they do already."""
-        # Without forces none leaves.
         nodes = self.elements.surface
         place, gap = self.nearest(state)
         touches = np.isin(nodes, state.touching)
         place[touches] = state.place
         chosen = np.where(touches, True, gap < -_INSIDE * self.elements.thickness)
-        if forces is not None:
+        if forces is not None:  # else none leaves
             _, (along, up), _ = self.face.contour(place)
             pushed = up * forces[nodes] - along * forces[nodes + self.elements.n] > 0
             chosen[touches] = pushed[touches]
@@ -310,10 +307,6 @@ _GROWTH = 1.4
 # Under a rod no step is longer than this share of its radius: film that comes to stick on the way
 # is placed to the second order in it.
 _LONGEST = 0.1
-# A step that takes more iterations than this is not followed by a longer one.
-_EASY = 9
-# States through which the next is guessed.
-_THROUGH = 3
 # A step is halved at most so many times.
 _HALVINGS = 8
 
@@ -328,13 +321,10 @@ def work(states: list[Pressed]) -> float:
 
     # Over the number of the step, so that a path may turn back.
     number = np.arange(len(states) + 1)
-    depth, load = (
-        CubicSpline(number, [0.0, *(getattr(state, name) for state in states)])
-        for name in ("depth", "load")
-    )
+    path = CubicSpline(number, [(0.0, 0.0), *((state.depth, state.load) for state in states)])
     t, weights = np.polynomial.legendre.leggauss(4)
     places = (number[:-1, None] + (t + 1) / 2).ravel()
-    return float(np.tile(weights / 2, number.size - 1) @ (load(places) * depth(places, 1)))
+    return float(np.tile(weights / 2, len(states)) @ (path(places)[:, 1] * path(places, 1)[:, 0]))
 
 
 class Path:
@@ -370,24 +360,21 @@ class Path:
                     raise
                 continue
             halvings = max(0, halvings - 1)
-            if state.iterations <= _EASY:
-                self.length = max(abs(ahead - begin), self.length) * _GROWTH
-            self.length = min(self.length, _LONGEST * self._radius(goal))
+            longer = max(abs(ahead - begin), self.length) * _GROWTH
+            self.length = min(longer, _LONGEST * self._radius(goal))
             self.states.append(state)
             begin = ahead
             yield 1 - (goal.value - begin) / way
 
     def _radius(self, goal: Goal) -> float:
         """Return a rod's radius as a depth, or the load that sinks it so far; inf for a sphere."""
-        face = self.pressing.face
-        if not isinstance(face, RodFace):
-            return np.inf
-        stiffness = 8 * self.pressing.elements.material.shear_modulus * face.radius
-        return face.radius * (stiffness if goal.is_load else 1.0)
+        radius = self.pressing.face.radius if isinstance(self.pressing.face, RodFace) else np.inf
+        modulus = self.pressing.elements.material.shear_modulus
+        return radius * (8 * modulus * radius if goal.is_load else 1.0)
 
     def _guess(self, goal: Goal) -> Pressed:
         """Return the last state, carried on as it came as far as that is sound."""
-        states = self.states[-_THROUGH:] or [self.start]
+        states = self.states[-3:] or [self.start]
         values = np.array([_value(state, goal) for state in states])
         if np.any(np.diff(values) * np.sign(goal.value - values[-1]) <= 0):  # it turned back
             states, values = states[-1:], values[-1:]
