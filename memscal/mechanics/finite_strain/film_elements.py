@@ -259,13 +259,25 @@ class FilmElements:
         moving = np.concatenate([dofs, dofs + self.n], axis=1)
         return gradients, pressures, volumes, moving, pressure.element_dofs.T + 2 * self.n
 
-    def _state(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _state(self, x: FloatArray, shapes: Any = None) -> tuple[FloatArray, FloatArray]:
         """Return the deformation gradient (cells, points, 5) and the pressure (cells, points)."""
-        gradients, pressures, _, moving, pressing = self._shape
+        gradients, pressures = shapes or self._shape[:2]
+        moving, pressing = self._shape[3:]
         cells, points = pressures.shape[:2]
         F = (gradients.reshape(cells, -1, 12) @ x[moving][:, :, None]).reshape(cells, points, 5)
         F[..., [0, 3, 4]] += 1.0
         return F, (pressures @ x[pressing][:, :, None])[..., 0]
+
+    def volume_ratio(self, x: FloatArray) -> FloatArray:
+        """Return J at the points of integration, shape (cells, points)."""
+        return determinant(self._state(x)[0])
+
+    def interpolated(self, x: FloatArray, mesh: FilmElements) -> FloatArray:
+        """Return the unknowns ``x`` of another mesh of the same film at this mesh's nodes."""
+        displacement, pressure = mesh.bases
+        moved = displacement.probes(self.nodes) @ x[: 2 * mesh.n].reshape(2, -1).T
+        pressures = pressure.probes(self.bases[1].doflocs) @ x[2 * mesh.n :]
+        return np.concatenate([moved.T.ravel(), pressures])
 
     def energy(self, x: FloatArray) -> float:
         """Return the stored energy, in mJ."""
@@ -329,11 +341,7 @@ class FilmElements:
         displacement = skfem.Basis(self.mesh, skfem.ElementTriP2(), quadrature=at_nodes)
         pressure = displacement.with_element(skfem.ElementTriP1())
         radius = np.asarray(displacement.global_coordinates())[0]
-        gradients, pressures = _shapes(displacement, pressure, radius)
-        _, _, _, moving, pressing = self._shape
-        F = np.einsum("cqij,cj->cqi", gradients, x[moving])
-        F[..., [0, 3, 4]] += 1.0
-        stress = self.material.cauchy(F, np.einsum("cqj,cj->cq", pressures, x[pressing]))
+        stress = self.material.cauchy(*self._state(x, _shapes(displacement, pressure, radius)))
         dofs = displacement.element_dofs.T.ravel()
         sums = [np.bincount(dofs, stress[..., i].ravel()) for i in range(4)]
         return np.stack(sums, axis=-1) / np.bincount(dofs)[:, None]

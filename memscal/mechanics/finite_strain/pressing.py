@@ -8,7 +8,8 @@ second derivatives, so that the forces are normal to the face where it slides.  
 active set: a node that is pulled leaves, and one that lies inside the indenter is taken in.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -81,7 +82,11 @@ _SETTLED = 1e-10
 _LOOSE = 1e-3
 # Near the end the factors are kept while each step is this much shorter than the one before.
 _KEPT = 0.1
-_MOST_ITERATIONS = 20
+_MOST_ITERATIONS = 30
+# A step or a guess that changes a point's volume by such factors is shortened to the first of these
+# shares that does not.  One that moves nothing by more than so many thicknesses is harmless.
+_CRUSHED, _SWOLLEN, _HARMLESS = 0.1, 4.0, 1e-5
+_SHARES = (1.0, 1 / 2, 1 / 4, 1 / 8, 1 / 16, 1 / 32)
 # A Newton step that moves something farther than so many thicknesses has diverged.
 _FARTHEST = 3.0
 # A node must lie this deep inside the indenter, in film thicknesses, to be taken in.
@@ -109,7 +114,6 @@ class Pressed:
     touching: IntArray  # nodes, from the axis outward
     place: FloatArray  # their places on the contour, in mm of arc length
     load: float = 0.0  # N
-    iterations: int = 0  # Newton steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,32 +137,51 @@ class Pressing:
     upright: bool = False
 
     def press(self, start: Pressed, goal: Goal, before: Pressed) -> Pressed:
-        """Return the equilibrium at a goal from a state near it and the last one on the way."""
-        # It raises :class:`NewtonError` where it finds none.
-        state = start if goal.is_load else replace(start, depth=goal.value)
-        seen: set[bytes] = set()
-        state = self.placed(self._touching(state, before, set(), guess=True) or state)
-        tangent, last = None, np.inf
-        for iteration in range(1, _MOST_ITERATIONS + 1):
-            state, moved, tangent = self._step(state, goal, tangent)
-            if not moved < _FARTHEST * self.elements.thickness:
+        """Return the equilibrium at a goal, from a state near it and the last; or NewtonError."""
+        elements, seen = self.elements, set[bytes]()
+        state = self.placed(self._touching(start, before, set()) or start)
+        forces, tangent, last = elements.forces(state.x), None, np.inf
+        for _ in range(_MOST_ITERATIONS):
+            state, moved, tangent = self._step(state, forces, goal, tangent)
+            if not moved < _FARTHEST * elements.thickness:
                 break
-            near, last = moved < _KEPT * last, moved
-            if moved > _LOOSE * self.elements.thickness:
+            forces, near, last = elements.forces(state.x), moved < _KEPT * last, moved
+            if tangent is None or moved > _LOOSE * elements.thickness:
                 tangent = None
                 continue
-            changed = self._touching(state, before, seen)
+            changed = self._touching(state, before, seen, forces)
             if changed is not None:
                 state, tangent = self.placed(changed), None
-            elif moved < _SETTLED * self.elements.thickness:
-                if self.elements.is_inside_out(state.x):
+                forces = elements.forces(state.x)
+            elif moved < _SETTLED * elements.thickness:
+                if elements.is_inside_out(state.x):
                     break
-                forces = self.elements.forces(state.x)
-                load = -float(np.sum(forces[state.touching + self.elements.n]))
-                return replace(state, load=load, iterations=iteration)
+                load = -float(np.sum(forces[state.touching + elements.n]))
+                return replace(state, load=load)
             elif not near:
                 tangent = None
         raise NewtonError(f"No equilibrium was found near a depth of {state.depth:.4g} mm.")
+
+    def interpolated(self, contact: Any) -> Pressed:
+        """Return a guess at the state of a contact that was found on another mesh."""
+        elements, pressed = self.elements, contact.inside.pressed
+        mesh = contact.inside.pressing.elements
+        # A node touches between two that did.
+        touched = np.isin(mesh.surface, pressed.touching)
+        r, before = elements.nodes[0][elements.surface], mesh.nodes[0][mesh.surface]
+        touching = elements.surface[np.interp(r, before, touched) > 1 - 1e-9]
+        x = elements.interpolated(pressed.x, mesh)
+        return self.at_nearest(replace(pressed, x=x, touching=touching))
+
+    def at_nearest(self, state: Pressed) -> Pressed:
+        """Return the state with its touching nodes' places where they are nearest to the face."""
+        touches = np.isin(self.elements.surface, state.touching)
+        return replace(state, place=self.nearest(state)[0][touches])
+
+    def is_sound(self, state: Pressed, before: Pressed) -> bool:
+        """Whether no point's volume has changed by so much that Newton's method would go astray."""
+        now, last = (self.elements.volume_ratio(s.x) for s in (state, before))
+        return bool(np.all((last <= 0) | (now > _CRUSHED * last) & (now < _SWOLLEN * last)))
 
     def placed(self, state: Pressed) -> Pressed:
         """Return the state with its touching nodes on the face."""
@@ -170,7 +193,7 @@ class Pressing:
         return replace(state, x=x)
 
     def _touching(
-        self, state: Pressed, before: Pressed, seen: set[bytes], *, guess: bool = False
+        self, state: Pressed, before: Pressed, seen: set[bytes], forces: Any = None
     ) -> Pressed | None:
         """Return the state with the nodes that should touch, or None if they do already."""
         nodes = self.elements.surface
@@ -178,18 +201,15 @@ class Pressing:
         touches = np.isin(nodes, state.touching)
         place[touches] = state.place
         chosen = np.where(touches, True, gap < -_INSIDE * self.elements.thickness)
-        if not guess:
+        if forces is not None:  # else none leaves
             _, (along, up), _ = self.face.contour(place)
-            forces = self.elements.forces(state.x)
             pushed = up * forces[nodes] - along * forces[nodes + self.elements.n] > 0
             chosen[touches] = pushed[touches]
         chosen[0] = True
-        if np.array_equal(chosen, touches):
-            return None
         if (key := chosen.tobytes()) in seen:  # a node that enters and leaves by turns is kept
             chosen |= touches
-            if np.array_equal(chosen, touches):
-                return None
+        if np.array_equal(chosen, touches):
+            return None
         seen.add(key)
         if self.sticking and not self.upright:
             # A node that sticks stays where its way since the last state crossed the face.
@@ -209,33 +229,32 @@ class Pressing:
         u, w = ((1 - share) * state.x[dofs] + share * to.x[dofs] for dofs in (nodes, nodes + n))
         depth = (1 - share) * state.depth + share * to.depth
         place, gap = self.face.nearest(radius + u, w + depth)
-        return (self.place_at(radius) if self.upright else place), gap
-
-    def place_at(self, r: FloatArray) -> FloatArray:
-        """Return the arc length at which the face has the radius ``r``."""
-        s = r.copy()
-        for _ in range(3):  # Newton; faces are nearly flat where this is asked
-            points, tangents, _ = self.face.contour(s)
-            s -= (points[0] - r) / np.maximum(tangents[0], 0.1)
-        return s
+        if self.upright:
+            place = self.face.radius * np.arcsin(np.minimum(radius / self.face.radius, 1.0))
+        return place, gap
 
     def _step(
-        self, state: Pressed, goal: Goal, tangent: _Tangent | None
-    ) -> tuple[Pressed, float, _Tangent]:
-        """Take Newton's step; return the state after it and how far it moved something, in mm."""
-        touching, n = state.touching, self.elements.n
-        forces, change = self.elements.forces(state.x), self._change(state)
+        self, state: Pressed, forces: FloatArray, goal: Goal, tangent: _Tangent | None
+    ) -> tuple[Pressed, float, _Tangent | None]:
+        """Take Newton's step; return the state after it and how far it moves something, in mm."""
+        touching, n, change = state.touching, self.elements.n, self._change(state)
         tangent = tangent or self._tangent(state, forces, change)
-        solution, sunk = tangent.factors.solve(-np.asarray(change.T @ forces)), 0.0
+        solution = tangent.factors.solve(-np.asarray(change.T @ forces))
+        sunk = goal.value - state.depth
         if goal.is_load:
             load = -float(np.sum(forces[touching + n]))
             sunk = (goal.value - load - tangent.pushed @ solution) / tangent.stiffness
-            solution = solution + sunk * tangent.along
+        solution = solution + sunk * tangent.along
         free = np.zeros(self.elements.size)
         free[self._free(state)] = solution
-        place = state.place if self.sticking else state.place + free[touching]
-        ahead = replace(state, x=state.x + free, depth=state.depth + sunk, place=place)
-        return self.placed(ahead), max(float(np.max(np.abs(free[: 2 * n]))), abs(sunk)), tangent
+        moved = max(float(np.max(np.abs(free[: 2 * n]))), abs(sunk))
+        for share in _SHARES:
+            place = state.place if self.sticking else state.place + share * free[touching]
+            x, depth = state.x + share * free, state.depth + share * sunk
+            ahead = self.placed(replace(state, x=x, depth=depth, place=place))
+            if moved < _HARMLESS * self.elements.thickness or self.is_sound(ahead, state):
+                break
+        return ahead, moved, tangent if share == 1 else None
 
     def _free(self, state: Pressed) -> IntArray:
         """Return the unknowns that are free; those of sliding nodes are radial."""
@@ -288,81 +307,43 @@ _GROWTH = 1.4
 # Under a rod no step is longer than this share of its radius: film that comes to stick on the way
 # is placed to the second order in it.
 _LONGEST = 0.1
-# A step that takes more iterations than this is not followed by a longer one.
-_EASY = 9
-# States through which the next is guessed.
-_THROUGH = 3
 # A step is halved at most so many times.
 _HALVINGS = 8
-
-
-# What is told the share of the work that is done.
-Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """A state on the way, how many steps led there, and the work on the way in mJ."""
-
-    pressed: Pressed
-    count: int
-    work: float
 
 
 def _value(state: Pressed, goal: Goal) -> float:
     return state.load if goal.is_load else state.depth
 
 
-def follow(
-    pressing: Pressing, start: Pressed, goals: list[Goal], progress: Progress | None = None
-) -> Iterator[Step]:
-    """Yield the states at the goals, in order; the ``last`` of a NewtonError is the last step.
+def work(states: list[Pressed]) -> float:
+    """Return the integral of load over depth from the untouched film, by splines, in mJ."""
+    from scipy.interpolate import CubicSpline
 
-    ``progress`` is told the share of the way after each step.
-    """
-    path = _Path(pressing, start)
-    for number, goal in enumerate(goals):
-        try:
-            for share in path.reach(goal):
-                if progress is not None:
-                    progress((number + share) / len(goals))
-        except NewtonError as problem:
-            problem.last = path.step if path.states else None
-            raise
-        yield path.step
+    # Over the number of the step, so that a path may turn back.
+    number = np.arange(len(states) + 1)
+    path = CubicSpline(number, [(0.0, 0.0), *((state.depth, state.load) for state in states)])
+    t, weights = np.polynomial.legendre.leggauss(4)
+    places = (number[:-1, None] + (t + 1) / 2).ravel()
+    return float(np.tile(weights / 2, len(states)) @ (path(places)[:, 1] * path(places, 1)[:, 0]))
 
 
-class _Path:
-    """The state reached, the one before it, and the length of the next step."""
+class Path:
+    """The states so far, and the length of the next step."""
 
     def __init__(self, pressing: Pressing, start: Pressed) -> None:
         self.pressing, self.start, self.length = pressing, start, np.inf
         self.states: list[Pressed] = []
 
-    @property
-    def step(self) -> Step:
-        return Step(self.states[-1], len(self.states), self._work())
-
-    def _work(self) -> float:
-        """Return the integral of load over depth, by splines through four points or more."""
-        from scipy.interpolate import CubicSpline
-
-        depths = np.array([0.0] + [state.depth for state in self.states])
-        loads = np.array([0.0] + [state.load for state in self.states])
-        # Over the number of the step, so that a path may turn back.
-        number = np.arange(depths.size)
-        if number.size < 4:
-            return float(np.sum(np.diff(depths) * (loads[1:] + loads[:-1]) / 2))
-        depth, load = CubicSpline(number, depths), CubicSpline(number, loads)
-        t, weights = np.polynomial.legendre.leggauss(4)
-        places = (number[:-1, None] + (t + 1) / 2).ravel()
-        return float(np.tile(weights / 2, number.size - 1) @ (load(places) * depth(places, 1)))
-
-    def reach(self, goal: Goal) -> Iterator[float]:
-        """Go to a goal; yield the share of the way after each step."""
+    def reach(self, goal: Goal, guesses: Iterable[Pressed]) -> Iterator[float]:
+        """Go to a goal, at once from a good guess; yield the share of the way after each step."""
+        for guess in guesses:
+            with suppress(NewtonError):
+                self.states.append(self.pressing.press(guess, goal, guess))
+                yield 1.0
+                return
         begin, halvings = _value(self.states[-1], goal) if self.states else 0.0, 0
         way = goal.value - begin
-        if not self.states:
+        if np.isinf(self.length):
             self.length = min(_FIRST * self._radius(goal), goal.value / _FIRST_STEPS)
         while begin != goal.value:
             left = goal.value - begin
@@ -379,36 +360,33 @@ class _Path:
                     raise
                 continue
             halvings = max(0, halvings - 1)
-            if state.iterations <= _EASY:
-                self.length = max(abs(ahead - begin), self.length) * _GROWTH
-            self.length = min(self.length, _LONGEST * self._radius(goal))
+            longer = max(abs(ahead - begin), self.length) * _GROWTH
+            self.length = min(longer, _LONGEST * self._radius(goal))
             self.states.append(state)
             begin = ahead
             yield 1 - (goal.value - begin) / way
 
     def _radius(self, goal: Goal) -> float:
         """Return a rod's radius as a depth, or the load that sinks it so far; inf for a sphere."""
-        face = self.pressing.face
-        if not isinstance(face, RodFace):
-            return np.inf
-        stiffness = 8 * self.pressing.elements.material.shear_modulus * face.radius
-        return face.radius * (stiffness if goal.is_load else 1.0)
+        radius = self.pressing.face.radius if isinstance(self.pressing.face, RodFace) else np.inf
+        modulus = self.pressing.elements.material.shear_modulus
+        return radius * (8 * modulus * radius if goal.is_load else 1.0)
 
     def _guess(self, goal: Goal) -> Pressed:
-        """Return the last state, carried on as it came: by a parabola through three states."""
-        states = self.states[-_THROUGH:] or [self.start]
+        """Return the last state, carried on as it came as far as that is sound."""
+        states = self.states[-3:] or [self.start]
         values = np.array([_value(state, goal) for state in states])
         if np.any(np.diff(values) * np.sign(goal.value - values[-1]) <= 0):  # it turned back
-            return states[-1]
-        weights = [
-            np.prod((goal.value - np.delete(values, i)) / (values[i] - np.delete(values, i)))
-            for i in range(values.size)
-        ]
-        x = np.sum([w * s.x for w, s in zip(weights, states, strict=True)], axis=0)
-        depth = float(sum(w * s.depth for w, s in zip(weights, states, strict=True)))
-        ahead = replace(states[-1], x=x, depth=depth)
-        if self.pressing.sticking:
-            return ahead
-        place, _ = self.pressing.nearest(ahead)
-        touching = np.isin(self.pressing.elements.surface, ahead.touching)
-        return replace(ahead, place=place[touching])
+            states, values = states[-1:], values[-1:]
+        for share in _SHARES:
+            to = float(values[-1] + share * (goal.value - values[-1]))
+            # The parabola through three states.
+            powers = np.vander(values - to, increasing=True).T
+            weights = np.linalg.solve(powers, np.eye(values.size)[0])
+            x, depth = weights @ [s.x for s in states], float(weights @ [s.depth for s in states])
+            ahead = replace(states[-1], x=x, depth=depth if goal.is_load else to)
+            if not self.pressing.sticking:
+                ahead = self.pressing.at_nearest(ahead)
+            if self.pressing.is_sound(self.pressing.placed(ahead), states[-1]):
+                break
+        return ahead

@@ -20,13 +20,12 @@ from memscal.mechanics.finite_strain import film_elements
 from memscal.mechanics.finite_strain.pressing import (
     Goal,
     NewtonError,
+    Path,
     Pressed,
     Pressing,
-    Progress,
     RodFace,
     SphereFace,
-    Step,
-    follow,
+    work,
 )
 from memscal.mechanics.solver.refinement import RingRequest, relative_change
 from memscal.mechanics.solver.step import Depth, Load, Target
@@ -35,10 +34,15 @@ from memscal.model.field_mesh import FieldMesh
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, Sphere
 
+# What is told the share of the work that is done.
+Progress = Callable[[float], None]
+
 _MM = 1e3
 _MPA = 1e6
 # The mesh that tells the convergence has sides longer by a factor, and takes a share of the work.
 _COARSER, _COARSE_WORK = 1.5, 0.3
+# Where a state does not depend on the path, this is followed on a mesh that is rougher still.
+_ROUGHER = 1.5**3
 # Distance of the film's free edge from the axis, in thicknesses, where none is given.
 _FREE_EDGE = 12.5
 # Radius of the rounding of a rod's edge, as a share of the rod's radius, where none is given: a
@@ -114,8 +118,9 @@ def solve_finite_strain(
     goals = [Goal(target.value * (1.0 if by_load else _MM), by_load) for target in targets]
     request = _Request(film, indenter, goals, sticking, radius * _MM, edge)
     tell, rest = progress or (lambda _: None), 1 - _COARSE_WORK
-    coarse = tuple(request.solve(refinement / _COARSER, progress=lambda x: tell(_COARSE_WORK * x)))
-    return tuple(request.solve(refinement, coarse, progress=lambda x: tell(1 - rest + rest * x)))
+    rough = () if request.path_dependent else tuple(request.reached(refinement / _ROUGHER))
+    coarse = tuple(request.solve(refinement / _COARSER, rough, lambda x: tell(_COARSE_WORK * x)))
+    return tuple(request.solve(refinement, coarse, lambda x: tell(1 - rest + rest * x)))
 
 
 def follow_depths(
@@ -124,8 +129,7 @@ def follow_depths(
     """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
     goals = [Goal(depth * _MM, False) for depth in depths]
     request = _Request(film, rod, goals, sticking, _FREE_EDGE * film.thickness * _MM, None)
-    with suppress(ConvergenceError):
-        yield from request.solve(1.0)
+    return request.reached(1.0)
 
 
 @dataclass(frozen=True)
@@ -140,20 +144,22 @@ class _Request:
     edge: float | None
 
     def solve(
-        self,
-        refinement: float,
-        coarse: Sequence[Contact] = (),
-        progress: Progress = lambda _: None,
+        self, refinement: float, coarse: Sequence[Contact] = (), progress: Progress = lambda _: None
     ) -> Iterator[Contact]:
         """Yield the contacts on one mesh; their convergence against those on a coarser one."""
         pressing = self._pressing(refinement, coarse)
+        path = Path(pressing, self._start(pressing))
         try:
-            steps = follow(pressing, self._start(pressing), self.goals, progress)
-            for i, step in enumerate(steps):
-                contact = self._contact(pressing, step)
-                if coarse:
-                    change = relative_change(contact, coarse[i], _SAMPLES * self.film.thickness)
-                    contact = replace(contact, convergence=change)
+            for i, goal in enumerate(self.goals):
+                others = coarse[i : i + 1]
+                guesses = map(pressing.interpolated, () if self.path_dependent else others)
+                for share in path.reach(goal, guesses):
+                    progress((i + share) / len(self.goals))
+                contact = self._contact(pressing, path.states)
+                for other in others:
+                    change = relative_change(contact, other, _SAMPLES * self.film.thickness)
+                    steps = max(contact.steps, other.steps)
+                    contact = replace(contact, convergence=change, steps=steps)
                 yield contact
         except NewtonError as problem:
             error = ConvergenceError(
@@ -161,9 +167,19 @@ class _Request:
                 why="The film folds around the indenter more sharply than its elements can follow.",
                 cure="Ask for less; or let the film stick (friction inf), which goes further.",
             )
-            if isinstance(problem.last, Step):
-                error.last = self._contact(pressing, problem.last)
+            if path.states:
+                error.last = self._contact(pressing, path.states)
             raise error from problem
+
+    @property
+    def path_dependent(self) -> bool:
+        """Whether the film stays where it first touched the indenter."""
+        return self.sticking and isinstance(self.indenter, Rod)
+
+    def reached(self, refinement: float) -> Iterator[Contact]:
+        """Yield the contacts on one mesh as far as it goes."""
+        with suppress(ConvergenceError):
+            yield from self.solve(refinement)
 
     def _pressing(self, refinement: float, coarse: Sequence[Contact]) -> Pressing:
         """Return film and indenter, on a mesh made for them."""
@@ -221,15 +237,21 @@ class _Request:
         else:
             reach = 0.8 * self._hertz_radius(self.goals[0])
             depth = reach**2 / (self.indenter.extent * _MM)
-        chosen = r <= reach * (1 + 1e-9)
-        return Pressed(np.zeros(elements.size), depth, nodes[chosen], pressing.place_at(r[chosen]))
+        touching = nodes[r <= reach * (1 + 1e-9)]
+        return pressing.at_nearest(Pressed(np.zeros(elements.size), depth, touching, np.empty(0)))
 
-    def _contact(self, pressing: Pressing, step: Step) -> Contact:
-        """Return a state in SI units, of unknown convergence."""
-        pressed, elements, rod = step.pressed, pressing.elements, isinstance(self.indenter, Rod)
-        radius = min(outermost(pressing, pressed) / _MM, self.indenter.extent if rod else math.inf)
-        # A sphere that sticks has no way: nothing moves radially wherever it touches.
-        work = None if pressing.upright else step.work / _MM
+    def _contact(self, pressing: Pressing, states: list[Pressed]) -> Contact:
+        """Return the last state on a way in SI units, of unknown convergence."""
+        pressed, elements, rod = states[-1], pressing.elements, isinstance(self.indenter, Rod)
+        # Between the last node that touches and the next.
+        field = FiniteStrainField(pressing, pressed)
+        last = int(np.flatnonzero(np.isin(elements.surface, pressed.touching))[-1])
+        ends = field.surface[0][last : last + 2] + field.surface[2][last : last + 2]
+        radius = min(float(np.mean(ends)), self.indenter.extent if rod else math.inf)
+        energy = elements.energy(pressed.x) / _MM
+        # Without friction the energy is the work; a sphere that sticks has no way.
+        by_load = work(states) / _MM if self.path_dependent else energy
+        done = None if pressing.upright else by_load
         return Contact(
             film=self.film,
             indenter=self.indenter,
@@ -241,14 +263,14 @@ class _Request:
             loading="" if rod or not self.sticking else "total",
             backend="fem",
             convergence=math.inf,
-            steps=step.count,
+            steps=len(states),
             discretisation=f"{elements.mesh.t.shape[1]} Taylor-Hood triangles (quadratic "
             f"displacement, linear pressure), {elements.size} unknowns",
             traction=interface_traction(pressing, pressed),
-            inside=FiniteStrainField(pressing, pressed),
-            elastic_energy=elements.energy(pressed.x) / _MM,
-            work=work,
-            dissipated_energy=None if work is None else 0.0,
+            inside=field,
+            elastic_energy=energy,
+            work=done,
+            dissipated_energy=None if done is None else 0.0,
             strain="finite",
         )
 
@@ -393,11 +415,3 @@ def _interpolated(nodes: FloatArray, values: FloatArray, r: ArrayLike, parity: i
     radii = np.asarray(r, dtype=np.float64)
     spline = _spline(nodes, values, parity) if parity else PchipInterpolator(nodes, values)
     return np.where(radii <= nodes[-1], spline(np.minimum(radii, nodes[-1])), 0.0)
-
-
-def outermost(pressing: Pressing, pressed: Pressed) -> float:
-    """Return the radius after deformation at which the contact ends, in mm, between two nodes."""
-    nodes = pressing.elements.surface
-    r = pressing.elements.nodes[0][nodes] + pressed.x[nodes]
-    last = int(np.flatnonzero(np.isin(nodes, pressed.touching))[-1])
-    return float((r[last] + r[min(last + 1, r.size - 1)]) / 2)
