@@ -26,7 +26,7 @@ DEEPEST = {"sticking": 0.45, "sliding": 0.16}
 # edge: together they change the stiffness by 4e-3.  Deep below a thin rod the film is stretched to
 # eight times its length, and needs fine elements there too.
 STEP, SHORTEST = 0.03, 0.004  # over the radius, but no shorter than this over the thickness
-FINER, FINER_BELOW_THIN, THIN = (2.0, 1.0), (1.5, 3.5), 0.1
+FINER, FINER_BELOW_THIN, THIN = (2.0, 1.0), (1.5, 3.5), 0.14
 KH = np.linspace(0.0, 20.0, 81)
 # The table is dimensionless.
 THICKNESS, MODULUS = 2e-3, 1e6

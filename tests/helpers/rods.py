@@ -14,18 +14,13 @@ def compare_with_the_table(nu: float, radius: float, depths: list[float], sticki
     """Assert that spectra, stress and depth agree; radius and depths in thicknesses."""
     film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=H, law="neo-hookean")
     rod, k, r = Rod(radius=radius * H), np.linspace(0.0, 12.0, 61) / H, np.linspace(0.1, 4, 40) * H
-    way, finer = np.array(depths), (1.0, 1.0)
+    way = np.array(depths)
     if sticking:  # what touches stays: short steps, and elements finer than the table's
-        way, finer = (
-            np.union1d(way, np.arange(1, 25 * depths[-1] / radius) * radius / 25),
-            (2.5, 2.5),
-        )
+        way = np.union1d(way, np.arange(1, 25 * depths[-1] / radius) * radius / 25)
+    finer = (2.5, 2.5) if sticking else (1.0, 1.0)
     states = follow_depths(film, rod, list(way * H), sticking=sticking, finer=finer)
-    for depth, state in zip(way, states, strict=True):
-        if depth not in depths:
-            continue
+    for state in (s for d, s in zip(way, states, strict=True) if d in depths):
         tabulated = tabulated_rod(film, rod, state.load, sticking=sticking)
-        assert tabulated is not None
         largest = float(state.base_stress(0.0))
         for name, at, bound in (
             ("base_spectrum", k, 1e-3 * state.load), ("base_shear_spectrum", k, 1e-3 * state.load),
