@@ -1,7 +1,7 @@
 """Make the table of rods at finite strain: ``python docs/rod_table.py FOLDER [PROCESSES]``.
 
 A file for each column of depths is kept in the folder, so that the script can be stopped and run
-again; when all are there it joins them in the package.  It takes some 15 minutes on two cores.
+again; when all are there it joins them in the package.  It takes some 30 minutes on two cores.
 """
 
 from __future__ import annotations
@@ -22,6 +22,11 @@ RADII = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.36, 0.44, 0.52, 0.6)  # over the th
 DEPTHS = (0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45)
 # A film that slides is drawn out from under the rod: deeper ones are not solved for all radii.
 DEEPEST = {"sticking": 0.45, "sliding": 0.16}
+# Where a film that sticks comes to lie depends on the length of a step and on the elements at the
+# edge: together they change the stiffness by 4e-3.  Deep below a thin rod the film is stretched to
+# eight times its length, and needs fine elements there too.
+STEP, SHORTEST = 0.03, 0.004  # over the radius, but no shorter than this over the thickness
+FINER, FINER_BELOW_THIN, THIN = (2.0, 1.0), (1.5, 3.5), 0.14
 KH = np.linspace(0.0, 20.0, 81)
 # The table is dimensionless.
 THICKNESS, MODULUS = 2e-3, 1e6
@@ -44,15 +49,31 @@ def make_column(job: tuple[Path, Key]) -> None:
         young_modulus=MODULUS, poisson_ratio=poisson, thickness=THICKNESS, law="neo-hookean"
     )
     rod, k = memscal.Rod(radius=radius * THICKNESS), KH / THICKNESS
-    depths = [depth * THICKNESS for depth in DEPTHS if depth <= DEEPEST[friction]]
-    rows = []
-    for contact in follow_depths(film, rod, depths, sticking=friction == "sticking"):
+    sticking, rows = friction == "sticking", []
+    depths = [depth for depth in DEPTHS if depth <= DEEPEST[friction]]
+    way, finer = depths, (1.0, 1.0)
+    if sticking:
+        way = steps_to(depths, max(STEP * radius, SHORTEST))
+        finer = FINER_BELOW_THIN if radius <= THIN else FINER
+    contacts = follow_depths(
+        film, rod, [d * THICKNESS for d in way], sticking=sticking, finer=finer
+    )
+    for depth, contact in zip(way, contacts, strict=False):
+        if depth not in depths:
+            continue
         load = contact.load / (film.shear_modulus * THICKNESS**2)
         spectra = contact.base_spectrum(k), contact.base_shear_spectrum(k)
         rows.append(np.concatenate([[load], *(s / contact.load for s in spectra)]))
-        depth = contact.depth / THICKNESS
         sys.stdout.write(f"{column_file(folder, key).stem}: {depth:.3f} h, {contact.steps} steps\n")
     np.savez(column_file(folder, key), rows=np.array(rows))
+
+
+def steps_to(depths: list[float], longest: float) -> list[float]:
+    """Return the depths and others between them, so that no step is longer."""
+    way: list[float] = []
+    for begin, end in itertools.pairwise([0.0, *depths]):
+        way += [*np.linspace(begin, end, int(np.ceil((end - begin) / longest)) + 1)[1:-1], end]
+    return way
 
 
 def start_of_column(poisson: float, radius: float, *, sticking: bool) -> np.ndarray:

@@ -11,7 +11,7 @@ ROD = Rod(radius=0.25e-3)
 
 
 @pytest.mark.parametrize(
-    ("nu", "radius", "depths"), [(0.5, 0.125, [0.06, 0.28]), (0.46, 0.4, [0.07])]
+    ("nu", "radius", "depths"), [(0.5, 0.125, [0.06]), (0.46, 0.56, [0.02, 0.28])]
 )
 def test_a_tabulated_rod_is_that_which_is_solved(nu: float, radius: float, depths) -> None:
     compare_with_the_table(nu, radius, depths, sticking=True)

@@ -138,13 +138,16 @@ _SLOPE = 0.7
 
 # Thickness and radius in mm, and how many times finer than by default the mesh is.
 FilmSize = tuple[float, float, float]
+# How much finer than by default sides at a rod's edge are, and how much more slowly they grow.
+Finer = tuple[float, float]
 
 
 def mesh_below_a_rod(
-    size: FilmSize, *, rod: float, fold: tuple[float, float], finest: float
+    size: FilmSize, *, rod: float, fold: tuple[float, float], finest: float, finer: Finer
 ) -> Any:
     """Return a mesh (mm) that is finest where the rod's edge folds the surface."""
     thickness, _, refinement = size
+    finest, slope = finest / finer[0] / refinement, _SLOPE / finer[1]
     side = min(_SHARE_OF_ROD * rod, _WIDEST_NEAR * thickness) / refinement
     mesh = _tensor(np.linspace(0.0, rod, max(2, round(rod / side)) + 1), side, _NEAR_A_ROD, size)
     while True:
@@ -153,7 +156,7 @@ def mesh_below_a_rod(
         away = np.maximum(np.maximum(fold[0] - r, r - fold[1]), 0.0)
         distance = np.hypot(away, thickness - z).min(axis=0)
         # A triangle that is cut has sides up to sqrt(2) of the size that is asked for.
-        long = longest > np.sqrt(2) * (finest / refinement + _SLOPE * distance)
+        long = longest > np.sqrt(2) * (finest + slope * distance)
         if not np.any(long & (longest < 3 * side)):
             return mesh
         mesh = mesh.refined(np.flatnonzero(long & (longest < 3 * side)))

@@ -17,6 +17,7 @@ from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.contact import Contact
 from memscal.mechanics.film_response import RingTraction
 from memscal.mechanics.finite_strain import film_elements
+from memscal.mechanics.finite_strain.film_elements import Finer
 from memscal.mechanics.finite_strain.pressing import (
     Goal,
     NewtonError,
@@ -124,12 +125,12 @@ def solve_finite_strain(
 
 
 def follow_depths(
-    film: ElasticFilm, rod: Rod, depths: Sequence[float], *, sticking: bool
+    film: ElasticFilm, rod: Rod, depths: Sequence[float], *, sticking: bool, finer: Finer = (1, 1)
 ) -> Iterator[Contact]:
     """Yield a rod at growing depths (m) as far as it goes, on one mesh: of unknown convergence."""
     goals = [Goal(depth * _MM, False) for depth in depths]
-    request = _Request(film, rod, goals, sticking, _FREE_EDGE * film.thickness * _MM, None)
-    return request.reached(1.0)
+    radius = _FREE_EDGE * film.thickness * _MM
+    return _Request(film, rod, goals, sticking, radius, None, finer).reached(1.0)
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,7 @@ class _Request:
     sticking: bool
     radius: float
     edge: float | None
+    finer: Finer = (1, 1)
 
     def solve(
         self, refinement: float, coarse: Sequence[Contact] = (), progress: Progress = lambda _: None
@@ -193,9 +195,10 @@ class _Request:
                 outer += _DRAWN_IN * max(map(self._depth, self.goals)) / rod
             else:
                 finest, (inner, outer) = _FINEST_SLIDING, _FOLD_SLIDING
-            fold = (inner * rod, outer * rod)
-            finest *= face.edge
-            mesh = film_elements.mesh_below_a_rod(size, rod=rod, fold=fold, finest=finest)
+            mesh = film_elements.mesh_below_a_rod(
+                size, rod=rod, fold=(inner * rod, outer * rod), finest=finest * face.edge,
+                finer=self.finer,
+            )  # fmt: skip
         else:
             face = SphereFace(self.indenter.radius * _MM)
             widest = max(map(self._hertz_radius, self.goals))

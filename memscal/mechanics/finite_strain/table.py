@@ -1,9 +1,10 @@
 """Table of neo-Hookean rods: base stress and depth against load, made by docs/rod_table.py.
 
 Columns of growing depth stand at values of Poisson's ratio and of the rod's radius over the film's
-thickness h; each holds the load over G h d, with the depth d, and the transforms of the base's
-normal stress and shear over the load.  A rod between the columns is found by polynomials through
-the four nearest, one between depths by cubic splines.
+thickness h; each holds the stiffness, the load over G h d with the depth d, and the transforms of
+the base's normal stress and shear over the load.  A rod between the columns is found by polynomials
+through the four nearest in the logarithms of stiffness and radius, one between depths by cubic
+splines over the cube root of the depth: the contact grows around a rounded edge as its square.
 """
 
 import math
@@ -81,10 +82,10 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
     """Return a rod on a neo-Hookean film under a load (N); ``None`` outside the table."""
     column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
     scale = film.shear_modulus * film.thickness**2
-    if column is None or load > column.largest_load * scale:
+    if column is None or load > column.load(column.deepest) * scale:
         return None
     depth = column.depth(load / scale)
-    normal, shear = column.spectra(depth) * load
+    normal, shear = column.rows(np.cbrt(depth))[1:].reshape(2, -1) * load
     inside: Any = TabulatedField(_table()["kh"] / film.thickness, (normal, shear), rod.radius)
     loads = column.load(_STEPS * depth) * scale
     work = float(np.trapezoid(loads, _STEPS * depth * film.thickness))
@@ -113,25 +114,21 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
 def largest_tabulated_load(film: ElasticFilm, rod: Rod, *, sticking: bool) -> float:
     """Return the load (N) at which the table ends for a rod; 0 outside the table."""
     column = _column(film.poisson_ratio, rod.radius / film.thickness, sticking=sticking)
-    return 0.0 if column is None else column.largest_load * film.shear_modulus * film.thickness**2
+    scale = film.shear_modulus * film.thickness**2
+    return 0.0 if column is None else float(column.load(column.deepest)) * scale
 
 
 @dataclass(frozen=True, eq=False)
 class _Column:
     """A rod by its depth over the thickness; loads in units of G h^2."""
 
-    stiffness: Callable[[Any], Any]  # load over depth
-    both: Callable[[float], FloatArray]  # spectra over the load
+    # Of the cube root of the depth: log of load over depth, spectra of stress and shear over load.
+    rows: Callable[[Any], Any]
     deepest: float
 
     def load(self, depth: Any) -> Any:
         """Load at depths."""
-        return self.stiffness(depth) * depth
-
-    @property
-    def largest_load(self) -> float:
-        """Load at which the column ends."""
-        return float(self.load(self.deepest))
+        return np.exp(self.rows(np.cbrt(depth))[..., 0]) * depth
 
     def depth(self, load: float) -> float:
         """Depth at a load."""
@@ -139,15 +136,13 @@ class _Column:
 
         return float(brentq(lambda d: float(self.load(d)) - load, 0.0, self.deepest, xtol=1e-12))
 
-    def spectra(self, depth: float) -> FloatArray:
-        """Spectra of normal stress and shear over the load, (2, k)."""
-        return np.asarray(self.both(depth)).reshape(2, -1)
-
 
 @lru_cache(maxsize=1)
 def _table() -> dict[str, FloatArray]:
     with np.load(FILE) as file:
-        return {name: file[name].astype(np.float64) for name in file.files}
+        table = {name: file[name].astype(np.float64) for name in file.files}
+    table["table"][..., 0] = np.log(table["table"][..., 0])
+    return table
 
 
 @lru_cache(maxsize=256)
@@ -160,11 +155,12 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
     if not (ratios[0] <= poisson <= ratios[-1] and radii[0] <= radius <= radii[-1]):
         return None
     columns = table["table"][0 if sticking else 1]
-    # How many depths each column has; it ends where the first of its neighbours does.
+    # How many depths each column has; it ends where the first of those beside it does.
     reached = np.isfinite(columns[..., 0]).sum(axis=-1)
     i, j = (int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
             for axis, value in ((ratios, poisson), (radii, radius)))  # fmt: skip
-    count = int(reached[i : i + 2, j : j + 2].min())
+    ends = reached[i : i + 2, j : j + 2].min(axis=1)
+    count = int(ends[_polynomial(ratios[i : i + 2], poisson) != 0].min())
     if count < _STENCIL:
         return None
     rows = np.empty((count, columns.shape[-1]))
@@ -175,14 +171,13 @@ def _column(poisson: float, radius: float, *, sticking: bool) -> _Column | None:
             nodes = _nearest(np.flatnonzero(reached[m] > n), j)
             if {j, j + 1} <= set(nodes):
                 usable.append(m)
-                of_ratios[m] = (
-                    _polynomial(np.log(radii[nodes]), np.log(radius)) @ columns[m, nodes, n]
-                )
+                weights = _polynomial(np.log(radii[nodes]), np.log(radius))
+                of_ratios[m] = weights @ columns[m, nodes, n]
         chosen = _nearest(np.array(usable), i)
         rows[n] = _polynomial(ratios[chosen], poisson) @ of_ratios[chosen]
-    stiffness, spectra = (CubicSpline(depths[:count], rows[:, part])
-                          for part in (0, slice(1, None)))  # fmt: skip
-    return _Column(stiffness, spectra, float(depths[count - 1]))
+    flat: Any = ((1, np.zeros(rows.shape[1])), "not-a-knot")
+    spline = CubicSpline(np.cbrt(depths[:count]), rows, bc_type=flat)
+    return _Column(spline, float(depths[count - 1]))
 
 
 def _nearest(nodes: Any, place: int) -> list[int]:
@@ -193,8 +188,5 @@ def _nearest(nodes: Any, place: int) -> list[int]:
 
 def _polynomial(nodes: FloatArray, x: float) -> FloatArray:
     """Weights of values at nodes in the polynomial through them, at ``x``."""
-    weights = np.ones(nodes.size)
-    for i, node in enumerate(nodes):
-        others = np.delete(nodes, i)
-        weights[i] = np.prod((x - others) / (node - others))
-    return weights
+    others = [np.delete(nodes, i) for i in range(nodes.size)]
+    return np.array([np.prod((x - o) / (node - o)) for node, o in zip(nodes, others, strict=True)])
