@@ -22,7 +22,7 @@ from memscal.mechanics.press_rod import press_rod
 from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
 from memscal.model.checks import QualityCheck, check, chi_square_limit
-from memscal.model.film import LINEAR
+from memscal.model.film import LINEAR, law_in_words
 from memscal.model.notation import format_measured
 
 #: The Bayes factor of a Gaussian sensor has mean one, and exceeds a thousand at most once in a
@@ -436,7 +436,7 @@ def _indentation(solution: Solution, results: Results) -> QualityCheck:
         )
     else:
         why = (
-            f"the reference is that of a {film.law} film"
+            f"the reference is that of a {law_in_words(film.law)} film"
             if film.law
             else ("the form of the film's law, which is not stated, is counted (model_form)")
         )

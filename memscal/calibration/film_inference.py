@@ -28,7 +28,7 @@ from memscal.mechanics.press_rod import is_tabulated, press_rod
 from memscal.model.arrays import FloatArray
 from memscal.model.bayes_factor import POSITIVE, STRONG, BayesFactor
 from memscal.model.checks import Message
-from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm
+from memscal.model.film import LINEAR, NEO_HOOKEAN, ElasticFilm, law_in_words
 from memscal.model.notation import format_measured
 from memscal.model.quantities import MM, MV
 from memscal.model.scan import Scan
@@ -80,15 +80,16 @@ class FilmLawComparison:
         """The Bayes factor, and what to do where it favours another law than the reference's."""
         best, factor = self.laws[0], self.factor(self.laws[1])
         value = f"{factor.value:.3g}" if factor.value < 1e6 else f"{factor.value:.1e}"
+        names = [law_in_words(law.law) for law in self.laws]
         text = (
-            f"Loads of {min(self.loads):.3g} to {max(self.loads):.3g} N favour a {factor.favoured} "
-            f"film over a {factor.against} one by a Bayes factor of {value} ({factor.words}). "
-            f"Weighed: {', '.join(law.law for law in self.laws)}."
+            f"Loads of {min(self.loads):.3g} to {max(self.loads):.3g} N favour a {names[0]} "
+            f"film over a {names[1]} one by a Bayes factor of {value} ({factor.words}). "
+            f"Weighed: {', '.join(names)}."
         )
         against = best.law != self.reference
         if against and 2 * factor.log_factor >= POSITIVE:
             text += (
-                f" By the {best.law} film A = {best.conversion_constant / MV:.4g} mV/Pa and "
+                f" By the {names[0]} film A = {best.conversion_constant / MV:.4g} mV/Pa and "
                 f"σ = {best.gaussian_sigma / MM:.4g} mm; --film-law {best.law} makes it the "
                 "reference."
             )

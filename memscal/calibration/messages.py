@@ -18,7 +18,7 @@ from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck
-from memscal.model.film import LINEAR, NEO_HOOKEAN
+from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
 from memscal.model.scan import Scan
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
@@ -143,8 +143,8 @@ def _law(solution: Solution, results: Results) -> list[Message]:
             )
     else:
         text = (
-            f"The film is taken as {law}, as stated; how far it departs from that law, by "
-            "viscosity, swelling or slip at the rod's side, is not part of the uncertainties."
+            f"The film is taken as {law_in_words(law)}, as stated; how far it departs from "
+            "that, by viscosity, swelling or slip at the rod's side, is not in the uncertainties."
         )
         if solution.scan.rod_friction is None:
             text += (

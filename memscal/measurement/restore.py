@@ -10,15 +10,9 @@ from scipy.special import chdtrc
 from memscal.apparatus import ApparatusFunction, opened_apparatus
 from memscal.axisymmetry.hankel import RadialSpectrum, Wavenumbers
 from memscal.errors import FitError, InputError
+from memscal.estimation import points as scan_points
 from memscal.estimation import profile
 from memscal.estimation.assumptions import axisymmetry_test, symmetry_test
-from memscal.estimation.points import (
-    ScanPoints,
-    accepted_differences,
-    file_in_words,
-    measured_points,
-    stated_differences,
-)
 from memscal.estimation.residuals import FEWEST_RESIDUALS, chi_square_test, residuals_of
 from memscal.formats.opened import opened_scan
 from memscal.measurement.posterior import film_transfer, posterior_of, reach_of, sensor_transfer
@@ -76,7 +70,7 @@ def accept_mismatches(scan: Scan, apparatus: ApparatusFunction, *, override: boo
     if apparatus.order:
         raise InputError(
             f"The artifact is of the tangential channel {apparatus.sensor.channel}, but "
-            f"{file_in_words(scan.source, 'scan')} is to be read as normal stress.",
+            f"{scan_points.file_in_words(scan.source, 'scan')} is to be read as normal stress.",
             why="A shear is no normal stress: this cannot be overridden.",
             cure="Give the artifact of channel zz; memscal.compare_shear() reads the shear.",
         )
@@ -87,12 +81,13 @@ def accept_other_sensor(
     scan: Scan | MeasuredScan, apparatus: ApparatusFunction, names: Sequence[str], *, override: bool
 ) -> list[str]:
     """Refuse a scan whose sensor (its ``names``) or film is not the artifact's, or return that."""
-    places = file_in_words(scan.source, "scan"), file_in_words(apparatus.source, "artifact")
+    sources = (scan.source, "scan"), (apparatus.source, "artifact")
+    places = tuple(scan_points.file_in_words(*source) for source in sources)
     sensors, films = (scan.sensor, apparatus.sensor), (scan.film, apparatus.film)
-    return accepted_differences(
+    return scan_points.accepted_differences(
         [
-            *stated_differences(SENSOR, names, sensors, places),
-            *stated_differences(FILM, _OF_THE_FILM, films, places, "film"),
+            *scan_points.stated_differences(SENSOR, names, sensors, places),
+            *scan_points.stated_differences(FILM, _OF_THE_FILM, films, places, "film"),
         ],
         override=override,
         problem="Scan and artifact do not belong together",
@@ -296,7 +291,7 @@ def restore_known(
     scan: Scan, apparatus: ApparatusFunction, expected: Expected = None
 ) -> Restoration:
     """Restore a stress from a scan and an apparatus function that were checked to fit together."""
-    points = measured_points(scan)
+    points = scan_points.measured_points(scan)
     estimate, transfer = gaussian_pressure(scan, apparatus, points)
     wavenumbers = estimate.model.reference.wavenumbers
     posterior = posterior_of(scan, apparatus, estimate, transfer)
@@ -322,7 +317,7 @@ def restore_known(
 
 
 def gaussian_pressure(
-    scan: Scan, apparatus: ApparatusFunction, points: ScanPoints
+    scan: Scan, apparatus: ApparatusFunction, points: scan_points.ScanPoints
 ) -> tuple[profile.ProfileEstimate, FloatArray]:
     """Return the best Gaussian pressure on the film, with departures, and A G's transform."""
     wavenumbers = Wavenumbers.covering(_LARGEST_KH / scan.film.thickness, reach_of(points))

@@ -93,8 +93,13 @@ class ElasticFilm:
     def law_text(self) -> str:
         """The law in words, with its ratio C2/C1."""
         ratio = self.mooney_rivlin_ratio
-        words = self.law or "of a law that is not stated"
+        words = law_in_words(self.law) or "of a law that is not stated"
         return words if ratio is None else f"{words} of C2/C1 = {ratio:.4g}"
+
+
+def law_in_words(law: str) -> str:
+    """Write a law as text does, with the names that it has."""
+    return law.replace("hookean", "Hookean").replace("mooney-rivlin", "Mooney-Rivlin")
 
 
 def more_and_less(record: Any, name: str) -> tuple[Any, Any, float] | None:

@@ -33,9 +33,8 @@ def scans_of(
     scans = []
     for i, (load, radius) in enumerate((load, radius) for load in loads for radius in radii):
         rng, kernel = np.random.default_rng([seed, i]), SENSORS[sensor]
-        scan = direct_scan(
-            kernel, noise=noise, seed=1000 * seed + i, load=load, radius=radius, law=law
-        )
+        rod = {"load": load, "radius": radius, "law": law}
+        scan = direct_scan(kernel, noise=noise, seed=1000 * seed + i, **rod)
         off = {"u_zz": scan.u_zz * (1 + BALANCE * rng.normal()), "load_uncertainty": BALANCE * load}
         scans.append(replace(scan, **off, film=film, rod_friction=np.inf))
     return scans

@@ -24,13 +24,9 @@ def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
 
 @lru_cache
 def cramer_rao(
-    noise: float,
-    kernel: memscal.GaussianMixture = GAUSSIAN,
-    *,
-    centre: tuple[float, float] = (CENTRE, 0.0),
-    inexact: bool = False,
-    **setting: Any,
-) -> dict[str, float]:
+    noise: float, kernel: memscal.GaussianMixture = GAUSSIAN, *,
+    centre: tuple[float, float] = (CENTRE, 0.0), inexact: bool = False, **setting: Any,
+) -> dict[str, float]:  # fmt: skip
     """Cramer-Rao bounds of A, sigma, centre and baseline, all unknown, in SI units.
 
     By finite differences of simulated, noise-free scans: not by the estimator's own Jacobian.

@@ -98,16 +98,11 @@ def load_comparison(profile: Any, loading: str, grid: np.ndarray) -> memscal.Loa
 
 
 def comparison(
-    *,
-    friction: float = 0.15,
-    lubrications: Sequence[str] = ("dry", "lubricated"),
-    loadings: Sequence[str] = ("incremental", "total"),
-    failed: bool = False,
+    *, friction: float = 0.15, lubrications: Sequence[str] = ("dry", "lubricated"),
+    loadings: Sequence[str] = ("incremental", "total"), failed: bool = False,
     macroscopic: tuple[float, float | None] | None = (1.6, 0.2),
-    friction_grid: np.ndarray = FRICTION,
-    loads: Sequence[float] = LOADS,
-    **fields: Any,
-) -> memscal.FrictionComparison:
+    friction_grid: np.ndarray = FRICTION, loads: Sequence[float] = LOADS, **fields: Any,
+) -> memscal.FrictionComparison:  # fmt: skip
     """Return a comparison of every load, dry and lubricated."""
     rng = np.random.default_rng(1)
     profiles = [

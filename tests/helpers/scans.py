@@ -111,11 +111,9 @@ def sphere_scan(
 
 
 def known_apparatus(
-    kernel: RadialKernel = GAUSSIAN,
-    *,
-    conversion_uncertainty: float = 0.0,
+    kernel: RadialKernel = GAUSSIAN, *, conversion_uncertainty: float = 0.0,
     width_uncertainty: float = 0.0,
-) -> memscal.ApparatusFunction:
+) -> memscal.ApparatusFunction:  # fmt: skip
     """Return a sensor whose G is known, or wrong in one way only: wider or narrower.
 
     The uncertainties are relative.
