@@ -138,14 +138,14 @@ def _law(solution: Solution, results: Results) -> list[Message]:
             f"linear film; {rubber}."
         )
         if "model_form" in changes:
-            text += (
-                " Changes up to that, of either sign, are counted as equally likely (model_form)."
-            )
+            text += " Changes up to that, of either sign, count as equally likely (model_form)."
     else:
         text = (
             f"The film is taken as {law_in_words(law)}, as stated; how far it departs from "
             "that, by viscosity, swelling or slip at the rod's side, is not in the uncertainties."
         )
+        if isinstance(solution.stress, Contact):
+            text += f" The rod is found by {solution.stress.discretisation}."
         if solution.scan.rod_friction is None:
             text += (
                 " Whether it sticks under the rod is not stated (indenter/friction_coefficient, "

@@ -139,7 +139,7 @@ def test_a_figure_of_the_contacts_is_written(run: Run, folder: Path):
 @pytest.mark.parametrize("law", [["--strain", "finite"], ["--film-law", "neo-hookean"]])
 def test_finite_strain_is_a_reference_like_any_other(run: Run, folder: Path, law):
     done = run("reference", "rod", "--load", 0.02, *law, "-o", "finite.h5").exits(0)
-    assert "sticking (fem, neo-hookean)" in done.out
+    assert "sticking (fem, neo-Hookean)" in done.out
     profile = memscal.read_reference("finite.h5")
     assert profile.solver == "memscal, fem backend, finite strain"
     assert (profile.film.law, profile.friction_coefficient) == ("neo-hookean", np.inf)

@@ -101,7 +101,7 @@ def tabulated_rod(film: ElasticFilm, rod: Rod, load: float, *, sticking: bool) -
         backend="fem",
         convergence=_ACCURACY,
         steps=1,
-        discretisation="table of rods, interpolated",
+        discretisation="interpolation in the table of rods",
         traction=inside,
         inside=inside,
         elastic_energy=work,
