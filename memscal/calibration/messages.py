@@ -18,7 +18,7 @@ from memscal.model import checks as quality
 from memscal.model.apparatus import ParameterSet
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, QualityCheck
-from memscal.model.film import LINEAR, NEO_HOOKEAN, law_in_words
+from memscal.model.film import LINEAR, NEO_HOOKEAN
 from memscal.model.scan import Scan
 
 #: Methods whose window is that of the stress's transform: nothing is left to say of them.
@@ -141,8 +141,8 @@ def _law(solution: Solution, results: Results) -> list[Message]:
             text += " Changes up to that, of either sign, count as equally likely (model_form)."
     else:
         text = (
-            f"The film is taken as {law_in_words(law)}, as stated; how far it departs from "
-            "that, by viscosity, swelling or slip at the rod's side, is not in the uncertainties."
+            f"The film is taken as {solution.scan.film.law_text}, as stated; how far it departs "
+            "from that, by viscosity, swelling or slip at the rod, is not in the uncertainties."
         )
         if isinstance(solution.stress, Contact):
             text += f" The rod is found by {solution.stress.discretisation}."
