@@ -51,9 +51,8 @@ _SHEARS_INCOMPRESSIBLE = (0.0, -0.2, -0.4)
 _SHEARS_COMPRESSIBLE = (0.0, 0.1, 0.2)
 #: Above this Poisson's ratio a pressed film flows outward under the indenter.
 _FLOWING = 0.4
-
-
-#: Where a rod's pressure is below this share of its force, the film counts as linear.
+#: The transform of a rod's pressure passes through zero: where it is below this share of its force,
+#: the film counts as linear.  Half and twice of it change forces and stresses by less than 0.4 %.
 _LEAST_PRESSURE = 0.1
 
 
