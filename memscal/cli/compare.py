@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from memscal.cli import output as out
-from memscal.cli.options import FILE, Quantity, option, options_of, output_options
+from memscal.cli.options import FILE, Quantity, option, output_options
 
 if TYPE_CHECKING:
     from memscal.friction.results import FrictionComparison
@@ -45,15 +45,6 @@ def user_cache_folder() -> Path | None:
 
     folder = user_cache_path("memscal", appauthor=False) / "contacts"
     return folder if folder.is_absolute() else None
-
-
-cache_options = options_of(
-    option("--cache", FILE, metavar="FOLDER")(
-        "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
-        "the user's cache folder]"
-    ),
-    option("--no-cache", is_flag=True)("Calculate all contacts, and store none."),
-)
 
 
 def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
@@ -110,7 +101,11 @@ Examples:
 @option("--override", is_flag=True)(
     "Compare although sensor, channel or film of artifact and scan differ; recorded."
 )
-@cache_options
+@option("--cache", FILE, metavar="FOLDER")(
+    "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
+    "the user's cache folder]"
+)
+@option("--no-cache", is_flag=True)("Calculate all contacts, and store none.")
 @option("--figure single", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated."
 )

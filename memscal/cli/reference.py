@@ -154,27 +154,18 @@ Examples:
     "and one load or depth."
 )
 @common.output_options
-def command(
-    indenter: str,
-    loads: tuple[float, ...],
-    depths: tuple[float, ...],
-    output: Path | None,
-    figures: tuple[Path, ...],
-    mesh: Path | None,
-    as_json: bool,
-    force: bool,
-    **options: Any,
-) -> int:
+def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
     Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and thickness 2 mm; a
     rod of radius 0.25 mm, a sphere of radius 128.8 mm. Without --film-law the film is linear.
     """
-    _check_usage(loads, depths, output, mesh, options)
+    _check_usage(options)
+    output, mesh, figures = options["output"], options["mesh"], options["figures"]
     files = [path for path in (output, mesh, *figures) if path is not None]
     table = options["profile_table"]
     out.prove_writable(files, force=force, inputs=[table] if table else [])
-    contacts = _pressed(indenter, loads, depths, options)
+    contacts = _pressed(indenter, options)
     _write(contacts, output, figures, mesh, force=force)
 
     _print(contacts, options["loading"], output, as_json=as_json)
@@ -183,17 +174,13 @@ def command(
     return DONE
 
 
-def _check_usage(
-    loads: tuple[float, ...],
-    depths: tuple[float, ...],
-    output: Path | None,
-    mesh: Path | None,
-    options: dict[str, Any],
-) -> None:
+def _check_usage(options: dict[str, Any]) -> None:
+    """Refuse options that do not go together, and choose the film's law."""
+    loads, depths, mesh = options["loads"], options["depths"], options["mesh"]
     if loads and depths:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
-    for name, path in (("output", output), ("mesh", mesh)):
-        if path is not None and max(len(loads), len(depths)) > 1:
+    for name in ("output", "mesh"):
+        if options[name] is not None and max(len(loads), len(depths)) > 1:
             raise click.UsageError(
                 f"A file holds one load: with --{name} give one --load or one --depth."
             )
@@ -215,9 +202,7 @@ def _choose_law(options: dict[str, Any]) -> None:
         options["film_law"] = law or ("neo-hookean" if strain else "linear")
 
 
-def _pressed(
-    indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], options: dict[str, Any]
-) -> list[Contact]:
+def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
     film, body = common.film_from(options), indenter_of(indenter, options)
     interface = interface_of(options)
     from memscal.mechanics.indent import indent
@@ -232,9 +217,10 @@ def _pressed(
     settings["strain"] = "linear" if film.law == "linear" else "finite"
     with out.working("Pressing") as show:
         settings["progress"] = lambda share: show(f"Pressing: {share:.0%}")
-        if depths:
-            return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
-        return indent(film, body, load=list(loads or (1.0,)), **settings)
+        if options["depths"]:
+            depths = [si(depth, -6) for depth in options["depths"]]
+            return indent(film, body, depth=depths, **settings)
+        return indent(film, body, load=list(options["loads"] or (1.0,)), **settings)
 
 
 def _write(
