@@ -5,23 +5,16 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import (
-    FILE,
-    FILM_LAWS,
-    Quantity,
-    force_option,
-    json_option,
-    option,
-    rod_friction_option,
-)
+from memscal.cli.options import FILE, Quantity, force_option, json_option, option
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -36,32 +29,28 @@ _MOST_WORKERS = 8
 
 
 def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
-    """Draw in processes, and show how many draws are done."""
+    """Draw in processes, show how many draws are done, and where they and the budget disagree."""
     from memscal.calibration.monte_carlo import monte_carlo
+    from memscal.model.checks import Message
+    from memscal.model.quantities import estimated_quantity
 
     # Starting a process takes about as long as forty draws of a line.
     workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
     with out.working(f"Drawing {draws} scans") as show:
-        return monte_carlo(
+        drawn = monte_carlo(
             calibration,
             draws=draws,
             seed=seed,
             workers=workers,
             progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
         )
-
-
-def _show_disagreements(drawn: MonteCarlo) -> None:
-    """Write the messages of the draws, and where they and the budget disagree."""
-    from memscal.model.checks import Message
-    from memscal.model.quantities import estimated_quantity
-
     disagreements = [
         Message("disagreement", f"{estimated_quantity(c.name).words}: {c.reason}")
         for c in drawn.comparisons
         if not c.agrees
     ]
     out.show_messages([*drawn.messages, *disagreements])
+    return drawn
 
 
 def _chosen_method(
@@ -152,14 +141,14 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "The same stress by another model of the film (memscal-reference): its difference is counted "
     "as an uncertainty of the model's form, in place of the neo-Hookean film's."
 )
-@option("--film-law", click.Choice(FILM_LAWS))(
+@option("--film-law", click.Choice(common.FILM_LAWS))(
     "Law of the film by which the rod is solved, taken as known. By default the one that scan or "
     "reference state; else linear, and its difference from neo-hookean is counted (model_form)."
 )
 @option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
     "C2/C1 of --film-law mooney-rivlin."
 )
-@rod_friction_option(
+@common.rod_friction_option(
     "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite "
     "strain. By default as the scan states it; else it sticks, and the difference is counted."
 )
@@ -263,13 +252,12 @@ def command(
     chosen = {"method": regulariser, "seed": seed or 0, **settings}
     with out.working(f"Calibrating by {regulariser.name}"):
         calibration = calibrate(data, reference=profile, alternative=other, **chosen)
-    sweep, drawn = None, None
+    further: dict[str, Sweep | MonteCarlo] = {}
     if sweeping or sweep_figure:
         with out.working("Sweeping the noise amplitude"):
-            sweep = calibration.sweep(seed=seed or 0)
+            further["sweep"] = calibration.sweep(seed=seed or 0)
     if draws is not None:
-        drawn = _drawn(calibration, draws, seed or 0)
-        _show_disagreements(drawn)
+        further["monte_carlo"] = _drawn(calibration, draws, seed or 0)
     with out.working("Drawing"):
         contents = {}
         if report is not None:
@@ -277,11 +265,11 @@ def command(
 
             contents[report] = html_report(calibration.apparatus).encode("utf-8")
         contents |= out.rendered(calibration.plot, figures)
-        if sweep is not None and sweep_figure is not None:
-            contents |= out.rendered(sweep.plot, [sweep_figure])
+        if sweep_figure is not None:
+            contents |= out.rendered(further["sweep"].plot, [sweep_figure])
     calibration.apparatus.save(output, overwrite=force)
     out.write_files(contents, force=force)
-    return _show(calibration, sweep, drawn, outputs, as_json)
+    return _show(calibration, further, outputs, as_json)
 
 
 def _read(
@@ -355,14 +343,11 @@ def _rehearse(
 
 def _show(
     calibration: Calibration,
-    sweep: Sweep | None,
-    drawn: MonteCarlo | None,
+    further: Mapping[str, Sweep | MonteCarlo],
     outputs: Sequence[Path],
     as_json: bool,
 ) -> int:
     """Print the results and the messages; return the exit code."""
-    results = {"sweep": sweep, "monte_carlo": drawn}
-    further = {name: result for name, result in results.items() if result is not None}
     if as_json:
         files = {"schema_version": "1", "artifact": str(outputs[0])}
         values = {name: result.to_dict() for name, result in further.items()}

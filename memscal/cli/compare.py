@@ -147,7 +147,7 @@ def command(
         stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
     inputs, friction = [artifact, *scans, *options["references"]], options["friction"]
-    outputs = [*single, *named.values()]
+    outputs = figures = [*single, *named.values()]
     if folder is not None and not folder.is_dir():
         if folder.exists():
             raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
@@ -173,7 +173,6 @@ def command(
     if folder is not None:
         folder.mkdir(exist_ok=True)
     out.write_files(ready, force=force)
-    figures = [*single, *named.values()]
     _show(comparison, artifact, references, figures, as_json)
     for path in figures:
         out.message(f"Written: {path}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -161,14 +161,14 @@ def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
     rod of radius 0.25 mm, a sphere of radius 128.8 mm. Without --film-law the film is linear.
     """
     _check_usage(options)
-    output, mesh, figures = options["output"], options["mesh"], options["figures"]
-    files = [path for path in (output, mesh, *figures) if path is not None]
+    outputs = (options["output"], options["mesh"], *options["figures"])
+    files = [path for path in outputs if path is not None]
     table = options["profile_table"]
     out.prove_writable(files, force=force, inputs=[table] if table else [])
     contacts = _pressed(indenter, options)
-    _write(contacts, output, figures, mesh, force=force)
+    _write(contacts, options, force=force)
 
-    _print(contacts, options["loading"], output, as_json=as_json)
+    _print(contacts, options, as_json=as_json)
     for path in files:
         out.message(f"Written: {path}")
     return DONE
@@ -223,15 +223,9 @@ def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
         return indent(film, body, load=list(options["loads"] or (1.0,)), **settings)
 
 
-def _write(
-    contacts: list[Contact],
-    output: Path | None,
-    figures: tuple[Path, ...],
-    mesh: Path | None,
-    *,
-    force: bool,
-) -> None:
+def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) -> None:
     """Write the files: figures are drawn before, and a mesh, which may be refused, comes first."""
+    output, mesh, figures = options["output"], options["mesh"], options["figures"]
     drawn: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.stress import contact_figure
@@ -248,15 +242,14 @@ def _write(
     out.write_files(drawn, force=force)
 
 
-def _print(
-    contacts: Sequence[Contact], loading: str, output: Path | None, *, as_json: bool
-) -> None:
+def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool) -> None:
     """Print the contacts as a table or as one JSON object; notes go to stderr."""
     from memscal.summaries.contact import contacts_table, depth_messages
 
     messages, warnings = depth_messages(contacts)
     if as_json:
         # A rod's contact does not depend on the loading that was asked for.
+        loading, output = options["loading"], options["output"]
         solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
         head = {"schema_version": "1", "output": None if output is None else str(output)}
         out.emit_json({**head, "solutions": solutions, "warnings": warnings})

@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with the names of its scans."""
 
+#: Options of a sphere whose values are given on as they are.
 _OF_SPHERE = ("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "gain")
 _SPHERE_NAMES = (
-    *(*_OF_SPHERE, "sphere_radius", "sphere_radius_uncertainty", "slip_length", "thickness_factor"),
-    *("greenwood_tripp", "exponential", "contacts", "spacing", "load_scatter", "position_error"),
+    *_OF_SPHERE,
+    *("sphere_radius", "sphere_radius_uncertainty", "slip_length", "greenwood_tripp"),
+    *("exponential", "contacts", "spacing", "load_scatter", "position_error", "thickness_factor"),
 )
 """The options that only an experiment with a sphere has."""
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from os import PathLike
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 from memscal.errors import InputError
 from memscal.formats.hdf5.reader import open_hdf5
@@ -19,13 +19,10 @@ Scans: TypeAlias = Scan | Path | Sequence[Scan | Path]
 Contacts: TypeAlias = Scan | MeasuredStress | Path | Sequence[Scan | MeasuredStress | Path]
 """Scans, or the stress that was measured of them; each itself or as the path of its file."""
 
-_Kind = TypeVar("_Kind", Scan, MeasuredStress)
-_A_SCAN = (Scan, "a Scan", "a scan")
-
 
 def opened_scan(scan: Scan | Path) -> Scan:
     """Return a scan that is given itself or as a path."""
-    return read_scan(scan) if isinstance(scan, str | PathLike) else _required(scan, *_A_SCAN)
+    return read_scan(scan) if isinstance(scan, str | PathLike) else _required(scan)
 
 
 def opened_scans(scans: Scans) -> tuple[Scan, ...]:
@@ -37,7 +34,12 @@ def opened_stress(measured: MeasuredStress | Path) -> MeasuredStress:
     """Return measured stress that is given itself or as a path."""
     if isinstance(measured, str | PathLike):
         return read_stress(measured)
-    return _required(measured, MeasuredStress, "measured stress", "what measure_stress returns")
+    if not isinstance(measured, MeasuredStress):
+        raise InputError(
+            f"There is a {type(measured).__name__} where measured stress is needed.",
+            cure="Give what measure_stress returns, or the path of its file.",
+        )
+    return measured
 
 
 def opened_contacts(contacts: Contacts) -> tuple[Scan | MeasuredStress, ...]:
@@ -49,7 +51,7 @@ def _scan_or_stress(item: Any) -> Scan | MeasuredStress:
     if isinstance(item, MeasuredStress):
         return item
     if not isinstance(item, str | PathLike):
-        return _required(item, *_A_SCAN)
+        return _required(item)
     with open_hdf5(item) as file:
         if file.attribute("/", SCHEMA_ATTRIBUTE) == STRESS_SCHEMA:
             return stress_from(file)
@@ -64,10 +66,10 @@ def _listed(items: Any) -> list[Any]:
     return listed
 
 
-def _required(item: Any, kind: type[_Kind], words: str, what: str) -> _Kind:
-    if not isinstance(item, kind):
+def _required(item: Any) -> Scan:
+    if not isinstance(item, Scan):
         raise InputError(
-            f"There is a {type(item).__name__} where {words} is needed.",
-            cure=f"Give {what}, or the path of its file.",
+            f"There is a {type(item).__name__} where a Scan is needed.",
+            cure="Give a scan, or the path of its file.",
         )
     return item
