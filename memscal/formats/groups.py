@@ -28,14 +28,7 @@ from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.quantities import (
-    TRUTH,
-    Quantity,
-    Record,
-    declared_quantity,
-    estimated_quantity,
-    record,
-)
+from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
@@ -251,7 +244,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
 def estimated_record(file: SafeFile, path: str) -> Record:
     """Return what the group of the parameters holds, by the names that the file gives them."""
     names = text_list(file, f"{path}/names")
-    return record("NXcollection", *map(estimated_quantity, names))
+    return Record("NXcollection", tuple(map(estimated_quantity, names)))
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
