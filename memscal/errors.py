@@ -3,6 +3,9 @@
 The command line exits with the ``exit_code`` of an error; a user catches :class:`MemscalError`.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class MemscalError(Exception):
     """Base of every error that memscal raises on purpose.
@@ -62,3 +65,15 @@ class OutputError(MemscalError):
     """An output that was not written; what was there before is untouched."""
 
     exit_code = 4
+
+
+@contextmanager
+def placed(where: str) -> Iterator[None]:
+    """Say in an error about a value in which file, and where in it, the value stands."""
+    try:
+        yield
+    except InputError as error:
+        if where in error.problem:
+            raise
+        problem = f"{where}: {error.problem}"
+        raise type(error)(problem, why=error.why, cure=error.cure) from error

@@ -1,6 +1,7 @@
 """``memscal apply``: contact scans and a calibrated sensor to measured stress."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -30,13 +31,7 @@ Examples:
 )
 @output_options
 def command(
-    artifact: Path,
-    scans: tuple[Path, ...],
-    output: Path | None,
-    override: bool,
-    figures: tuple[Path, ...],
-    as_json: bool,
-    force: bool,
+    artifact: Path, scans: tuple[Path, ...], as_json: bool, force: bool, **options: Any
 ) -> int:
     """Turn contact SCANs into measured stress with a calibrated sensor (ARTIFACT).
 
@@ -50,14 +45,15 @@ def command(
     from memscal.formats.scan import read_scan
 
     data = [read_scan(path) for path in scans]
-    written = output or out.beside(scans[0], ".stress.h5")
+    written = options["output"] or out.beside(scans[0], ".stress.h5")
+    figures = options["figures"]
     out.prove_writable([written, *figures], force=force, inputs=[artifact, *scans])
 
     from memscal.measurement.measure_stress import measure_stress
     from memscal.summaries.stress import tables
 
     with out.working("Measuring"):
-        stress = measure_stress(data, artifact, override=override)
+        stress = measure_stress(data, artifact, override=options["override"])
     with out.working("Drawing"):
         drawn = out.rendered(stress.plot, figures)
     stress.save(written, overwrite=force)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from memscal.cli import options as common
 from memscal.cli import output as out
 from memscal.cli.failures import DONE, debug_option, exit_code_of
-from memscal.cli.options import FILE, FILM_LAWS, Quantity, force_option, json_option, option
+from memscal.cli.options import FILE, Quantity, force_option, json_option, option
 
 if TYPE_CHECKING:
     from memscal.calibration.calibrate import Calibration
@@ -28,60 +29,28 @@ _MOST_WORKERS = 8
 
 
 def _drawn(calibration: Calibration, draws: int, seed: int) -> MonteCarlo:
-    """Draw in processes, and show how many draws are done."""
+    """Draw in processes, show how many draws are done, and where they and the budget disagree."""
     from memscal.calibration.monte_carlo import monte_carlo
+    from memscal.model.checks import Message
+    from memscal.model.quantities import estimated_quantity
 
     # Starting a process takes about as long as forty draws of a line.
     workers = max(1, min(os.cpu_count() or 1, _MOST_WORKERS, draws // 40))
     with out.working(f"Drawing {draws} scans") as show:
-        return monte_carlo(
+        drawn = monte_carlo(
             calibration,
             draws=draws,
             seed=seed,
             workers=workers,
             progress=lambda done, _: show(f"Drawing {draws} scans: {done} calibrated"),
         )
-
-
-def _show_disagreements(drawn: MonteCarlo) -> None:
-    """Write the messages of the draws, and where they and the budget disagree."""
-    from memscal.model.checks import Message
-    from memscal.model.quantities import estimated_quantity
-
     disagreements = [
         Message("disagreement", f"{estimated_quantity(c.name).words}: {c.reason}")
         for c in drawn.comparisons
         if not c.agrees
     ]
     out.show_messages([*drawn.messages, *disagreements])
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files of the results."""
-
-    artifact: Path
-    report: Path | None
-    figures: tuple[Path, ...]
-    sweep_figure: Path | None
-
-    @property
-    def paths(self) -> tuple[Path, ...]:
-        """All of them, the artifact first."""
-        others = (self.report, *self.figures, self.sweep_figure)
-        return (self.artifact, *(path for path in others if path is not None))
-
-    def rendered(self, calibration: Calibration, sweep: Sweep | None) -> dict[Path, bytes]:
-        """Return the figures and the report as the bytes of their files."""
-        contents: dict[Path, bytes] = {}
-        if self.report is not None:
-            from memscal.figures.report import html_report
-
-            contents[self.report] = html_report(calibration.apparatus).encode("utf-8")
-        contents |= out.rendered(calibration.plot, self.figures)
-        if self.sweep_figure is not None and sweep is not None:
-            contents |= out.rendered(sweep.plot, [self.sweep_figure])
-        return contents
+    return drawn
 
 
 def _chosen_method(
@@ -172,14 +141,14 @@ def _complete_method(_: click.Context, __: click.Parameter, incomplete: str) -> 
     "The same stress by another model of the film (memscal-reference): its difference is counted "
     "as an uncertainty of the model's form, in place of the neo-Hookean film's."
 )
-@option("--film-law", click.Choice(FILM_LAWS))(
+@option("--film-law", click.Choice(common.FILM_LAWS))(
     "Law of the film by which the rod is solved, taken as known. By default the one that scan or "
     "reference state; else linear, and its difference from neo-hookean is counted (model_form)."
 )
 @option("--mooney-rivlin-ratio", Quantity("ratio", high=math.inf, open_low=False))(
     "C2/C1 of --film-law mooney-rivlin."
 )
-@option("--rod-friction", click.Choice(("0", "inf")))(
+@common.rod_friction_option(
     "Whether the film slides freely under the rod (0) or sticks (inf), which matters at finite "
     "strain. By default as the scan states it; else it sticks, and the difference is counted."
 )
@@ -238,17 +207,10 @@ def command(
     output: Path | None,
     reference: Path | None,
     alternative: Path | None,
-    film_law: str | None,
-    mooney_rivlin_ratio: float | None,
-    rod_friction: str | None,
     correlations: tuple[str, ...],
-    channel: str,
     method: str | None,
-    centre: str | None,
-    free: tuple[str, ...],
     options: tuple[str, ...],
     seed: int | None,
-    override: bool,
     as_json: bool,
     report: Path | None,
     figures: tuple[Path, ...],
@@ -257,6 +219,7 @@ def command(
     draws: int | None,
     force: bool,
     dry_run: bool,
+    **settings: Any,
 ) -> int:
     """Find a sensor's apparatus function from a rod scan, or from several of one sensor.
 
@@ -270,49 +233,43 @@ def command(
 
     A failed quality check is exit code 1: the artifact is written and states it.
     """
+    channel = settings["channel"]
     ending = ".apparatus.h5" if channel == "zz" else f".{channel}.apparatus.h5"
     output = output or out.beside(scans[0], ending)
-    outputs = Outputs(output, report, figures, sweep_figure)
+    outputs = [path for path in (output, report, *figures, sweep_figure) if path is not None]
     regulariser = _chosen_method(method, options, seed, channel)
-    pairs = [_correlation(text) for text in correlations]
+    settings["correlations"] = dict(_correlation(text) for text in correlations)
     data, profile = _read(scans, reference)
     other = None if alternative is None else _read_reference(alternative)
     inputs = [path for path in (*scans, reference, alternative) if path is not None]
-    out.prove_writable(outputs.paths, force=force, inputs=inputs)
+    out.prove_writable(outputs, force=force, inputs=inputs)
     if dry_run:
-        _rehearse(data, profile, other, override, channel, regulariser, outputs, as_json, centre)
+        _rehearse(data, profile, other, regulariser, settings, outputs, as_json)
         return DONE
 
     from memscal.calibration.calibrate import calibrate
 
+    chosen = {"method": regulariser, "seed": seed or 0, **settings}
     with out.working(f"Calibrating by {regulariser.name}"):
-        calibration = calibrate(
-            data,
-            reference=profile,
-            alternative=other,
-            film_law=film_law,
-            mooney_rivlin_ratio=mooney_rivlin_ratio,
-            rod_friction=None if rod_friction is None else float(rod_friction),
-            channel=channel,
-            method=regulariser,
-            centre=centre,
-            correlations=dict(pairs),
-            free=free,
-            seed=seed or 0,
-            override=override,
-        )
-    sweep, drawn = None, None
+        calibration = calibrate(data, reference=profile, alternative=other, **chosen)
+    further: dict[str, Sweep | MonteCarlo] = {}
     if sweeping or sweep_figure:
         with out.working("Sweeping the noise amplitude"):
-            sweep = calibration.sweep(seed=seed or 0)
+            further["sweep"] = calibration.sweep(seed=seed or 0)
     if draws is not None:
-        drawn = _drawn(calibration, draws, seed or 0)
-        _show_disagreements(drawn)
+        further["monte_carlo"] = _drawn(calibration, draws, seed or 0)
     with out.working("Drawing"):
-        contents = outputs.rendered(calibration, sweep)
+        contents = {}
+        if report is not None:
+            from memscal.figures.report import html_report
+
+            contents[report] = html_report(calibration.apparatus).encode("utf-8")
+        contents |= out.rendered(calibration.plot, figures)
+        if sweep_figure is not None:
+            contents |= out.rendered(further["sweep"].plot, [sweep_figure])
     calibration.apparatus.save(output, overwrite=force)
     out.write_files(contents, force=force)
-    return _show(calibration, sweep, drawn, outputs, as_json)
+    return _show(calibration, further, outputs, as_json)
 
 
 def _read(
@@ -349,12 +306,10 @@ def _rehearse(
     scans: list[Scan],
     profile: StressProfile | None,
     alternative: StressProfile | None,
-    override: bool,
-    channel: str,
     regulariser: Method,
-    outputs: Outputs,
+    settings: dict[str, Any],
+    outputs: Sequence[Path],
     as_json: bool,
-    centre: str | None,
 ) -> None:
     """Check what a calibration checks before it computes, and print what it would do."""
     from memscal.calibration.stages import require_channel_method
@@ -368,16 +323,17 @@ def _rehearse(
     from memscal.model.checks import override_messages
     from memscal.summaries.calibration import rehearsal_json, rehearsal_table
 
+    channel, override = settings["channel"], settings["override"]
     require_one_sensor(scans)
     require_channel_method(channel, regulariser)
     given = [profile] * len(scans), [alternative] * len(scans)
     out.show_messages(override_messages(require_same_set_up(scans, *given, override=override)))
-    if centre == "per-repeat":
+    if settings["centre"] == "per-repeat":
         scans = scans_of_repeats(scans, channel)[0]
     readings = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
     reference_spectra(stresses, readings, [scan.film.thickness for scan in scans])
-    points, plan = joined_points(readings), (regulariser.name, outputs.paths)
+    points, plan = joined_points(readings), (regulariser.name, outputs)
     if as_json:
         out.emit_json(rehearsal_json(stresses[0], *plan))
     else:
@@ -387,23 +343,20 @@ def _rehearse(
 
 def _show(
     calibration: Calibration,
-    sweep: Sweep | None,
-    drawn: MonteCarlo | None,
-    outputs: Outputs,
+    further: Mapping[str, Sweep | MonteCarlo],
+    outputs: Sequence[Path],
     as_json: bool,
 ) -> int:
     """Print the results and the messages; return the exit code."""
-    results = {"sweep": sweep, "monte_carlo": drawn}
-    further = {name: result for name, result in results.items() if result is not None}
     if as_json:
-        files = {"schema_version": "1", "artifact": str(outputs.artifact)}
+        files = {"schema_version": "1", "artifact": str(outputs[0])}
         values = {name: result.to_dict() for name, result in further.items()}
         out.emit_json(files | calibration.to_dict() | values)
     else:
         tables = [table for result in further.values() for table in result.tables()]
         out.emit_tables(*calibration.tables(), *tables)
     out.show_messages(calibration.apparatus.process.messages)
-    for path in outputs.paths:
+    for path in outputs:
         out.message(f"Written: {path}")
     checks = calibration.apparatus.checks
-    return exit_code_of(checks, then=f" {outputs.artifact.name} was written and is marked so.")
+    return exit_code_of(checks, then=f" {outputs[0].name} was written and is marked so.")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from memscal.cli import output as out
-from memscal.cli.options import FILE, Quantity, option, options_of, output_options
+from memscal.cli.options import FILE, Quantity, option, output_options
 
 if TYPE_CHECKING:
     from memscal.friction.results import FrictionComparison
@@ -45,15 +45,6 @@ def user_cache_folder() -> Path | None:
 
     folder = user_cache_path("memscal", appauthor=False) / "contacts"
     return folder if folder.is_absolute() else None
-
-
-cache_options = options_of(
-    option("--cache", FILE, metavar="FOLDER")(
-        "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
-        "the user's cache folder]"
-    ),
-    option("--no-cache", is_flag=True)("Calculate all contacts, and store none."),
-)
 
 
 def cache_from(cache: Path | None, no_cache: bool) -> Path | None:
@@ -110,7 +101,11 @@ Examples:
 @option("--override", is_flag=True)(
     "Compare although sensor, channel or film of artifact and scan differ; recorded."
 )
-@cache_options
+@option("--cache", FILE, metavar="FOLDER")(
+    "Where calculated contacts are kept for the next run.  [default: memscal/contacts in "
+    "the user's cache folder]"
+)
+@option("--no-cache", is_flag=True)("Calculate all contacts, and store none.")
 @option("--figure single", out.FigurePath(), multiple=True, metavar="FILE.png|svg|pdf")(
     "Draw profiles, residuals, maxima and friction coefficients on one page. May be repeated."
 )
@@ -152,7 +147,7 @@ def command(
         stems = figure_stems((scan.lubrication for scan in scans_of(data)), interface=interface)
         named = {stem: folder / f"{stem}.{options['figure_format']}" for stem in stems}
     inputs, friction = [artifact, *scans, *options["references"]], options["friction"]
-    outputs = [*single, *named.values()]
+    outputs = figures = [*single, *named.values()]
     if folder is not None and not folder.is_dir():
         if folder.exists():
             raise click.UsageError(f"--figures names a folder, but {folder} is a file.")
@@ -178,7 +173,6 @@ def command(
     if folder is not None:
         folder.mkdir(exist_ok=True)
     out.write_files(ready, force=force)
-    figures = [*single, *named.values()]
     _show(comparison, artifact, references, figures, as_json)
     for path in figures:
         out.message(f"Written: {path}")

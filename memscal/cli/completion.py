@@ -23,8 +23,7 @@ def command(shell: str) -> int:
     from memscal.cli.commands import memscal
 
     kind = get_completion_class(shell)
-    if kind is None:
-        raise click.UsageError(f"There is no completion for {shell}.")
+    assert kind is not None  # click completes each of the shells of the argument
     script = kind(memscal, {}, "memscal", "_MEMSCAL_COMPLETE")
     # Not .source(): for bash it would look for a shell on this machine before it answers.
     emit(script.source_template % script.source_vars())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,21 +15,10 @@ from memscal.cli.options import PAPER_FILM, Quantity, option, output_options, si
 if TYPE_CHECKING:
     from memscal.planning.design import Design
 
-    _TargetType = click.ParamType[tuple[str, float]]
-else:  # generic since click 8.2 only
-    _TargetType = click.ParamType
-
 _VARIED = ("step", "half-range", "repeats")
 #: Options in other units than SI, by the power of ten.
 _IN_MM_OR_MV = ("conversion_constant", "step", "half_range", "noise_voltage", "centre")
 _SCALED = dict.fromkeys(_IN_MM_OR_MV, -3) | dict.fromkeys(("load_uncertainty", "noise"), -2)
-
-#: What stands for G beyond the resolved band, by method bayesian or by a division.
-_HIDDEN = (
-    "Beyond the resolved band {what}: the uncertainty there does not scatter from scan to scan, "
-    "and repeats do not show it."
-)
-_BY_PRIOR, _BY_WINDOW = "G follows from the prior", "the window hides G"
 
 EXAMPLES = """\b
 Examples:
@@ -43,31 +31,21 @@ Examples:
 """
 
 
-class _Target(_TargetType):
-    """A target: ``sigma=1%``, or ``resolved=4`` in rad/mm."""
-
-    name = "target"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, float]:
-        """Read name and number; the library checks the name."""
-        if isinstance(value, tuple):
-            return value
-        name, equals, text = str(value).partition("=")
-        percent = text.strip().endswith("%")
-        try:
-            number = float(text.strip().removesuffix("%"))
-        except ValueError:
-            equals = ""
-            number = 0.0
-        if not equals:
-            self.fail(f"{value!r} is no target: write sigma=1% or resolved=4 (rad/mm).", param, ctx)
-        name = name.strip()
-        if percent == (name == "resolved"):
-            unit = "in rad/mm, without %" if percent else "in percent: write the %"
-            self.fail(f"{value!r}: {name} is given {unit}.", param, ctx)
-        return name, si(number, -2) if percent else si(number, 3)
+def _target(value: str) -> tuple[str, float]:
+    """Read a target, ``sigma=1%`` or ``resolved=4`` in rad/mm; the library checks the name."""
+    name, equals, text = value.partition("=")
+    percent = text.strip().endswith("%")
+    try:
+        number = float(text.strip().removesuffix("%"))
+    except ValueError:
+        equals = ""
+    if not equals:
+        raise click.BadParameter(f"{value!r} is no target: write sigma=1% or resolved=4 (rad/mm).")
+    name = name.strip()
+    if percent == (name == "resolved"):
+        unit = "in rad/mm, without %" if percent else "in percent: write the %"
+        raise click.BadParameter(f"{value!r}: {name} is given {unit}.")
+    return name, si(number, -2) if percent else si(number, 3)
 
 
 @click.command("design", epilog=EXAMPLES)
@@ -92,7 +70,7 @@ class _Target(_TargetType):
 @option("--method", default="bayesian")(
     "Method of memscal calibrate with which the scan would be evaluated."
 )
-@option("--want targets", _Target(), multiple=True, metavar="TARGET")(
+@option("--want targets", _target, multiple=True, metavar="TARGET")(
     "What to reach by --vary: A=1%, sigma=1% or fwhm=5% at most, relative standard "
     "uncertainty, or resolved=4 at least, in rad/mm. Repeated: all are to be reached."
 )
@@ -103,14 +81,7 @@ class _Target(_TargetType):
     "Figure of the expected result (.png, .svg or .pdf). May be repeated."
 )
 @output_options
-def command(
-    figures: tuple[Path, ...],
-    targets: tuple[tuple[str, float], ...],
-    vary: str | None,
-    as_json: bool,
-    force: bool,
-    **options: Any,
-) -> int:
+def command(as_json: bool, force: bool, **options: Any) -> int:
     """Predict the uncertainties of a calibration before its scan is made.
 
     They follow, without simulation, from the Fisher information of the planned scan, the prior of
@@ -118,6 +89,7 @@ def command(
     and --vary, the smallest scan that reaches the targets is found.
     """
     common.require_one_kernel(options)
+    targets, figures, vary = (options[name] for name in ("targets", "figures", "vary"))
     if bool(targets) != (vary is not None):
         raise click.UsageError("--want and --vary go together: give targets, and what to vary.")
     out.prove_writable(figures, force=force)
@@ -130,7 +102,11 @@ def command(
         out.emit_json({"schema_version": "1", **planned.to_dict()})
     else:
         out.emit_tables(*planned.tables())
-    out.note(_HIDDEN.format(what=_BY_PRIOR if planned.method == "bayesian" else _BY_WINDOW))
+    beyond = "G follows from the prior" if planned.method == "bayesian" else "the window hides G"
+    out.note(
+        f"Beyond the resolved band {beyond}: the uncertainty there does not scatter from scan to "
+        "scan, and repeats do not show it."
+    )
     for path in figures:
         out.message(f"Written: {path}")
     return DONE

@@ -175,7 +175,7 @@ _NEEDED = {
 @option("--indenter", click.Choice(["rod", "sphere"]), "rod")("Shape of the indenter.")
 @common.radius_options("the rod or of the sphere's curvature")
 @common.film_options()
-@common.rod_friction_option
+@common.rod_friction_option(common.FREE_OR_STUCK)
 @option("--delimiter", metavar="CHAR")("What separates columns; found from the table by default.")
 @option("--decimal", click.Choice([".", ","]))("Decimal mark; found from the table by default.")
 @output_options

@@ -38,31 +38,27 @@ class Quantity(_Number):
         open_low: bool = True,
         infinite: bool = False,
     ) -> None:
-        self.name = unit
-        self.unit = unit
+        self.name = self.unit = unit
         self.low, self.high, self.open_low, self.infinite = low, high, open_low, infinite
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
         """Read the number; refuse one out of range."""
+        in_unit = f" (in {self.name})" if self.name != "ratio" else ""
         try:
             number = float(value)
         except ValueError:
-            self.fail(f"{value!r} is not a number{self._in_unit}.", param, ctx)
+            self.fail(f"{value!r} is not a number{in_unit}.", param, ctx)
         finite = math.isfinite(number) or (self.infinite and number == math.inf)
         above = number > self.low if self.open_low else number >= self.low
         if not (finite and above and number <= self.high):
-            self.fail(f"{value} is not {self._range}{self._in_unit}.", param, ctx)
+            self.fail(f"{value} is not {self._range}{in_unit}.", param, ctx)
         return number
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Return the unit as the name of the value: MM, but MPa."""
-        return self.name.upper() if self.unit.islower() else self.unit
-
-    @property
-    def _in_unit(self) -> str:
-        return f" (in {self.unit})" if self.unit != "ratio" else ""
+        return self.name.upper() if self.name.islower() else self.name
 
     @property
     def _range(self) -> str:
@@ -71,9 +67,7 @@ class Quantity(_Number):
             bounds.append(("above" if self.open_low else "of at least") + f" {self.low:g}")
         if self.high < math.inf:
             bounds.append(f"at most {self.high:g}")
-        if not bounds:
-            return "a finite number"
-        return "a number " + " and ".join(bounds)
+        return f"a number {' and '.join(bounds)}" if bounds else "a finite number"
 
 
 class _Adder(Protocol):
@@ -151,7 +145,8 @@ rod_friction_option = option(
     "--rod-friction",
     click.Choice(["0", "inf"]),
     callback=lambda _, __, text: None if text is None else float(text),
-)("Rod: 0, the film slides freely under it; inf, it sticks.")
+)
+FREE_OR_STUCK = "Rod: 0, the film slides freely under it; inf, it sticks."
 
 
 def radius_options(
@@ -177,7 +172,7 @@ def _measured(
     options = [(name, kind, about) for name, kind, about, _ in entries]
     if uncertainties:
         options += [
-            (f"{name}-uncertainty", Quantity(kind.unit, open_low=False), _UNCERTAINTY + of)
+            (f"{name}-uncertainty", Quantity(kind.name, open_low=False), _UNCERTAINTY + of)
             for name, kind, _, of in entries
         ]
     return options_of(

@@ -191,9 +191,6 @@ class FigurePath(click.Path):
 
     name = "figure"
 
-    def __init__(self) -> None:
-        super().__init__(path_type=Path)
-
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Path:

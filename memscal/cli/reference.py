@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -154,46 +154,33 @@ Examples:
     "and one load or depth."
 )
 @common.output_options
-def command(
-    indenter: str,
-    loads: tuple[float, ...],
-    depths: tuple[float, ...],
-    output: Path | None,
-    figures: tuple[Path, ...],
-    mesh: Path | None,
-    as_json: bool,
-    force: bool,
-    **options: Any,
-) -> int:
+def command(indenter: str, as_json: bool, force: bool, **options: Any) -> int:
     """Press a rigid INDENTER on a bonded film: load, depth, contact, and stress at the base.
 
     Defaults are the paper's: a film of E = 2.2 MPa, Poisson's ratio 0.5 and thickness 2 mm; a
     rod of radius 0.25 mm, a sphere of radius 128.8 mm. Without --film-law the film is linear.
     """
-    _check_usage(loads, depths, output, mesh, options)
-    files = [path for path in (output, mesh, *figures) if path is not None]
+    _check_usage(options)
+    outputs = (options["output"], options["mesh"], *options["figures"])
+    files = [path for path in outputs if path is not None]
     table = options["profile_table"]
     out.prove_writable(files, force=force, inputs=[table] if table else [])
-    contacts = _pressed(indenter, loads, depths, options)
-    _write(contacts, output, figures, mesh, force=force)
+    contacts = _pressed(indenter, options)
+    _write(contacts, options, force=force)
 
-    _print(contacts, options["loading"], output, as_json=as_json)
+    _print(contacts, options, as_json=as_json)
     for path in files:
         out.message(f"Written: {path}")
     return DONE
 
 
-def _check_usage(
-    loads: tuple[float, ...],
-    depths: tuple[float, ...],
-    output: Path | None,
-    mesh: Path | None,
-    options: dict[str, Any],
-) -> None:
+def _check_usage(options: dict[str, Any]) -> None:
+    """Refuse options that do not go together, and choose the film's law."""
+    loads, depths, mesh = options["loads"], options["depths"], options["mesh"]
     if loads and depths:
         raise click.UsageError("Give --load or --depth, not both: one follows from the other.")
-    for name, path in (("output", output), ("mesh", mesh)):
-        if path is not None and max(len(loads), len(depths)) > 1:
+    for name in ("output", "mesh"):
+        if options[name] is not None and max(len(loads), len(depths)) > 1:
             raise click.UsageError(
                 f"A file holds one load: with --{name} give one --load or one --depth."
             )
@@ -215,9 +202,7 @@ def _choose_law(options: dict[str, Any]) -> None:
         options["film_law"] = law or ("neo-hookean" if strain else "linear")
 
 
-def _pressed(
-    indenter: str, loads: tuple[float, ...], depths: tuple[float, ...], options: dict[str, Any]
-) -> list[Contact]:
+def _pressed(indenter: str, options: dict[str, Any]) -> list[Contact]:
     film, body = common.film_from(options), indenter_of(indenter, options)
     interface = interface_of(options)
     from memscal.mechanics.indent import indent
@@ -232,20 +217,15 @@ def _pressed(
     settings["strain"] = "linear" if film.law == "linear" else "finite"
     with out.working("Pressing") as show:
         settings["progress"] = lambda share: show(f"Pressing: {share:.0%}")
-        if depths:
-            return indent(film, body, depth=[si(depth, -6) for depth in depths], **settings)
-        return indent(film, body, load=list(loads or (1.0,)), **settings)
+        if options["depths"]:
+            depths = [si(depth, -6) for depth in options["depths"]]
+            return indent(film, body, depth=depths, **settings)
+        return indent(film, body, load=list(options["loads"] or (1.0,)), **settings)
 
 
-def _write(
-    contacts: list[Contact],
-    output: Path | None,
-    figures: tuple[Path, ...],
-    mesh: Path | None,
-    *,
-    force: bool,
-) -> None:
+def _write(contacts: list[Contact], options: Mapping[str, Any], *, force: bool) -> None:
     """Write the files: figures are drawn before, and a mesh, which may be refused, comes first."""
+    output, mesh, figures = options["output"], options["mesh"], options["figures"]
     drawn: dict[Path, bytes] = {}
     if figures:
         from memscal.figures.stress import contact_figure
@@ -262,15 +242,14 @@ def _write(
     out.write_files(drawn, force=force)
 
 
-def _print(
-    contacts: Sequence[Contact], loading: str, output: Path | None, *, as_json: bool
-) -> None:
+def _print(contacts: list[Contact], options: Mapping[str, Any], *, as_json: bool) -> None:
     """Print the contacts as a table or as one JSON object; notes go to stderr."""
     from memscal.summaries.contact import contacts_table, depth_messages
 
     messages, warnings = depth_messages(contacts)
     if as_json:
         # A rod's contact does not depend on the loading that was asked for.
+        loading, output = options["loading"], options["output"]
         solutions = [{**contact.to_dict(), "loading": loading} for contact in contacts]
         head = {"schema_version": "1", "output": None if output is None else str(output)}
         out.emit_json({**head, "solutions": solutions, "warnings": warnings})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -41,16 +41,7 @@ Examples:
     "Draw the restored, the measured and the calculated stress, and residuals. May be repeated."
 )
 @output_options
-def command(
-    artifact: Path,
-    scan: Path,
-    output: Path | None,
-    expected: Path | None,
-    override: bool,
-    figures: tuple[Path, ...],
-    as_json: bool,
-    force: bool,
-) -> int:
+def command(artifact: Path, scan: Path, as_json: bool, force: bool, **options: Any) -> int:
     """Restore the stress at the base of a film from a SCAN with a calibrated sensor (ARTIFACT).
 
     Takes the sensor's conversion constant A and apparatus function G as known, and finds the
@@ -63,6 +54,7 @@ def command(
     from memscal.formats.reference import read_reference
     from memscal.formats.scan import read_scan
 
+    output, expected, figures = (options[name] for name in ("output", "expected", "figures"))
     apparatus, data = load_apparatus(artifact), read_scan(scan)
     stress = None if expected is None else read_reference(expected)
     files = [path for path in (output, *figures) if path is not None]
@@ -71,7 +63,7 @@ def command(
     from memscal.measurement.restore import restore
 
     with out.working("Restoring"):
-        restored = restore(data, apparatus, expected=stress, override=override)
+        restored = restore(data, apparatus, expected=stress, override=options["override"])
         if stress is None:
             restored = _beside_calculated(restored)
     with out.working("Drawing"):

@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 FILES = ("rod_scan.h5", "sphere_dry.h5", "sphere_lubricated.h5")
 """The files of an experiment; a test compares them with the names of its scans."""
 
+#: Options of a sphere whose values are given on as they are.
+_OF_SPHERE = ("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "gain")
 _SPHERE_NAMES = (
-    *("lubricated_loads", "sphere_radius", "sphere_radius_uncertainty", "friction", "loading"),
-    *("slip_length", "greenwood_tripp", "exponential", "contacts", "spacing", "load_scatter"),
-    *("record_loads", "position_error", "draw_inputs", "gain", "thickness_factor"),
+    *_OF_SPHERE,
+    *("sphere_radius", "sphere_radius_uncertainty", "slip_length", "greenwood_tripp"),
+    *("exponential", "contacts", "spacing", "load_scatter", "position_error", "thickness_factor"),
 )
 """The options that only an experiment with a sphere has."""
 
@@ -79,7 +81,6 @@ _SHARED = ("repeats", "state_noise", "state_law", "rod_friction", "seed")
 _SCALED = {"conversion_constant": -3} | dict.fromkeys(
     ("noise", "baseline", "drift", "load_uncertainty"), -2
 )
-_OF_SPHERE = ("lubricated_loads", "friction", "loading", "record_loads", "draw_inputs", "gain")
 
 
 def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -96,18 +97,13 @@ def _shared_settings(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def _experiment_from(options: Mapping[str, Any]) -> Experiment:
     """Simulate the experiment that the options describe."""
-    settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
-    radius = {
-        "radius": options["sphere_radius"],
-        "radius_uncertainty": options["sphere_radius_uncertainty"],
-    }
-    settings |= {
-        "sphere": common.indenter_from("sphere", radius),
-        "interface": interface_of(options),
-    }
     from memscal.simulation.experiment import simulate_experiment
 
+    settings = _shared_settings(options) | {name: options[name] for name in _OF_SPHERE}
+    of_sphere = {name: options[f"sphere_{name}"] for name in ("radius", "radius_uncertainty")}
+    settings["sphere"] = common.indenter_from("sphere", of_sphere)
     return simulate_experiment(
+        interface=interface_of(options),
         rod_points=options["points"],
         loads=options["loads"] or _LOADS,
         points=options["contacts"],
@@ -195,7 +191,7 @@ Examples of an experiment: a rod scan to calibrate with, and a sphere's contacts
 )
 @common.radius_options(default=0.25, uncertainty=0.0025)
 @common.film_options(defaults=PAPER_FILM)
-@common.rod_friction_option
+@common.rod_friction_option(common.FREE_OR_STUCK)
 @option("--half-range", Quantity("mm"), 8.0)(
     "Rod scan alone: positions run from minus to plus this, in mm."
 )

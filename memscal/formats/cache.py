@@ -31,7 +31,6 @@ CacheFolder = str | os.PathLike[str] | None
 _MOST_BYTES = 64 * 2**20
 _MOST_ENTRIES = 512
 _ENTRY = re.compile(r"[0-9a-f]{64}\.h5")
-_KEY = re.compile(r"[0-9a-f]{64}")
 _TRANSFORM = ("N", ("value", "load", "k"))
 #: Units and axes of arrays that are not transforms in N.
 _OTHERS = {
@@ -100,9 +99,9 @@ def clear_contact_tables(folder: str | os.PathLike[str]) -> int:
 
 
 def _path(folder: str | os.PathLike[str], key: str) -> Path:
-    if not _KEY.fullmatch(key):
+    if not _ENTRY.fullmatch(name := f"{key}.h5"):
         raise FormatError(f"{key!r} is not the key of a contact table.")
-    return Path(folder) / f"{key}.h5"
+    return Path(folder) / name
 
 
 def _entries(folder: str | os.PathLike[str]) -> list[tuple[Path, os.stat_result]]:

@@ -2,26 +2,16 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from memscal.errors import FormatError, InputError
+from memscal.errors import FormatError, InputError, placed
+from memscal.formats.hdf5 import writer
 from memscal.formats.hdf5.reader import SafeFile
-from memscal.formats.hdf5.writer import (
-    Attribute,
-    Group,
-    Node,
-    Number,
-    count,
-    index_axis,
-    note,
-    si,
-    to_json,
-)
+from memscal.formats.hdf5.writer import Attribute, Group, Node, Number, si, to_json
 from memscal.formats.units import dimension_of, from_si, to_si
 from memscal.formats.values import (
     any_scalar,
@@ -34,18 +24,11 @@ from memscal.formats.values import (
 )
 from memscal.model import records
 from memscal.model.apparatus import ParameterSet
-from memscal.model.checks import QualityCheck, messages_from_json, messages_to_json
+from memscal.model.checks import QualityCheck, messages_from_json
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Cone, Indenter, Profile, Rod, RoundIndenter, Sphere
 from memscal.model.provenance import Process, SourceFile
-from memscal.model.quantities import (
-    TRUTH,
-    Quantity,
-    Record,
-    declared_quantity,
-    estimated_quantity,
-    record,
-)
+from memscal.model.quantities import TRUTH, Quantity, Record, declared_quantity, estimated_quantity
 from memscal.model.scan import StressSensor
 from memscal.model.stress import StressProfile
 
@@ -64,7 +47,7 @@ class Kind:
 
 def _write_json_note(quantity: Quantity, value: Any) -> Group:
     text = to_json(quantity.name, value)
-    return note(text, media_type="application/json", description=quantity.words)
+    return writer.note(text, media_type="application/json", description=quantity.words)
 
 
 def write_source(source: SourceFile) -> Group:
@@ -81,9 +64,9 @@ def read_source(file: SafeFile, path: str) -> SourceFile:
 
 KINDS = {
     "text": Kind(lambda _, text: str(text), require_text),
-    "note": Kind(lambda _, text: note(text), require_text, inside="/data"),
+    "note": Kind(lambda _, text: writer.note(text), require_text, inside="/data"),
     "truth": Kind(
-        lambda _, truth: count(int(truth)),
+        lambda _, truth: writer.count(int(truth)),
         lambda file, path: bool(require_scalar(file, path, "dimensionless")),
         always=True,
     ),
@@ -91,7 +74,7 @@ KINDS = {
         _write_json_note, lambda file, path: json_value(file, path, dict, {}), True, "/data"
     ),
     "messages": Kind(
-        lambda quantity, messages: _write_json_note(quantity, messages_to_json(messages)),
+        lambda quantity, messages: _write_json_note(quantity, [*map(asdict, messages)]),
         lambda file, path: messages_from_json(json_value(file, path, list, [])),
         True,
         "/data",
@@ -112,7 +95,7 @@ def write_record(record: Record, stated: object, **others: Node) -> Group:
         if value is not None and kind is None:
             for axis, size in zip(quantity.axes, np.shape(value), strict=True):
                 if axis not in keys:
-                    children.setdefault(axis, index_axis(axis, size))
+                    children.setdefault(axis, writer.index_axis(axis, size))
             children[quantity.key] = si(value, quantity.dimension, quantity.axes)
         elif value is not None and kind is not None and (value or kind.always):
             children[quantity.key] = kind.write(quantity, value)
@@ -225,7 +208,7 @@ def parameter_group(parameters: ParameterSet, budget: Mapping[str, Mapping[str, 
         children[name] = si(float(value), dimension)
         children[f"{name}_errors"] = si(parameters.uncertainty(name), dimension)
     for axis in _AXES:
-        children[axis] = index_axis(axis, len(parameters.names))
+        children[axis] = writer.index_axis(axis, len(parameters.names))
     scale = np.array([float(from_si(1.0, dimension)[0]) for dimension in dimensions])
     numbers = parameters.covariance * scale[:, None] * scale[None, :]
     children["covariance"] = Number(numbers, "1", _AXES, {"description": _COVARIANCE})
@@ -261,7 +244,7 @@ def read_parameters(file: SafeFile, path: str) -> ParameterSet:
 def estimated_record(file: SafeFile, path: str) -> Record:
     """Return what the group of the parameters holds, by the names that the file gives them."""
     names = text_list(file, f"{path}/names")
-    return record("NXcollection", *map(estimated_quantity, names))
+    return Record("NXcollection", tuple(map(estimated_quantity, names)))
 
 
 def budget_group(budget: Mapping[str, Mapping[str, float]], dimensions: Mapping[str, str]) -> Group:
@@ -292,18 +275,6 @@ def _unit_scale(file: SafeFile, path: str) -> float:
 
 
 _ROUND: dict[str, type[RoundIndenter]] = {shape.shape: shape for shape in (Rod, Sphere)}
-
-
-@contextmanager
-def placed(where: str) -> Iterator[None]:
-    """Say in an error about a value at which path of which file it stands."""
-    try:
-        yield
-    except InputError as error:
-        if where in error.problem:
-            raise
-        problem = f"{where}: {error.problem}"
-        raise type(error)(problem, why=error.why, cure=error.cure) from error
 
 
 def read_film(file: SafeFile, path: str) -> ElasticFilm:

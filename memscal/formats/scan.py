@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from memscal.errors import FormatError, OutputError
+from memscal.errors import FormatError, OutputError, placed
 from memscal.formats import groups, values
 from memscal.formats.files import ensure_writable
 from memscal.formats.groups import read_record, write_record
@@ -78,7 +78,7 @@ def scan_from(file: SafeFile) -> Scan:
     """Read the scan of an open memscal-scan file."""
     values.require_schema(file, writer.SCAN_SCHEMA)
     load = read_record(records.LOAD, file, "/entry/indenter")
-    with groups.placed(file.where("/entry/indenter/friction_coefficient")):
+    with placed(file.where("/entry/indenter/friction_coefficient")):
         require_rod_friction(load.get("rod_friction"))
     film = groups.read_film(file, f"{_SAMPLE}/film")
     indenter = groups.read_round_indenter(file, "/entry/indenter")

@@ -22,9 +22,9 @@ def require_positive(name: str, value: float, unit: str = "") -> None:
         )
 
 
-def require_non_negative(name: str, value: float) -> None:
-    """Refuse a value that is not a finite number of at least zero."""
-    if not (math.isfinite(value) and value >= 0):
+def require_non_negative(name: str, value: float | None) -> None:
+    """Refuse a value that is stated, and is not a finite number of at least zero."""
+    if value is not None and not (math.isfinite(value) and value >= 0):
         raise InputError(f"{name} is {value:g}, but it must be finite and not negative.")
 
 

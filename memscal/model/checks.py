@@ -1,7 +1,7 @@
 """Quality checks and messages of a result: their records, the limits they share, their wording."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Literal
 
 #: Chance that a check fails although its assumption holds.
@@ -140,11 +140,6 @@ def import_notes(texts: Iterable[str]) -> list[Message]:
 def marked_texts(messages: Iterable[Message]) -> list[str]:
     """Return texts for a list without severities: a warning begins with "Warning: "."""
     return [("Warning: " if m.severity == "warning" else "") + m.text for m in messages]
-
-
-def messages_to_json(messages: Iterable[Message]) -> list[dict[str, str]]:
-    """Return messages as files store them: objects of kind, severity and text."""
-    return [asdict(message) for message in messages]
 
 
 def messages_from_json(stored: Sequence[Any]) -> tuple[Message, ...]:

@@ -60,10 +60,8 @@ class ElasticFilm:
         require_positive("film thickness", self.thickness, "m")
         for name in ("young_modulus", "poisson_ratio", "thickness", "roughness_rms"):
             uncertainty = getattr(self, f"{name}_uncertainty")
-            if uncertainty is not None:
-                require_non_negative(f"standard uncertainty of film {name}", uncertainty)
-        if self.roughness_rms is not None:
-            require_non_negative("film roughness_rms", self.roughness_rms)
+            require_non_negative(f"standard uncertainty of film {name}", uncertainty)
+        require_non_negative("film roughness_rms", self.roughness_rms)
         if self.law not in ("", *LAWS):
             raise InputError(
                 f"The film's law is {self.law!r}.",
@@ -76,8 +74,7 @@ class ElasticFilm:
                 why="A Mooney-Rivlin film has such a ratio, and no other film has.",
                 cure="Give both or neither: law and mooney_rivlin_ratio.",
             )
-        if self.mooney_rivlin_ratio is not None:
-            require_non_negative("film mooney_rivlin_ratio", self.mooney_rivlin_ratio)
+        require_non_negative("film mooney_rivlin_ratio", self.mooney_rivlin_ratio)
 
     @property
     def shear_modulus(self) -> float:

@@ -47,8 +47,8 @@ class RoundIndenter(Indenter):
 
     def __post_init__(self) -> None:
         arrays.require_positive(f"{self.shape} radius", self.radius, "m")
-        if (u := self.radius_uncertainty) is not None:
-            arrays.require_non_negative(f"uncertainty of the {self.shape} radius", u)
+        u = self.radius_uncertainty
+        arrays.require_non_negative(f"uncertainty of the {self.shape} radius", u)
 
     @property
     def extent(self) -> float:

@@ -11,9 +11,7 @@ _NEGLIGIBLE = 1e-12
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def format_measured(
-    value: float, uncertainty: float | None, unit: str = "", *, concise: bool = False
-) -> str:
+def format_measured(value: float, uncertainty: float | None, unit: str = "") -> str:
     """Write a value with its standard uncertainty and unit, for people to read."""
     # The uncertainty keeps two significant digits and the value is rounded to the same place (GUM,
     # JCGM 100:2008, 7.2).
@@ -28,9 +26,6 @@ def format_measured(
         return f"{value:.6g}{tail} (no uncertainty stated)"
     number, spread, exponent = _rounded(value, uncertainty)
     factor = "" if exponent == 0 else "×10" + str(exponent).translate(_SUPERSCRIPTS)
-    if concise:
-        digits = spread.replace(".", "").lstrip("0") if float(spread) < 1 else spread
-        return f"{number}({digits}){factor}{tail}"
     if factor or tail:
         return f"({number} ± {spread}){factor}{tail}"
     return f"{number} ± {spread}"

@@ -519,15 +519,14 @@ class Scan:
                 why="A calibration divides the voltage by the stress that this load produces.",
                 cure="Give the indenter's load (/entry/indenter/load).",
             )
-        if self.load_uncertainty is not None:
-            arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
+        arrays.require_non_negative("standard uncertainty of the load", self.load_uncertainty)
         require_rod_friction(self.rod_friction)
-        loads, errors_of_loads = self.normal_load, self.normal_load_errors
-        stated = {"u_zz_errors": self.u_zz_errors, "normal_load_errors": errors_of_loads}
-        for name, errors in stated.items():
+        for name in ("u_zz_errors", "normal_load_errors"):
+            errors = getattr(self, name)
             if errors is not None and np.any((errors < 0) | np.isinf(errors)):
                 problem = "holds a standard uncertainty that is negative or infinite."
                 raise InputError(f"{name} {problem}")
+        loads = self.normal_load
         if loads is not None and np.any((loads <= 0) | np.isinf(loads)):
             raise InputError(
                 "normal_load holds a load that is infinite or not above zero.",
@@ -540,11 +539,9 @@ class Scan:
                 f"The direction of the scan is {self.direction!r}.",
                 cure="A line scan runs along 'x' or 'y'; a raster has its own y.",
             )
-        if self.position_scale_uncertainty is not None:
-            arrays.require_non_negative(
-                "relative standard uncertainty of the stage's scale",
-                self.position_scale_uncertainty,
-            )
+        arrays.require_non_negative(
+            "relative standard uncertainty of the stage's scale", self.position_scale_uncertainty
+        )
         if self.x_errors is None:
             return
         errors = arrays.finite_vector("x_errors of the scan", self.x_errors)

@@ -72,10 +72,8 @@ def attribute_text_lengths(data: bytes, header: int, name: bytes, number: int) -
 
 
 def _dense_lengths(data: bytes, name: bytes, number: int) -> Iterator[int]:
-    """Yield the claims of every attribute of this name and of variable length, in any object.
-
-    In a heap of many attributes a message stands as it would in the header.
-    """
+    """Yield the claims of every attribute of this name and of variable length, in any object."""
+    # In a heap of many attributes a message stands as it would in the header.
     terminated = name + b"\0"
     position = data.find(terminated)
     while position >= 0:

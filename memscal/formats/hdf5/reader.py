@@ -17,7 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from memscal.errors import FormatError, InputError, MemscalError, UnsafeFileError
+from memscal.errors import FormatError, MemscalError, UnsafeFileError, placed
 from memscal.formats.files import read_bytes
 from memscal.formats.hdf5 import limits
 from memscal.formats.hdf5.limits import MAX_TEXT_BYTES, refuse
@@ -65,12 +65,9 @@ def open_hdf5(path: str | os.PathLike[str]) -> Iterator[SafeFile]:
     with damage_named(f"{name} cannot be opened as HDF5"):
         file = h5py.File(BytesIO(data), "r")
     try:
-        yield SafeFile(file, name, source, data)
-    except InputError as error:
-        if name in error.problem:
-            raise
         # The dataclasses check values without knowing where they come from.
-        raise type(error)(f"{name}: {error.problem}", why=error.why, cure=error.cure) from error
+        with placed(name):
+            yield SafeFile(file, name, source, data)
     finally:
         with contextlib.suppress(Exception):
             file.close()

@@ -205,7 +205,11 @@ def tree_to_bytes(root: Group) -> bytes:
     with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
         for path, node in walk(root):
             if isinstance(node, Group):
-                _check_names(path, node)
+                if wrong := [name for name in node.children if not _NAME.fullmatch(name)]:
+                    raise InputError(
+                        f"{wrong[0]!r} cannot be written into {path}: a name is lower-case ASCII.",
+                        cure="Use the letters a to z, digits and underscores.",
+                    )
                 group = file if path == "/" else file.create_group(path)
                 for name, value in node.all_attributes.items():
                     _write_attribute(group, name, value)
@@ -216,15 +220,6 @@ def tree_to_bytes(root: Group) -> bytes:
                 file.create_dataset(path, data=text, dtype=_text_type(), track_times=False)
         _attach_scales(file, root)
     return memory.getvalue()
-
-
-def _check_names(path: str, group: Group) -> None:
-    for name in group.children:
-        if not _NAME.fullmatch(name):
-            raise InputError(
-                f"{name!r} cannot be written into {path}: a name is lower-case ASCII.",
-                cure="Use the letters a to z, digits and underscores.",
-            )
 
 
 def _with_contents(root: Group, text: str) -> Group:

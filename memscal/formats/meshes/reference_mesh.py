@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,6 @@ from memscal.formats.tables import reference
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
 from memscal.model.notation import printable
 
 AXES = "xyz"
@@ -269,22 +268,20 @@ def read_reference_mesh(
     sigma: str,
     r_unit: str,
     sigma_unit: str,
-    load: float,
     sign: int = -1,
     shear: str | None = None,
     shear_sign: int | None = None,
     vertical: str | None = None,
     base: float | None = None,
     centre: tuple[float, float] | None = None,
-    film: ElasticFilm | None = None,
-    indenter: Indenter | None = None,
-    solver: str = "",
+    **stated: Any,
 ) -> reference.ImportedProfile:
     """Read the stress at the base of the film from a mesh: a section, or a film in 3-D.
 
     ``sigma`` is a field of the normal stress or of a tensor of 4, 6 or 9 components, ``"name:2"``
-    component 2.  ``base`` and ``centre`` are in m, ``load`` in N.  Without ``shear_sign`` the shear
-    is taken for the stress component rz; with 1, for the radial traction of the base on the film.
+    component 2.  ``base`` and ``centre`` are in m.  Without ``shear_sign`` the shear is taken for
+    the stress component rz; with 1, for the radial traction of the base on the film.  ``stated``
+    are the profile's ``load`` in N and, where they are known, ``film``, ``indenter``, ``solver``.
     """
     reference.require_sign("sign", sign)
     if shear_sign is not None:
@@ -323,7 +320,7 @@ def read_reference_mesh(
         discretisation=f"{mesh.size}, {len(footing.nodes)} nodes on the base",
     )
     samples = _along_radius(samples, frame, places, centre or (0.0, 0.0))
-    return reference.profile_of(samples, load=load, film=film, indenter=indenter, solver=solver)
+    return reference.profile_of(samples, stated)
 
 
 def _along_radius(

@@ -1,8 +1,9 @@
 """References from samples of a calculated stress, checked; and from tables."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,8 +11,6 @@ from memscal.errors import InputError
 from memscal.formats.tables.text_table import read_table
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
 from memscal.model.stress import StressProfile
 
@@ -74,14 +73,7 @@ def require_numbers(samples: Samples) -> None:
             )
 
 
-def profile_of(
-    samples: Samples,
-    *,
-    load: float,
-    film: ElasticFilm | None,
-    indenter: Indenter | None,
-    solver: str,
-) -> ImportedProfile:
+def profile_of(samples: Samples, stated: Mapping[str, Any]) -> ImportedProfile:
     """Check samples of a stress, sort them by radius, and hold their force against the load."""
     name = samples.source.file_name
     require_numbers(samples)
@@ -98,10 +90,7 @@ def profile_of(
         r=columns["r"],
         sigma_zz=columns["sigma_zz"],
         sigma_rz=columns.get("sigma_rz"),
-        load=load,
-        film=film,
-        indenter=indenter,
-        solver=solver,
+        **stated,  # what no table or mesh holds: load, film, indenter
         discretisation=samples.discretisation,
         source=samples.source,
     )
@@ -191,20 +180,18 @@ def read_reference_table(
     sigma: Column,
     r_unit: str,
     sigma_unit: str,
-    load: float,
     sign: int = 1,
     shear: Column | None = None,
     shear_sign: int = 1,
-    film: ElasticFilm | None = None,
-    indenter: Indenter | None = None,
-    solver: str = "",
     delimiter: str | None = None,
     decimal: str | None = None,
+    **stated: Any,
 ) -> ImportedProfile:
     """Read the stress at the base of the film from a table with one row per radius.
 
-    ``load`` is in N; ``sign`` is -1 where compression is negative, and turns the normal stress;
-    ``shear_sign`` is -1 where the shear is S13 with axis 3 from the base to the surface.
+    ``sign`` is -1 where compression is negative, and turns the normal stress; ``shear_sign`` is -1
+    where the shear is S13 with axis 3 from the base to the surface.  ``stated`` are the profile's
+    ``load`` in N and, where they are known, ``film``, ``indenter`` and ``solver``.
     """
     require_sign("sign", sign)
     require_sign("shear sign", shear_sign)
@@ -215,16 +202,14 @@ def read_reference_table(
     }
     if shear is not None:
         columns["sigma_rz"] = shear_sign * table.quantity(shear, sigma_unit, "stress")
-    source = table.source
-    origin = f"Imported from {source.file_name} (sha256 {source.sha256})."
     samples = Samples(
         columns=columns,
-        source=source,
-        notes=import_notes([origin, *table.notes]),
+        source=table.source,
+        notes=import_notes(table.notes),
         kind="table",
         item="data row",
         units=(r_unit, sigma_unit),
         sign=sign,
         spacing=_SAME * float(np.nanmax(np.abs(columns["r"]), initial=0.0)),
     )
-    return profile_of(samples, load=load, film=film, indenter=indenter, solver=solver)
+    return profile_of(samples, stated)

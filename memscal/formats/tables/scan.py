@@ -3,16 +3,17 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from memscal.errors import InputError, UnitError
+from memscal.formats.tables.reference import require_sign
 from memscal.formats.tables.text_table import Table, read_table
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import Message, import_notes, marked_texts
-from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Rod, RoundIndenter
-from memscal.model.scan import BRANCHES, Scan, StressSensor, branch_numbers, places_of
+from memscal.model.scan import BRANCHES, Scan, branch_numbers, places_of
 
 Column = str | int
 
@@ -38,7 +39,6 @@ def read_scan_table(
     u: Column,
     x_unit: str,
     u_unit: str,
-    film: ElasticFilm,
     indenter: RoundIndenter,
     load: float | None = None,
     y: Column | None = None,
@@ -48,30 +48,24 @@ def read_scan_table(
     u_yz: Column | None = None,
     load_column: Column | None = None,
     load_unit: str = "N",
-    load_uncertainty: float | None = None,
     load_scatter: float | None = None,
     x_error: float | None = None,
-    lubrication: str = "",
-    lubricant: str = "",
-    rod_friction: float | None = None,
     u_scale: float | None = None,
     u_sign: int = 1,
-    sensor: StressSensor | None = None,
-    title: str = "",
     delimiter: str | None = None,
     decimal: str | None = None,
+    **stated: Any,
 ) -> ImportedScan:
     """Read a scan from a table with one row per reading, in the order of the file.
 
     Columns are names, or numbers counted from 1; ``x_unit`` holds for ``y`` too, ``u_unit`` for
-    all channels.  ``load_uncertainty``, in N, is common to all points; ``load_scatter``, relative,
-    and ``x_error``, in m, are independent.  ``u_scale`` is in volts per unit of the readings.
+    all channels.  ``load_scatter``, relative, and ``x_error``, in m, are independent from point to
+    point.  ``u_scale`` is in volts per unit of the readings.  ``stated`` are the scan's ``film``
+    and other fields of :class:`Scan` that no table holds, such as ``load_uncertainty``.
     """
-    if u_sign not in (1, -1):
-        raise InputError(f"The sign of the voltage is {u_sign}.", cure="Give 1 or -1.")
+    require_sign("sign of the voltage", u_sign)
     table = read_table(path, delimiter=delimiter, decimal=decimal)
-    source = table.source
-    notes = [f"Imported from {source.file_name} (sha256 {source.sha256}).", *table.notes]
+    notes = [*table.notes]
     channels = {"u_zz": u, "u_xz": u_xz, "u_yz": u_yz}
     columns = {
         name: _voltage(table, column, u_unit, u_scale)
@@ -91,8 +85,8 @@ def read_scan_table(
     if repeat is not None:
         columns["repeat"] = _lines(table, repeat, notes)
     if branch is not None:
-        stated = np.nan_to_num(table.column(branch, BRANCHES))
-        columns["branch"] = branch_numbers(table.where(branch), stated).astype(np.float64)
+        numbers = np.nan_to_num(table.column(branch, BRANCHES))
+        columns["branch"] = branch_numbers(table.where(branch), numbers).astype(np.float64)
     columns = _placed(columns, notes)
     notes += _counted(columns)
     messages = import_notes(notes)
@@ -111,16 +105,10 @@ def read_scan_table(
         normal_load_errors=None if load_scatter is None or loads is None else load_scatter * loads,
         channels={name: arrays[name] for name in ("u_xz", "u_yz") if name in arrays},
         load=load,
-        load_uncertainty=load_uncertainty,
-        lubrication=lubrication,
-        lubricant=lubricant,
-        rod_friction=rod_friction,
-        film=film,
         indenter=indenter,
-        sensor=sensor or StressSensor(),
-        title=title,
         notes="\n".join(marked_texts(messages)),
-        source=source,
+        source=table.source,
+        **stated,
     )
     return ImportedScan(scan, tuple(messages))
 

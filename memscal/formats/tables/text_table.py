@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from memscal.errors import FormatError, InputError
+from memscal.errors import FormatError, InputError, placed
 from memscal.formats.files import read_bytes
 from memscal.formats.units import to_si
 from memscal.model.arrays import FloatArray
@@ -100,7 +100,8 @@ def read_table(
     """
     data = read_bytes(path)
     name = os.path.basename(os.fspath(path))
-    notes = []
+    source = SourceFile(name, hashlib.sha256(data).hexdigest())
+    notes = [f"Imported from {name} (sha256 {source.sha256})."]
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -128,7 +129,7 @@ def read_table(
         f"{_DELIMITERS.get(delimiter, repr(delimiter))}, with a decimal {mark}."
     )
     return Table(
-        source=SourceFile(name, hashlib.sha256(data).hexdigest()),
+        source=source,
         names=tuple(printable(cell, _MAX_NAME) for cell in header),
         rows=body,
         decimal=decimal,
@@ -193,10 +194,6 @@ def read_indenter_table(path: str | os.PathLike[str], *, r_unit: str, z_unit: st
     """Read an indenter's profile from a table with one row per radius: radius and height."""
     table = read_table(path)
     radii, heights = table.quantity(1, r_unit, "length"), table.quantity(2, z_unit, "length")
-    try:
+    with placed(table.source.file_name):
         # What a microscope calls zero is anywhere.
         return Profile(r=radii, z=heights - heights.min())
-    except InputError as error:
-        raise InputError(
-            f"{table.source.file_name}: {error.problem}", why=error.why, cure=error.cure
-        ) from error
