@@ -265,9 +265,8 @@ def _blurred(
 ) -> tuple[FloatArray, FloatArray]:
     """Return G convolved with each member's base stress, and its uncertainty (not that of A)."""
     predicted = predict(points_at(r, like), sensor.of_shape, members, load)
-    variance = np.zeros_like(predicted.signal)
-    for column in predicted.columns.values():
-        variance = variance + np.sum(column**2, axis=-1)
+    squares = (np.sum(column**2, axis=-1) for column in predicted.columns.values())
+    variance = sum(squares, start=np.zeros_like(predicted.signal))
     a = sensor.conversion_constant
     return predicted.signal / a, np.sqrt(variance) / a
 

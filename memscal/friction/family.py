@@ -380,21 +380,11 @@ _LARGEST_KH = 20.0
 _CHANGE = "change_"
 
 
-@dataclass(frozen=True, eq=False)
 class FamilySetup:
     """What all members of a family share: contact, loads (N), wavenumbers, cache and workers."""
 
-    film: ElasticFilm
-    indenter: Sphere
-    loads: FloatArray
-    wavenumbers: Wavenumbers
-    cache: CacheFolder
-    workers: int
-    order: int = 0
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         film: ElasticFilm,
         indenter: Indenter,
         loads: ArrayLike,
@@ -403,8 +393,8 @@ class FamilySetup:
         cache: CacheFolder,
         workers: int,
         order: int = 0,
-    ) -> FamilySetup:
-        """Check what was asked for: a sphere, positive loads and reach (m), a number of workers."""
+    ) -> None:
+        # Refused is what is no sphere, no positive load or reach (m), or no number of workers.
         require_workers(workers)
         if not isinstance(indenter, Sphere):
             raise InputError(
@@ -412,8 +402,10 @@ class FamilySetup:
                 why="Friction shows under an indenter whose contact grows with the load.",
                 cure="Give the sphere of the contact scan.",
             )
-        nodes = base_wavenumbers(film.thickness, reach)
-        return cls(film, indenter, require_loads(loads), nodes, cache, workers, order)
+        self.film, self.indenter = film, indenter
+        self.wavenumbers = base_wavenumbers(film.thickness, reach)
+        self.loads = require_loads(loads)
+        self.cache, self.workers, self.order = cache, workers, order
 
     def path(self, **law: Any) -> LoadingPath:
         """Return the loading path of one member; ``law``: its friction, loading and interface."""
