@@ -89,16 +89,6 @@ class ProfileFamily:
         changes = {source: frozen_array(change) for source, change in self.changes.items()}
         object.__setattr__(self, "changes", MappingProxyType(changes))
         require_positive("scale of a profile family", self.scale)
-        self._require_shapes()
-        falling = self.slopes is None and np.any(np.diff(self.values) <= 0)
-        if np.any(np.isnan(self.values)) or self.values.min() < 0 or falling:
-            raise InputError(
-                f"The values of a profile family are {', '.join(f'{v:g}' for v in self.values)}.",
-                why="They increase strictly, from 0 or above.",
-                cure="Sort them, and give each once.",
-            )
-
-    def _require_shapes(self) -> None:
         table = (self.values.size, self.loads.size)
         whole = (*table, self.wavenumbers.k.size)
         arrays = {name: getattr(self, name) for name in ("spectra", "by_load", *_NUMBERS)}
@@ -109,6 +99,13 @@ class ProfileFamily:
                 raise InputError(
                     f"{name} of a profile family has shape {array.shape}, not {shape}."
                 )
+        falling = self.slopes is None and np.any(np.diff(self.values) <= 0)
+        if np.any(np.isnan(self.values)) or self.values.min() < 0 or falling:
+            raise InputError(
+                f"The values of a profile family are {', '.join(f'{v:g}' for v in self.values)}.",
+                why="They increase strictly, from 0 or above.",
+                cure="Sort them, and give each once.",
+            )
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what was computed on demand; a mapping proxy cannot be pickled."""

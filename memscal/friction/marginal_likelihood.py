@@ -100,14 +100,11 @@ def evidence_of_each(
     if not tables or len(tables) != len(weights):
         raise InputError(f"There are {len(tables)} loads and {len(weights)} priors.")
     tables = _compressed(tables)
-    size = tables[0].pulls.shape[-1]
     steps = len(tables) - 1
     # Without scrambling the first point is 0: it is moved into the middle of its cell.
     draws = Sobol(steps, scramble=False).random(_PATHS) + 0.5 / _PATHS if steps else None
     paths = _PATHS if steps else 1
-    taken = Tables(
-        np.zeros(paths), np.zeros((paths, size)), np.zeros((paths, size, size)), np.zeros(paths)
-    )
+    taken = Tables(*(np.zeros((paths, *array.shape[2:])) for array in tables[0]))
     logs, before = np.zeros(paths), np.zeros(paths)
     for step, (table, weight) in enumerate(zip(tables, weights, strict=True)):
         both = Tables(
@@ -135,11 +132,9 @@ def _compressed(tables: Sequence[Tables]) -> list[Tables]:
     values, vectors = np.linalg.eigh(largest)
     basis = vectors[:, values > _NEGLIGIBLE**2]
     return [
-        Tables(
-            table.squares,
-            table.pulls @ basis,
-            np.einsum("qa,mjqp,pb->mjab", basis, table.grips, basis, optimize=True),
-            table.volumes,
+        table._replace(
+            pulls=table.pulls @ basis,
+            grips=np.einsum("qa,mjqp,pb->mjab", basis, table.grips, basis, optimize=True),
         )
         for table in tables
     ]

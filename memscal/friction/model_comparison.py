@@ -76,9 +76,8 @@ def weigh_slip_length(
     laws = [one_of_all("effective Amontons, one coefficient", of_all, of_friction, degrees)]
     if len(rigid.points) > 1:
         of_each = [curve(rigid, load=j) for j in range(len(rigid.points))]
-        laws.append(
-            one_of_each("effective Amontons, one for each load", of_each, of_friction, degrees)
-        )
+        name = "effective Amontons, one for each load"
+        laws.append(one_of_each(name, of_each, of_friction, degrees))
     name = f"elasto-plastic at {macroscopic:g}, slip length"
     laws.append(one_of_all(name, along, of_length, degrees))
     length = interface_length(along, slipping.family, "slip length")
