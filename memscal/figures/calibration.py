@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from numpy.typing import ArrayLike
 
 from memscal.figures import style
 from memscal.figures.style import COLOURS, channel_indices, legend_above
@@ -33,11 +32,7 @@ def draw_scan(axes: Axes, data: ApparatusData) -> None:
 
 
 def draw_scan_log(axes: Axes, data: ApparatusData) -> None:
-    """Draw the scan less its baseline on a logarithmic axis.
-
-    Of a point below 2u the upper limit, max(U, 0) + 2u, is drawn as an open triangle.  Of a
-    tangential channel, the side where the voltage is negative is turned over.
-    """
+    """Draw the scan less its baseline, logarithmic; of points below 2u the upper limit, U + 2u."""
     scan = data.reconvolution
     signal = _turned(data, scan.x) * (scan.u_zz - _background(data, scan.x))
     errors = _finite_errors(scan.u_zz_errors)
@@ -74,9 +69,8 @@ def _draw_measured(
 ) -> None:
     size, colour = style.marker_size(x.size), COLOURS["measured"]
     if x.size > style.SCATTER_THRESHOLD:
-        (points,) = axes.plot(x / MM, u / MV, ".", color=colour, ms=1.5, mew=0, label="scan")
-        points.set_rasterized(True)
-        points.set_label("scan" if not label.startswith("_") else label)
+        (points,) = axes.plot(x / MM, u / MV, ".", color=colour, ms=1.5, mew=0)
+        points.set(rasterized=True, label=label.removesuffix(", ±u"))
         return
     axes.errorbar(
         x / MM, u / MV, errors / MV, fmt="o", ms=size, mfc="white", mew=0.7, color=colour,
@@ -169,10 +163,8 @@ def _turned(data: ApparatusData, x: FloatArray) -> FloatArray:
 
 def _draw_indenter(axes: Axes, data: ApparatusData) -> None:
     """Draw the rod's diameter (or the sphere's contact) as the paper's black patch."""
-    radius: float | None = data.indenter.radius
-    form = "rod"
-    if data.indenter.shape != "rod":
-        radius, form = data.reference.contact_radius, "contact"
+    form = "rod" if data.indenter.shape == "rod" else "contact"
+    radius = data.indenter.radius if form == "rod" else data.reference.contact_radius
     if radius is None:
         return
     left = (_centre(data) - radius) / MM
@@ -186,14 +178,8 @@ def _stress_axis(axes: Axes, data: ApparatusData, *, baseline: float) -> None:
     if not (np.isfinite(constant := data.conversion_constant) and constant > 0):
         return
     per_mv, offset = MV / constant / KPA, baseline / MV
-
-    def stress(voltage: ArrayLike) -> FloatArray:
-        return (np.asarray(voltage, dtype=float) - offset) * per_mv
-
-    def voltage(stress: ArrayLike) -> FloatArray:
-        return np.asarray(stress, dtype=float) / per_mv + offset
-
-    right = axes.secondary_yaxis("right", functions=(stress, voltage))
+    both_ways = (lambda u: (u - offset) * per_mv, lambda stress: stress / per_mv + offset)
+    right = axes.secondary_yaxis("right", functions=both_ways)
     right.set_ylabel(rf"stress $\sigma_{{{channel_indices(data)}}}$, $U/A$ (kPa)")
 
 
@@ -241,7 +227,11 @@ def limit_to_scan(axes: Axes, x: FloatArray) -> None:
 def draw_residuals(axes: Axes, data: ApparatusData) -> None:
     """Draw residuals over each point's standard uncertainty; those beyond the axis at its edge."""
     scan = data.reconvolution
-    errors, scale = _residual_scale(data)
+    errors, scale = scan.u_zz_errors, "$u$"
+    if not np.all(np.isfinite(errors) & (errors > 0)):
+        # Without a stated uncertainty residuals are shown over their own rms.
+        rms = _rms(scan.residual)
+        errors, scale = np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
     with_g, with_gaussian = scan.residual / errors, (scan.u_zz - scan.u_zz_gaussian) / errors
     limit = _residual_limit(with_g, with_gaussian)
     axes.axhspan(-_EXPANDED, _EXPANDED, color="0.92", lw=0, label="_±2")
@@ -261,15 +251,6 @@ def draw_residuals(axes: Axes, data: ApparatusData) -> None:
     axes.set_ylabel(f"residual / {scale}")
     limit_to_scan(axes, scan.x)
     legend_above(axes, points=scan.x.size)
-
-
-def _residual_scale(data: ApparatusData) -> tuple[FloatArray, str]:
-    """Return what residuals are divided by: the stated uncertainty, or else their own rms."""
-    errors = data.reconvolution.u_zz_errors
-    if np.all(np.isfinite(errors) & (errors > 0)):
-        return errors, "$u$"
-    rms = _rms(data.reconvolution.residual)
-    return np.full(errors.shape, rms if rms > 0 else 1.0), "own rms"
 
 
 def _rms(values: FloatArray) -> float:
@@ -347,11 +328,14 @@ def draw_transfer(axes: Axes, data: ApparatusData) -> None:
     gaussian = np.exp(-0.5 * (data.gaussian_sigma * transfer.k) ** 2)
     axes.plot(k, gaussian, "--", color=COLOURS["gaussian"], label="Gaussian")
     axes.plot(k, transfer.window, ":", color=COLOURS["window"], label="window")
-    _shade_unresolved(axes, limit, end)
+    if np.isfinite(limit) and limit < end:
+        axes.axvspan(0.0, limit, color=COLOURS["reference"], alpha=0.10, lw=0, label="_resolved")
+        hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
+        hatched.set(zorder=0, label="extrapolated")
+        axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
     top = max(1.1, min(1.1 * _largest(transfer.modulus[shown]), 3.0))
     axes.set(xlim=(0.0, end), ylim=(0.0, top))
-    axes.set_xlabel("wavenumber $k$ (rad/mm)")
-    axes.set_ylabel("transfer function (1)")
+    axes.set(xlabel="wavenumber $k$ (rad/mm)", ylabel="transfer function (1)")
     legend_above(axes)
 
 
@@ -365,15 +349,6 @@ def _draw_band(axes: Axes, radial: ApparatusRadial, *, floor: float) -> None:
 def _draw_profiles(axes: Axes, r: FloatArray, g: FloatArray, gaussian: FloatArray) -> None:
     axes.plot(r / MM, g / PER_MM2, "-", color=COLOURS["deconvolved"], label="deconvolved G")
     axes.plot(r / MM, gaussian / PER_MM2, "--", color=COLOURS["gaussian"], label="Gaussian fit")
-
-
-def _shade_unresolved(axes: Axes, limit: float, end: float) -> None:
-    if not (np.isfinite(limit) and limit < end):
-        return
-    axes.axvspan(0.0, limit, color=COLOURS["reference"], alpha=0.10, lw=0, label="_resolved")
-    hatched = axes.axvspan(limit, end, facecolor="0.95", edgecolor="0.75", hatch="////", lw=0)
-    hatched.set(zorder=0, label="extrapolated")
-    axes.axvline(limit, color="0.25", lw=0.8, label=f"resolved to {limit:.3g} rad/mm")
 
 
 def _shown_radius(radial: ApparatusRadial) -> float:
@@ -401,11 +376,7 @@ _MARGIN = 0.012  # left and right of the lines of text, of the width
 
 
 def calibration_figure(result: Calibrated) -> Figure:
-    """Draw an apparatus function and the scan that it came from, after Fig. 2 of the paper.
-
-    Panels a and c, the scan with reconvolutions and reference; b, residuals over u; d and e, G(r)
-    with its band (k = 2) and the Gaussian; f, the transfer function.
-    """
+    """Draw an apparatus function and the scan that it came from, after Fig. 2 of the paper."""
     data = apparatus_of(result)
     with style.house_style():
         lines = _text_lines(data)
@@ -486,10 +457,8 @@ def _write_lines(figure: Figure, lines: list[tuple[str, str, str]]) -> None:
         y = 1.0 - (0.08 + _LINE_HEIGHT * i) / height
         # A sensor's name may hold a dollar sign: it is text, not mathematics.
         text = figure.text(_MARGIN, y, style.drawable(line), color=colour, weight=weight, va="top")
-        text.set_parse_math(False)
         size = 9.0 if i == 0 else 7.5
-        text.set_fontsize(size)
-        text.set_in_layout(False)
+        text.set(parse_math=False, fontsize=size, in_layout=False)
         # Lines are broken by their number of characters; one of wide letters is set smaller.
         available = (1 - 3 * _MARGIN) * figure.bbox.width
         text.set_fontsize(size * min(1.0, available / max(text.get_window_extent().width, 1.0)))

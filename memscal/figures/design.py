@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from memscal.errors import InputError
 from memscal.figures.style import COLOURS, legend_above, panels_of
@@ -29,12 +30,7 @@ _CURVES = (
 
 
 def design_figure(planned: Design, vary: str = "step") -> Figure:
-    """Draw what is expected of a planned scan.
-
-    Panel a, G with its band (k = 1), and as the plan assumes it; b, its transfer function, the
-    resolved band shaded; c, relative uncertainties of A and sigma, and those from noise alone,
-    against ``vary``: ``step``, ``half_range`` or ``repeats``.
-    """
+    """Draw G, its transfer function, and uncertainties of A and sigma against what is varied."""
     if vary not in _AXES:
         raise InputError(
             f"The figure is to vary {vary!r}, which cannot be varied.",
@@ -57,8 +53,7 @@ def _draw_radial(axes: Axes, planned: Design) -> None:
     assumed = planned.plan.kernel.radial(r * MM) / PER_MM2
     axes.plot(r, assumed, color=COLOURS["measured"], ls=":", label="G assumed")
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set_xlim(0, r[-1])
-    axes.set(xlabel="radius (mm)", ylabel="G (1/mm²)")
+    axes.set(xlim=(0, r[-1]), xlabel="radius (mm)", ylabel="G (1/mm²)")
     legend_above(axes, columns=2)
 
 
@@ -91,7 +86,11 @@ def _draw_varied(axes: Axes, planned: Design, vary: str) -> None:
     axes.plot([], [], color="0.4", ls="--", label="noise alone")
     axes.axvline(number / scale, color=COLOURS["muted"], ls=":", lw=0.8)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="relative uncertainty (%)")
-    _plain_ticks(axes)
+    # 0.5 and 20 in place of powers of ten: the axes span a decade or two.
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_formatter(NullFormatter())
     legend_above(axes, columns=3)
 
 
@@ -104,13 +103,3 @@ def _values(planned: Design, vary: str) -> list[float]:
     values = [float(number * factor) for factor in factors]
     # The scan has to reach over the sensor.
     return [v for v in values if vary == "step" or v > abs(planned.plan.centre)]
-
-
-def _plain_ticks(axes: Axes) -> None:
-    """Show 0.5 and 20 in place of powers of ten: the axes span a decade or two."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(NullFormatter())

@@ -34,11 +34,7 @@ _COLOURS = {"tangential": "deconvolved", "normal": "gaussian"}
 
 
 def interface_figure(comparison: FrictionComparison | InterfaceComparison) -> Figure:
-    """Draw laws of the interface, of a comparison with friction or of the laws alone.
-
-    Panel a, profile likelihood of the length; b, marginal likelihood of each law over that of the
-    best; c, of dry scans, the coefficient by the slip length at each load, beside the measured one.
-    """
+    """Draw laws of the interface, of a comparison with friction or of the laws alone."""
     laws = comparison if isinstance(comparison, InterfaceComparison) else comparison.interface
     loads: Sequence[LoadComparison] = ()
     if isinstance(comparison, FrictionComparison):
@@ -73,8 +69,7 @@ def _draw_lengths(axes: Axes, by_direction: dict[str, LawComparison]) -> None:
     draw_levels(axes)
     names = ["∞" if np.isinf(tick) else f"{tick:g}" for tick in _TICKS]
     axes.xaxis.set_ticks(list(length_position(np.array(_TICKS) * _UM)), names)
-    axes.set_xlim(-0.02, 1.02)
-    axes.set(xlabel="length (um)", ylabel=r"$\chi^2 - \chi^2_{min}$")
+    axes.set(xlim=(-0.02, 1.02), xlabel="length (um)", ylabel=r"$\chi^2 - \chi^2_{min}$")
     legend_above(axes, columns=1)
 
 
@@ -145,25 +140,20 @@ def _draw_maxima(axes: Axes, comparison: FrictionComparison, loading: str) -> No
         line.set_gid(f"mu={mu:g}")
         ends.append((float(curve[-1]), mu))
     for lubrication in dict.fromkeys(at_load.lubrication for at_load in comparison.loads[loading]):
-        _draw_ratios(axes, comparison.loads[loading], lubrication)
+        measured = [p for p in comparison.loads[loading] if p.lubrication == lubrication]
+        values = [(at_load.load, at_load.ratio, at_load.ratio_uncertainty) for at_load in measured]
+        x, ratio, u = zip(*values, strict=True)
+        look = profiles.mark(lubrication, COLOURS["measured"])
+        look |= {"ms": 4, "mew": 0.8, "ls": "none", "elinewidth": 0.8, "capsize": 2}
+        axes.errorbar(x, ratio, u, zorder=3, label=lubricated_words(lubrication), **look)
     first, last = loads[0], loads[-1]
     # Room at the right for the curves' names.
     axes.set_xlim(min(0.0, first), last + _ROOM * max(last - first, 0.2 * last))
     _name_ends(axes, last, ends)
-    axes.set_xlabel("load (N)")
-    axes.set_ylabel(r"$S_{max}/p^0_{max}$")
+    axes.set(xlabel="load (N)", ylabel=r"$S_{max}/p^0_{max}$")
     words = f"{loading} loading" if loading else "as given"
     axes.annotate(words, (0.03, 0.96), xycoords="axes fraction", va="top", fontsize=7)
     legend_above(axes, columns=3)
-
-
-def _draw_ratios(axes: Axes, loads: Sequence[LoadComparison], lubrication: str) -> None:
-    measured = [load for load in loads if load.lubrication == lubrication]
-    values = [(load.load, load.ratio, load.ratio_uncertainty) for load in measured]
-    x, ratio, u = zip(*values, strict=True)
-    look = profiles.mark(lubrication, COLOURS["measured"]) | {"ms": 4, "mew": 0.8, "ls": "none"}
-    look |= {"elinewidth": 0.8, "capsize": 2, "label": profiles.lubricated_words(lubrication)}
-    axes.errorbar(x, ratio, u, zorder=3, **look)
 
 
 def _name_ends(axes: Axes, x: float, ends: list[tuple[float, float]]) -> None:
@@ -196,11 +186,7 @@ def _group_name(group: list[float]) -> str:
 def comparison_figure(
     comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
 ) -> Figure:
-    """Draw a comparison on one page; by default of the first lubrication and loading.
-
-    Panel a, profiles between no friction and full stick; b, maxima over frictionless ones; c,
-    residuals against the frictionless profiles; d, the effective friction coefficient.
-    """
+    """Draw a comparison on one page; by default of the first lubrication and loading."""
     loads = profiles.chosen(comparison, loading, lubrication)
     with panels_of(5.6, 2, 2) as (figure, panels):
         profiles.draw_profiles(panels[0, 0], comparison, loads)
@@ -218,11 +204,9 @@ def comparison_figures(comparison: FrictionComparison) -> Mapping[str, Callable[
     measured = (profile.lubrication for profile in comparison.measured.profiles)
     for lubrication in dict.fromkeys(measured):
         tail = f"-{lubrication}" if lubrication else ""
-        of_state = {"lubrication": lubrication}
-        figures[f"profiles{tail}"] = partial(profiles.profile_figure, comparison, **of_state)
-        figures[f"friction-set{tail}"] = partial(
-            profiles.friction_set_figure, comparison, **of_state
-        )
+        of_state: dict[str, Any] = {"comparison": comparison, "lubrication": lubrication}
+        figures[f"profiles{tail}"] = partial(profiles.profile_figure, **of_state)
+        figures[f"friction-set{tail}"] = partial(profiles.friction_set_figure, **of_state)
     figures["maxima"] = partial(maxima_figure, comparison)
     figures["effective-friction"] = partial(effective_friction_figure, comparison)
     figures["likelihood"] = partial(likelihood_figure, comparison)
@@ -245,11 +229,7 @@ _ENTRIES = 7
 
 
 def effective_friction_figure(comparison: FrictionComparison) -> Figure:
-    """Draw the effective friction coefficient against the load, with intervals.
-
-    A row for each lubrication, a panel for each loading.  Open intervals end in arrows; a band is
-    the interval of all loads together.
-    """
+    """Draw the effective friction coefficient against the load, with intervals."""
     return _panels(comparison, draw_effective, 2.7)
 
 
@@ -263,11 +243,20 @@ def draw_effective(
             reading, x = getattr(at_load, name), at_load.load + side * _ASIDE * span
             look = profiles.mark(at_load.lubrication, COLOURS[colour])
             _draw_reading(axes, reading, x, words if i == 0 else "", look)
-    _draw_joint(axes, comparison.joint[loads[0].lubrication][loads[0].loading])
-    _draw_macroscopic(axes, comparison.macroscopic)
+    joint, grey = comparison.joint[loads[0].lubrication][loads[0].loading], COLOURS["muted"]
+    low, top = _ends(joint)
+    axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
+    if joint.value is not None:
+        axes.axhline(float(friction_position(joint.value)), color=COLOURS["reference"], lw=0.8)
+    if comparison.macroscopic is not None:
+        value, u = comparison.macroscopic
+        place = float(friction_position(value))
+        axes.axhline(place, color=grey, lw=0.8, ls="--", label="macroscopic")
+        if u:
+            low, high = friction_position([max(value - 1.96 * u, 0.0), value + 1.96 * u])
+            axes.axhspan(low, high, color=grey, alpha=0.15, lw=0)
     profiles.friction_axis(axes, "y")
-    axes.set_xlim(0, loads[-1].load + 0.08 * span)
-    axes.set_xlabel("load (N)")
+    axes.set(xlim=(0, loads[-1].load + 0.08 * span), xlabel="load (N)")
 
 
 def _draw_reading(
@@ -294,24 +283,6 @@ def _ends(reading: BoundedEstimate) -> FloatArray:
     """Return where the ends of an interval stand on the axis."""
     low, high = reading.interval.low, reading.interval.high
     return friction_position([low, math.inf if high is None else high])
-
-
-def _draw_joint(axes: Axes, joint: BoundedEstimate) -> None:
-    low, top = _ends(joint)
-    axes.axhspan(low, top, color=COLOURS["reference"], alpha=0.18, lw=0, label="all loads, 95 %")
-    if joint.value is not None:
-        axes.axhline(float(friction_position(joint.value)), color=COLOURS["reference"], lw=0.8)
-
-
-def _draw_macroscopic(axes: Axes, macroscopic: tuple[float, float | None] | None) -> None:
-    if macroscopic is None:
-        return
-    value, u = macroscopic
-    place = float(friction_position(value))
-    axes.axhline(place, color=COLOURS["muted"], lw=0.8, ls="--", label="macroscopic")
-    if u:
-        low, high = friction_position([max(value - 1.96 * u, 0.0), value + 1.96 * u])
-        axes.axhspan(low, high, color=COLOURS["muted"], alpha=0.15, lw=0)
 
 
 def _panels(

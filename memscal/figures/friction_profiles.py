@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from typing import Any, Literal
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from memscal.errors import InputError
@@ -33,8 +35,7 @@ def friction_axis(axes: Axes, which: Literal["x", "y"]) -> None:
     """Give an axis the ticks of effective friction coefficients from 0 to infinity."""
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_ticks(list(friction_position(_TICKS)), [friction_name(mu) for mu in _TICKS])
-    margin = 0.02
-    (axes.set_xlim if which == "x" else axes.set_ylim)(-margin, 1 + margin)
+    (axes.set_xlim if which == "x" else axes.set_ylim)(-0.02, 1.02)
     axis.set_label_text(r"effective friction coefficient $\mu_e$")
 
 
@@ -45,8 +46,6 @@ def friction_name(friction: float) -> str:
 
 def friction_colours(friction: ArrayLike) -> list[str]:
     """Return colours of friction coefficients, by their place between 0 and infinity."""
-    import matplotlib as mpl
-
     shades = mpl.colormaps["plasma"](0.92 * (1.0 - friction_position(friction)))
     return [mpl.colors.to_hex(shade) for shade in np.atleast_2d(shades)]
 
@@ -101,27 +100,19 @@ def chosen(
 
 
 def on_axis(r: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
-    """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones.
-
-    Radii closer than a micrometre count as one.
-    """
+    """Return smooth even profiles (m, k) at fine radii, through (m, n) at increasing ones."""
     from scipy.interpolate import CubicSpline
 
-    kept = _apart(r)
-    inner, samples = r[kept], values[:, kept]
-    start = 1 if inner[0] < _CLOSE else 0
-    mirrored = np.concatenate([-inner[start:][::-1], inner])
-    both = np.concatenate([samples[:, start:][:, ::-1], samples], axis=1)
-    return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
-
-
-def _apart(r: FloatArray) -> Sequence[int]:
     kept, last = [], -np.inf
     for i, radius in enumerate(r):
         if radius - last > _CLOSE:
             kept.append(i)
             last = radius
-    return kept
+    inner, samples = r[kept], values[:, kept]
+    start = 1 if inner[0] < _CLOSE else 0
+    mirrored = np.concatenate([-inner[start:][::-1], inner])
+    both = np.concatenate([samples[:, start:][:, ::-1], samples], axis=1)
+    return np.asarray(CubicSpline(mirrored, both, axis=1)(fine))
 
 
 #: Coverage factor of the grey band, and of points distinct from zero.
@@ -180,11 +171,7 @@ _MOST_LOADS = 4
 def profile_figure(
     comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
 ) -> Figure:
-    """Draw measured profiles between no friction and full stick, as Figure 3 of the paper.
-
-    Panels a and b, stress on a linear and a logarithmic scale; c and d, residuals over standard
-    uncertainties against the frictionless profile and that of the largest coefficient.
-    """
+    """Draw measured profiles between no friction and full stick, as Figure 3 of the paper."""
     loads = chosen(comparison, loading, lubrication)
     with panels_of(4.6, 2, 2, height_ratios=(2.2, 1), sharex=True) as (figure, panels):
         draw_profiles(panels[0, 0], comparison, loads)
@@ -262,11 +249,7 @@ def _plot_residuals(
 def friction_set_figure(
     comparison: FrictionComparison, *, lubrication: str | None = None, loading: str | None = None
 ) -> Figure:
-    """Draw profiles beside those of a set of friction coefficients, as Figure 4 of the paper.
-
-    A column for each of at most four loads: stress near the centre, the same less the frictionless
-    profile (percent of its maximum), residuals against the coefficient of least chi-square.
-    """
+    """Draw profiles beside those of a set of friction coefficients, as Figure 4 of the paper."""
     loads = chosen(comparison, loading, lubrication)
     shown = np.linspace(0, len(loads) - 1, min(len(loads), _MOST_LOADS)).round().astype(int)
     loads = [loads[i] for i in np.unique(shown)]
@@ -330,8 +313,6 @@ def _draw_best(axes: Axes, comparison: FrictionComparison, at_load: LoadComparis
 def _legend_of_friction(
     figure: Figure, comparison: FrictionComparison, at_load: LoadComparison
 ) -> None:
-    from matplotlib.lines import Line2D
-
     handles = [
         Line2D([], [], color=friction_colours(comparison.friction[i])[0], lw=1.2,
                label=rf"$\mu$ = {friction_name(comparison.friction[i])}")

@@ -1,6 +1,7 @@
 """Report of a calibration as one HTML page, without other files, network or scripts."""
 
 import base64
+import math
 from collections.abc import Iterator
 from html import escape
 from string import Template
@@ -10,7 +11,7 @@ import numpy as np
 from memscal.figures.calibration import calibration_figure, values_text
 from memscal.figures.style import render_figure
 from memscal.model import records
-from memscal.model.apparatus import ApparatusData, ParameterSet
+from memscal.model.apparatus import ApparatusData
 from memscal.model.notation import format_measured
 from memscal.model.quantities import PER_MM, Record, estimated_quantity
 from memscal.summaries.calibration import sensor_title, tables
@@ -111,20 +112,16 @@ def _budget(data: ApparatusData) -> str:
         quantity = estimated_quantity(name)
         total = float(np.sqrt(sum(u**2 for u in budget.values())))
         cells = [_share(budget.get(source), total, quantity.scale) for source in sources]
-        ratio = _relative(data.parameters, name)
-        share = f"{100 * ratio:.2g} %" if np.isfinite(ratio) else "–"
+        ratio = math.nan
+        if name in data.parameters and data.parameters[name] != 0:
+            ratio = data.parameters.uncertainty(name) / abs(data.parameters[name])
+        share = f"{100 * ratio:.2g} %" if math.isfinite(ratio) else "–"
         column = f"{quantity.words} ({quantity.unit})"
         columns.append((column, *cells, f"{total / quantity.scale:.2g}", share))
     names = [source.replace("_", " ") for source in sources]
     first = ("source", *names, "root sum of squares", "relative standard uncertainty")
     head, *rows = zip(first, *columns, strict=True)
     return Table("Standard uncertainty by source, and its share of the variance", head, rows).html()
-
-
-def _relative(parameters: ParameterSet, name: str) -> float:
-    if name not in parameters or parameters[name] == 0:
-        return float("nan")
-    return parameters.uncertainty(name) / abs(parameters[name])
 
 
 def _share(u: float | None, total: float, scale: float) -> str:
@@ -163,10 +160,7 @@ def _stated(prefix: str, record: Record, holder: object) -> Iterator[tuple[str, 
 
 def _provenance(data: ApparatusData) -> str:
     process = data.process
-    rows = [
-        ("program", f"{process.program} {process.version}"),
-        ("date", process.date),
-    ]
+    rows = [("program", f"{process.program} {process.version}"), ("date", process.date)]
     for name, source in (("scan", process.input_scan), ("reference", process.input_reference)):
         if source is not None:
             rows.append((f"input {name}", source.file_name))

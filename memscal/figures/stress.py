@@ -25,12 +25,7 @@ _SAME_LOAD = 0.05
 
 
 def measured_stress_figure(measured: MeasuredStress) -> Figure:
-    """Draw the measured profiles of all loads against the distance from the centre.
-
-    Panel a linear; b over three decades, where points not distinct from zero are pale and without
-    bars.  Bars are 95 %; lines are the restored stress, blurred by G; ticks at the top mark the
-    radius of the frictionless contact.
-    """
+    """Draw the measured profiles of all loads against the distance from the centre."""
     with style.panels_of(3.6, 1, 2) as (figure, panels):
         scales = ("linear scale", "logarithmic scale, three decades")
         for axes, scale in zip(panels, scales, strict=True):
@@ -91,9 +86,8 @@ def _legend(figure: Figure, measured: MeasuredStress) -> None:
         handle.set_label(f"{state or 'measured'}, ±1.96u")
         handles.append(handle)
     radius = Line2D([], [], color="0.2", marker="|", ms=6, ls="none", label="contact radius, µ = 0")
-    figure.legend(
-        handles=[*handles, radius], loc="outside upper center", ncols=min(len(handles) + 1, 7)
-    )
+    handles.append(radius)
+    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 7))
 
 
 _RESTORATION_EXPANDED = 2.0
@@ -101,10 +95,7 @@ _LEAST_LIMIT = 3.5
 
 
 def restoration_figure(restored: Restoration, compared: StressComparison | None = None) -> Figure:
-    """Draw the stress at the base as restored, as blurred by the sensor, and as calculated.
-
-    Panel a, stress against the distance from the centre; b, residuals against position.
-    """
+    """Draw the stress at the base as restored, as blurred by the sensor, and as calculated."""
     compared = restored.comparison if compared is None else compared
     with style.panels_of(3.3, 1, 2, width_ratios=(1.6, 1)) as (figure, panels):
         _draw_stress(panels[0], restored, compared)
@@ -167,11 +158,7 @@ _NAMED = 6
 
 
 def contact_figure(contacts: Contact | Sequence[Contact]) -> Figure:
-    """Draw one contact, or several such as the states of a loading.
-
-    Panel a, pressure and shear at the interface; b, the same at the base; with several contacts,
-    c, load against depth.
-    """
+    """Draw pressure and shear of one contact or several; of several, load against depth, too."""
     if isinstance(contacts, Contact):
         contacts = [contacts]
     if not contacts:
@@ -207,9 +194,8 @@ def _draw_interface(axes: Axes, contacts: Sequence[Contact], colours: Sequence[s
     if any(0 < contact.stick_radius < contact.contact_radius for contact in contacts):
         label = "stick radius"
         axes.plot([], [], color="0.4", marker="o", ms=3, mfc="none", ls="none", label=label)
-    axes.set_xlim(0, r[-1] / MM)
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set(xlabel="radius (mm)", ylabel="at the interface (kPa)")
+    axes.set(xlim=(0, r[-1] / MM), xlabel="radius (mm)", ylabel="at the interface (kPa)")
     style.legend_above(axes, columns=2)
 
 
@@ -222,8 +208,7 @@ def _draw_base(axes: Axes, contacts: Sequence[Contact], colours: Sequence[str]) 
     axes.plot([], [], color="0.4", label="pressure")
     axes.plot([], [], color="0.4", ls="--", label="shear, outward")
     axes.axhline(0.0, color="0.8", lw=0.5, zorder=0)
-    axes.set_xlim(0, r[-1] / MM)
-    axes.set(xlabel="radius (mm)", ylabel="at the base (kPa)")
+    axes.set(xlim=(0, r[-1] / MM), xlabel="radius (mm)", ylabel="at the base (kPa)")
     style.legend_above(axes, columns=1)
 
 

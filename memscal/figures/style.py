@@ -73,10 +73,8 @@ _STYLE: dict[str, Any] = {
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Set matplotlib's settings to those of this module, not the user's, and restore them after.
-
-    They are read both when a figure is built and when it is rendered: both need this.
-    """
+    """Set matplotlib's settings to those of this module, not the user's, and restore them after."""
+    # They are read both when a figure is built and when it is rendered: both need this.
     with mpl.rc_context():
         mpl.rcdefaults()
         settings: Any = mpl.rcParams

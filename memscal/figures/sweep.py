@@ -3,7 +3,6 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from memscal.calibration.sweep import Sweep
 from memscal.figures.style import COLOURS, panels_of
@@ -16,10 +15,7 @@ _SHOWN = (0.05, 0.95)  # the axis follows these; heavy tails go to its edge
 
 
 def sweep_figure(sweep: Sweep) -> Figure:
-    """Draw how A, sigma and the reconvolution change with the noise that regularises them.
-
-    A line joins exact expectations; dots are draws, those beyond the axis triangles at its edge.
-    """
+    """Draw how A, sigma and the reconvolution change with the noise that regularises them."""
     constants = sweep.conversion_constant, sweep.seed_conversion_constant
     widths = sweep.gaussian_sigma_deconvolved, sweep.seed_gaussian_sigma
     power = power_of_ten(sweep.conversion_constant / MV)
@@ -97,20 +93,16 @@ def _limits(exact: FloatArray, draws: FloatArray) -> tuple[float, float]:
     if not shown.size:
         return 0.0, 1.0
     centre = float(np.median(exact[np.isfinite(exact)])) if np.any(np.isfinite(exact)) else 0.0
-    reach = _reach(exact, draws, centre)
+    # The axis reaches no farther from the centre than some times the typical spread.
+    steps = np.abs(exact[np.isfinite(exact)] - centre)
+    spread = np.abs(draws[np.isfinite(draws)] - centre)
+    typical = float(np.quantile(spread, 0.68)) if spread.size else 0.0
+    reach = max(1.2 * float(np.max(steps, initial=0.0)), 4.0 * typical, 1e-3 * abs(centre))
     low = max(float(np.min(shown)), centre - reach)
     high = min(float(np.max(shown)), centre + reach)
     margin = 0.12 * (high - low) or 0.05 * abs(centre) or 1.0
     bottom = low - margin
     return (max(bottom, 0.0) if low >= 0 else bottom), high + margin
-
-
-def _reach(exact: FloatArray, draws: FloatArray, centre: float) -> float:
-    """Return how far from the centre the axis may reach: some times the typical spread."""
-    steps = np.abs(exact[np.isfinite(exact)] - centre)
-    spread = np.abs(draws[np.isfinite(draws)] - centre)
-    typical = float(np.quantile(spread, 0.68)) if spread.size else 0.0
-    return max(1.2 * float(np.max(steps, initial=0.0)), 4.0 * typical, 1e-3 * abs(centre))
 
 
 def _relative_axis(axes: Axes, amplitude: FloatArray) -> None:
@@ -119,11 +111,5 @@ def _relative_axis(axes: Axes, amplitude: FloatArray) -> None:
     base = float(np.asarray(line.get_ydata())[np.argmin(np.abs(np.log(amplitude)))])
     if not (np.isfinite(base) and base != 0):
         return
-
-    def percent(value: ArrayLike) -> FloatArray:
-        return 100 * (np.asarray(value, dtype=float) / base - 1)
-
-    def at_percent(percent: ArrayLike) -> FloatArray:
-        return base * (1 + np.asarray(percent, dtype=float) / 100)
-
-    axes.secondary_yaxis("right", functions=(percent, at_percent)).set_ylabel("change (%)")
+    both_ways = (lambda value: 100 * (value / base - 1), lambda change: base * (1 + change / 100))
+    axes.secondary_yaxis("right", functions=both_ways).set_ylabel("change (%)")

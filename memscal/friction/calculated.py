@@ -45,7 +45,7 @@ def amontons_family(
     order: int = 0,  # one for the shear at the base
 ) -> ProfileFamily:
     """Return the base stresses of a sphere on a film for a range of friction coefficients."""
-    setup = FamilySetup.of(
+    setup = FamilySetup(
         film, indenter, loads, reach=reach, cache=cache, workers=workers, order=order
     )
     values = parameter_values("friction coefficients", friction)
@@ -83,7 +83,7 @@ def elasto_plastic_family(
     workers: int = 1,
 ) -> ProfileFamily:
     """Return incremental base stresses for slip lengths (m), from 0 (rigid) to inf (no shear)."""
-    setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    setup = FamilySetup(film, indenter, loads, reach=reach, cache=cache, workers=workers)
     values = parameter_values("slip lengths", slip_lengths)
     if not 0 < friction < math.inf:
         raise InputError(
@@ -125,7 +125,7 @@ def normal_compliance_family(
     :math:`p_1` only shifts the depth.  ``"greenwood-tripp"``: asperities of the roughness
     :math:`\sigma`, with :math:`\eta\beta\sigma = 0.05` and :math:`\beta/\sigma = 100`.
     """
-    setup = FamilySetup.of(film, indenter, loads, reach=reach, cache=cache, workers=workers)
+    setup = FamilySetup(film, indenter, loads, reach=reach, cache=cache, workers=workers)
     if law not in ("exponential", "greenwood-tripp"):
         raise InputError(f'law is {law!r}, but it is "exponential" or "greenwood-tripp".')
     if lengths is None:
@@ -185,10 +185,9 @@ class LawFamilies:
     def __init__(
         self, profiles: Sequence[MeasuredProfile], cache: CacheFolder, workers: int
     ) -> None:
-        self.film: ElasticFilm = profiles[0].scan.film
-        self.indenter: Indenter = profiles[0].scan.indenter
-        reach = _REACH * max(float(profile.r[-1]) for profile in profiles)
-        self._how: dict[str, Any] = {"reach": reach, "cache": cache, "workers": workers}
+        scan, reach = profiles[0].scan, _REACH * max(float(profile.r[-1]) for profile in profiles)
+        self._contacts: dict[str, Any] = {"film": scan.film, "indenter": scan.indenter}
+        self._contacts |= {"reach": reach, "cache": cache, "workers": workers}
 
     def rigid(
         self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
@@ -196,8 +195,7 @@ class LawFamilies:
         """Return incremental contacts of Amontons' law, from no friction to full stick."""
         if calculated is not None and tuple(calculated.values[[0, -1]]) != (0.0, math.inf):
             calculated = None
-        family = partial(amontons_family, self.film, self.indenter, **self._how)
-        return _at_loads(profiles, calculated, family)
+        return _at_loads(profiles, calculated, partial(amontons_family, **self._contacts))
 
     def slipping(
         self,
@@ -209,18 +207,16 @@ class LawFamilies:
         """Return contacts of the elasto-plastic law at a macroscopic coefficient."""
 
         def family(loads: FloatArray) -> ProfileFamily:
-            how = {"indenter": self.indenter, "loads": loads, **self._how}
-            made = elasto_plastic_family(self.film, friction=friction, **how)
+            contacts = {**self._contacts, "loads": loads}
+            made = elasto_plastic_family(friction=friction, **contacts)
             if uncertainty is None:
                 return made
             # Only its stresses count: without uncertainties it takes a third of the time.
-            bare = replace(
-                self.film,
-                young_modulus_uncertainty=None,
-                thickness_uncertainty=None,
-                poisson_ratio_uncertainty=None,
+            exact: Any = dict.fromkeys(
+                f"{name}_uncertainty" for name in ("young_modulus", "thickness", "poisson_ratio")
             )
-            more = elasto_plastic_family(bare, friction=friction + uncertainty, **how)
+            contacts["film"] = replace(contacts["film"], **exact)
+            more = elasto_plastic_family(friction=friction + uncertainty, **contacts)
             change = more.spectra - made.spectra
             return replace(made, changes={**made.changes, "macroscopic_friction": change})
 
@@ -230,14 +226,13 @@ class LawFamilies:
         self, profiles: Sequence[MeasuredProfile], calculated: ProfileFamily | None
     ) -> ProfileFamily:
         """Return contacts without friction that yield normally."""
-        family = partial(normal_compliance_family, self.film, self.indenter, **self._how)
-        return _at_loads(profiles, calculated, family)
+        return _at_loads(profiles, calculated, partial(normal_compliance_family, **self._contacts))
 
 
 def _at_loads(
     profiles: Sequence[MeasuredProfile],
     calculated: ProfileFamily | None,
-    calculate: Callable[[FloatArray], ProfileFamily],
+    calculate: Callable[..., ProfileFamily],
 ) -> ProfileFamily:
     """Return a family at the nearest of its loads; calculate it where one is not near enough."""
     loads = np.array([profile.load for profile in profiles])
@@ -250,7 +245,7 @@ def _at_loads(
         for load in sorted(loads.tolist()):
             if not distinct or math.log(load / distinct[-1]) > _NEAR:
                 distinct.append(load)
-        calculated = calculate(np.array(distinct))
+        calculated = calculate(loads=np.array(distinct))
     # What is left of a difference is in the points' own loads, to first order.
     return calculated.only(apart(calculated).argmin(axis=1).tolist())
 

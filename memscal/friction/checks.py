@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 from scipy.special import chdtrc
 
+from memscal.friction.effective import EXPANDED
 from memscal.friction.family import ProfileFamily
 from memscal.friction.results import BoundedEstimate, LoadComparison
 from memscal.model import checks as quality
@@ -94,8 +95,6 @@ def _place(profile: MeasuredProfile) -> str:
 
 #: Calculated contacts that are less certain than this share of their stress are named.
 _COARSE = 2e-3
-#: Coverage factor of 95 %.
-_EXPANDED = 1.96
 
 
 def comparison_messages(
@@ -151,7 +150,7 @@ def _against_macroscopic(
     if macroscopic is None:
         return
     value, u = macroscopic
-    spread = _EXPANDED * (u or 0.0)
+    spread = EXPANDED * (u or 0.0)
     for lubrication, by_loading in joint.items():
         if lubrication == "lubricated":
             continue

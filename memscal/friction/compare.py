@@ -428,9 +428,14 @@ def compare_shear(
     """
     sensor, measured = opened_apparatus(apparatus), opened_stress(measured)
     require_contacts(measured.scans)
-    _require_tangential(sensor)
-    overridden = accept_other_sensor(measured.scans[0], sensor, ("name",), override=override)
     channel = sensor.sensor.channel
+    if channel not in TANGENTIAL:
+        raise InputError(
+            f"The artifact is of channel {channel}, not of a tangential one.",
+            cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="evidence"); '
+            "compare the normal channel with memscal.compare().",
+        )
+    overridden = accept_other_sensor(measured.scans[0], sensor, ("name",), override=override)
     families = _families(_setting(measured, cache, workers), friction, loading, order=1)
     confronted = _confronted(measured, sensor, families, channel)
     note = f"Channel {channel} is experimental: comparisons were tested on synthetic scans only."
@@ -449,13 +454,3 @@ def compare_shear(
             *synthetic_messages(measured),
         ),
     )
-
-
-def _require_tangential(apparatus: ApparatusFunction) -> None:
-    channel = apparatus.sensor.channel
-    if channel not in TANGENTIAL:
-        raise InputError(
-            f"The artifact is of channel {channel}, not of a tangential one.",
-            cure='Give the artifact of memscal.calibrate(scan, channel="xz", method="evidence"); '
-            "compare the normal channel with memscal.compare().",
-        )

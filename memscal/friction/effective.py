@@ -24,8 +24,8 @@ from memscal.model.arrays import FloatArray
 from memscal.model.measured_stress import MeasuredProfile
 from memscal.model.notation import format_bound
 
-#: Coverage factor of 95 %.
-_EXPANDED = 1.96
+EXPANDED = 1.96
+"""Coverage factor of 95 %."""
 
 
 def bracketed_share(
@@ -34,13 +34,12 @@ def bracketed_share(
     """Return the share of stresses (n,) within 1.96 u of the extremes of calculated ones (m, n)."""
     # Away from the axis the profiles cross: the larger of the two extremes is above.
     ends, end_errors = calculated[[0, -1]], calculated_errors[[0, -1]]
-    allowed = _EXPANDED * np.hypot(errors, end_errors)
+    allowed = EXPANDED * np.hypot(errors, end_errors)
     above = (ends + allowed).max(axis=0)
     below = (ends - allowed).min(axis=0)
     return float(np.mean((below <= measured) & (measured <= above)))
 
 
-LEVEL = 0.95
 #: Level of one standard deviation of a normal distribution.
 _ONE_SIGMA = 0.6827
 _STEPS = 40
@@ -54,14 +53,10 @@ def profile_estimate(
     *,
     reason: Callable[[Interval], str],
     two_sided: bool = False,
-    level: float = LEVEL,
+    level: float = 0.95,
     unit: str = "",
 ) -> BoundedEstimate:
-    """Return best value and interval of chi-square (m,) along an increasing bounded coordinate.
-
-    The interval is open at an end of the coordinate that it holds.  There is a value where it has
-    an upper end (with ``two_sided`` both ends); elsewhere ``reason`` says why not.
-    """
+    """Return best value and interval of chi-square (m,) along an increasing bounded coordinate."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(coordinates, chi_square)
@@ -78,12 +73,12 @@ def profile_estimate(
         )
 
     wide, narrow = interval(level), interval(_ONE_SIGMA)
+    # There is no value without an upper end, with ``two_sided`` without both; ``reason`` says why.
     if wide.high is None or (two_sided and not wide.two_sided):
         value = spread = None
     else:
         value = value_at(float(np.clip(best, coordinates[0], coordinates[-1])))
-        closed = narrow.high is not None and narrow.low > 0
-        spread = (narrow.high - narrow.low) / 2 if closed and narrow.high is not None else None
+        spread = (narrow.high - narrow.low) / 2 if narrow.high and narrow.low > 0 else None
     return BoundedEstimate(value, spread, wide, reason(wide), values, chi_square, least, unit=unit)
 
 
@@ -265,9 +260,8 @@ def _blurred(
 ) -> tuple[FloatArray, FloatArray]:
     """Return G convolved with each member's base stress, and its uncertainty (not that of A)."""
     predicted = predict(points_at(r, like), sensor.of_shape, members, load)
-    variance = np.zeros_like(predicted.signal)
-    for column in predicted.columns.values():
-        variance = variance + np.sum(column**2, axis=-1)
+    squares = (np.sum(column**2, axis=-1) for column in predicted.columns.values())
+    variance = sum(squares, start=np.zeros_like(predicted.signal))
     a = sensor.conversion_constant
     return predicted.signal / a, np.sqrt(variance) / a
 
@@ -308,11 +302,9 @@ def dry_against_lubricated(
     loads: tuple[int, int],  # its loads of the two
     conversion_share: float,  # relative standard uncertainty of A
 ) -> DryAgainstLubricated | None:
-    """Compare the dry and the lubricated profile of one load, without A.
-
-    Errors of A, G and film nearly cancel in the difference: noise, the scatter of the loads, and
-    each scan's own baseline, drift and centre are left.  ``None``: too few places in common.
-    """
+    """Compare the dry and the lubricated profile of one load; None of too few places in common."""
+    # Errors of A, G and film nearly cancel in the difference: noise, the scatter of the loads, and
+    # each scan's own baseline, drift and centre are left.
     sides = [of_load.averaged() for of_load in points]
     kept = _common(sides[0].offset, sides[1].offset)
     if kept[0].size < _FEWEST_PLACES:

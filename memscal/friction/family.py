@@ -89,16 +89,6 @@ class ProfileFamily:
         changes = {source: frozen_array(change) for source, change in self.changes.items()}
         object.__setattr__(self, "changes", MappingProxyType(changes))
         require_positive("scale of a profile family", self.scale)
-        self._require_shapes()
-        falling = self.slopes is None and np.any(np.diff(self.values) <= 0)
-        if np.any(np.isnan(self.values)) or self.values.min() < 0 or falling:
-            raise InputError(
-                f"The values of a profile family are {', '.join(f'{v:g}' for v in self.values)}.",
-                why="They increase strictly, from 0 or above.",
-                cure="Sort them, and give each once.",
-            )
-
-    def _require_shapes(self) -> None:
         table = (self.values.size, self.loads.size)
         whole = (*table, self.wavenumbers.k.size)
         arrays = {name: getattr(self, name) for name in ("spectra", "by_load", *_NUMBERS)}
@@ -109,6 +99,13 @@ class ProfileFamily:
                 raise InputError(
                     f"{name} of a profile family has shape {array.shape}, not {shape}."
                 )
+        falling = self.slopes is None and np.any(np.diff(self.values) <= 0)
+        if np.any(np.isnan(self.values)) or self.values.min() < 0 or falling:
+            raise InputError(
+                f"The values of a profile family are {', '.join(f'{v:g}' for v in self.values)}.",
+                why="They increase strictly, from 0 or above.",
+                cure="Sort them, and give each once.",
+            )
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what was computed on demand; a mapping proxy cannot be pickled."""
@@ -380,21 +377,11 @@ _LARGEST_KH = 20.0
 _CHANGE = "change_"
 
 
-@dataclass(frozen=True, eq=False)
 class FamilySetup:
     """What all members of a family share: contact, loads (N), wavenumbers, cache and workers."""
 
-    film: ElasticFilm
-    indenter: Sphere
-    loads: FloatArray
-    wavenumbers: Wavenumbers
-    cache: CacheFolder
-    workers: int
-    order: int = 0
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         film: ElasticFilm,
         indenter: Indenter,
         loads: ArrayLike,
@@ -403,8 +390,8 @@ class FamilySetup:
         cache: CacheFolder,
         workers: int,
         order: int = 0,
-    ) -> FamilySetup:
-        """Check what was asked for: a sphere, positive loads and reach (m), a number of workers."""
+    ) -> None:
+        # Refused is what is no sphere, no positive load or reach (m), or no number of workers.
         require_workers(workers)
         if not isinstance(indenter, Sphere):
             raise InputError(
@@ -412,8 +399,10 @@ class FamilySetup:
                 why="Friction shows under an indenter whose contact grows with the load.",
                 cure="Give the sphere of the contact scan.",
             )
-        nodes = base_wavenumbers(film.thickness, reach)
-        return cls(film, indenter, require_loads(loads), nodes, cache, workers, order)
+        self.film, self.indenter = film, indenter
+        self.wavenumbers = base_wavenumbers(film.thickness, reach)
+        self.loads = require_loads(loads)
+        self.cache, self.workers, self.order = cache, workers, order
 
     def path(self, **law: Any) -> LoadingPath:
         """Return the loading path of one member; ``law``: its friction, loading and interface."""

@@ -99,8 +99,19 @@ class LoadPoints:
 def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
     """Return the points of a measured profile, with the noise that is stated, or was estimated."""
     points = profile.points.get(channel)
+    if not profile.points:
+        raise InputError(
+            f"{profile.label}: the measured stress holds no measured points.",
+            why="Its file is of version 1.0, which kept the profiles alone.",
+            cure="Make it again with memscal apply, or give the scans.",
+        )
     if points is None:
-        raise _missing(profile, channel)
+        raise InputError(
+            f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",
+            why="The scan has none, or it does not change, or the scan does not run along "
+            f"{channel[0]}: across it the shear is zero.",
+            cure=f"Give a line scan along {channel[0]} through the sensor, with u_{channel}.",
+        )
     if points.noise is None:
         raise InputError(
             f"{profile.label}: the noise of u_{channel}, u_{channel}_errors, is missing.",
@@ -108,6 +119,7 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
             cure=f"State the electronic noise of u_{channel}.",
         )
     position = (points.x, points.y)[profile.axis]
+    drift = (position - (position.max() + position.min()) / 2) / (np.ptp(position) / 2)
     return LoadPoints(
         u=points.u,
         offset=position - float(profile.centre[profile.axis]),
@@ -116,26 +128,10 @@ def load_points(profile: MeasuredProfile, channel: str = "zz") -> LoadPoints:
         noise=np.asarray(points.noise / np.sqrt(points.weight)),
         load_errors=points.load_errors / profile.load,
         x_errors=points.x_errors,
-        flat=np.stack([np.ones_like(position), _unit_range(position)], axis=1),
+        flat=np.stack([np.ones_like(position), drift], axis=1),
         load_share=(profile.load_uncertainty or 0.0) / profile.load,
         position_share=profile.scan.position_scale_uncertainty or 0.0,
         correlation=points.correlation,
-    )
-
-
-def _missing(profile: MeasuredProfile, channel: str) -> InputError:
-    """Say why a profile holds no points of a channel."""
-    if not profile.points:
-        return InputError(
-            f"{profile.label}: the measured stress holds no measured points.",
-            why="Its file is of version 1.0, which kept the profiles alone.",
-            cure="Make it again with memscal apply, or give the scans.",
-        )
-    return InputError(
-        f"{profile.label}: the measured stress holds no usable voltage u_{channel}.",
-        why="The scan has none, or it does not change, or the scan does not run along "
-        f"{channel[0]}: across it the shear is zero.",
-        cure=f"Give a line scan along {channel[0]} through the sensor, with u_{channel}.",
     )
 
 
@@ -156,11 +152,6 @@ def points_at(
         load_share=like.load_share,
         position_share=like.position_share,
     )
-
-
-def _unit_range(position: FloatArray) -> FloatArray:
-    middle = (position.max() + position.min()) / 2
-    return np.asarray((position - middle) / (np.ptp(position) / 2))
 
 
 #: Directions in which A G changes the signal by less than this share of its largest are dropped.

@@ -26,8 +26,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy.special import logsumexp
 
 from memscal.errors import InputError
 from memscal.friction.family import bounded
@@ -39,8 +41,7 @@ _PATHS = 256
 _NEGLIGIBLE = 1e-2
 
 
-@dataclass(frozen=True, eq=False)
-class Tables:
+class Tables(NamedTuple):
     """Statistics of J groups at M values of a parameter, their own nuisances integrated."""
 
     squares: FloatArray  # (M, J): rho^T Q rho
@@ -50,17 +51,12 @@ class Tables:
 
     def together(self) -> Tables:
         """Return the groups as one, of shape (M, 1): one parameter for all of them."""
-        return Tables(*(np.sum(array, axis=1, keepdims=True) for array in self.arrays))
+        return Tables(*(np.sum(array, axis=1, keepdims=True) for array in self))
 
     def group(self, index: int | Sequence[int]) -> Tables:
         """Return some of the groups, as one."""
         chosen = np.atleast_1d(np.asarray(index, dtype=np.intp))
-        return Tables(*(array[:, chosen] for array in self.arrays)).together()
-
-    @property
-    def arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Squares, pulls, grips and volumes."""
-        return self.squares, self.pulls, self.grips, self.volumes
+        return Tables(*(array[:, chosen] for array in self)).together()
 
 
 def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
@@ -88,8 +84,7 @@ def log_likelihood(tables: Tables) -> tuple[FloatArray, FloatArray]:
 
 def evidence_of_one(log_likelihoods: FloatArray, weights: FloatArray) -> float:
     """Return the logarithm of the evidence of a law with one parameter; ``weights`` (M,): prior."""
-    with np.errstate(divide="ignore"):
-        return float(_log_sum(log_likelihoods + np.log(weights)))
+    return float(logsumexp(log_likelihoods, b=weights))
 
 
 def evidence_of_each(
@@ -105,40 +100,30 @@ def evidence_of_each(
     if not tables or len(tables) != len(weights):
         raise InputError(f"There are {len(tables)} loads and {len(weights)} priors.")
     tables = _compressed(tables)
-    size = tables[0].pulls.shape[-1]
     steps = len(tables) - 1
     # Without scrambling the first point is 0: it is moved into the middle of its cell.
     draws = Sobol(steps, scramble=False).random(_PATHS) + 0.5 / _PATHS if steps else None
     paths = _PATHS if steps else 1
-    taken = Tables(
-        np.zeros(paths), np.zeros((paths, size)), np.zeros((paths, size, size)), np.zeros(paths)
-    )
+    taken = Tables(*(np.zeros((paths, *array.shape[2:])) for array in tables[0]))
     logs, before = np.zeros(paths), np.zeros(paths)
     for step, (table, weight) in enumerate(zip(tables, weights, strict=True)):
-        added = Tables(*(array[None, :, 0] for array in table.arrays))
         both = Tables(
-            *(old[:, None] + new for old, new in zip(taken.arrays, added.arrays, strict=True))
+            *(old[:, None] + new[None, :, 0] for old, new in zip(taken, table, strict=True))
         )
         with np.errstate(divide="ignore"):
             joint = log_likelihood(both)[0] + np.log(weight)
-        expected = _log_sum(joint)
+        expected = np.asarray(logsumexp(joint, axis=-1))
         logs += expected - before
         if draws is None or step == steps:
             continue
         cumulated = np.cumsum(np.exp(joint - expected[:, None]), axis=1)
         drawn = (cumulated < draws[:, step, None] * cumulated[:, -1:]).sum(axis=1)
         drawn = np.minimum(drawn, weight.size - 1)
-        taken = Tables(*(array[np.arange(paths), drawn] for array in both.arrays))
+        taken = Tables(*(array[np.arange(paths), drawn] for array in both))
         before = log_likelihood(taken)[0]
-    mean = float(_log_sum(logs) - np.log(paths))
+    mean = float(logsumexp(logs)) - math.log(paths)
     spread = np.std(np.exp(logs - mean)) / np.sqrt(paths)
     return mean, float(spread)
-
-
-def _log_sum(logs: FloatArray) -> FloatArray:
-    """Logarithm of the sum of exponentials along the last axis."""
-    top = np.max(logs, axis=-1, keepdims=True)
-    return np.asarray((np.log(np.exp(logs - top).sum(axis=-1, keepdims=True)) + top)[..., 0])
 
 
 def _compressed(tables: Sequence[Tables]) -> list[Tables]:
@@ -147,11 +132,9 @@ def _compressed(tables: Sequence[Tables]) -> list[Tables]:
     values, vectors = np.linalg.eigh(largest)
     basis = vectors[:, values > _NEGLIGIBLE**2]
     return [
-        Tables(
-            table.squares,
-            table.pulls @ basis,
-            np.einsum("qa,mjqp,pb->mjab", basis, table.grips, basis, optimize=True),
-            table.volumes,
+        table._replace(
+            pulls=table.pulls @ basis,
+            grips=np.einsum("qa,mjqp,pb->mjab", basis, table.grips, basis, optimize=True),
         )
         for table in tables
     ]
@@ -176,11 +159,8 @@ def bounded_prior(scale: float, words: str) -> Prior:
 
 def log_uniform_prior(low: float, high: float, words: str) -> Prior:
     """Return the prior that gives each decade from ``low`` to ``high`` the same share."""
-
-    def below(values: FloatArray) -> FloatArray:
-        return np.asarray(np.log(np.clip(values, low, high) / low) / math.log(high / low))
-
-    return Prior(words, below)
+    whole = math.log(high / low)
+    return Prior(words, lambda values: np.asarray(np.log(np.clip(values, low, high) / low) / whole))
 
 
 def uniform_prior(high: float, words: str) -> Prior:

@@ -76,9 +76,8 @@ def weigh_slip_length(
     laws = [one_of_all("effective Amontons, one coefficient", of_all, of_friction, degrees)]
     if len(rigid.points) > 1:
         of_each = [curve(rigid, load=j) for j in range(len(rigid.points))]
-        laws.append(
-            one_of_each("effective Amontons, one for each load", of_each, of_friction, degrees)
-        )
+        name = "effective Amontons, one for each load"
+        laws.append(one_of_each(name, of_each, of_friction, degrees))
     name = f"elasto-plastic at {macroscopic:g}, slip length"
     laws.append(one_of_all(name, along, of_length, degrees))
     length = interface_length(along, slipping.family, "slip length")
@@ -103,7 +102,8 @@ def weigh_normal_compliance(measured: Measured) -> LawComparison:
         uniform_prior(high, f"length uniform up to {high / _UM:.3g} um"),
     )
     along = curve(measured, also=np.geomspace(low / 10, high, _DECADES))
-    rigid = of_one_value("rigid, frictionless", along, 0, measured.degrees)
+    top, least = float(along.log_likelihood[0]), float(along.chi_square[0])
+    rigid = _law("rigid, frictionless", (), top, 0.0, top, least, measured.degrees)
     yielding = one_of_all("normal compliance, length", along, prior, measured.degrees)
     return LawComparison(
         lubrication="lubricated",
@@ -316,9 +316,7 @@ def curve(measured: Measured, *, load: int | None = None, also: Iterable[float] 
     close = tables_at(fine)
     both = np.concatenate([coarse, fine])
     order = np.argsort(both)
-    tables = Tables(
-        *(np.concatenate(pair)[order] for pair in zip(rough.arrays, close.arrays, strict=True))
-    )
+    tables = Tables(*(np.concatenate(pair)[order] for pair in zip(rough, close, strict=True)))
     t = both[order]
     logs, chi_square = log_likelihood(tables)
     middles = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
@@ -333,18 +331,12 @@ def one_of_all(name: str, along: LawCurve, prior: Prior, degrees: int) -> Interf
     return _law(name, (best,), log_evidence, 0.0, top, least, degrees - 1)
 
 
-def of_one_value(name: str, along: LawCurve, index: int, degrees: int) -> InterfaceLaw:
-    """Return the law that leaves nothing free, by the index of its parameter in a curve."""
-    top, least = float(along.log_likelihood[index]), float(along.chi_square[index])
-    return _law(name, (), top, 0.0, top, least, degrees)
-
-
 def one_of_each(name: str, curves: Sequence[LawCurve], prior: Prior, degrees: int) -> InterfaceLaw:
     """Return the law with one parameter of each load; arguments as for :func:`one_of_all`."""
     # Nodes that one load alone excludes are left out.
     near = [2 * (c.log_likelihood.max() - c.log_likelihood) < _EXCLUDED for c in curves]
     pairs = list(zip(curves, near, strict=True))
-    tables = [Tables(*(array[nodes] for array in c.tables.arrays)) for c, nodes in pairs]
+    tables = [Tables(*(array[nodes] for array in c.tables)) for c, nodes in pairs]
     weights = [prior.weights(along.edges)[nodes] for along, nodes in pairs]
     log_evidence, error = evidence_of_each(tables, weights)
     start = [int(np.argmax(log_likelihood(table)[0][:, 0])) for table in tables]
@@ -373,9 +365,9 @@ def _best_of_each(tables: Sequence[Tables], start: list[int]) -> tuple[list[int]
     for _ in range(_SWEEPS):
         before = top
         for j, table in enumerate(tables):
-            at = [[a[chosen[i]] for a in other.arrays] for i, other in enumerate(tables) if i != j]
+            at = [[a[chosen[i]] for a in other] for i, other in enumerate(tables) if i != j]
             sums = [np.sum(arrays, axis=0) for arrays in zip(*at, strict=True)] or [0.0] * 4
-            both = Tables(*(a + s for a, s in zip(table.arrays, sums, strict=True)))
+            both = Tables(*(a + s for a, s in zip(table, sums, strict=True)))
             logs, squares = log_likelihood(both)
             chosen[j] = int(np.argmax(logs[:, 0]))
             top, chi_square = float(logs[chosen[j], 0]), float(squares[chosen[j], 0])

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -273,8 +273,7 @@ _CURES = {
 }
 
 
-@dataclass(frozen=True)
-class _Search:
+class _Search(NamedTuple):
     """A number to vary: its name, its least and most count, and the plan of a count."""
 
     name: str

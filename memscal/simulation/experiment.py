@@ -100,15 +100,9 @@ def simulate_contacts(
 ) -> Scan:
     r"""Simulate a line scan of contacts of a sphere, each pressed anew at its place.
 
-    The base stress of contact i of nominal load P, with its own load :math:`P_i` and at its own
-    distance :math:`R_i` from the sensor, is convolved with G exactly:
-
-    .. math:: U_i = A\,(G \otimes \sigma_{zz}^{P_i})(R_i) + b + d\,\xi_i + n_i
-
-    with an offset b, a linear drift d and Gaussian noise :math:`n_i`.  The stress at each load is a
-    parabola in ln P through solved contacts.  Arguments are those of
-    :func:`memscal.simulate_experiment` for one scan; each nominal ``load`` gives ``repeats`` rows;
-    ``load_scale``: all true loads over the stated ones.
+    Contact i has a load and a distance from the sensor of its own: :math:`U_i = A\,(G \otimes
+    \sigma_{zz}^{P_i})(R_i) + b + d\,\xi_i + n_i` with offset, drift and noise.  Arguments are those
+    of :func:`memscal.simulate_experiment`; ``load_scale``: all true loads over the stated ones.
     """
     loads = checked_loads(load)
     if np.unique(loads).size != loads.size:

@@ -92,7 +92,7 @@ class Linear:
         """Return what a load tells at values of its parameter."""
         residuals = self.data[load] - np.outer(nodes, self.shapes[load])
         each = [tables(r, self.columns[load], np.full(r.size, self.noise)) for r in residuals]
-        return Tables(*map(np.concatenate, zip(*(t.arrays for t in each), strict=True)))
+        return Tables(*map(np.concatenate, zip(*each, strict=True)))
 
 
 @pytest.mark.parametrize("loads", [1, 2, 4])
