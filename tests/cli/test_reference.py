@@ -101,6 +101,7 @@ def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
     (2, ["cone"], "needs --inclination"), (2, ["profile"], "needs --profile-table"),
     (2, ["cone", "--inclination", "5", "--radius", "1"], "--radius does not describe a cone"),
     (2, ["rod", "--inclination", "5"], "--inclination does not describe a rod"),
+    (2, ["sphere", "--thickness", "-2"], "-2"),
     (2, ["sphere", "--friction", "-0.1"], "-0.1"), (2, ["sphere", "--rings", "4"], "4"),
     (2, ["sphere", "--mesh", "film.vtu"], "--backend fem"),
     (2, ["sphere", "--backend", "fem", "--mesh", "film.png"], ".vtu"),
