@@ -4,7 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from helpers.calculated_cases import FILM, REACH, SPHERE
+from helpers.calculated_cases import REACH
+from helpers.paper import FILM, SPHERE
 from helpers.records import assert_same
 
 from memscal.friction import family as assembly
