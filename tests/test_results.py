@@ -34,7 +34,7 @@ def loaded(calibration: memscal.Calibration, scan: Path) -> memscal.ApparatusFun
 
 @pytest.fixture(scope="module")
 def drawn(calibration: memscal.Calibration) -> memscal.MonteCarlo:
-    return memscal.monte_carlo(calibration, draws=6)
+    return memscal.monte_carlo(calibration, draws=6, seed=4)
 
 
 def printed(capsys: pytest.CaptureFixture[str], scan: Path, *options: str) -> str:
@@ -44,17 +44,29 @@ def printed(capsys: pytest.CaptureFixture[str], scan: Path, *options: str) -> st
 
 
 def test_print_shows_the_tables_of_the_command(calibration, drawn, scan, capsys) -> None:
-    shown = printed(capsys, scan, "--sweep", "--monte-carlo", "6")
-    sweep = calibration.sweep()
+    options = ("--sweep", "--monte-carlo", "6", "--seed", "4")
+    shown = printed(capsys, scan, *options)
+    sweep = calibration.sweep(seed=4)
     assert shown == f"{calibration}\n\n{sweep}\n\n{drawn}\n"
     columns = ("6 draws of noise", "u by the budget", "u of the draws", "95 % interval", "agrees")
     assert [words for words in columns if words not in str(drawn)] == []
-    values = json.loads(printed(capsys, scan, "--sweep", "--monte-carlo", "6", "--json"))
+    values = json.loads(printed(capsys, scan, *options, "--json"))
     assert Path(values.pop("artifact")).name == "out.h5"
     expected = {"sweep": sweep.to_dict(), "monte_carlo": drawn.to_dict()}
     assert values == json.loads(json.dumps(calibration.to_dict() | expected))
     for result in (calibration, calibration.apparatus, sweep, drawn):
         assert "\n" not in repr(result)
+
+
+def test_draws_are_told_in_the_units_of_the_rest(drawn: memscal.MonteCarlo) -> None:
+    told = drawn.to_dict()
+    assert (told["draws"], told["seed"]) == (6, 4)
+    assert {"noise", "thickness", "poisson_ratio", "rod_radius", "load"} < set(told["sources"])
+    width, shown = drawn["gaussian_sigma"], told["parameters"]["gaussian_sigma"]
+    assert (shown["unit"], shown["agrees"]) == ("mm", shown["reason"] == "")
+    assert shown["standard_uncertainty"] == pytest.approx(width.uncertainty * 1e3, rel=1e-6)
+    assert shown["interval_95"] == pytest.approx(1e3 * np.array(width.symmetric), rel=1e-6)
+    assert told["parameters"]["noise_equivalent_area"]["unit"] == "mm^2"
 
 
 def test_an_artifact_from_a_file_shows_what_it_holds(calibration, loaded) -> None:

@@ -22,7 +22,6 @@ from helpers.estimation_study import (
     REDUCED,
     SEEDS,
     chance,
-    half_width,
     mean_coverage,
     mean_efficiency,
     study,
@@ -115,9 +114,3 @@ def test_scans_of_the_study_are_those_of_the_simulation_far_below_their_noise(
     ours, theirs = direct_scan(**setting), simulated(**setting)
     assert np.abs(ours.u_zz - theirs.u_zz).max() < 1e-5 * theirs.u_zz.max()
     assert np.abs(ours.u_zz_errors / theirs.u_zz_errors - 1).max() < 1e-5
-
-
-@pytest.mark.parametrize("sigma", [0.45e-3, 0.75e-3])
-def test_the_true_width_at_half_maximum_is_that_of_a_gaussian(sigma: float) -> None:
-    width = half_width(memscal.GaussianMixture((1.0,), (sigma,)))
-    assert width == pytest.approx(2 * np.sqrt(2 * np.log(2)) * sigma, rel=1e-6)

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.bounds import FULL
+from helpers.paper import FILM, ROD
 from numpy.typing import NDArray
 from scipy.special import j0
 
-from memscal import ElasticFilm, Rod, indent
+from memscal import indent
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.step import Load
 
@@ -22,8 +23,6 @@ felupe = pytest.importorskip("felupe", reason="FElupe, the other program, is not
 
 pytestmark = pytest.mark.accuracy
 
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-ROD = Rod(radius=0.25e-3)
 H, A, EDGE = 2.0, 0.25, 0.025  # mm
 WAVENUMBERS = np.linspace(0.0, 3.0, 13)  # rad/mm
 REFINEMENT = 1.0 if FULL else 0.5

@@ -20,6 +20,7 @@ from helpers import getfem_sphere
 from helpers.bounds import FULL
 from helpers.getfem_sphere import contact_radius, load_beyond
 from helpers.machine import once
+from helpers.paper import FILM, LOADS, SPHERE
 
 import memscal
 from memscal.mechanics.solver.refinement import solve_on_rings
@@ -27,7 +28,6 @@ from memscal.mechanics.solver.refinement import solve_on_rings
 STEP, LAYERS = (0.05, 8) if FULL else (0.1, 5)
 STEPS = (50, 100, 200) if FULL else (50, 100)
 FRICTIONS = (0.3, 1.0, math.inf)
-LOADS = (0.34, 0.69, 1.37, 2.75)
 PROGRAM = Path(getfem_sphere.__file__)
 # As good as infinite: the shear of a sticking contact stays below the pressure.
 STICKING = 1e3
@@ -67,9 +67,7 @@ def by_getfem(python: str, friction: float, steps: int, step: float = STEP) -> l
 
 @lru_cache
 def by_memscal(friction: float) -> list[memscal.Contact]:
-    film = memscal.ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    sphere = memscal.Sphere(radius=128.8e-3)
-    return memscal.indent(film, sphere, load=LOADS, friction=friction, loading="incremental")
+    return memscal.indent(FILM, SPHERE, load=LOADS, friction=friction, loading="incremental")
 
 
 def edge(state: dict[str, Any]) -> float:

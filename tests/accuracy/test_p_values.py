@@ -46,7 +46,6 @@ def p_values(sensor: str, noise: float) -> dict[str, np.ndarray]:
         changes = round(same * (1 - runs.value))
         rows.append({
             "size": chi_square_test(residuals).p_value,
-            "runs": runs.p_value,
             # A count's p-value moves in steps: spread evenly over its own, it is uniform.
             "spread runs": runs.p_value - rng.uniform() * binom.pmf(changes, same, 0.5),
             "neighbours": neighbour_correlation_test(residuals).p_value,
@@ -69,12 +68,6 @@ def test_p_values_of_all_sensors_together_are_uniform_in_their_lower_tail(name: 
         for level in (0.01, 0.1):
             low, high = binom.ppf([CHANCE, 1 - CHANCE], found.size, level)
             assert low <= np.sum(found < level) <= high
-
-
-def test_runs_are_rejected_no_more_often_than_their_level() -> None:
-    found = np.concatenate([p_values(sensor, 0.003)["runs"] for sensor in SENSORS])
-    for level in (0.01, 0.05, 0.2):
-        assert np.sum(found < level) <= binom.ppf(1 - CHANCE, found.size, level)
 
 
 def test_uncertain_positions_are_noise_of_every_chi_square() -> None:

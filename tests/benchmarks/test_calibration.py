@@ -14,6 +14,7 @@ from scipy.optimize import curve_fit
 
 import memscal
 from memscal import EvenGrid, Scan, StressProfile
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import DivisionProblem, WhiteNoise
 from memscal.model.arrays import FloatArray
 
@@ -24,14 +25,10 @@ STRESS_WIDTH, BLURRED_WIDTH = 0.9e-3, 1.06e-3
 WEAKEST = 1e-3
 
 
-def gaussian(r: FloatArray, width: float) -> FloatArray:
-    return np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
-
-
 def division_problem(pixels: int) -> DivisionProblem:
     """Two Gaussians on a plane of ``pixels`` by ``pixels``, of which a quarter is kept."""
     grid = EvenGrid(pixels // 2 + 1, WIDTH / pixels)
-    voltage, stress = gaussian(grid.radius, BLURRED_WIDTH), gaussian(grid.radius, STRESS_WIDTH)
+    voltage, stress = (unit_gaussian(grid.radius, w) for w in (BLURRED_WIDTH, STRESS_WIDTH))
     # Grids remember their wavenumbers; neither side of a comparison is to compute them.
     assert grid.wavenumber.size == voltage.size
     return DivisionProblem(grid, voltage, stress, WEAKEST**1.4, WEAKEST)
@@ -78,7 +75,7 @@ def reference(scan: Scan) -> StressProfile:
 
 def test_a_quarter_plane_is_divided_as_a_plain_transform_divides_the_whole(problem, plain) -> None:
     quarter = WhiteNoise().divide(problem).field
-    exact = gaussian(problem.grid.radius, np.sqrt(BLURRED_WIDTH**2 - STRESS_WIDTH**2))
+    exact = unit_gaussian(problem.grid.radius, np.sqrt(BLURRED_WIDTH**2 - STRESS_WIDTH**2))
     np.testing.assert_allclose(quarter, exact, atol=0.05 * exact.max())
     # The central pixel is the axis; the quarter lies to the lower right, less the last edge.
     np.testing.assert_allclose(plain()[256:, 256:], quarter[:-1, :-1], atol=1e-6 * quarter.max())
@@ -123,7 +120,7 @@ def plain_pipeline(scan: Scan, reference: StressProfile) -> FloatArray:
     rows = slice(pixels // 2 - 100, pixels // 2 + 101)
 
     def bell(distance: FloatArray, constant: float, width: float) -> FloatArray:
-        return constant * gaussian(distance, width)
+        return constant * unit_gaussian(distance, width)
 
     fit, _ = curve_fit(bell, r[rows, rows].ravel(), g[rows, rows].ravel(), p0=(1e-7, 0.5e-3))
     return np.asarray(fit)

@@ -4,23 +4,19 @@ import math
 
 import numpy as np
 import pytest
-from helpers.machine import once, show, turns
+from helpers.machine import show, turns
+from helpers.paper import FILM, LOADS, SPHERE
 from scipy.integrate import quad
 from scipy.optimize import nnls
 from scipy.special import ellipk
 
-from memscal import ElasticFilm, Interface, Sphere
+from memscal import Interface
 from memscal.mechanics.film_response import HankelFilm
 from memscal.mechanics.solver.path import follow
-from memscal.mechanics.solver.refinement import RingRequest, solve_on_rings
 from memscal.mechanics.solver.step import ContactProblem, ContactState, Depth, Load
 from memscal.model.arrays import FloatArray
 
 pytestmark = pytest.mark.benchmark
-
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-SPHERE = Sphere(radius=128.8e-3)
-LOADS = (0.34, 0.69, 1.37, 2.75)
 
 
 def contact_of_200_rings(friction: float) -> ContactProblem:
@@ -104,18 +100,3 @@ def test_friction_along_a_path_costs_a_few_solutions_per_ring() -> None:
     # 200 steps, most of them on a part of the rings.
     ratio = turns(path, lambda: np.linalg.solve(whole, right), rounds=3)
     show("friction along a path, over a dense solution", ratio, 400)
-
-
-def test_a_second_call_is_instant() -> None:
-    request = RingRequest(
-        film=FILM, indenter=SPHERE, interface=Interface(), friction=0.2, loading="total",
-        targets=tuple(Load(load) for load in LOADS), backend="hankel", film_radius=None, rings=48,
-    )  # fmt: skip
-
-    def afresh() -> object:
-        solve_on_rings.cache_clear()
-        return solve_on_rings(request)
-
-    afresh()
-    again = min(once(lambda: solve_on_rings(request)) for _ in range(5))
-    show("second call, over the first", again / once(afresh), 1 / 300)

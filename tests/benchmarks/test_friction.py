@@ -1,13 +1,14 @@
 """Speed of families of profiles and of their likelihood, as ratios on the same machine."""
 
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 
 import pytest
 from helpers.linear_contacts import Laboratory
 from helpers.machine import once, show
+from helpers.paper import FILM, SPHERE
 
-from memscal import ElasticFilm, Sphere
 from memscal.friction.calculated import amontons_family
 from memscal.friction.effective import fine_values
 from memscal.friction.family import ProfileFamily
@@ -16,16 +17,13 @@ from memscal.mechanics.solver.refinement import solve_on_rings
 
 pytestmark = pytest.mark.benchmark
 
-FILM = ElasticFilm(
-    young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, thickness_uncertainty=2e-5
-)
-SPHERE = Sphere(radius=128.8e-3)
+UNCERTAIN = replace(FILM, thickness_uncertainty=2e-5)
 
 
 def family(cache: Path | None) -> ProfileFamily:
     solve_on_rings.cache_clear()
     return amontons_family(
-        FILM, SPHERE, [0.34, 2.75], friction=[0.0, 0.3], reach=12e-3, cache=cache
+        UNCERTAIN, SPHERE, [0.34, 2.75], friction=[0.0, 0.3], reach=12e-3, cache=cache
     )
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from helpers.console import Outcome, Run
+from helpers.scans import known_apparatus
 
 import memscal
 from memscal.cli import main
@@ -52,3 +53,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def scan(good_scan: Path, folder: Path) -> Path:
     """A copy of the good scan in the folder."""
     return Path(shutil.copy(good_scan, folder / "scan.h5"))
+
+
+@pytest.fixture
+def artifact(folder: Path) -> Path:
+    """A sensor whose G and A are known, in the folder."""
+    path = folder / "sensor.apparatus.h5"
+    known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01).save(path)
+    return path

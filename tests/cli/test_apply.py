@@ -3,23 +3,15 @@
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import pytest
 from helpers.console import Run, names
-from helpers.scans import contact_scan, known_apparatus
+from helpers.scans import contact_scan
 
 import memscal
 from memscal.cli.failures import CHECK_FAILED
 
 LOADS = (0.69, 2.75)
 REFUSED, EXISTS, USAGE = 3, 4, 2
-
-
-@pytest.fixture
-def artifact(folder: Path) -> Path:
-    path = folder / "sensor.apparatus.h5"
-    known_apparatus(conversion_uncertainty=0.005, width_uncertainty=0.01).save(path)
-    return path
 
 
 @pytest.fixture
@@ -76,28 +68,18 @@ def test_another_film_is_refused_or_its_override_recorded(run: Run, artifact: Pa
     assert found.process.configuration == {"override": list(found.overridden)}
 
 
-def test_an_old_output_is_kept_without_force(run: Run, artifact: Path, dry: Path, folder: Path):
-    (folder / "dry.stress.h5").write_text("mine")
-    assert run("apply", artifact, dry).code == EXISTS
-    assert (folder / "dry.stress.h5").read_text() == "mine"
-    assert run("apply", artifact, dry, "--force").code == 0
-    assert h5py.is_hdf5(folder / "dry.stress.h5")
-
-
 def test_an_input_is_never_overwritten(run: Run, artifact: Path, dry: Path):
     before = dry.read_bytes()
     assert run("apply", artifact, dry, "-o", dry, "--force").code == EXISTS
     assert dry.read_bytes() == before
 
 
-def test_files_of_another_kind_are_refused(run: Run, artifact: Path, dry: Path):
-    assert "memscal-artifact" in run("apply", dry, dry).err
+def test_files_of_another_kind_are_refused(run: Run, artifact: Path):
     assert "memscal-scan" in run("apply", artifact, artifact).err
     assert run("apply", artifact).code == USAGE
     assert run("apply", artifact, "absent.h5").code == REFUSED
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
-def test_a_figure_is_drawn(run: Run, artifact: Path, dry: Path, folder: Path, suffix):
-    assert run("apply", artifact, dry, "--figure", f"f.{suffix}").code == 0
-    assert (folder / f"f.{suffix}").stat().st_size > 1000
+def test_a_figure_is_drawn(run: Run, artifact: Path, dry: Path, folder: Path):
+    assert run("apply", artifact, dry, "--figure", "f.svg").code == 0
+    assert (folder / "f.svg").stat().st_size > 1000

@@ -1,6 +1,5 @@
 """What cannot be calibrated: plain words, the right exit code, and the old output still there."""
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -47,7 +46,7 @@ def test_a_file_that_was_spoilt_is_refused(refused: Refused, scan: Path, change,
     refused(scan, words=words)
 
 
-@pytest.mark.parametrize("command", ["restore", "compare"])
+@pytest.mark.parametrize("command", ["apply", "restore", "compare"])
 def test_files_in_the_wrong_order_are_refused(run: Run, scan: Path, command):
     assert run(command, scan, scan).exits(3, "memscal-artifact").out == ""
 
@@ -66,13 +65,14 @@ def test_a_scan_of_no_use_is_refused(refused: Refused, folder: Path, scan, words
 def test_a_reference_shorter_than_the_scan_is_refused(refused: Refused, scan: Path, folder: Path):
     rod = press_rod(SCAN.film, memscal.Rod(radius=0.25e-3), 1.0)
     memscal.write_reference(rod.profile(np.linspace(0.0, 2e-3, 100)), folder / "short.h5")
-    refused(scan, "--reference", "short.h5", words=("ends at r = 2 mm", "Extend the reference"))
+    for further in ([], ["--dry-run"]):
+        words = ("ends at r = 2 mm", "Extend the reference")
+        refused(scan, "--reference", "short.h5", *further, words=words)
 
 
 def test_a_scan_is_no_reference_and_a_missing_scan_is_named(refused: Refused, scan: Path):
     refused(scan, "--reference", scan, words=("memscal-reference",))
     refused("missing.h5", words=("missing.h5 cannot be read: No such file",))
-    refused(os.devnull, words=("not a regular file",))
 
 
 def test_a_name_that_would_steer_the_terminal_is_shown_without_its_controls(run: Run, folder: Path):

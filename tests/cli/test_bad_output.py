@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 from helpers.console import Run, names
+from helpers.scans import pressed, sphere_scan
+
+import memscal
 
 OLD = b"an artifact from last week"
 CALIBRATE = "memscal.calibration.calibrate.calibrate"
@@ -50,6 +53,23 @@ def test_a_report_does_not_replace_the_reference(run: Run, scan: Path):
     before = Path("rod.h5").read_bytes()
     run("calibrate", scan, "--reference", "rod.h5", "--report", "rod.h5", "--force").exits(4)
     assert Path("rod.h5").read_bytes() == before
+
+
+@pytest.mark.parametrize(("name", "arguments"), [
+    ("scan.apparatus.h5", ["calibrate", "scan.h5"]),
+    ("rod.h5", ["reference", "rod", "-o", "rod.h5"]),
+    ("d.png", ["design", "--figure", "d.svg", "--figure", "d.png"]),
+    ("sphere.stress.h5", ["apply", "sensor.apparatus.h5", "sphere.h5"]),
+    ("out.h5", ["restore", "sensor.apparatus.h5", "sphere.h5", "-o", "out.h5"]),
+])  # fmt: skip
+@pytest.mark.usefixtures("artifact", "scan")
+def test_an_old_output_is_replaced_only_if_forced(run: Run, folder: Path, name, arguments):
+    memscal.write_scan(sphere_scan(pressed(), seed=5), "sphere.h5")
+    (folder / name).write_bytes(OLD)
+    assert run(*arguments).exits(4, "--force").out == ""
+    assert (folder / name).read_bytes() == OLD
+    assert run(*arguments, "--force").code == 0
+    assert (folder / name).read_bytes()[:4] in (b"\x89HDF", b"\x89PNG")
 
 
 def test_an_interruption_keeps_the_old(run: Run, scan: Path, monkeypatch: Patch):

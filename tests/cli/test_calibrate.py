@@ -47,28 +47,11 @@ def test_a_failed_check_is_exit_code_1_and_marked(run: Run, drifting_scan: Path,
     assert "out.h5 was written and is marked" in done.err
 
 
-def test_an_artifact_is_not_replaced_unless_forced(run: Run, scan: Path, folder: Path):
-    old = folder / "scan.apparatus.h5"
-    old.write_bytes(b"old")
-    assert run("calibrate", scan).exits(4, "--force").out == ""
-    assert old.read_bytes() == b"old"
-    assert run("calibrate", scan, "--force").code == 0
-    assert memscal.load_apparatus(old).passed
-
-
 def test_a_dry_run_checks_everything_and_writes_nothing(run: Run, scan: Path, folder: Path):
     done = run("calibrate", scan, "--dry-run", "--figure", "a.png", "--report", "a.html").exits(0)
     for name in ("scan.apparatus.h5", "a.png", "a.html", "65 points", "rod, solved on the film"):
         assert name in done.out
     assert names(folder) == ["scan.h5"]
-
-
-def test_a_dry_run_refuses_what_a_real_run_would_refuse(run: Run, scan: Path):
-    run("reference", "rod", "-o", "rod.h5")
-    profile = memscal.read_reference("rod.h5")
-    cut = memscal.StressProfile(r=profile.r[:60], sigma_zz=profile.sigma_zz[:60], load=1.0)
-    memscal.write_reference(cut, "short.h5")
-    run("calibrate", scan, "--reference", "short.h5", "--dry-run").exits(3, "Extend the reference")
 
 
 def test_figures_and_report_are_written_in_their_formats(run: Run, scan: Path, folder: Path):
@@ -89,10 +72,9 @@ def lawless(folder: Path) -> Path:
 
 
 def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, lawless: Path):
-    scan = lawless
-    own = run("calibrate", scan, "--json", "-o", "own.h5").json
+    own = run("calibrate", lawless, "--json", "-o", "own.h5").json
     assert run("reference", "rod", "-o", "rod.h5").code == 0
-    given = run("calibrate", scan, "--reference", "rod.h5", "--json", "-o", "given.h5").json
+    given = run("calibrate", lawless, "--reference", "rod.h5", "--json", "-o", "given.h5").json
     # The file holds a table of the same solution: to its accuracy nothing changes.
     assert given["conversion_constant"]["value"] == pytest.approx(
         own["conversion_constant"]["value"], rel=1e-5
@@ -101,15 +83,12 @@ def test_a_reference_file_takes_the_place_of_the_solved_rod(run: Run, lawless: P
 
 
 def test_a_reference_of_another_film_is_refused_or_its_override_recorded(run: Run, lawless: Path):
-    scan = lawless
     run("reference", "rod", "--thickness", "2.1", "-o", "thick.h5")
+    both = "2 mm (u 0.02) in the scan scan.h5, 2.1 mm (u not stated) in the reference thick.h5"
     for further in ([], ["--dry-run"]):
-        refused = run("calibrate", scan, "--reference", "thick.h5", *further).exits(3, "--override")
-        assert (
-            "2 mm (u 0.02) in the scan scan.h5, 2.1 mm (u not stated) in the reference thick.h5"
-            in refused.err
-        )
-    done = run("calibrate", scan, "--reference", "thick.h5", "--override")
+        refused = run("calibrate", lawless, "--reference", "thick.h5", *further)
+        refused.exits(3, "--override", both)
+    done = run("calibrate", lawless, "--reference", "thick.h5", "--override")
     assert "Overridden: film thickness 2 mm" in done.err
     process = memscal.load_apparatus("scan.apparatus.h5").process
     (message,) = (m for m in process.messages if m.kind == "override")
@@ -131,12 +110,8 @@ def test_a_method_and_its_options_reach_the_artifact(run: Run, scan: Path):
     assert configuration["options"]["amplitude"] == 0.5
 
 
-def test_the_seed_decides_a_draw_and_is_recorded(run: Run, scan: Path):
-    def width(seed: int, name: str) -> float:
-        arguments = ["--method", "white-noise-draw", "--seed", seed, "-o", name, "--json"]
-        return float(run("calibrate", scan, *arguments).json["gaussian_sigma_deconvolved"]["value"])
-
-    assert width(5, "a.h5") == width(5, "b.h5") != width(6, "c.h5")
+def test_the_seed_of_a_draw_is_recorded(run: Run, scan: Path):
+    run("calibrate", scan, "--method", "white-noise-draw", "--seed", 6, "-o", "c.h5")
     assert memscal.load_apparatus("c.h5").process.configuration["seed"] == 6
 
 
@@ -153,7 +128,7 @@ def test_a_seed_without_effect_is_said_to_have_none(run: Run, scan: Path):
     (["--figure", "a.jpg"], ".png"),
     (["--figure", "a.png", "--sweep-figure", "./a.png"], "Two outputs"),
     (["--report", "scan.apparatus.h5"], "Two outputs"), (["--seed", "x"], "--seed"),
-    (["--colour"], "--colour"),
+    (["--colour"], "--colour"), *((["--monte-carlo", n], "--monte-carlo") for n in (1, "many")),
 ])  # fmt: skip
 def test_wrong_use_is_exit_code_2_with_a_hint(run: Run, scan: Path, folder: Path, arguments, hint):
     assert run("calibrate", scan, *arguments).exits(2, hint, "--help").out == ""
@@ -179,16 +154,9 @@ def test_a_sweep_is_drawn_and_given_as_json(run: Run, scan: Path, monkeypatch: p
         return sweep_noise(found.solution, amplitudes=5, draws=2, seed=seed)
 
     monkeypatch.setattr(memscal.Calibration, "sweep", short)
-    found = run("calibrate", scan, "--json", "--sweep-figure", "sweep.SVG").json
-    sweep = found["sweep"]
-    amplitude = sweep["amplitude"]
-    assert max(amplitude) / min(amplitude) == pytest.approx(100)
+    sweep = run("calibrate", scan, "--json", "--sweep-figure", "sweep.SVG").json["sweep"]
     assert sweep["conversion_constant"]["unit"] == "mV/Pa"
-    middle = amplitude.index(1.0)
-    assert sweep["conversion_constant"]["values"][middle] == pytest.approx(
-        found["conversion_constant"]["value"], rel=1e-6
-    )
-    assert len(sweep["relative_rms"]["draws"]) == len(amplitude)
+    assert len(sweep["relative_rms"]["draws"]) == len(sweep["amplitude"])
     assert b"<svg" in Path("sweep.SVG").read_bytes()
 
 
@@ -196,14 +164,6 @@ def test_the_name_of_the_artifact_keeps_what_is_no_suffix(run: Run, good_scan: P
     shutil.copy(good_scan, folder / "film_0.5mm")
     assert run("calibrate", "film_0.5mm").code == 0
     assert (folder / "film_0.5mm.apparatus.h5").is_file()
-
-
-def test_a_link_to_an_output_is_followed_and_stays(run: Run, scan: Path, folder: Path):
-    (folder / "store").mkdir()
-    (folder / "out.h5").symlink_to("store/real.h5")
-    assert run("calibrate", scan, "-o", "out.h5").code == 0
-    assert (folder / "out.h5").is_symlink()
-    assert memscal.load_apparatus(folder / "store" / "real.h5").passed
 
 
 @pytest.mark.parametrize(("typed", "power"), [(0.14, -3), (2.2, 6), (561.0, -6), (1e-4, -3)])

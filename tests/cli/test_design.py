@@ -1,9 +1,7 @@
 """``memscal design``."""
 
-from pathlib import Path
-
 import pytest
-from helpers.console import Run, names
+from helpers.console import Run
 
 
 def test_options_reach_the_plan(run: Run):
@@ -34,22 +32,11 @@ def test_a_resolved_wavenumber_is_wanted_in_rad_per_mm(run: Run):
     (2, ["--want", "sigma=0.01", "--vary", "step"], "write the %"),
     (2, ["--want", "resolved=4%", "--vary", "step"], "without %"),
     (2, ["--weight", 0.5, "--weight", 0.5], "--weight"), (3, ["--method", "magic"], "magic"),
-    (3, ["--want", "colour=1%", "--vary", "step"], "no known target"),
-    (3, ["--half-range", 2, "--centre", 3], "not passed over"),
     (3, ["--radius", 1.5], "rod's width is 3 mm"),
     (3, ["--want", "sigma=1%", "--vary", "repeats"], "the best is"),
 ])  # fmt: skip
 def test_wrong_use_and_a_plan_that_cannot_be_are_refused(run: Run, code, arguments, told):
     assert run("design", *arguments).exits(code, told).out == ""
-
-
-def test_figures_are_written_and_not_overwritten(run: Run, folder: Path):
-    (folder / "d.png").write_bytes(b"mine")
-    assert run("design", "--figure", "d.svg", "--figure", "d.png").code == 4
-    assert (folder / "d.png").read_bytes() == b"mine"
-    assert run("design", "--figure", "d.svg", "--figure", "d.png", "--force").code == 0
-    assert names(folder) == ["d.png", "d.svg"]
-    assert (folder / "d.png").read_bytes() != b"mine"
 
 
 @pytest.mark.parametrize(

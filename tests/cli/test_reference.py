@@ -10,12 +10,6 @@ import memscal
 from memscal.mechanics.press_rod import press_rod
 
 
-def test_the_papers_rod_has_the_known_stiffness(run: Run):
-    (solution,) = run("reference", "rod", "--json").json["solutions"]
-    assert solution["load"]["value"] == 1.0
-    assert 1e3 / solution["depth"]["value"] == pytest.approx(1.704, abs=5e-4)
-
-
 def test_a_depth_gives_the_load_that_gives_the_depth(run: Run):
     (pressed,) = run("reference", "rod", "--depth", 100, "--json").json["solutions"]
     load = pressed["load"]["value"]
@@ -45,14 +39,6 @@ def test_a_file_is_for_one_load(run: Run, folder: Path):
 
 def test_load_and_depth_exclude_each_other(run: Run):
     run("reference", "rod", "--load", 1, "--depth", 2).exits(2, "not both")
-
-
-def test_a_reference_is_not_replaced_unless_forced(run: Run, folder: Path):
-    Path("rod.h5").write_bytes(b"old")
-    assert run("reference", "rod", "-o", "rod.h5").code == 4
-    assert Path("rod.h5").read_bytes() == b"old"
-    assert run("reference", "rod", "-o", "rod.h5", "--force").code == 0
-    assert memscal.read_reference("rod.h5").load == 1
 
 
 def test_a_depth_beyond_linear_elasticity_is_pointed_out_with_what_a_rubber_does(run: Run):
@@ -107,9 +93,7 @@ def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
 
 @pytest.mark.parametrize(("code", "arguments", "word"), [
     (3, ["rod", "--depth", "3000"], "would sink 3000 um"),
-    (3, ["sphere", "--load", "1e9"], "times as wide as the film is thick"),
     (3, ["sphere", "--strain", "finite", "--friction", "0.3"], "slides freely (friction 0) or"),
-    (3, ["sphere", "--film-radius", "25"], "a film has no end"),
     (3, ["sphere", "--backend", "fem", "--film-radius", "1"], "the film's edge at 1 mm"),
     (3, ["profile", "--profile-table", "absent.csv"], "absent.csv"),
     (2, ["rod", "--strain", "finite", "--film-law", "linear"], "leave --strain out"),
@@ -117,8 +101,8 @@ def test_a_table_that_is_no_tip_is_refused_by_its_name(run: Run, folder: Path):
     (2, ["cone"], "needs --inclination"), (2, ["profile"], "needs --profile-table"),
     (2, ["cone", "--inclination", "5", "--radius", "1"], "--radius does not describe a cone"),
     (2, ["rod", "--inclination", "5"], "--inclination does not describe a rod"),
-    (2, ["sphere", "--friction", "-0.1"], "-0.1"), (2, ["sphere", "--poisson-ratio", "0.6"], "0.6"),
-    (2, ["sphere", "--thickness", "-2"], "-2"), (2, ["sphere", "--rings", "4"], "4"),
+    (2, ["sphere", "--thickness", "-2"], "-2"),
+    (2, ["sphere", "--friction", "-0.1"], "-0.1"), (2, ["sphere", "--rings", "4"], "4"),
     (2, ["sphere", "--mesh", "film.vtu"], "--backend fem"),
     (2, ["sphere", "--backend", "fem", "--mesh", "film.png"], ".vtu"),
     (2, ["sphere", "--figure", "film.txt"], ".png"),

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 
 from memscal.axisymmetry.grids import EvenGrid, FieldGrid, Lattice
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import Division, DivisionProblem
 from memscal.model.arrays import FloatArray
 
 A = 3e-8
 STRESS_WIDTH, KERNEL_WIDTH = 0.9e-3, 0.561e-3
-
-
-def _gaussian(r: FloatArray, width: float) -> FloatArray:
-    return np.exp(-((r / width) ** 2) / 2) / (2 * np.pi * width**2)
 
 
 def _lattice(x: float = 0.0, y: float = 0.0) -> Lattice:
@@ -54,12 +51,12 @@ def _make(grid_name: str = "quarter plane", weakest: float = 1e-3) -> Gaussians:
     k = np.sqrt(-2 * np.log(weakest)) / STRESS_WIDTH
     both = float(np.hypot(STRESS_WIDTH, KERNEL_WIDTH))
     problem = DivisionProblem(
-        grid, A * _gaussian(grid.radius, both), _gaussian(grid.radius, STRESS_WIDTH),
+        grid, A * unit_gaussian(grid.radius, both), unit_gaussian(grid.radius, STRESS_WIDTH),
         A * float(np.exp(-((k * both) ** 2) / 2)), weakest,
     )  # fmt: skip
     widths = (STRESS_WIDTH, KERNEL_WIDTH)
     transforms = [np.exp(-((grid.wavenumber * width) ** 2) / 2) for width in widths]
-    return Gaussians(problem, _gaussian(centred.radius, KERNEL_WIDTH), *transforms)
+    return Gaussians(problem, unit_gaussian(centred.radius, KERNEL_WIDTH), *transforms)
 
 
 @pytest.fixture
@@ -71,10 +68,4 @@ def gaussians() -> Callable[..., Gaussians]:
 @pytest.fixture(params=GRIDS)
 def on_each_grid(request: pytest.FixtureRequest) -> Callable[..., Gaussians]:
     """Return the maker of problems on one of the grids."""
-    return lambda weakest=1e-3: _make(request.param, weakest)
-
-
-@pytest.fixture(params=[name for name in GRIDS if name.startswith("lattice")])
-def on_each_lattice(request: pytest.FixtureRequest) -> Callable[..., Gaussians]:
-    """Return the maker of problems on one of the lattices."""
     return lambda weakest=1e-3: _make(request.param, weakest)

@@ -55,14 +55,15 @@ def test_the_units_of_voltage_and_stress_do_not_matter(regulariser, volts, stres
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 1.0, 10.0])
+@pytest.mark.parametrize("grid", ["lattice", "lattice off centre"])
 def test_the_penalty_of_wiener_is_the_noise_at_the_edge_of_the_relevant_band(
-    on_each_lattice: Callable, amplitude: float
+    gaussians: Callable, grid: str, amplitude: float
 ) -> None:
     # Just beyond the weakest relevant component w, the window is |z|^2/(|z|^2 + (0.1 a w)^2).
-    gaussians = on_each_lattice(weakest=1e-2)
-    division = Wiener(amplitude=amplitude).divide(gaussians.problem)
-    index = int(np.argmax(gaussians.stress_transform[0] < 1e-2))
-    z2 = gaussians.stress_transform[0, index] ** 2
+    made = gaussians(grid, weakest=1e-2)
+    division = Wiener(amplitude=amplitude).divide(made.problem)
+    index = int(np.argmax(made.stress_transform[0] < 1e-2))
+    z2 = made.stress_transform[0, index] ** 2
     expected = z2 / (z2 + (0.1 * amplitude * 1e-2) ** 2)
     assert division.window[0, index] == pytest.approx(expected, abs=2e-3)
 

@@ -4,18 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from helpers.bounds import RARE
 from scipy.stats import chi2, gamma
 
 from memscal.axisymmetry.grids import EvenGrid, Lattice
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.deconvolution.division import (
     DivisionProblem,
     UnsupervisedWiener,
     WhiteNoise,
     WhiteNoiseDraw,
 )
-
-RARE = 1e-9
-"""Probability with which a correct program would fail one of the random tests here."""
 
 
 def square_lattice(count: int, step: float = 0.5) -> Lattice:
@@ -124,13 +123,9 @@ def test_a_draw_on_a_quarter_plane_convolves_back_as_its_quotient_says(seed: int
     # of a draw's do, would leak into the band by half a percent.
     narrow, wide, weakest = 0.9e-3, 1.06e-3, 1e-3
     k = np.sqrt(-2 * np.log(weakest)) / narrow
-    grid = EvenGrid(129, 1e-4)
-
-    def unit(sigma: float):
-        return np.exp(-0.5 * (grid.radius / sigma) ** 2) / (2 * np.pi * sigma**2)
-
-    least = float(np.exp(-0.5 * (k * wide) ** 2))
-    problem = DivisionProblem(grid, unit(wide), unit(narrow), least, weakest)
+    grid, least = EvenGrid(129, 1e-4), float(np.exp(-0.5 * (k * wide) ** 2))
+    fields = (unit_gaussian(grid.radius, width) for width in (wide, narrow))
+    problem = DivisionProblem(grid, *fields, least, weakest)
     back = grid.convolve(WhiteNoiseDraw(seed=seed).divide(problem).field, problem.reference)
     assert np.abs(back - problem.voltage).max() < 5e-4 * problem.voltage.max()
 

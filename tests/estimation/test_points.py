@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.scans import simulated
 
-from memscal.errors import FitError, InputError
+from memscal.errors import InputError
 from memscal.estimation.points import joined_points, measured_points, scans_by_load
 
 
@@ -48,17 +48,16 @@ def test_repeats_at_loads_of_their_own_become_scans_and_keep_their_readings() ->
     assert split[1].load_uncertainty == pytest.approx(0.01 * 0.3 / several.load)
 
 
-@pytest.mark.parametrize(("change", "error", "words"), [
-    (lambda s: {"u_zz": np.full_like(s.u_zz, np.nan)}, InputError, "missing"),
-    (lambda s: {"u_zz": -s.u_zz}, InputError, "positive in compression"),
-    (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, InputError, "Every voltage"),
-    (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, InputError, "zero"),
-    (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, InputError, "above zero"),
-    (lambda s: {"x": s.x[:5], "u_zz": s.u_zz[:5], "u_zz_errors": None}, FitError, "at least 6"),
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda s: {"u_zz": np.full_like(s.u_zz, np.nan)}, "missing"),
+    (lambda s: {"u_zz": -s.u_zz}, "positive in compression"),
+    (lambda s: {"u_zz": np.full_like(s.u_zz, 2.0)}, "Every voltage"),
+    (lambda s: {"u_zz_errors": np.zeros_like(s.u_zz)}, "zero"),
+    (lambda s: {"normal_load": np.zeros_like(s.u_zz)}, "above zero"),
 ])  # fmt: skip
-def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, error, words) -> None:
+def test_a_scan_that_cannot_be_calibrated_is_refused_with_its_reason(change, words) -> None:
     scan = simulated()
-    with pytest.raises(error, match=words):
+    with pytest.raises(InputError, match=words):
         measured_points(replace(scan, **change(scan)))
 
 

@@ -11,6 +11,7 @@ from helpers.builders import make_artifact
 from matplotlib.figure import Figure
 
 from memscal import ApparatusRadial, Reconvolution, TransferFunction
+from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.figures.calibration import calibration_figure
 from memscal.model.apparatus import ApparatusData, ApparatusField, ParameterSet
 from memscal.model.checks import Message, QualityCheck
@@ -27,14 +28,9 @@ _CONSTANT = 3.0e-8  # V/Pa
 _CENTRE, _BASELINE = 0.14e-3, 4.0e-5
 
 
-def gaussian(r: Any, sigma: float) -> Any:
-    """Return the Gaussian of unit integral over the plane."""
-    return np.exp(-0.5 * (r / sigma) ** 2) / (2 * np.pi * sigma**2)
-
-
 def voltage(r: Any, parts: tuple[tuple[float, float], ...]) -> Any:
     """Return baseline + A (G * sigma_zz): the convolution of Gaussians is a Gaussian."""
-    stress = _LOAD * sum(w * gaussian(r, float(np.hypot(_WIDTH, s))) for w, s in parts)
+    stress = _LOAD * sum(w * unit_gaussian(r, float(np.hypot(_WIDTH, s))) for w, s in parts)
     return _BASELINE + _CONSTANT * stress
 
 
@@ -59,10 +55,10 @@ def reconvolution(kind: str, points: int, noise: float, seed: int) -> Reconvolut
 def radial_profile(error: float, ripple: float) -> ApparatusRadial:
     """Return G(r) with a standard uncertainty of a share of its maximum, and a ripple."""
     r = np.linspace(0.0, 8e-3, 321)
-    g = sum(w * gaussian(r, s) for w, s in _PARTS)
+    g = sum(w * unit_gaussian(r, s) for w, s in _PARTS)
     g = g + ripple * g[0] * np.cos(3500.0 * r) * np.exp(-r / 4e-3)
     errors = error * g[0] * (0.4 + 0.6 * np.exp(-r / 1e-3))
-    return ApparatusRadial(r, g, errors, gaussian(r, _SIGMA), np.diag(errors**2))
+    return ApparatusRadial(r, g, errors, unit_gaussian(r, _SIGMA), np.diag(errors**2))
 
 
 def transfer_function(resolved: float) -> TransferFunction:
@@ -81,7 +77,7 @@ def build(
 ) -> ApparatusData:  # fmt: skip
     """Return the data of a calibration that never ran."""
     grid = np.linspace(-3e-3, 3e-3, 61)
-    g = sum(w * gaussian(np.hypot(grid, grid[:, None]), s) for w, s in _PARTS)
+    g = sum(w * unit_gaussian(np.hypot(grid, grid[:, None]), s) for w, s in _PARTS)
     names = ("reconvolution", "symmetry", "tail_share", "resolved_band", "gaussian_misfit")
     values = {
         "conversion_constant": (_CONSTANT, 1.3e-10), "gaussian_sigma": (_SIGMA, 3.4e-6),
@@ -94,7 +90,7 @@ def build(
     r = np.linspace(0.0, 10e-3, 201)
     data = make_artifact()
     contact = {"film": data.film, "indenter": data.indenter}
-    stress = _LOAD * gaussian(r, _WIDTH)
+    stress = _LOAD * unit_gaussian(r, _WIDTH)
     reference = StressProfile(r=r, sigma_zz=stress, load=_LOAD, **contact)
     return replace(
         data,

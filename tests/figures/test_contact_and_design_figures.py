@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.paper import FILM, SPHERE
 from matplotlib.lines import Line2D
 
 import memscal
@@ -12,12 +13,8 @@ from memscal.figures.design import design_figure
 from memscal.figures.stress import contact_figure
 from memscal.figures.style import render_figure
 from memscal.mechanics.indent import indent
-from memscal.model.film import ElasticFilm
-from memscal.model.indenter import Rod, Sphere
+from memscal.model.indenter import Rod
 from memscal.planning.design import Design
-
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-SPHERE = Sphere(radius=128.8e-3)
 
 
 def curve(axes, color: str, style: str) -> Line2D:

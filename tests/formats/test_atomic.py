@@ -79,23 +79,6 @@ def test_a_disk_that_refuses_leaves_the_old_output_and_says_what_to_do(
     assert_untouched(target)
 
 
-def test_a_disk_that_fills_up_leaves_the_old_output(target: Path, monkeypatch: pytest.MonkeyPatch):
-    write, written = os.write, []
-
-    def short_write(descriptor: int, data: Any) -> int:
-        if written:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        written.append(write(descriptor, bytes(data)[:100]))
-        return written[0]
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "write", short_write)
-        with pytest.raises(OutputError, match="No space left"):
-            atomic_write_bytes(target, bytes(1000), overwrite=True)
-    assert written == [100]
-    assert_untouched(target)
-
-
 def test_short_writes_are_continued(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     write = os.write
     data = bytes(range(256)) * 10

@@ -124,7 +124,6 @@ NO_TABLES = ("", "\n\n", "# only a comment\n", "x,u\n", "\0\0\0")
     *((TWO_ROWS, {"u": column}, r"columns are: x, u\.") for column in ("volts", "0", "3", -1)),
     *((TWO_ROWS, {"u_unit": "uT", "u_scale": value}, "scale") for value in (0.0, np.nan, np.inf)),
     *((text, {}, r"table\.csv") for text in NO_TABLES),
-    ("x,y,u\n0,5,1\n1,5,2\n2,5,1\n", {"y": "y"}, r"0 mm along y(.|\n)*Leave y out"),
     ("x,u\n0,1\n1,3\n", {"branch": "u"}, r"table\.csv: column 'u' holds 3"),
 ])  # fmt: skip
 def test_a_table_of_no_use_is_refused(tmp_path: Path, text, options, words):

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart, profiles
+from helpers.calculated_cases import LOADS, REACH, apart, profiles
 from helpers.machine import assert_same_to_rounding
+from helpers.paper import FILM, SPHERE
 
 from memscal import ElasticFilm, ExponentialCompliance, Interface, Rod, Sphere, indent
 from memscal.errors import DomainError, InputError

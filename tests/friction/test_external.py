@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.calculated_cases import FILM, LOADS, REACH, SPHERE, apart
+from helpers.calculated_cases import LOADS, REACH, apart
 from helpers.machine import assert_same_to_rounding
+from helpers.paper import FILM, SPHERE
 
 from memscal import StressProfile, indent
 from memscal.errors import InputError

@@ -3,9 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-from helpers.calculated_cases import FILM, REACH, SPHERE
+from helpers.calculated_cases import REACH
+from helpers.paper import FILM, SPHERE
 from helpers.records import assert_same
 
 from memscal.friction import family as assembly
@@ -57,15 +57,6 @@ def test_two_laws_of_one_length_are_two_requests(tmp_path: Path, solved: list[in
         normal_compliance_family(
             FILM, SPHERE, [0.34], lengths=[2e-6], law=law, reach=REACH, cache=tmp_path
         )
-    assert len(solved) == 2
-
-
-def test_a_damaged_entry_is_calculated_anew(tmp_path: Path, solved: list[int]) -> None:
-    first = calculated(tmp_path)
-    (path,) = tmp_path.iterdir()
-    path.write_bytes(path.read_bytes()[:1000])
-    np.testing.assert_array_equal(first.spectra, calculated(tmp_path).spectra)
-    calculated(tmp_path)
     assert len(solved) == 2
 
 

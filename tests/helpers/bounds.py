@@ -17,6 +17,10 @@ FULL = bool(os.environ.get("MEMSCAL_FULL_STUDY"))
 """Whether studies run over all their seeds and on their finest meshes."""
 
 
+RARE = 1e-9
+"""Probability with which a correct program would fail one of the random tests."""
+
+
 def root_mean_square_limit(ratio: float, count: int, chance: float) -> float:
     """Largest RMS of ``count`` normal deviates of RMS ``ratio``, but for this chance."""
     return ratio * float(np.sqrt(chi2.isf(chance, count) / count))

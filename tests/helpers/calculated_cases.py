@@ -1,13 +1,10 @@
-"""Film, sphere and loads of the paper, and how far profiles are apart."""
+"""Loads and reach of calculated families, and how far profiles are apart."""
 
 import numpy as np
 
-from memscal import ElasticFilm, Sphere
 from memscal.friction.family import ProfileFamily
 from memscal.model.arrays import FloatArray
 
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-SPHERE = Sphere(radius=128.8e-3)
 LOADS = (0.34, 2.75)
 REACH = 12e-3
 RADII = np.linspace(0.0, 10e-3, 101)

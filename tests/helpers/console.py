@@ -1,7 +1,10 @@
-"""What tests of the command line need: the outcome of a run, and a look at a folder."""
+"""What tests of the command line need: runs, their outcomes, and a look at a folder."""
 
 import json
 import os
+import resource
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,3 +45,14 @@ Run = Callable[..., Outcome]
 def names(folder: Path) -> list[str]:
     """Names of everything in a folder, hidden files included."""
     return sorted(os.listdir(folder))
+
+
+def run_program(
+    *arguments: str, cwd: Path, limit: int | None = None, stdout: int = subprocess.PIPE, **env: str
+) -> subprocess.CompletedProcess[str]:
+    """Run the program, with a limit to the size of every file, which holds for root too."""
+    return subprocess.run(
+        [sys.executable, "-m", "memscal", *arguments], cwd=cwd, env={**os.environ, **env},
+        stdout=stdout, stderr=subprocess.PIPE, text=True, encoding="utf-8", check=False,
+        preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))),
+    )  # fmt: skip

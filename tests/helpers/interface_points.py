@@ -6,20 +6,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from helpers.paper import LOADS, SPHERE
 
-from memscal import ElasticFilm, Sphere
+from memscal import ElasticFilm
 from memscal.friction import calculated
 from memscal.friction.family import ProfileFamily
 from memscal.friction.likelihood import LoadPoints, Sensor
 from memscal.friction.model_comparison import Measured
 
-LOADS = (0.34, 0.69, 1.37, 2.75)
 MACROSCOPIC = 1.6
 FILM = ElasticFilm(
     young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3, young_modulus_uncertainty=0.1e6,
     thickness_uncertainty=0.02e-3, poisson_ratio_uncertainty=0.005,
 )  # fmt: skip
-SPHERE = Sphere(radius=128.8e-3)
 _REACH = 9e-3
 _SIGMA = 561e-6
 

@@ -21,10 +21,6 @@ def ratios(found: MeasuredStress) -> np.ndarray:
     return np.array([profile.force / profile.load for profile in found.profiles])
 
 
-def failed(found: MeasuredStress) -> set[str]:
-    return {check.name for check in found.checks if not check.passed}
-
-
 def test_there_is_a_check_for_each_load_and_one_for_all() -> None:
     names = [check.name for check in measured(0).checks if "force" in check.name]
     assert names == [*(f"applied_force_{i}" for i in (1, 2, 3, 4)), "applied_force_all"]

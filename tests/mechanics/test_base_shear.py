@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 from helpers.machine import assert_same_to_rounding
+from helpers.paper import ROD, SPHERE, film
 from scipy.integrate import simpson
 from scipy.special import j1
 
-from memscal import ElasticFilm, Rod, Sphere, indent
-
-ROD, SPHERE = Rod(radius=0.25e-3), Sphere(radius=128.8e-3)
-
-
-def film(nu: float) -> ElasticFilm:
-    return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
+from memscal import indent
 
 
 @pytest.mark.parametrize("nu", [0.2, 0.45, 0.5])

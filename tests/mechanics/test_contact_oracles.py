@@ -4,21 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from helpers.paper import LOADS, SPHERE, film
 from scipy.integrate import simpson
 
-from memscal import Cone, Contact, ElasticFilm, Profile, Rod, Sphere, indent
+from memscal import Cone, Contact, Profile, Rod, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import ConvergenceError, DomainError
 from memscal.mechanics.rod import solve_rod
 from memscal.model.arrays import FloatArray
 
-SPHERE = Sphere(radius=128.8e-3)
-LOADS = (0.34, 0.69, 1.37, 2.75)
 FRICTIONS = (0.0, 0.1, 0.3, 1.6, math.inf)
-
-
-def film(nu: float = 0.5, thickness: float = 2e-3) -> ElasticFilm:
-    return ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=thickness)
 
 
 def test_a_sphere_on_a_thick_film_is_hertz_s() -> None:

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from helpers.paper import FILM, ROD, SPHERE
 
-from memscal import Cone, ElasticFilm, Interface, Rod, Sphere, indent
+from memscal import Cone, Interface, indent
 from memscal.errors import DomainError, InputError
 
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-ROD, SPHERE = Rod(radius=0.25e-3), Sphere(radius=128.8e-3)
 R = np.linspace(0.0, 4e-3, 30)
 
 

@@ -7,21 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.machine import assert_same_to_rounding
+from helpers.paper import FILM, ROD, film
 from scipy.interpolate import CubicSpline
 from scipy.special import j0
 
-from memscal import Contact, ElasticFilm, Rod, Sphere, indent
+from memscal import Contact, Rod, Sphere, indent
 from memscal.axisymmetry.hankel import gauss_panels
 from memscal.errors import DomainError, InputError
 
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-ROD = Rod(radius=0.25e-3)
 CASES = [(nu, friction) for nu in (0.0, 0.3, 0.5) for friction in (0.0, math.inf)]
 
 
 def press(nu: float, friction: float, radius: float = 0.25e-3) -> Contact:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
-    return indent(film, Rod(radius=radius), load=0.5, friction=friction)
+    return indent(film(nu), Rod(radius=radius), load=0.5, friction=friction)
 
 
 @pytest.mark.parametrize("radius", [0.25e-3, 4e-3])

@@ -4,15 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from helpers.paper import FILM, SPHERE
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from memscal import Contact, ElasticFilm, Rod, Sphere, indent
+from memscal import Contact, ElasticFilm, Rod, indent
 from memscal.errors import InputError
 from memscal.mechanics.interface import ExponentialCompliance, GreenwoodTripp, Interface
 
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-SPHERE = Sphere(radius=128.8e-3)
 ROUGHNESS = 1.82e-6
 GREENWOOD_TRIPP = GreenwoodTripp(roughness=ROUGHNESS, asperity_density=5e9, asperity_radius=20e-6)
 EXPONENTIAL = ExponentialCompliance(decay_length=0.8e-6, reference_pressure=0.5e6)

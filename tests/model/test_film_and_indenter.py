@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.paper import FILM
 from hypothesis import given
 from hypothesis import strategies as st
 
-from memscal import Cone, ElasticFilm, Profile, Rod, Sphere
+from memscal import Cone, Profile, Rod, Sphere
 from memscal.errors import InputError
-
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
 
 
 @given(nu=st.floats(0.0, 0.5), modulus=st.floats(1.0, 1e12))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.bounds import cramer_rao
 from helpers.scans import EXACT_FILM, EXACT_ROD, estimated, simulated
 
 import memscal
@@ -28,23 +29,10 @@ def paper() -> Design:
 
 
 def test_sigma_has_the_bound_of_cramer_and_rao_by_finite_differences() -> None:
-    planned = memscal.design(**EXACT, noise=0.004)
-    plan = planned.plan
-    x = plan.scan().x
-
-    def voltages(a: float, sigma: float, centre: float) -> np.ndarray:
-        kernel = memscal.GaussianMixture((1.0,), (sigma,))
-        made = memscal.simulate(
-            film=EXACT_FILM, rod=EXACT_ROD, kernel=kernel, conversion_constant=a, noise=0.0,
-            centre=(centre, 0.0), baseline=0.0, drift=0.0,
-        )  # fmt: skip
-        return made.u_zz
-
-    theta, steps = np.array([1e-7, 561e-6, 0.0]), np.array([1e-9, 1e-6, 1e-6])
-    columns = [(voltages(*(theta + h)) - voltages(*(theta - h))) / 2 for h in np.diag(steps)]
-    jacobian = np.stack([*columns, np.ones_like(x), x / x.max()], axis=1)
-    bound = np.sqrt((np.linalg.inv(jacobian.T @ jacobian) * plan.point_noise**2)[1, 1]) * steps[1]
-    assert planned.parameters.uncertainty("gaussian_sigma") == pytest.approx(bound, rel=1e-3)
+    # About the middle of an even scan a drift, which is odd, tells nothing of the width.
+    bound = cramer_rao(0.004, centre=(0.0, 0.0))["gaussian_sigma"]
+    found = memscal.design(**EXACT, noise=0.004).parameters.uncertainty("gaussian_sigma")
+    assert found == pytest.approx(bound, rel=1e-3)
 
 
 def test_twice_the_load_or_four_repeats_halve_what_a_voltage_of_noise_makes_of_sigma() -> None:
@@ -218,21 +206,6 @@ def test_too_few_positions_or_too_short_a_range_determine_nothing() -> None:
         memscal.design(step=2e-3, half_range=4e-3)
     with pytest.raises(FitError, match="not distinct from zero"):
         memscal.design(half_range=0.8e-3, step=0.1e-3, noise=0.01)
-
-
-def test_a_kernel_without_unit_integral_is_refused() -> None:
-    class Half:
-        def transform(self, k: np.ndarray) -> np.ndarray:
-            return 0.5 * np.exp(-0.5 * (5e-4 * k) ** 2)
-
-        def radial(self, r: np.ndarray) -> np.ndarray:
-            return np.exp(-0.5 * (r / 5e-4) ** 2) / (4 * np.pi * 5e-4**2)
-
-        def describe(self) -> dict[str, float | str]:
-            return {"kernel": "half a Gaussian"}
-
-    with pytest.raises(InputError, match="unit integral"):
-        memscal.design(kernel=Half())
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.bounds import RARE
 from helpers.machine import assert_same_to_rounding
 from scipy.integrate import simpson
 from scipy.stats import chi2
@@ -14,16 +15,12 @@ from memscal.errors import DomainError, InputError
 from memscal.model.arrays import FloatArray
 from memscal.model.scan import Scan
 from memscal.simulation.experiment import (
-    PAPER_LOADS,
     PAPER_SPHERE,
     Reality,
     drawn,
     simulate_contacts,
 )
 from memscal.simulation.rod_scan import PAPER_FILM, PAPER_ROD, blurred_stress
-
-RARE = 1e-9
-"""Probability with which a correct program would fail one of the random tests here."""
 
 STILL: dict[str, Any] = {"noise": 0.0, "baseline": 0.0, "drift": 0.0}
 EXACT: dict[str, Any] = {**STILL, "load_scatter": 0.0, "position_error": 0.0}
@@ -151,12 +148,6 @@ def test_the_scan_and_its_truth_say_what_was_pressed() -> None:
     told = truth(scan)
     assert (told["friction"], told["load_1"], told["load_2"]) == (0.4, 0.34, 0.69)
     assert (told["young_modulus"], told["indenter_radius"]) == (2.2e6, 128.8e-3)
-
-
-def test_the_defaults_are_the_papers_scan() -> None:
-    scan = simulate_contacts()
-    assert scan.u_zz.shape == (len(PAPER_LOADS), 33)
-    np.testing.assert_allclose(np.diff(scan.x), 0.5e-3)
 
 
 @pytest.mark.parametrize(("options", "error", "problem"), [

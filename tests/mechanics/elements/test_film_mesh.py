@@ -17,13 +17,6 @@ def areas(mesh: TriangleMesh) -> np.ndarray:
     return np.abs((r1 - r0) * (d2 - d0) - (r2 - r0) * (d1 - d0)) / 2
 
 
-def quality(mesh: TriangleMesh) -> np.ndarray:
-    """One for an equilateral triangle, zero for a flat one."""
-    corners = mesh.points[mesh.triangles]
-    sides = np.sum((corners - np.roll(corners, 1, axis=1)) ** 2, axis=(1, 2))
-    return 4 * np.sqrt(3) * areas(mesh) / sides
-
-
 @pytest.mark.parametrize("radius", [2.0, 12.5, 1000.0])
 @pytest.mark.parametrize("name", RINGS)
 def test_the_triangles_cover_the_film_once(name: str, radius: float) -> None:

@@ -5,17 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import skfem
+from helpers.paper import FILM, ROD, SPHERE, film
 
-from memscal import Contact, ElasticFilm, Rod, Sphere, indent
+from memscal import Contact, ElasticFilm, Rod, indent
 from memscal.errors import ConvergenceError
 from memscal.mechanics.finite_strain.film_elements import FilmElements, Rubber
 from memscal.mechanics.finite_strain.pressing import RodFace, SphereFace
 from memscal.mechanics.finite_strain.solve import solve_finite_strain
 from memscal.mechanics.solver.step import Depth, Load
 
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-ROD = Rod(radius=0.25e-3)
-SPHERE = Sphere(radius=128.8e-3)
 EDGE = 0.05e-3
 RADII = np.array([0.0, 0.5, 1.0, 2.0]) * 1e-3
 
@@ -102,10 +100,10 @@ def test_a_contour_is_as_far_from_a_point_as_its_nearest_point(face: RodFace | S
 
 @pytest.mark.parametrize(("nu", "sticking"), [(0.3, False), (0.5, False), (0.5, True)])
 def test_a_lightly_pressed_sphere_is_that_of_the_linear_model(nu: float, sticking: bool) -> None:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
-    (state,) = solve_finite_strain(film, SPHERE, (Load(0.1),), sticking=sticking, refinement=0.6)
+    tip = {"sticking": sticking, "refinement": 0.6}
+    (state,) = solve_finite_strain(film(nu), SPHERE, (Load(0.1),), **tip)
     friction = np.inf if sticking else 0.0
-    linear = indent(film, SPHERE, load=0.1, friction=friction, loading="total")
+    linear = indent(film(nu), SPHERE, load=0.1, friction=friction, loading="total")
     assert state.load == pytest.approx(0.1, rel=1e-9)
     assert state.depth == pytest.approx(linear.depth, rel=5e-3)
     highest = linear.base_stress(0.0)

@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from helpers.paper import FILM, SPHERE, film
 
-from memscal import ElasticFilm, Rod, Sphere, indent
+from memscal import Rod, Sphere, indent
 
-FILM = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-SPHERE = Sphere(radius=128.8e-3)
 R = np.linspace(0.0, 8e-3, 60)
 
 
@@ -33,8 +32,7 @@ def test_a_path_and_its_end_alone_are_one_contact() -> None:
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 def test_what_sticks_gives_back_the_work_done(nu: float) -> None:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
-    for contact in indent(film, SPHERE, load=[0.5, 2.0], friction=math.inf, rings=96):
+    for contact in indent(film(nu), SPHERE, load=[0.5, 2.0], friction=math.inf, rings=96):
         assert contact.dissipated_energy == 0
         assert contact.work == pytest.approx(contact.elastic_energy, rel=1e-3)
 
@@ -42,9 +40,8 @@ def test_what_sticks_gives_back_the_work_done(nu: float) -> None:
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 @pytest.mark.parametrize("friction", [0.05, 0.2])
 def test_work_is_stored_or_lost_to_friction(nu: float, friction: float) -> None:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=nu, thickness=2e-3)
     previous = 0.0
-    for contact in indent(film, SPHERE, load=[0.5, 2.0, 1.0, 2.0], friction=friction, rings=96):
+    for contact in indent(film(nu), SPHERE, load=[0.5, 2.0, 1.0, 2.0], friction=friction, rings=96):
         assert contact.work is not None
         assert contact.dissipated_energy > previous
         balance = contact.elastic_energy + contact.dissipated_energy
@@ -67,8 +64,7 @@ def test_a_sphere_that_slips_remembers_where_it_has_been() -> None:
 
 
 def test_shear_holds_the_film_in_while_loading_and_out_after_unloading() -> None:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.5, thickness=2e-3)
-    up, down = indent(film, SPHERE, load=[2.75, 1.0], friction=0.1)[:2]
+    up, down = indent(FILM, SPHERE, load=[2.75, 1.0], friction=0.1)[:2]
     # The squeezed film slides outward under the indenter, which pulls it back; on the way up
     # it flows back, and near the edge the pull turns around.
     assert up.interface_shear(0.8 * up.contact_radius) < 0
@@ -95,8 +91,8 @@ def test_more_friction_means_a_stiffer_contact_and_more_stress_below() -> None:
 
 
 def test_a_rod_slips_in_proportion_while_it_is_loaded() -> None:
-    film = ElasticFilm(young_modulus=2.2e6, poisson_ratio=0.3, thickness=2e-3)
-    half, whole, back = indent(film, Rod(radius=0.5e-3), load=[0.1, 0.2, 0.1], friction=0.2)
+    rod = Rod(radius=0.5e-3)
+    half, whole, back = indent(film(0.3), rod, load=[0.1, 0.2, 0.1], friction=0.2)
     assert whole.depth == pytest.approx(2 * half.depth, rel=1e-4)
     assert whole.stick_radius == pytest.approx(half.stick_radius, rel=1e-6)
     # On the way back a part sticks that had slipped: less is given back than was put in.
