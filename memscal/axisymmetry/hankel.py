@@ -32,7 +32,7 @@ import numpy as np
 from scipy.special import j0, j1
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray
+from memscal.model.arrays import FloatArray, table_spline
 
 
 def gauss_panels(upper: float, longest: float, order: int = 16) -> tuple[FloatArray, FloatArray]:
@@ -123,20 +123,26 @@ def radial_spline(
     """Return an even (odd for ``order`` 1) cubic spline through a table, mirrored at the axis."""
     from scipy.interpolate import CubicSpline
 
+    return CubicSpline(*_mirrored(r, f, order))
+
+
+def _mirrored(r: FloatArray, f: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
+    """Continue a table beyond the axis by three radii."""
     if r.size < 4:
         raise InputError(
             f"A radial table of {r.size} radii cannot be interpolated.", cure="Give four or more."
         )
     inner = slice(3, 0, -1) if r[0] == 0 else slice(2, None, -1)
     sign = -1 if order else 1
-    spline = CubicSpline(np.append(-r[inner], r), np.concatenate([sign * f[inner], f]))
-    return lambda radius: np.asarray(spline(radius))
+    return np.append(-r[inner], r), np.concatenate([sign * f[inner], f])
 
 
 def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int = 0) -> FloatArray:
     r"""Return :math:`2\pi\int f J_n(kr) r\,dr` at ``k`` of a table that ends at ``r[-1]``."""
-    spline = radial_spline(r, f, order=order)
-    nodes, weights = gauss_between(_panel_edges(r, float(np.max(np.abs(k)))), _TABLE_ORDER)
+    spline, sharp = table_spline(*_mirrored(r, f, order))
+    knots = r if sharp else r[::_INTERVALS_PER_PANEL]
+    edges = _panel_edges(knots, float(r[-1]), float(np.max(np.abs(k))))
+    nodes, weights = gauss_between(edges, _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
     return np.asarray(_bessel(order, np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
 
@@ -146,9 +152,9 @@ def _bessel(order: int, x: FloatArray) -> FloatArray:
     return np.asarray(j1(x) if order else j0(x))
 
 
-def _panel_edges(r: FloatArray, fastest: float) -> FloatArray:
-    """Ends of panels that hold few intervals of a table, and little phase of the kernel."""
-    knots = np.unique(np.concatenate([[0.0], r[::_INTERVALS_PER_PANEL], r[-1:]]))
+def _panel_edges(knots: FloatArray, end: float, fastest: float) -> FloatArray:
+    """Ends of panels between knots from the axis to ``end`` that hold little of a phase."""
+    knots = np.unique(np.concatenate([[0.0], knots, [end]]))
     pieces = np.maximum(np.ceil(np.diff(knots) * fastest / _TABLE_PHASE), 1).astype(int)
     starts = np.repeat(knots[:-1], pieces)
     widths = np.repeat(np.diff(knots) / pieces, pieces)

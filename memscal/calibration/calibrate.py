@@ -433,7 +433,7 @@ def _effects(
         pairs = zip(solution.owners, solution.stresses, strict=True)
         others = [alternatives[i] or stress for i, stress in pairs]
         points = [estimate.points.only(i) for i in range(len(scans))]
-        spectra = reference_spectra(others, points, [scan.film.thickness for scan in scans])
+        spectra = reference_spectra(others, points, estimate.model.reference.wavenumbers)
     effects = dict(input_effects(scans, solution.stresses, estimate, spectra))
     contacts = all(isinstance(stress, Contact) for stress in solution.stresses)
     if "model_form" in effects and (others or contacts):

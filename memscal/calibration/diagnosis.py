@@ -233,17 +233,14 @@ class _Search:
     def _trial(self, length: _Length, factor: float) -> _Trial:
         """Fit a Gaussian with one length scaled."""
         points, stresses = self.points, self.stresses
-        thicknesses = [scan.film.thickness for scan in self.scans]
         if length.path == "data/x":
             points = tuple(replace(p, x=p.x * factor, y=p.y * factor) for p in points)
         else:
             stresses = tuple(_scaled(stress, length.path, factor) for stress in stresses)
-            if length.path != "indenter/radius":
-                thicknesses = [h * min(factor, 1.0) for h in thicknesses]
         joined = joined_points(points)
         weights = np.ones_like(joined.u) if joined.u_errors is None else 1 / joined.u_errors**2
         with np.errstate(all="ignore"), suppress(MemscalError, np.linalg.LinAlgError):
-            model = ForwardModel(joined, reference_spectra(stresses, points, thicknesses))
+            model = ForwardModel(joined, reference_spectra(stresses, points))
             fit = fit_gaussian_to_points(model, weights)
             residual = (joined.u - fit.predicted) * np.sqrt(weights)
             if np.isfinite(residual).all():

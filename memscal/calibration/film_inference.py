@@ -256,12 +256,13 @@ def free_thickness(solution: Solution) -> FreeThickness:
     u = np.array([film.thickness_uncertainty or 0.0 for film in films])
     points = [estimate.points.only(i) for i in range(len(scans))]
     inputs, noise = _input_columns(solution, THICKNESS), estimate.noise_scale
+    nodes = estimate.model.reference.wavenumbers
 
     def log_posterior(z: FloatArray) -> FloatArray:
         pairs = zip(films, stated + z * u, strict=True)
         at = {film: replace(film, thickness=float(h)) for film, h in pairs}
         rods = [press_rod(at[s.film], s.indenter, s.load, s.rod_friction) for s in scans]
-        references = reference_spectra(rods, points, [s.film.thickness for s in scans])
+        references = reference_spectra(rods, points, nodes)
         model = ForwardModel(estimate.points, references)
         both = log_marginal_likelihood(replace(estimate, model=model), inputs, noise)
         return np.asarray(both - z @ z / 2)

@@ -94,7 +94,7 @@ def require_profile(
 ) -> ProfileEstimate:
     """Estimate the profile of scans; refuse one that is as narrow as its reference."""
     measured = [points.measured_points(scan, channel) for scan in scans]
-    references = reference_spectra(stresses, measured, [scan.film.thickness for scan in scans])
+    references = reference_spectra(stresses, measured)
     outcome: ProfileEstimate | Exception
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.

@@ -332,7 +332,7 @@ def _rehearse(
         scans = scans_of_repeats(scans, channel)[0]
     readings = [measured_points(scan, channel) for scan in scans]
     stresses = [reference_profile(scan, profile) for scan in scans]
-    reference_spectra(stresses, readings, [scan.film.thickness for scan in scans])
+    reference_spectra(stresses, readings)
     points, plan = joined_points(readings), (regulariser.name, outputs)
     if as_json:
         out.emit_json(rehearsal_json(stresses[0], *plan))

@@ -24,6 +24,9 @@ from memscal.model.stress import StressProfile
 
 #: The film passes nothing of exp(-kh) beyond this: 2e-9 of the load.
 _LARGEST_KH = 20.0
+#: A Gaussian G of half the scan's step passes 3e-9 at this wavenumber times the step. A table's
+#: transform is looked at so many wavenumbers, and ends at this share of its largest.
+_PASSED, _WAVENUMBERS, _NOTHING = 4 * math.pi, 400, 1e-6
 #: Two models differ by a bound, anywhere within which the truth may lie: a rectangle.
 RECTANGLE = 1 / math.sqrt(3)
 #: Rods of somewhat larger load are in the table, too, where it serves for varied inputs.
@@ -155,17 +158,30 @@ def reference_profile(scan: Scan, reference: BaseStress | None) -> BaseStress:
 
 
 def reference_spectra(
-    references: Sequence[BaseStress], data: Sequence[ScanPoints], thicknesses: Sequence[float]
+    references: Sequence[BaseStress],
+    data: Sequence[ScanPoints],
+    wavenumbers: Wavenumbers | None = None,
 ) -> tuple[RadialSpectrum, ...]:
     """Transforms of the references per newton, on common nodes that serve every distance."""
     order = data[0].order
     spans = [float(np.hypot(np.ptp(p.x), np.ptp(p.y))) for p in data]
-    # Fields are lifted to squares that reach one span from the centre, to their corners.
-    wavenumbers = Wavenumbers.covering(_LARGEST_KH / min(thicknesses), 1.5 * max(spans))
+    if wavenumbers is None:
+        last = max(_last_wavenumber(*pair) for pair in zip(references, data, strict=True))
+        # Fields are lifted to squares that reach one span from the centre, to their corners.
+        wavenumbers = Wavenumbers.covering(last, 1.5 * max(spans))
     return tuple(
         RadialSpectrum(wavenumbers, _per_newton(reference, wavenumbers.k, span, order), order)
         for reference, span in zip(references, spans, strict=True)
     )
+
+
+def _last_wavenumber(reference: BaseStress, points: ScanPoints) -> float:
+    """Return the wavenumber (rad/m) beyond which a reference has nothing, or none that is seen."""
+    if isinstance(reference, Contact):
+        return _LARGEST_KH / reference.film.thickness
+    k = np.linspace(0.0, _PASSED / points.step, _WAVENUMBERS)[1:]
+    values = np.abs(hankel_transform(reference.r, reference.sigma_zz, k))
+    return float(k[values > _NOTHING * values.max()][-1])
 
 
 def _per_newton(reference: BaseStress, k: FloatArray, span: float, order: int) -> FloatArray:

@@ -75,6 +75,22 @@ def require_increasing(name: str, values: FloatArray) -> None:
         raise InputError(f"{name} must increase strictly.", cure="Sort it; merge equal positions.")
 
 
+#: A table has an edge where it changes by this share of its range within an interval that is
+#: narrower than that share of its neighbours.
+_JUMP, _NARROW = 0.05, 0.1
+
+
+def table_spline(x: FloatArray, y: FloatArray) -> tuple[Any, bool]:
+    """Return a cubic spline through a table; for one with an edge a monotone one, and ``True``."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    widths, jumps = np.diff(x), np.abs(np.diff(y))
+    narrow = widths[1:-1] < _NARROW * np.minimum(widths[:-2], widths[2:])
+    sharp = bool(np.any(jumps[1:-1][narrow] > _JUMP * np.ptp(y)))
+    # A cubic spline swings about an edge, by more than the table holds.
+    return (PchipInterpolator if sharp else CubicSpline)(x, y), sharp
+
+
 def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.int64]:
     """Return a read-only copy of a vector of whole numbers."""
     array = np.asarray(values, dtype=np.float64)

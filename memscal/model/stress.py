@@ -5,7 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from memscal.errors import InputError
-from memscal.model.arrays import FloatArray, finite_vector, require_increasing, require_positive
+from memscal.model.arrays import (
+    FloatArray,
+    finite_vector,
+    require_increasing,
+    require_positive,
+    table_spline,
+)
 from memscal.model.film import ElasticFilm
 from memscal.model.indenter import Indenter
 from memscal.model.provenance import SourceFile
@@ -103,16 +109,15 @@ class StressProfile:
 
         The integral, from the axis to the last radius, is that of the cubic spline through
         :math:`\sigma_{zz}\,r`, mirrored as the odd function that it is: its error falls with
-        the fourth power of the spacing, also for the uneven radii of a mesh.
+        the fourth power of the spacing, also for the uneven radii of a mesh.  Through a table with
+        an edge goes a monotone spline.
         """
         if self.r[-1] == 0:
             return 0.0
-        from scipy.interpolate import CubicSpline
-
         # Three mirrored radii make the axis an inner point of the spline.
         inner = slice(1, 4) if self.r[0] == 0 else slice(0, 3)
         density = self.sigma_zz * self.r
-        spline = CubicSpline(
+        spline, _ = table_spline(
             np.concatenate([-self.r[inner][::-1], self.r]),
             np.concatenate([-density[inner][::-1], density]),
         )

@@ -138,7 +138,7 @@ def expected_calibration(plan: Plan, method: Method) -> tuple[Solution, Results]
     reference.require_calibration_rod(scan)
     stress = reference.reference_profile(scan, None)
     points = measured_points(scan)
-    references = reference.reference_spectra([stress], [points], [plan.film.thickness])
+    references = reference.reference_spectra([stress], [points])
     estimate = _expected_estimate(ForwardModel(points, references), plan.repeats)
     solution = solved([scan], [stress], estimate, method, both=False)
     effects = input_effects([scan], [stress], estimate)

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import j1, jv
 
+import memscal
 from memscal.axisymmetry.hankel import (
     RadialSpectrum,
     Wavenumbers,
@@ -174,3 +175,14 @@ def test_no_panel_is_longer_than_allowed_and_none_is_spent_needlessly(upper, lon
     assert panels == 1 or upper / (panels - 1) >= longest * (1 - 1e-12)
     assert np.all(np.diff(nodes, prepend=0.0, append=upper) > 0)
     assert weights.sum() == pytest.approx(upper, rel=1e-12)
+
+
+def test_a_table_with_an_edge_is_integrated_as_it_stands() -> None:
+    radius = 3.175e-3
+    r = np.concatenate([np.linspace(0, 3.1749e-3, 20), np.linspace(3.1751e-3, 10e-3, 20)])
+    disc = memscal.StressProfile(r=r, sigma_zz=np.where(r < radius, 1e5, 0.0), load=1.0)
+    k = np.linspace(1.0, 4e3, 200)
+    expected = 2e5 * np.pi * radius / k * j1(k * radius)
+    force = 1e5 * np.pi * radius**2
+    assert disc.force == pytest.approx(force, rel=1e-3)
+    np.testing.assert_allclose(hankel_transform(r, disc.sigma_zz, k), expected, atol=1e-6 * force)

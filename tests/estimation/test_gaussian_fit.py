@@ -20,7 +20,7 @@ from memscal.estimation.points import measured_points
 def forward(scan: Scan) -> ForwardModel:
     points = measured_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=1.0)
-    return ForwardModel(points, (reference_spectrum(contact, points, scan.film.thickness),))
+    return ForwardModel(points, (reference_spectrum(contact, points),))
 
 
 def fit(scan: Scan):

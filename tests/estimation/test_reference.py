@@ -26,18 +26,28 @@ CONTACT = memscal.indent(SCAN.film, SCAN.indenter, load=1.0)
 
 
 def test_a_table_of_the_contact_has_the_contact_s_transform() -> None:
-    exact = reference_spectrum(CONTACT, POINTS, SCAN.film.thickness)
-    table = reference_spectrum(CONTACT.profile(), POINTS, SCAN.film.thickness)
+    exact = reference_spectrum(CONTACT, POINTS)
+    table = reference_spectrum(CONTACT.profile(), POINTS, exact.wavenumbers)
     np.testing.assert_allclose(table.values, exact.values, atol=1e-6)
     assert exact.integral == pytest.approx(1.0, abs=1e-9)
 
 
+def test_a_reference_from_elsewhere_makes_the_thickness_of_the_film_irrelevant() -> None:
+    r = np.array([0.0, 0.5, 1.0, 1.4999, 1.5001, 2.0, 10.0]) * 1e-3
+    pressure = 1 / (np.pi * 1.5e-3**2)
+    disc = memscal.StressProfile(r=r, sigma_zz=np.where(r < 1.5e-3, pressure, 0.0), load=1.0)
+    found = [
+        memscal.calibrate(replace(SCAN, film=replace(SCAN.film, thickness=h)), reference=disc)
+        for h in (2e-3, 2.5e-3)
+    ]
+    one, other = (calibration.apparatus.parameters for calibration in found)
+    assert other.values == pytest.approx(one.values, rel=1e-12)
+
+
 def test_the_transform_is_per_newton_whatever_the_load() -> None:
-    light = reference_spectrum(CONTACT, POINTS, SCAN.film.thickness)
+    light = reference_spectrum(CONTACT, POINTS)
     heavy = memscal.indent(SCAN.film, SCAN.indenter, load=2.5)
-    np.testing.assert_allclose(
-        reference_spectrum(heavy, POINTS, SCAN.film.thickness).values, light.values, rtol=1e-12
-    )
+    np.testing.assert_allclose(reference_spectrum(heavy, POINTS).values, light.values, rtol=1e-12)
 
 
 def test_the_order_of_preference_is_given_then_carried_then_solved() -> None:
@@ -55,13 +65,13 @@ def test_a_table_that_does_not_reach_the_axis_is_refused() -> None:
     kept = full.r > 2e-3
     part = replace(full, r=full.r[kept], sigma_zz=full.sigma_zz[kept], sigma_rz=None)
     with pytest.raises(InputError, match="begins at r = 2"):
-        reference_spectrum(part, POINTS, SCAN.film.thickness)
+        reference_spectrum(part, POINTS)
 
 
 def test_a_table_in_tension_is_refused_with_its_cure() -> None:
     full = CONTACT.profile()
     with pytest.raises(InputError, match="Change the sign"):
-        reference_spectrum(replace(full, sigma_zz=-full.sigma_zz), POINTS, SCAN.film.thickness)
+        reference_spectrum(replace(full, sigma_zz=-full.sigma_zz), POINTS)
 
 
 FILM = replace(SCAN.film, law="")
@@ -129,7 +139,7 @@ def test_a_reference_that_travels_in_the_scan_takes_its_film_and_agrees(tmp_path
 
 
 def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertainty() -> None:
-    spectrum = reference_spectrum(CONTACT, POINTS, SCAN.film.thickness)
+    spectrum = reference_spectrum(CONTACT, POINTS)
     changes = film_sensitivities(SCAN, spectrum) | rod_sensitivities(SCAN, spectrum)
     assert set(changes) == {"young_modulus", "thickness", "poisson_ratio", "rod_radius"}
     # At a given load the base stress of a linear film does not know its modulus...
@@ -147,5 +157,5 @@ def test_sensitivities_are_the_change_of_the_solution_by_one_standard_uncertaint
 
 def test_sources_whose_uncertainty_is_not_stated_are_left_out() -> None:
     bare = simulated()
-    spectrum = reference_spectrum(CONTACT, POINTS, SCAN.film.thickness)
+    spectrum = reference_spectrum(CONTACT, POINTS)
     assert film_sensitivities(bare, spectrum) == rod_sensitivities(bare, spectrum) == {}

@@ -44,12 +44,12 @@ def estimated(scan: Scan) -> ProfileEstimate:
     """Estimate the profile of a scan with the rod's own solution as reference."""
     points: ScanPoints = measured_points(scan)
     contact = memscal.indent(scan.film, scan.indenter, load=scan.load)
-    return estimate_profile(points, reference_spectrum(contact, points, scan.film.thickness))
+    return estimate_profile(points, reference_spectrum(contact, points))
 
 
-def reference_spectrum(reference: Any, points: ScanPoints, thickness: float) -> RadialSpectrum:
+def reference_spectrum(reference: Any, points: ScanPoints, nodes: Any = None) -> RadialSpectrum:
     """Transform of one scan's reference per newton."""
-    return reference_spectra([reference], [points], [thickness])[0]
+    return reference_spectra([reference], [points], nodes)[0]
 
 
 def as_points(scan: Scan, seed: int = 0) -> Scan:

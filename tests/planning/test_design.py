@@ -92,7 +92,7 @@ def test_the_mean_of_repeats_is_worth_all_of_them() -> None:
         errors = np.full(u_zz.shape, noise / np.sqrt(share))
         points = measured_points(replace(clean, u_zz=u_zz, u_zz_errors=errors))
         contact = memscal.indent(clean.film, clean.indenter, load=clean.load)
-        references = reference_spectra([contact], [points], [clean.film.thickness])
+        references = reference_spectra([contact], [points])
         model, weights = ForwardModel(points, references), 1 / errors.ravel() ** 2
         fit = fit_gaussian_to_points(model, weights, start=fit_gaussian_to_points(model, weights))
         basis = departure_basis(model, fit)
