@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import j0, j1
+from scipy.special import j0, j1, jv
 
 from memscal.errors import InputError
 from memscal.model.arrays import FloatArray, table_spline
@@ -87,7 +87,7 @@ class Wavenumbers:
 
     def synthesise(self, spectrum: FloatArray, r: FloatArray, *, order: int = 0) -> FloatArray:
         """Evaluate the inverse transform at ``r`` (m); of spectra (n, m) along a last axis m."""
-        matrix = _bessel(order, np.multiply.outer(np.asarray(r, dtype=np.float64), self.k))
+        matrix = bessel(order, np.multiply.outer(np.asarray(r, dtype=np.float64), self.k))
         return np.asarray(matrix @ (spectrum.T * self.weights).T)
 
 
@@ -144,12 +144,12 @@ def hankel_transform(r: FloatArray, f: FloatArray, k: FloatArray, *, order: int 
     edges = _panel_edges(knots, float(r[-1]), float(np.max(np.abs(k))))
     nodes, weights = gauss_between(edges, _TABLE_ORDER)
     measure = 2 * np.pi * weights * nodes
-    return np.asarray(_bessel(order, np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
+    return np.asarray(bessel(order, np.multiply.outer(k, nodes)) @ (measure * spline(nodes)))
 
 
-def _bessel(order: int, x: FloatArray) -> FloatArray:
-    """Bessel function of the first kind, of order zero or one."""
-    return np.asarray(j1(x) if order else j0(x))
+def bessel(order: int, x: FloatArray) -> FloatArray:
+    """Bessel function of the first kind, of order zero or more."""
+    return np.asarray((j0, j1)[order](x) if order < 2 else jv(order, x))
 
 
 def _panel_edges(knots: FloatArray, end: float, fastest: float) -> FloatArray:

@@ -14,6 +14,7 @@ from memscal.apparatus import ApparatusFunction
 from memscal.axisymmetry.kernels import unit_gaussian
 from memscal.calibration.checks import quality_checks
 from memscal.calibration.drawn_scatter import drawn_scatter
+from memscal.calibration.field_uncertainty import field_errors
 from memscal.calibration.messages import calibration_messages
 from memscal.calibration.stages import COMMON, PER_REPEAT, Deconvolution, Solution, solve
 from memscal.calibration.sweep import Sweep, sweep_noise
@@ -76,9 +77,12 @@ def assemble(
         record["further_scans"] = [
             s and {"file_name": s.file_name, "sha256": s.sha256} for s in sources
         ]
-    g, errors = solution.deconvolution.g, np.sqrt(np.diag(results.radial_covariance))
+    g, plane = solution.deconvolution.g, results.field_errors
+    if plane is None:
+        errors = np.sqrt(np.diag(results.radial_covariance))
+        plane = np.interp(np.hypot.outer(g.y, g.x), g.r, errors)
     return ApparatusFunction(
-        field=ApparatusField(g.x, g.y, g.image, np.interp(np.hypot.outer(g.y, g.x), g.r, errors)),
+        field=ApparatusField(g.x, g.y, g.image, plane),
         radial_profile=_radial(solution, solution.deconvolution, results),
         transfer=_transfer(solution, results),
         reconvolution=_reconvolution(solution),
@@ -458,4 +462,6 @@ def uncertainties(
     # A linear method's derivatives are complete; of another, the scatter of draws is taken.
     linear = deconvolution is not solution.deconvolution or solution.method.name in _LINEAR
     drawn = None if linear else drawn_scatter(solution)
-    return propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
+    results = propagate(solution, deconvolution, wavenumbers, effects, correlations, drawn)
+    plane = field_errors(solution, deconvolution, effects, correlations)
+    return replace(results, field_errors=plane)

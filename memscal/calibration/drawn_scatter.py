@@ -84,8 +84,7 @@ def _drawn_estimates(
 ) -> Iterator[tuple[FloatArray, ProfileEstimate]]:
     """Draw noise of the voltages (n,), in V; move estimate and width with it to first order."""
     model, fit, basis = estimate.model, estimate.gaussian, estimate.basis
-    kernels = basis.kernels(model.k)[:, basis.flat :]
-    design = np.hstack([fit.jacobian, model.signal(fit.geometry, kernels)])
+    design = basis.signals(model, fit)
     predicted, root, weighed = estimate.predicted, estimate.noise_root, estimate.weighed
     for _ in range(count):
         error = root @ rng.standard_normal(predicted.size)

@@ -16,8 +16,6 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.deconvolution.division import NOISE_RATIO
 from memscal.deconvolution.fourier_ratio import Field
 from memscal.errors import InputError
-from memscal.estimation.forward import elliptic_departure
-from memscal.estimation.gaussian import GaussianFit
 from memscal.estimation.profile import PosteriorProfile, ProfileEstimate
 from memscal.estimation.smoothing import Band, SmoothedProfile
 from memscal.model.arrays import FloatArray
@@ -141,7 +139,7 @@ class RasterFields:
     stress: Field
     support: float
     step: float
-    gaussian: GaussianFit
+    oval: Callable[[FloatArray, FloatArray], FloatArray]
     index: tuple[NDArray[np.intp], NDArray[np.intp]]
     even: bool
 
@@ -171,60 +169,64 @@ class RasterFields:
         y, rows = _continued(lattice[1], float(np.ptp(points.y)), choice.extent)
         grid = Lattice(x - estimate.centre[0], y - estimate.centre[1])
         step = choice.spacing / 2
+        stress = on_grid(estimate.model.reference.at, grid, step)
+        central = _about_zero(grid)
         voltage = on_grid(smoothed.spectrum.at, grid, step)
+        voltage += grid.convolve(estimate.oval_kernel(*central.axes), stress)
         if rows.size:
-            # A point that is missing keeps the profile; an outlier keeps most of it.
+            # A point that is missing keeps what was fitted; an outlier keeps most of it.
             departure = (smoothed.signal - smoothed.predicted) * smoothed.outlier_weight
             total, number = np.zeros(voltage.shape), np.zeros(voltage.shape)
             np.add.at(total, (rows, columns), departure / points.load)
             np.add.at(number, (rows, columns), 1.0)
             voltage += total / np.maximum(number, 1.0)
-        stress = Field(grid, on_grid(estimate.model.reference.at, grid, step))
-        fit, index, reach = estimate.gaussian, (rows, columns), choice.support
-        return cls(grid, Field(grid, voltage), stress, reach, step, fit, index, even)
+        both, index = (Field(grid, voltage), Field(grid, stress)), (rows, columns)
+        return cls(grid, *both, choice.support, step, estimate.oval_kernel, index, even)
 
     @property
     def confinement(self) -> FloatArray:
         """Taper on the grid that confines a kernel to its support."""
-        return self.taper(self._kernel_grid.radius)
+        return self.taper(self.central.radius)
 
     def taper(self, radius: FloatArray) -> FloatArray:
         """Taper at radii, in m."""
         return _taper(radius, self.support)
 
     @property
-    def _kernel_grid(self) -> Lattice:
-        # A kernel's zero is the central point of the lattice, wherever the sensor is.
-        x, y = self.grid.x, self.grid.y
-        return Lattice(x - x[x.size // 2], y - y[y.size // 2])
+    def central(self) -> Lattice:
+        """The lattice about the zero of a kernel."""
+        return _about_zero(self.grid)
 
     def kernel(self, profile: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Lift a radial function about a kernel's zero, with what an ellipse adds to it."""
-        return self._lifted(profile, self._kernel_grid)
+        """Lift a radial function about a kernel's zero, with what of the sensor is not round."""
+        return self._lifted(profile, self.central)
 
     def _lifted(self, profile: Callable[[FloatArray], FloatArray], grid: Lattice) -> FloatArray:
-        fit = self.gaussian
-        oval = elliptic_departure(grid.x, grid.y, fit.sigma, fit.ellipticity)
-        return on_grid(profile, grid, self.step) + fit.conversion_constant * oval
+        return on_grid(profile, grid, self.step) + self.oval(*grid.axes)
 
     def at_points(self, field: FloatArray) -> FloatArray:
         """Return the values of a field at the measured points."""
         return np.asarray(field[self.index])
+
+    def share(self, smoothed: SmoothedProfile) -> FloatArray:
+        """What each reading (n,) adds to its node, over its voltage, in 1/N."""
+        readings = np.zeros(self.voltage.values.shape)
+        np.add.at(readings, self.index, 1.0)
+        weight = smoothed.outlier_weight / smoothed.estimate.points.load
+        return np.asarray(weight / readings[self.index])
 
     def gain(self, smoothed: SmoothedProfile) -> FloatArray:
         """Derivative of the field's transform by the voltages, (k, n), its mean over directions."""
         # The transform is a sum over the lattice: of the points, and of the profile elsewhere.
         points, k = smoothed.estimate.points, smoothed.estimate.model.k
         weights = smoothed.spectrum.wavenumbers.weights
-        readings = np.zeros(self.voltage.values.shape)
-        np.add.at(readings, self.index, 1.0)
-        share = smoothed.outlier_weight / readings[self.index]
-        profiled = np.ones_like(readings)
-        np.subtract.at(profiled, self.index, share)
+        share = self.share(smoothed)
+        profiled = np.ones_like(self.voltage.values)
+        np.subtract.at(profiled, self.index, share * points.load)
         kept = profiled > _ROUNDING
         bessel = j0(np.multiply.outer(k, self.grid.radius[kept]))
         elsewhere = (bessel * profiled[kept]) @ (bessel.T * weights) @ smoothed.gain
-        own = j0(np.multiply.outer(k, self.grid.radius[self.index])) * (share / points.load)
+        own = j0(np.multiply.outer(k, self.grid.radius[self.index])) * share
         return np.asarray(self.grid.cell_area * (own + elsewhere))
 
     def on_support(self, kernel: FloatArray, profile: PosteriorProfile | None) -> Field:
@@ -242,6 +244,12 @@ class RasterFields:
     def along_axis(self, spectral: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wavenumbers along one axis and a spectral quantity there."""
         return self.grid.wavenumber[0], spectral[0]
+
+
+def _about_zero(grid: Lattice) -> Lattice:
+    """The lattice of a kernel, whose zero is the central point, wherever the sensor is."""
+    x, y = grid.axes
+    return Lattice(x - x[x.size // 2], y - y[y.size // 2])
 
 
 Fields: TypeAlias = LineFields | RasterFields

@@ -99,7 +99,7 @@ def require_profile(
     try:
         # At a width of zero the slopes by the width vanish, and no later step is defined.
         with np.errstate(all="ignore"):
-            outcome = estimate_profile(points.joined_points(measured), *references)
+            outcome = estimate_profile(points.joined_points(measured), *references, angular=True)
         if outcome.gaussian.has_width(outcome.weights, outcome.noise_scale):
             return outcome
     except (FitError, np.linalg.LinAlgError) as failure:

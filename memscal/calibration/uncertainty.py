@@ -230,6 +230,7 @@ class Results:
     cross_covariance: FloatArray  # (n, p): covariance of G(r) with the parameters, in their units
     transfer_errors: FloatArray  # (m,): standard uncertainty of the transfer function
     radial_scatter: FloatArray  # (n,): standard uncertainty of G(r) from noise alone, in 1/m^2
+    field_errors: FloatArray | None = None  # (m, n): of a raster's G over the plane, in 1/m^2
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +297,7 @@ def propagate(
         columns[source] = column[:, None]
     if effects:
         together = np.hstack([columns[name] for name in effects])
-        independent.append(together @ _root(correlation_matrix(list(effects), correlations)))
+        independent.append(together @ square_root(correlation_matrix(list(effects), correlations)))
     everything = np.hstack(independent)
     count, stop = len(names), len(names) + radii
     stored = everything[:stop] @ everything[:stop].T
@@ -402,7 +403,7 @@ def _gaussian_numbers(
     """Width and ellipticity: a round departure beside an ellipse would be read as less of both."""
     gaussian, gain, count = estimate.gaussian, estimate.gaussian_gain, estimate.points.ellipse
     numbers = {"gaussian_sigma": (gaussian.sigma, _fitted(estimate, gain[1], hidden))}
-    first = estimate.basis.flat - count
+    first = len(gain) - count
     for i, name in enumerate(("ellipticity", "ellipticity_diagonal")[:count]):
         numbers[name] = float(gaussian.ellipticity[i]), _fitted(estimate, gain[first + i], hidden)
     return numbers
@@ -444,7 +445,7 @@ def _kernel_derivatives(
     by_nuisance = -division.direct @ division.nuisance
     by_state = np.zeros((len(by_nuisance), estimate.basis.integrals.size))
     by_state[:, division.places] = by_nuisance
-    spread = division.lost[:, 1:] @ _root(estimate.covariance)
+    spread = division.lost[:, 1:] @ square_root(estimate.covariance)
     return _Derivatives(
         by_voltage=division.direct + by_nuisance @ estimate.weighed.gain[division.places],
         by_state=by_state,
@@ -576,10 +577,10 @@ def _misfit_columns(estimate: ProfileEstimate, gain: FloatArray) -> FloatArray:
 def _fixed_root(estimate: ProfileEstimate) -> FloatArray:
     """Square root of what of the posterior's covariance does not scatter from scan to scan."""
     random = estimate.weighed.gain @ estimate.noise_root
-    return _root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))
+    return square_root(estimate.covariance - random @ random.T, np.diag(estimate.covariance))
 
 
-def _root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
+def square_root(covariance: FloatArray, variances: FloatArray | None = None) -> FloatArray:
     """A square root of a covariance that may be singular, scaled by the given variances."""
     scale = np.maximum(np.diag(covariance) if variances is None else variances, 0.0)
     safe = np.where(scale > 0, np.sqrt(scale), 1.0)

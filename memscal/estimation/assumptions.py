@@ -247,7 +247,8 @@ def _add(estimate: ProfileEstimate, columns: FloatArray) -> ExtraColumns:
     standardised = estimate.points.standardised
     scale = np.abs(columns).max(axis=0)
     columns = columns / scale
-    round_ = estimate.gaussian.jacobian[:, : estimate.basis.flat - estimate.points.ellipse]
+    round_ = estimate.gaussian.jacobian
+    round_ = round_[:, : round_.shape[1] - estimate.points.ellipse]
     base = np.linalg.qr(standardised(round_ / np.linalg.norm(round_, axis=0), weights))[0]
     scaled = standardised(columns, weights)
     residual = standardised(estimate.weighed.residual + estimate.oval, weights)
@@ -304,15 +305,14 @@ def _flattened(estimate: ProfileEstimate, inside: NDArray[np.bool_]) -> NDArray[
         fit = fit_gaussian_to_points(model, weights, start=estimate.gaussian)
     except FitError:
         return none
-    basis = departure_basis(model, fit, weights)
+    basis = departure_basis(model, fit, weights, estimate.basis.angular)
     count = float(estimate.outlier_weight[~plateau].sum())
     least = NUMERICAL_FLOOR * estimate.largest_signal if points.u_errors is None else 1.0
     others = weigh_departures(model, fit, basis, weights, count, least_noise=least)
     # Mean over the plateau of the prediction less the voltage, and its standard uncertainty.
     share = plateau / plateau.sum()
     overshoot = -float(share @ others.residual)
-    rings = model.signal(fit.geometry, basis.kernels(model.k)[:, basis.flat :])
-    slope = share @ np.hstack([fit.jacobian, rings])
+    slope = share @ basis.signals(model, fit)
     variance = share**2 @ _ordinary_noise(estimate) ** 2 + slope @ others.covariance @ slope
     return plateau if overshoot > -ndtri(FALSE_ALARM) * np.sqrt(variance) else none
 

@@ -42,6 +42,7 @@ import numpy as np
 
 from memscal.axisymmetry import kernels
 from memscal.axisymmetry.kernels import GaussianMixture, RadialKernel, Rings, SmoothedDisc
+from memscal.estimation.angular import AngularDepartures
 from memscal.estimation.forward import ForwardModel
 from memscal.estimation.gaussian import GaussianFit
 from memscal.model.arrays import FloatArray
@@ -161,6 +162,8 @@ class DepartureBasis:
     flat: int  # how many parameters have no prior: A, width, centre, baseline and drift
     rings: tuple[Rings, ...]  # the components of each of :data:`SHAPES`
     families: tuple[FamilyFit, ...]  # as many as fit the scan
+    # The last of the flat parameters have a prior of unit variance: amplitudes of these kernels.
+    angular: AngularDepartures | None = None
 
     @property
     def blocks(self) -> tuple[slice, ...]:
@@ -177,6 +180,14 @@ class DepartureBasis:
         rings = [ring.transform(k) for ring in self.rings]
         families = self._families(gaussian, lambda kernel: kernel.transform(k))
         return self._columns(gaussian, widening, rings + families)
+
+    def signals(self, model: ForwardModel, fit: GaussianFit) -> FloatArray:
+        """Voltages of all columns at the points, about the fit, shape (n, p), in V."""
+        columns = [fit.jacobian]
+        if self.angular:
+            columns.append(self.angular.signal(model, fit.centre))
+        columns.append(model.signal(fit.geometry, self.kernels(model.k)[:, self.flat :]))
+        return np.hstack(columns)
 
     def radial(self, r: FloatArray) -> FloatArray:
         """Values of all columns at radii ``r`` (m), shape (r, p)."""
@@ -210,15 +221,18 @@ class DepartureBasis:
 
 
 def departure_basis(
-    model: ForwardModel, fit: GaussianFit, weights: FloatArray | None = None
+    model: ForwardModel,
+    fit: GaussianFit,
+    weights: FloatArray | None = None,
+    angular: AngularDepartures | None = None,
 ) -> DepartureBasis:
     """Return the kernels of the fit's own parameters and of every shape about it."""
     # With the weights of the points, (n,), of the families' best fits, too.
     width = max(fit.sigma, _SMALLEST_WIDTH_IN_STEPS * model.points.step)
     rings = tuple(shape.rings(width, fit.conversion_constant) for shape in SHAPES)
     families = () if weights is None else tuple(_fitted_families(model, fit, weights, width))
-    flat = fit.jacobian.shape[1]
-    return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families)
+    flat = fit.jacobian.shape[1] + (angular.count if angular else 0)
+    return DepartureBasis(fit.conversion_constant, fit.sigma, flat, rings, families, angular)
 
 
 #: Steps in ln(width) end below the first, are cut at the second; beyond the third factor from the
@@ -484,17 +498,21 @@ def weigh_departures(
     # repeats.  Of a point of weight one, ``expected_noise`` is that of voltages that have none
     # (zero for data), ``least_noise`` the least that there is, as stated.
     standardised, flat = model.points.standardised, basis.flat
-    voltages = model.signal(fit.geometry, basis.kernels(model.k)[:, flat:])
-    unexplained = model.points.u - fit.predicted
-    columns = standardised(np.hstack([fit.jacobian, voltages]), weights)
-    data = standardised(unexplained, weights)
+    unexplained, signals = model.points.u - fit.predicted, basis.signals(model, fit)
+    columns, data = standardised(signals, weights), standardised(unexplained, weights)
+    count = data.size
+    if basis.angular:
+        # A prior of unit variance is a further reading of each amplitude: zero, with the noise.
+        size = basis.angular.count
+        prior = least_noise * np.eye(size, columns.shape[1], flat - size)
+        columns, data = np.vstack([columns, prior]), np.append(data, np.zeros(size))
+        effective_count += size
     # Down-weighted points carry no full degree of freedom.
     noise = effective_count - flat, expected_noise**2, least_noise**2
     conditionals = list(_conditionals(basis, columns, data, noise))
     averaged = _average(conditionals, expected_noise**2, basis.integrals)
-    explained = fit.jacobian @ averaged.mean[:flat] + voltages @ averaged.mean[flat:]
-    gain = averaged.gain @ standardised(np.eye(data.size), weights)
-    return replace(averaged, gain=gain, residual=unexplained - explained)
+    gain = averaged.gain[:, :count] @ standardised(np.eye(count), weights)
+    return replace(averaged, gain=gain, residual=unexplained - signals @ averaged.mean)
 
 
 def _conditionals(

@@ -10,10 +10,12 @@ from memscal.axisymmetry.hankel import RadialSpectrum
 from memscal.axisymmetry.kernels import gaussian_transfer, unit_gaussian
 from memscal.errors import FitError
 from memscal.estimation import bayesian
+from memscal.estimation.angular import angular_departures
 from memscal.estimation.bayesian import DepartureBasis, WeighedFit
-from memscal.estimation.forward import ForwardModel
-from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points
+from memscal.estimation.forward import ForwardModel, elliptic_departure
+from memscal.estimation.gaussian import GaussianFit, fit_gaussian_to_points, robust_scale
 from memscal.estimation.points import ScanPoints
+from memscal.estimation.raster_noise import isolated, raster_noise
 from memscal.model.arrays import FloatArray
 from memscal.model.checks import OUTLIER_WEIGHT, Message
 
@@ -41,6 +43,7 @@ class ProfileEstimate:
     weights: FloatArray  # (n,): relative weight of each point, the outliers' below one included
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
     departures: DepartureBasis  # all kernels, of negligible probability too
+    raster_noise: float | None = None  # of one reading of a raster that states none, in V
 
     @property
     def points(self) -> ScanPoints:
@@ -66,6 +69,8 @@ class ProfileEstimate:
 
     def adopted_noise(self, scatter: float) -> float:
         """Noise of a point of weight one: stated uncertainties are adopted until exceeded."""
+        if self.raster_noise is not None:
+            scatter = self.raster_noise
         scatter = max(scatter, NUMERICAL_FLOOR * self.largest_signal)
         return scatter if self.points.u_errors is None else max(scatter, 1.0)
 
@@ -117,7 +122,7 @@ class ProfileEstimate:
     def drifts(self) -> FloatArray:
         """Each scan's baseline and its change over half the range along x (and y), in V."""
         first = 2 + int(self.points.free.sum())
-        last = self.basis.flat - self.points.ellipse
+        last = self.gaussian.jacobian.shape[1] - self.points.ellipse
         return np.asarray(self.gaussian.drift + self.weighed.mean[first:last])
 
     @property
@@ -126,8 +131,25 @@ class ProfileEstimate:
         return self.drifts[: 1 + int(self.points.free[0].sum())]
 
     @property
+    def ellipticity(self) -> FloatArray:
+        """Ellipticity along x against y and along the diagonals, shape (2,)."""
+        end = self.gaussian.jacobian.shape[1]
+        change = self.weighed.mean[end - self.points.ellipse : end]
+        return self.gaussian.ellipticity + np.append(change, np.zeros(2 - change.size))
+
+    def oval_kernel(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """What of A G is not round, on a grid (y, x) about the centre, in V/Pa/m^2."""
+        fit, around = self.gaussian, self.basis.angular
+        kernel = fit.conversion_constant * elliptic_departure(x, y, fit.sigma, self.ellipticity)
+        if around:
+            amplitudes = self.weighed.mean[self.basis.flat - around.count : self.basis.flat]
+            plane = np.meshgrid(x, y)
+            kernel += (around.at(*(p.ravel() for p in plane)) @ amplitudes).reshape(kernel.shape)
+        return kernel
+
+    @property
     def oval(self) -> FloatArray:
-        """What an elliptic sensor adds to the radial profile's voltages, shape (n,), in V."""
+        """What a sensor that is not round adds to the radial profile's voltages, (n,), in V."""
         if not self.points.ellipse:
             return np.zeros_like(self.points.u)
         radial = self.model.signal(self.model.geometry(self.centres), self.kernel)
@@ -160,27 +182,51 @@ class ProfileEstimate:
         return float(np.abs(self.predicted - self.background).max())
 
 
-def estimate_profile(points: ScanPoints, *references: RadialSpectrum) -> ProfileEstimate:
+def estimate_profile(
+    points: ScanPoints, *references: RadialSpectrum, angular: bool = False
+) -> ProfileEstimate:
     """Estimate the radial profile, the centre and baseline of each scan, noise and outliers."""
+    # With ``angular`` also what of a sensor that was scanned over the plane is not round.
     model = ForwardModel(points, references)
     fit = fit_gaussian_to_points(model, _stated_weights(points))
     stated = _stated_weights(points, _position_noise(model, fit))
-    residual = points.u - fit.predicted
-    outlier = outlier_weights(residual * np.sqrt(stated), threshold=2 * OUTLIER_THRESHOLD)
-    least = _least_noise(fit)
+    residual, noise = points.u - fit.predicted, _least_noise(fit)
+    angular, around = angular and points.planar and not model.order, None
+    threshold, departing = 2 * OUTLIER_THRESHOLD, np.zeros_like(points.u)
+    outlier = _outliers(points, residual, stated, threshold)
     for _ in range(_WEIGHING_ROUNDS):
         weights, count = stated * outlier, float(outlier.sum())
-        fit = fit_gaussian_to_points(model, weights, start=fit)
-        basis = bayesian.departure_basis(model, fit, weights)
-        weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=least)
-        updated = outlier_weights(weighed.residual * np.sqrt(stated), OUTLIER_THRESHOLD)
+        round_ = replace(points, u=points.u - departing)
+        fit = fit_gaussian_to_points(ForwardModel(round_, references), weights, start=fit)
+        if angular:
+            noise = raster_noise(points, residual) or noise
+            around = angular_departures(model, fit, weights, noise)
+        basis = bayesian.departure_basis(model, fit, weights, around)
+        weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=noise)
+        residual = weighed.residual
+        if around:
+            amplitudes = weighed.mean[basis.flat - around.count : basis.flat]
+            departing = around.signal(model, fit.centre) @ amplitudes
+        updated = _outliers(points, residual, stated, OUTLIER_THRESHOLD)
         if np.allclose(updated, outlier, atol=0.02):
             break
         outlier = updated
     within = bayesian.supported(basis, weighed)
-    estimate = ProfileEstimate(model, fit, *within, weights, outlier, basis)
+    raster = raster_noise(points, residual) if angular else None
+    estimate = ProfileEstimate(model, fit, *within, weights, outlier, basis, raster)
     _require_determined(estimate)
     return estimate
+
+
+def _outliers(
+    points: ScanPoints, residual: FloatArray, stated: FloatArray, threshold: float
+) -> FloatArray:
+    """Weights of the points by their residuals; over the plane by what neighbours do not share."""
+    least = np.finfo(float).tiny
+    if points.planar:
+        least = float(robust_scale(residual * np.sqrt(stated)))
+        residual = isolated(points, residual)
+    return outlier_weights(residual * np.sqrt(stated), threshold, least)
 
 
 def log_marginal_likelihood(
@@ -205,7 +251,8 @@ def log_marginal_likelihood(
     if not fit.has_width(weights, noise):
         # The flat prior of ln(width) has no end there, where the width changes no voltage.
         return np.full(2, -np.inf)
-    basis, least = bayesian.departure_basis(model, fit, weights), _least_noise(fit)
+    basis = bayesian.departure_basis(model, fit, weights, estimate.basis.angular)
+    least = max(_least_noise(fit), estimate.raster_noise or 0.0)
     count = float(estimate.outlier_weight.sum())
     weighed = bayesian.weigh_departures(model, fit, basis, weights, count, least_noise=least)
     both = weighed.log_marginal_likelihood, weighed.log_marginal_of_uncertainty

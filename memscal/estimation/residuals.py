@@ -67,8 +67,8 @@ def free_model(estimate: ProfileEstimate, *, clip_outliers: bool = False) -> Fre
 
     jacobian = estimate.gaussian.jacobian
     flat = standardised(jacobian / np.linalg.norm(jacobian, axis=0))
-    kernels = basis.kernels(estimate.model.k)[:, basis.flat :]
-    rings = standardised(estimate.model.signal(estimate.gaussian.geometry, kernels))
+    signals = basis.signals(estimate.model, estimate.gaussian)
+    rings = standardised(signals[:, jacobian.shape[1] :])
     base = np.linalg.qr(flat)[0]
     left, singular, _ = np.linalg.svd(rings - base @ (base.T @ rings), full_matrices=False)
     stated = points.u_errors is not None

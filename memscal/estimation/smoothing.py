@@ -65,13 +65,13 @@ class SmoothedProfile:
 
     estimate: ProfileEstimate  # whose centre, baseline, drift and noise it takes
     gain: FloatArray  # (k, n): derivative of the profile's transform by the voltages, in m^2/N
-    predicted: FloatArray  # (n,): the smoothed voltages less background at the points, in V
+    predicted: FloatArray  # (n,): the smoothed signal at the points, in V
     outlier_weight: FloatArray  # (n,): one for ordinary points; less for outliers
 
-    @property
+    @cached_property
     def signal(self) -> FloatArray:
-        """Voltages less background, shape (n,), in V."""
-        return self.estimate.points.u - self.estimate.background
+        """Voltages less background, and less what is not round of the sensor, shape (n,), in V."""
+        return self.estimate.points.u - self.estimate.background - self.estimate.oval
 
     @cached_property
     def spectrum(self) -> RadialSpectrum:
@@ -93,10 +93,13 @@ def smooth_profile(estimate: ProfileEstimate) -> SmoothedProfile:
     gains, groups = [], dict[bytes, list[int]]()
     for scan, reference in enumerate(references):
         groups.setdefault(reference.values.tobytes(), []).append(scan)
+    signal = points.u - estimate.background - estimate.oval
     for scans in groups.values():
         rows = np.flatnonzero(np.isin(points.scan, scans))
         load = points.load[rows]
-        of_scans, smoothed, weight[rows] = _fitted(estimate, references[scans[0]], rows)
+        of_scans, smoothed, weight[rows] = _fitted(
+            estimate, signal[rows], references[scans[0]], rows
+        )
         predicted[rows] = load * smoothed
         gain = np.zeros((estimate.model.k.size, points.u.size))
         gain[:, rows] = of_scans / load
@@ -123,12 +126,15 @@ def _joined(
 
 
 def _fitted(
-    estimate: ProfileEstimate, reference: RadialSpectrum, rows: NDArray[np.intp]
+    estimate: ProfileEstimate,
+    signal: FloatArray,
+    reference: RadialSpectrum,
+    rows: NDArray[np.intp],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit the points of one reference; outliers are found by the residuals of the spline."""
     # By voltages per newton: derivative of the transform, prediction, weight of outliers.
     points, load = estimate.points, estimate.points.load[rows]
-    y = (points.u - estimate.background)[rows] / load
+    y = signal / load
     stated = 1 / ((estimate.noise[rows] / load) ** 2 + (_FLOOR_OF_NOISE * np.abs(y).max()) ** 2)
     spline = _RadialSpline.through(estimate.distance[rows], reference, points.step)
     weight, threshold = np.ones_like(y), 2 * OUTLIER_THRESHOLD
@@ -137,7 +143,11 @@ def _fitted(
         predicted = spline.design @ (gain @ y)
         freedom = 1 - np.einsum("ij,ji->i", spline.design, gain)
         left = (y - predicted) * np.sqrt(stated / np.clip(freedom, _LEAST_FREEDOM, 1.0))
-        updated = outlier_weights(left, threshold, _LEAST_SCALE)
+        if points.planar:
+            # Found by their neighbours in the plane.
+            updated = estimate.outlier_weight[rows]
+        else:
+            updated = outlier_weights(left, threshold, _LEAST_SCALE)
         threshold = OUTLIER_THRESHOLD
         if np.allclose(updated, weight, atol=0.02):
             break

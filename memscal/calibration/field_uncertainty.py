@@ -1,0 +1,163 @@
+r"""Uncertainty of G over the plane, of a scan that is used as a raster.
+
+Method ``bayesian`` takes it from the posterior: G is a linear combination of its kernels.
+
+A division is a filter :math:`f = \mathcal F^{-1}\{w/\hat\sigma\}` of the field of voltages.  At the
+measured nodes that field has the noise of the readings, elsewhere that of what was fitted:
+:math:`\delta U = E\,n + L\,g\,n` for the noise n, the nodes E of the readings, the signals L of the
+posterior's parameters where nothing was measured, and their gain g.  With
+:math:`\Phi = f \otimes L` the variance of A G at :math:`\rho` is
+
+.. math::
+
+    \sum_i f(\rho - x_i)^2 v_i + 2 \sum_j \Phi_j(\rho)\,(f \otimes E N g_j)(\rho)
+    + \Phi(\rho)\,g N g^T\,\Phi(\rho)^T, \qquad N = \langle n\,n^T \rangle .
+
+An error of the centre moves G by its slope.  What the filter takes away of the posterior's kernels
+is counted beside that, as it is for the profile (``window``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.fft import fftshift, ifftshift, irfft2, rfft2
+
+from memscal.calibration.fields import RasterFields
+from memscal.calibration.stages import Deconvolution, Solution
+from memscal.calibration.uncertainty import InputEffect, correlation_matrix, square_root
+from memscal.estimation.forward import elliptic_departure
+from memscal.estimation.profile import ProfileEstimate
+from memscal.model.arrays import FloatArray
+
+#: Relative step of the derivatives of an ellipse; windows below this have closed.
+_STEP, _CLOSED = 1e-4, 1e-9
+
+
+def field_errors(
+    solution: Solution,
+    deconvolution: Deconvolution,
+    effects: Mapping[str, InputEffect],
+    correlations: Mapping[tuple[str, str], float],
+) -> FloatArray | None:
+    """Standard uncertainty of G on its grid (m, n), in 1/m^2; ``None`` of a field that is lifted."""
+    from scipy.interpolate import RectBivariateSpline
+
+    fields, estimate, g = solution.fields, solution.estimate, deconvolution.g
+    if not isinstance(fields, RasterFields):
+        return None
+    voltages = np.array([effect.voltage for effect in effects.values()])
+    inputs = np.zeros((estimate.points.u.size, 0))
+    if effects:
+        inputs = voltages.T @ square_root(correlation_matrix(list(effects), correlations))
+    x, y = fields.central.axes
+    kernels = _kernels(estimate, fields)
+    on_lattice = RectBivariateSpline(g.y, g.x, g.image)(
+        np.clip(y, g.y[0], g.y[-1]), np.clip(x, g.x[0], g.x[-1])
+    )
+    on_lattice[fields.confinement == 0] = 0.0
+    changes = _divided if deconvolution.divided else _of_posterior
+    variance = changes(solution, deconvolution, kernels, on_lattice.ravel(), inputs)
+    errors = np.sqrt(np.maximum(variance, 0.0)).reshape(on_lattice.shape)
+    return np.maximum(RectBivariateSpline(y, x, errors)(g.y, g.x), 0.0)
+
+
+def _kernels(estimate: ProfileEstimate, fields: RasterFields) -> FloatArray:
+    """Kernels of all parameters about the centre on the lattice, (nodes, p)."""
+    from scipy.interpolate import CubicSpline
+
+    grid, basis, fit = fields.central, estimate.basis, estimate.gaussian
+    table = np.arange(0.0, float(grid.radius.max()) + 4 * fields.step, fields.step)
+    columns = CubicSpline(table, basis.radial(table))(grid.radius.ravel())
+    if estimate.points.ellipse:
+        e, end = estimate.ellipticity, fit.jacobian.shape[1]
+
+        def oval(sigma: float, *ellipticity: float) -> FloatArray:
+            return elliptic_departure(*grid.axes, sigma, np.array(ellipticity)).ravel()
+
+        round_ = oval(fit.sigma, *e)
+        columns[:, 0] += round_
+        a, width = fit.conversion_constant, (1 + _STEP) * fit.sigma
+        columns[:, 1] += a * (oval(width, *e) - round_) / (_STEP * fit.sigma)
+        columns[:, end - 2] += a * (oval(fit.sigma, e[0] + _STEP, e[1]) - round_) / _STEP
+        columns[:, end - 1] += a * (oval(fit.sigma, e[0], e[1] + _STEP) - round_) / _STEP
+    if basis.angular:
+        x, y = (axis.ravel() for axis in np.meshgrid(*grid.axes))
+        columns[:, basis.flat - basis.angular.count : basis.flat] = basis.angular.at(x, y)
+    return columns
+
+
+def _of_posterior(
+    solution: Solution,
+    deconvolution: Deconvolution,
+    kernels: FloatArray,
+    g: FloatArray,
+    inputs: FloatArray,
+) -> FloatArray:
+    """Variance of G (nodes,) by the covariance of the posterior's parameters, and inputs (n, q)."""
+    estimate, a = solution.estimate, deconvolution.conversion_constant
+    rows = (kernels - np.outer(g, estimate.basis.integrals)) / a
+    variance = np.sum((rows @ estimate.covariance) * rows, axis=1)
+    return np.asarray(variance + np.sum((rows @ (estimate.weighed.gain @ inputs)) ** 2, axis=1))
+
+
+def _divided(
+    solution: Solution,
+    deconvolution: Deconvolution,
+    kernels: FloatArray,
+    g: FloatArray,
+    inputs: FloatArray,
+) -> FloatArray:
+    """Variance of G (nodes,) by a division: of noise, of inputs (n, q), of what it takes away."""
+    fields: Any = solution.fields
+    estimate, smoothed = solution.estimate, solution.smoothed
+    grid, gain, a = fields.central, estimate.weighed.gain, deconvolution.conversion_constant
+    shape, taper = fields.confinement.shape, fields.confinement.ravel()
+    window, stress = deconvolution.quotient.window, rfft2(fields.stress.values)
+    ratio = np.divide(window, stress, out=np.zeros_like(stress), where=window > _CLOSED)
+    share = fields.share(smoothed)
+    noise = estimate.noise**2 / estimate.outlier_weight
+
+    def placed(values: FloatArray) -> FloatArray:
+        """Put columns (n, q) of the points on the lattice, (q, m, n)."""
+        planes = np.zeros((values.shape[1], *shape))
+        for plane, column in zip(planes, values.T, strict=True):
+            np.add.at(plane, fields.index, share * column)
+        return planes
+
+    def filtered(planes: FloatArray, spectrum: FloatArray = ratio) -> FloatArray:
+        """Filter planes (q, m, n) to A G: (nodes, q)."""
+        plane = fftshift(irfft2(spectrum * rfft2(planes), s=shape), axes=(1, 2))
+        return plane.reshape(len(planes), -1).T
+
+    mean = fields.kernel(estimate.radial).ravel()
+    columns = np.column_stack([kernels, mean])
+    passed = filtered(ifftshift(columns.T.reshape(-1, *shape), axes=(1, 2)), window)
+    lost, passed = columns - taper[:, None] * passed, passed[:, :-1]
+    # An error of the centre moves what was fitted around the raster, and the frame that G is seen
+    # in: where nothing was measured they cancel.
+    signals = estimate.basis.signals(estimate.model, estimate.gaussian)
+    beside = passed - filtered(placed(signals))
+    weighted = noise * gain
+    own = np.zeros(shape)
+    np.add.at(own, fields.index, share**2 * noise)
+    squared = rfft2(irfft2(ratio, s=shape) ** 2) * rfft2(own)
+    variance = fftshift(irfft2(squared, s=shape)).ravel()
+    variance += 2 * np.sum(beside * filtered(placed(weighted.T)), axis=1)
+    variance += np.sum((beside @ (weighted @ gain.T)) * beside, axis=1)
+    # A is the sum of A G over the nodes.
+    back = irfft2(np.conj(ratio) * rfft2(ifftshift(fields.confinement)), s=shape)
+    of_a = grid.cell_area * (share * back[fields.index] + (taper @ beside) @ gain)
+
+    def changed(voltages: FloatArray) -> FloatArray:
+        return taper[:, None] * (filtered(placed(voltages)) + beside @ (gain @ voltages))
+
+    with_a = changed((noise * of_a)[:, None])[:, 0]
+    variance = taper**2 * variance - 2 * g * with_a + g**2 * float(of_a**2 @ noise)
+    hidden = np.column_stack([lost[:, -1], lost[:, :-1] @ square_root(estimate.covariance)])
+    columns = np.hstack([changed(inputs), hidden])
+    sums = np.append(of_a @ inputs, grid.cell_area * hidden.sum(axis=0))
+    variance += np.sum((columns - np.outer(g, sums)) ** 2, axis=1)
+    return np.asarray(variance / a**2)

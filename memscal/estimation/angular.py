@@ -1,0 +1,150 @@
+r"""Angular departures: what of an apparatus function is not round, in orders 1 to 4.
+
+Beside the radial departures a sensor that was scanned over the plane has those that vary around
+its centre: rings of radius q, blurred by a Gaussian of width b, with random amplitudes of
+:math:`\cos m\varphi` and :math:`\sin m\varphi`.  Both sides of the transform have a closed form,
+
+.. math::
+
+    \frac{1}{2\pi b^2}\,e^{-(r^2+q^2)/2b^2}\,I_m(rq/b^2)\,\cos m\varphi, \qquad
+    (-i)^m J_m(kq)\,e^{-b^2k^2/2}\,\cos m\varphi_k ,
+
+and their convolution with a round base stress is
+:math:`\cos m\theta\,\frac{1}{2\pi}\int J_m(kq)\,e^{-b^2k^2/2}\,\hat\sigma(k)\,J_m(kR)\,k\,dk`.
+None has an integral: they do not change A.
+
+Order 1 leaves out a shift of the Gaussian, which is the centre's, and order 2 its ellipse: both are
+parameters without a prior.  The expected size of each order is the mean over its posterior, with a
+flat prior of its logarithm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ive
+
+from memscal.axisymmetry.hankel import bessel
+from memscal.axisymmetry.kernels import unit_gaussian
+from memscal.estimation.forward import ForwardModel
+from memscal.estimation.gaussian import GaussianFit
+from memscal.model.arrays import FloatArray
+
+ORDERS = (1, 2, 3, 4)
+#: In units of the Gaussian's width: blur of the rings, their distance, and where the envelope of
+#: their amplitudes falls; it is cut where it has fallen to 1e-5.
+_BLUR, _SPACING, _EXTENT, _CUT = 0.45, 0.3, 2.5, 2.2
+#: Radii of the tables, over the blur.
+_PER_BLUR = 10
+#: Expected sizes of an order, over the Gaussian's L2 norm.
+_STRENGTHS = np.geomspace(0.003, 2.0, 40)
+
+
+@dataclass(frozen=True, eq=False)
+class AngularDepartures:
+    """Kernels of unit prior variance: of each order those with a cosine, then those with a sine."""
+
+    radius: FloatArray  # (q,): of the rings, in m
+    blur: float  # in m
+    #: (q, m) of each of ORDERS: amplitudes of the rings in each kernel, in V/Pa.
+    amplitudes: tuple[FloatArray, ...]
+
+    @property
+    def count(self) -> int:
+        """How many kernels there are."""
+        return 2 * sum(amplitudes.shape[1] for amplitudes in self.amplitudes)
+
+    def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Kernels at positions from the centre, shape (n,), in m: (n, count), in V/Pa/m^2."""
+        table = self._table(float(np.hypot(x, y).max(initial=self.blur)))
+        radial = [rings_of_order(m, table, self.radius, self.blur) for m in ORDERS]
+        return self._around(x, y, table, radial)
+
+    def signal(self, model: ForwardModel, centres: FloatArray) -> FloatArray:
+        """Voltages of the kernels at the points, for centres (scans, 2) in m: (n, count), in V."""
+        points = model.points
+        columns = np.zeros((points.u.size, self.count))
+        for scan, reference in enumerate(model.references):
+            rows = points.scan == scan
+            x, y = points.x[rows] - centres[scan, 0], points.y[rows] - centres[scan, 1]
+            k, table = model.k, self._table(float(np.hypot(x, y).max(initial=self.blur)))
+            blurred = (np.exp(-0.5 * (self.blur * k) ** 2) * reference.values)[:, None]
+            nodes, across = reference.wavenumbers, np.multiply.outer(k, self.radius)
+            radial = [
+                nodes.synthesise(blurred * bessel(m, across), table, order=m) for m in ORDERS
+            ]
+            columns[rows] = points.load[rows, None] * self._around(x, y, table, radial)
+        return columns
+
+    def _table(self, reach: float) -> FloatArray:
+        step = self.blur / _PER_BLUR
+        return step * np.arange(int(np.ceil(reach / step)) + 4)
+
+    def _around(
+        self, x: FloatArray, y: FloatArray, table: FloatArray, radial: list[FloatArray]
+    ) -> FloatArray:
+        from scipy.interpolate import CubicSpline
+
+        r, angle, blocks = np.hypot(x, y), np.arctan2(y, x), []
+        for m, rings, amplitudes in zip(ORDERS, radial, self.amplitudes, strict=True):
+            values = CubicSpline(table, rings @ amplitudes)(r)
+            blocks += [np.cos(m * angle)[:, None] * values, np.sin(m * angle)[:, None] * values]
+        return np.hstack(blocks)
+
+
+def rings_of_order(m: int, r: FloatArray, radius: FloatArray, blur: float) -> FloatArray:
+    """Blurred rings of order m at radii (n,) in m, for unit amplitudes: (n, q), in 1/m^2."""
+    near = np.exp(-0.5 * (np.subtract.outer(r, radius) / blur) ** 2)
+    return np.asarray(near * ive(m, np.multiply.outer(r, radius / blur**2)) / (2 * np.pi * blur**2))
+
+
+def angular_departures(
+    model: ForwardModel, fit: GaussianFit, weights: FloatArray, noise: float
+) -> AngularDepartures:
+    """Choose the kernels about a Gaussian fit; ``noise`` is that of a point of weight one."""
+    width = max(fit.sigma, 0.5 * model.points.step)
+    radius = width * np.arange(_SPACING / 2, _CUT * _EXTENT, _SPACING)
+    blur, extent = _BLUR * width, _EXTENT * width
+    r = np.linspace(0.0, 2 * _CUT * extent, 800)
+    plain = AngularDepartures(radius, blur, _unit_amplitudes(r, radius, blur, extent, width))
+    size = fit.conversion_constant / (2 * np.sqrt(np.pi) * width)
+    plain = replace(plain, amplitudes=tuple(size * a for a in plain.amplitudes))
+    standardised = model.points.standardised
+    base = np.linalg.qr(standardised(fit.jacobian, weights))[0]
+    data = standardised(model.points.u - fit.predicted, weights) / noise
+    columns = standardised(plain.signal(model, fit.centre), weights) / noise
+    data, columns = (values - base @ (base.T @ values) for values in (data, columns))
+    ends = np.cumsum([2 * a.shape[1] for a in plain.amplitudes])[:-1]
+    strengths = [_expected_strength(c, data) for c in np.split(columns, ends, axis=1)]
+    scaled = tuple(s * a for s, a in zip(strengths, plain.amplitudes, strict=True))
+    return replace(plain, amplitudes=scaled)
+
+
+def _unit_amplitudes(
+    r: FloatArray, radius: FloatArray, blur: float, extent: float, width: float
+) -> tuple[FloatArray, ...]:
+    """Amplitudes of each order whose expected L2 norm over the plane is one."""
+    envelope = np.sqrt(radius) * np.exp(-0.5 * (radius / extent) ** 4)
+    measure = np.pi * r * np.gradient(r)  # half of the plane's: that of a squared cosine
+    gaussian, amplitudes = unit_gaussian(r, width), []
+    #: What the centre and the ellipse do to a Gaussian.
+    moved = {1: r * gaussian, 2: r**2 * gaussian}
+    for m in ORDERS:
+        rings = rings_of_order(m, r, radius, blur)
+        scale = envelope / np.sqrt(np.sum(measure @ (rings * envelope) ** 2))
+        free = np.eye(radius.size)
+        if m in moved:
+            free = np.linalg.svd(((measure * moved[m]) @ (rings * scale))[None, :])[2][1:].T
+        amplitudes.append(scale[:, None] * free)
+    return tuple(amplitudes)
+
+
+def _expected_strength(columns: FloatArray, data: FloatArray) -> float:
+    """Root of the mean square of the strength over its posterior, for noise of one."""
+    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    power = (left.T @ data) ** 2
+    variance = 1 + np.multiply.outer(_STRENGTHS**2, singular**2)
+    log_marginal = -0.5 * np.sum(np.log(variance) + power / variance, axis=1)
+    probability = np.exp(log_marginal - log_marginal.max())
+    return float(np.sqrt(probability @ _STRENGTHS**2 / probability.sum()))
